@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which column of X means what: the one implementation of skidyn's X contract.
+
+A row of ``X`` is one sample. With column names the order is free and other columns are ignored:
+``q_<joint>``, ``dq_<joint>``, ``ddq_<joint>`` (or ``q1 .. qn``, ``dq1 .. dqn``, ``ddq1 .. ddqn``),
+and optionally ``trajectory``, ``time`` and ``temp_<joint>`` (or ``temp1 .. tempn``).
+Without names the columns left after the key columns are exactly ``3 n``: all positions, all
+velocities, all accelerations, in the joint order of the robot.
+"""
+
+from __future__ import annotations
+
+import difflib
+import numbers
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from skidyn._exceptions import ColumnError
+
+#: How a key column may be given to an estimator: by position, by name, found by itself, or absent.
+ColumnSpec = int | str | None
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Positions of the signals among the columns of X.
+
+    Attributes
+    ----------
+    q, dq : tuple of int, length n_joints
+        Joint positions (rad or m) and velocities (rad/s or m/s).
+    ddq : tuple of int or None
+        Joint accelerations (rad/s^2 or m/s^2); None where X has none.
+    trajectory, time : int or None
+        Trajectory number; time in s.
+    temperature : tuple of int or None
+        Joint temperatures in degrees Celsius.
+    """
+
+    q: tuple[int, ...]
+    dq: tuple[int, ...]
+    ddq: tuple[int, ...] | None
+    trajectory: int | None = None
+    time: int | None = None
+    temperature: tuple[int, ...] | None = None
+
+    @property
+    def n_joints(self) -> int:
+        """Number of joints."""
+        return len(self.q)
+
+    def state(self) -> list[int]:
+        """Positions of q, dq and ddq, in this order, for learners that want only the state."""
+        return [*self.q, *self.dq, *(self.ddq or ())]
+
+
+def resolve_columns(
+    names: Sequence[str] | None,
+    n_features: int,
+    joint_names: Sequence[str],
+    *,
+    trajectory: ColumnSpec = "auto",
+    time: ColumnSpec = "auto",
+    require_acceleration: bool = True,
+) -> Columns:
+    """Find the signals of the X contract among the columns of X.
+
+    Parameters
+    ----------
+    names : sequence of str or None
+        Column names of X, None for an array.
+    n_features : int
+        Number of columns of X.
+    joint_names : sequence of str
+        Joint names in the order of the robot.
+    trajectory, time : int, str or None, default="auto"
+        Key columns; ``"auto"`` takes the column of that name if X has names and such a column.
+    require_acceleration : bool, default=True
+        Whether accelerations must be there; without names they always must.
+
+    Returns
+    -------
+    Columns
+
+    Raises
+    ------
+    ColumnError
+        A column is missing, given twice or the number of columns does not fit.
+
+    Examples
+    --------
+    >>> resolve_columns(None, 7, ["a", "b"], trajectory=0).dq
+    (3, 4)
+    """
+    if names is not None:
+        names = [str(name) for name in names]
+        _refuse_duplicates(names)
+    key_trajectory = _key_column("trajectory", trajectory, names, n_features)
+    key_time = _key_column("time", time, names, n_features)
+    if names is not None and _looks_named(names):
+        q, dq = (_by_name(names, prefix, joint_names, True) for prefix in ("q", "dq"))
+        ddq = _by_name(names, "ddq", joint_names, require_acceleration)
+        temperature = _by_name(names, "temp", joint_names, False)
+        assert q is not None and dq is not None
+        return Columns(q, dq, ddq, key_trajectory, key_time, temperature)
+    n = len(joint_names)
+    rest = [i for i in range(n_features) if i not in (key_trajectory, key_time)]
+    if len(rest) != 3 * n:
+        keys = n_features - len(rest)
+        raise ColumnError(
+            f"X has {n_features} columns; a robot with {n} joints needs {3 * n} by position "
+            f"(q, dq, ddq of {', '.join(joint_names)}) and {keys} key column(s) are declared. "
+            "Pass a DataFrame with the columns q1.., dq1.., ddq1.., or declare key columns by "
+            "position, for example trajectory=0."
+        )
+    return Columns(
+        tuple(rest[:n]), tuple(rest[n : 2 * n]), tuple(rest[2 * n :]), key_trajectory, key_time
+    )
+
+
+def _looks_named(names: Sequence[str]) -> bool:
+    """Whether the names follow the contract (a DataFrame with the columns 0, 1, .. does not)."""
+    return any(name == "q1" or name.startswith(("q_", "dq_")) for name in names)
+
+
+def _refuse_duplicates(names: Sequence[str]) -> None:
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise ColumnError(f"X has the column(s) {', '.join(twice)} more than once; keep one each.")
+
+
+def _key_column(
+    what: str, spec: ColumnSpec, names: Sequence[str] | None, n_features: int
+) -> int | None:
+    if spec is None:
+        return None
+    if isinstance(spec, numbers.Integral):
+        if not -n_features <= spec < n_features:
+            raise ColumnError(f"{what}={spec} is out of range: X has {n_features} columns.")
+        return int(spec) % n_features
+    if spec == "auto":
+        return names.index(what) if names is not None and what in names else None
+    if names is None:
+        raise ColumnError(
+            f"{what}={spec!r} names a column, but X has no column names; give its position."
+        )
+    if spec not in names:
+        raise ColumnError(f"{what} column {spec!r} is not in X{_suggest(str(spec), names)}.")
+    return names.index(str(spec))
+
+
+def _by_name(
+    names: Sequence[str], prefix: str, joint_names: Sequence[str], required: bool
+) -> tuple[int, ...] | None:
+    """Positions of ``prefix_<joint>`` or else ``prefix1 ..`` for all joints, in joint order."""
+    styles = (
+        [f"{prefix}_{joint}" for joint in joint_names],
+        [f"{prefix}{k + 1}" for k in range(len(joint_names))],
+    )
+    for wanted in styles:
+        if all(name in names for name in wanted):
+            return tuple(names.index(name) for name in wanted)
+    found = [name for wanted in styles for name in wanted if name in names]
+    if not required and not found:
+        return None
+    style = max(styles, key=lambda wanted: sum(name in names for name in wanted))
+    missing = [name for name in style if name not in names]
+    hint = _suggest(missing[0], names)
+    raise ColumnError(
+        f"X lacks the column(s) {', '.join(missing)}{hint}. The robot has {len(joint_names)} "
+        f"joints: {', '.join(joint_names)}."
+    )
+
+
+def _suggest(name: str, names: Sequence[str]) -> str:
+    close = difflib.get_close_matches(name, list(names), n=1)
+    return f" (did you mean {close[0]!r}?)" if close else ""
+
+
+def column_names(X: Any) -> list[str] | None:
+    """Column names of a pandas or polars table, None for anything else."""
+    columns = getattr(X, "columns", None)
+    return None if columns is None or callable(columns) else [str(name) for name in columns]
+
+
+def trajectory_numbers(X: np.ndarray, columns: Columns) -> np.ndarray:
+    """Trajectory number of every row (zeros where X has no such column)."""
+    if columns.trajectory is None:
+        return np.zeros(len(X), dtype=np.int64)
+    return np.asarray(X[:, columns.trajectory])

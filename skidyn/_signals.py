@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The signals of a log, as regressor columns and effects see them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidyn._columns import Columns, trajectory_numbers
+
+if TYPE_CHECKING:
+    from skidyn.robots import Robot
+
+Array = NDArray[np.float64]
+
+#: Velocity below which the direction of dry friction is blurred, as a share of ``unit_velocity``.
+SIGN_BLUR = 0.003
+#: A time step longer than this many median steps is a gap.
+GAP_STEPS = 5.0
+
+
+def find_segments(trajectory: NDArray[Any], time: Array | None = None) -> list[slice]:
+    """Contiguous runs of rows of the same trajectory without a gap in time.
+
+    Parameters
+    ----------
+    trajectory : ndarray of shape (n_samples,)
+        Trajectory number of every row.
+    time : ndarray of shape (n_samples,), s, optional
+        A step that is negative or longer than 5 median steps starts a new segment.
+
+    Returns
+    -------
+    list of slice
+        In row order, covering every row once.
+    """
+    n = len(trajectory)
+    if n == 0:
+        return []
+    starts = trajectory[1:] != trajectory[:-1]
+    if time is not None and n > 1:
+        steps = np.diff(time)
+        inside = steps[~starts & (steps > 0)]
+        if len(inside):
+            starts = starts | (steps < 0) | (steps > GAP_STEPS * np.median(inside))
+    edges = np.r_[0, np.flatnonzero(starts) + 1, n]
+    return [slice(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+
+
+@dataclass(frozen=True)
+class Signals:
+    """Motion of a robot and what goes with it, one row per sample.
+
+    Attributes
+    ----------
+    q, dq, ddq : ndarray of shape (n_samples, n_joints)
+        Position (rad or m), velocity (rad/s or m/s), acceleration (rad/s^2 or m/s^2).
+    trajectory : ndarray of shape (n_samples,)
+        Trajectory number.
+    time : ndarray of shape (n_samples,) or None
+        Time in s.
+    temperature : ndarray of shape (n_samples, n_joints) or None
+        Joint temperatures in degrees Celsius.
+    prismatic : ndarray of shape (n_joints,) of bool
+        Which joints slide.
+    robot : Robot or None
+        The robot, for effects that act through its kinematics or dynamics.
+    load : ndarray of shape (n_samples, n_joints) or None
+        Torque that the transmission carries: the rigid-body part of the model (N m or N).
+    model_torque : ndarray of shape (n_samples, n_joints) or None
+        Torque of the whole model so far (N m or N).
+    inertial_parameters : ndarray of shape (n_bodies, 10) or None
+        Parameters of the rigid body where effects need them; the robot's own if None.
+    """
+
+    q: Array
+    dq: Array
+    ddq: Array
+    trajectory: NDArray[Any]
+    time: Array | None = None
+    temperature: Array | None = None
+    prismatic: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    robot: Robot | None = None
+    load: Array | None = None
+    model_torque: Array | None = None
+    inertial_parameters: Array | None = None
+
+    def __post_init__(self) -> None:
+        if len(self.prismatic) == 0:
+            object.__setattr__(self, "prismatic", np.zeros(self.n_joints, dtype=bool))
+
+    @property
+    def n_samples(self) -> int:
+        """Number of rows."""
+        return self.q.shape[0]
+
+    @property
+    def n_joints(self) -> int:
+        """Number of joints."""
+        return self.q.shape[1]
+
+    @cached_property
+    def unit(self) -> Array:
+        """A length of motion that is moderate for each joint: 1 rad, or 0.1 m for sliders."""
+        return np.where(self.prismatic, 0.1, 1.0)
+
+    @cached_property
+    def sign(self) -> Array:
+        """Direction of motion in [-1, 1], blurred where a joint hardly moves."""
+        return np.tanh(self.dq / (SIGN_BLUR * self.unit))
+
+    @cached_property
+    def segments(self) -> list[slice]:
+        """Contiguous runs of rows; states of hysteresis, filters and windows never cross them."""
+        return find_segments(self.trajectory, self.time)
+
+    @cached_property
+    def clock(self) -> Array:
+        """Time in s; the sample number where no time is logged."""
+        return np.arange(self.n_samples, dtype=float) if self.time is None else self.time
+
+    def with_(self, **changes: Any) -> Signals:
+        """Copy with some fields replaced."""
+        return replace(self, **changes)
+
+    def take(self, rows: slice | NDArray[Any]) -> Signals:
+        """The same signals on some rows."""
+        per_sample = ("q", "dq", "ddq", "trajectory", "time", "temperature", "load", "model_torque")
+        values = {name: getattr(self, name) for name in per_sample}
+        return replace(self, **{k: None if v is None else v[rows] for k, v in values.items()})
+
+
+def signals_from(X: Array, columns: Columns, robot: Robot | None = None) -> Signals:
+    """Read the signals out of the columns of X.
+
+    Parameters
+    ----------
+    X : ndarray of shape (n_samples, n_features)
+        Validated table.
+    columns : Columns
+        From :func:`skidyn._columns.resolve_columns`; accelerations must be there.
+    robot : Robot, optional
+        Tells which joints slide.
+
+    Returns
+    -------
+    Signals
+    """
+    if columns.ddq is None:
+        raise ValueError("the columns hold no accelerations; derive them first")
+    pick = {name: X[:, list(getattr(columns, name))] for name in ("q", "dq", "ddq")}
+    prismatic = np.zeros(columns.n_joints, dtype=bool)
+    if robot is not None:
+        prismatic = np.array([kind == "prismatic" for kind in robot.joint_types])
+    return Signals(
+        **pick,
+        trajectory=trajectory_numbers(X, columns),
+        time=None if columns.time is None else X[:, columns.time],
+        temperature=None if columns.temperature is None else X[:, list(columns.temperature)],
+        prismatic=prismatic,
+        robot=robot,
+    )
