@@ -1,0 +1,61 @@
+# Every target works on a fresh clone: it makes the virtual environment .venv and installs there
+# what it needs, once. Nothing outside this folder is touched.
+#
+#   make demo   find a hidden effect in a simulated log, add it, write an HTML report
+#   make test   run the tests
+#   make lint   ruff, codespell, mypy and the documentation build with warnings as errors
+#   make docs   build the documentation into docs/_build/html
+#   make clean  remove what these targets made
+#
+# Choose another build of torch with, for example, `make demo TORCH=torch`.
+
+PYTHON ?= python3
+TORCH ?= torch==2.13.0
+VENV ?= .venv
+PYTEST_ARGS ?=
+
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+
+# One thread per process: the tests and the docs build use the cores through processes.
+export OMP_NUM_THREADS ?= 1
+export MKL_NUM_THREADS ?= 1
+export OPENBLAS_NUM_THREADS ?= 1
+export MPLBACKEND ?= Agg
+
+.PHONY: demo test lint format docs clean
+
+demo: $(VENV)/.demo
+	$(BIN)/python -m skidyn demo
+
+test: $(VENV)/.test
+	$(BIN)/python -m pytest -n 2 $(PYTEST_ARGS)
+
+lint: $(VENV)/.lint docs
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/codespell
+	$(BIN)/mypy
+
+format: $(VENV)/.lint
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+docs: $(VENV)/.docs
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
+
+clean:
+	rm -rf $(VENV) build dist docs/_build docs/gallery docs/api/generated
+
+# torch first and alone, so that the chosen build is the one that stays
+$(VENV)/.torch:
+	$(PYTHON) -m venv $(VENV)
+	@echo "Installing $(TORCH) into $(VENV) ..."
+	$(PIP) "$(TORCH)"
+	@touch $@
+
+# one stamp per extra: .venv/.test is newer than pyproject.toml when skidyn[test] is installed
+$(VENV)/.%: pyproject.toml setup.cfg | $(VENV)/.torch
+	@echo "Installing skidyn[$*] into $(VENV) ..."
+	$(PIP) --editable ".[$*]"
+	@touch $@

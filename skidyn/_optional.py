@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Import of packages that only some users need."""
+
+import importlib
+from types import ModuleType
+
+
+def import_optional(name: str, *, extra: str) -> ModuleType:
+    """Import an optional package, or say how to install it.
+
+    Parameters
+    ----------
+    name : str
+        Module to import, such as ``"matplotlib.pyplot"``.
+    extra : str
+        The extra of skidyn that installs it, such as ``"plot"``.
+
+    Returns
+    -------
+    module : module
+        The imported module; for a dotted name the innermost one.
+
+    Raises
+    ------
+    ImportError
+        If the package is not installed. The message names the extra.
+
+    Examples
+    --------
+    >>> from skidyn._optional import import_optional
+    >>> import_optional("json", extra="io").__name__
+    'json'
+    """
+    try:
+        return importlib.import_module(name)
+    except ModuleNotFoundError as error:
+        package = name.partition(".")[0]
+        # A module missing inside an installed package is a broken installation: say so as it is.
+        if error.name is None or error.name.partition(".")[0] != package:
+            raise
+        raise ImportError(
+            f"This function needs the package {package!r}, which is not installed. "
+            f"Install it with: pip install 'skidyn[{extra}]'",
+            name=name,
+        ) from error

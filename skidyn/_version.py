@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Version of skidyn and of what it runs on."""
+
+import platform
+import sys
+
+# The order in which a reader looks for the culprit: ours, then what it computes with, then extras.
+_CORE = (
+    "skidyn",
+    "scikit-learn",
+    "skorch",
+    "torch",
+    "pytorch-kinematics",
+    "numpy",
+    "scipy",
+    "joblib",
+)
+_OPTIONAL = (
+    "matplotlib", "jinja2", "pandas", "polars", "pyarrow", "h5py", "mcap", "rosbags", "rich",
+    "cvxpy", "clarabel", "onnx", "onnxscript", "skops", "pooch", "dask",
+)  # fmt: skip
+
+
+def package_version(package: str = "skidyn") -> str:
+    """Version of an installed distribution, ``"not installed"`` where there is none."""
+    # importlib.metadata pulls in the email package: not worth it on every import of skidyn
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed"
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python, the platform, skidyn, its dependencies and its optional packages.
+
+    Nothing is imported: the versions are read from the installed metadata.
+    """
+    environment = {
+        "python": sys.version.split()[0],
+        "platform": platform.platform(),
+        "executable": sys.executable,
+    }
+    return environment | {name: package_version(name) for name in (*_CORE, *_OPTIONAL)}
+
+
+def show_versions() -> None:
+    """Print the versions that a bug report needs.
+
+    Nothing is imported: the versions are read from the installed metadata.
+
+    Examples
+    --------
+    >>> import skidyn
+    >>> skidyn.show_versions()  # doctest: +ELLIPSIS
+    python: 3...
+    """
+    for name, value in versions().items():
+        print(f"{name}: {value}")
