@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Sphinx configuration."""
+
+import os
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE / "_ext"), str(HERE)]
+
+import skidyn  # noqa: E402
+
+project = "skidyn"
+author = "The skidyn developers"
+copyright = "2026, the skidyn developers"
+release = skidyn.__version__
+version = release
+
+extensions = [
+    "api_pages",
+    "effect_catalogue",
+    "mathml_math",
+    "myst_parser",
+    "numpydoc",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx_copybutton",
+    "sphinx_design",
+    "sphinx_gallery.gen_gallery",
+]
+templates_path = ["_templates"]
+exclude_patterns = ["_build", "**.ipynb_checkpoints", "gallery/**/*.md5", "gallery/**/*.ipynb"]
+nitpicky = False
+default_role = "code"
+
+autosummary_generate = True
+autosummary_ignore_module_all = False
+autodoc_typehints = "none"  # numpydoc sections say it better, with units
+autodoc_member_order = "bysource"
+numpydoc_show_class_members = False
+numpydoc_class_members_toctree = False
+
+html_math_renderer = "mathml"
+html_theme = "pydata_sphinx_theme"
+html_title = "skidyn"
+html_static_path = ["_static"]
+html_css_files = ["skidyn.css"]
+html_favicon = "_static/logo.svg"
+html_show_sourcelink = False
+html_theme_options = {
+    "logo": {"image_light": "_static/logo.svg", "image_dark": "_static/logo.svg", "text": "skidyn"},
+    "navbar_align": "left",
+    "navbar_end": ["theme-switcher"],
+    "show_prev_next": True,
+    "show_toc_level": 2,
+    "navigation_with_keys": False,
+    "footer_start": ["copyright"],
+    "footer_end": ["theme-version"],
+    "back_to_top_button": False,
+}
+html_sidebars = {"index": [], "installation": [], "faq": [], "comparison": [], "changelog": []}
+
+copybutton_prompt_text = r">>> |\.\.\. |\$ "
+copybutton_prompt_is_regexp = True
+myst_heading_anchors = 3
+
+# Examples that need real recordings are shown but not run where the recordings are absent.
+_has_recordings = bool(os.environ.get("SKIDYN_DATA")) or (
+    HERE.parents[1].joinpath("shared", "data").is_dir()
+)
+sphinx_gallery_conf = {
+    "examples_dirs": "../examples",
+    "gallery_dirs": "gallery",
+    "filename_pattern": r"/plot_" if _has_recordings else r"/plot_(?!real_)",
+    "ignore_pattern": r"__init__\.py|_mock|conftest",
+    "within_subsection_order": "FileNameSortKey",
+    "remove_config_comments": True,
+    "download_all_examples": False,
+    "show_signature": False,
+    "min_reported_time": 1e9,
+    "write_computation_times": False,
+    "abort_on_example_error": True,
+    "default_thumb_file": str(HERE / "_static" / "logo.png"),
+    "parallel": False,
+}
+suppress_warnings = ["config.cache"]

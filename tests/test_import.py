@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Importing skidyn stays light: what is heavy is loaded when it is first used."""
+
+import importlib
+import subprocess
+import sys
+
+import pytest
+
+import skidyn
+from skidyn._optional import import_optional
+
+HEAVY = ("matplotlib", "pandas", "pytorch_kinematics", "sklearn", "skorch", "torch")
+
+
+def modules_after(statement: str) -> set[str]:
+    """Names of the top-level packages that a fresh interpreter has loaded after a statement."""
+    code = f"{statement}; import sys; print(*sorted({{m.partition('.')[0] for m in sys.modules}}))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return set(done.stdout.split())
+
+
+def test_importing_skidyn_loads_nothing_heavy():
+    assert not modules_after("import skidyn").intersection((*HEAVY, "numpy", "scipy"))
+
+
+@pytest.mark.parametrize("name", ["effects", "evidence", "rigid_body", "diagnosis", "report"])
+def test_physics_needs_neither_torch_nor_pictures_nor_tables(name):
+    loaded = modules_after(f"import skidyn.{name}")
+    assert not loaded.intersection({"matplotlib", "pandas", "skorch", "torch"})
+
+
+def test_submodules_are_loaded_on_first_use():
+    assert skidyn.robots is importlib.import_module("skidyn.robots")
+
+
+def test_unknown_attribute_is_an_attribute_error():
+    with pytest.raises(AttributeError, match="no attribute 'robotics'"):
+        skidyn.robotics  # noqa: B018
+
+
+def test_version_is_that_of_the_installed_package():
+    assert skidyn.__version__[0].isdigit()
+
+
+def test_show_versions_prints_what_a_bug_report_needs(capsys):
+    skidyn.show_versions()
+    printed = capsys.readouterr().out
+    for package in ("python", "skidyn", "scikit-learn", "torch", "numpy"):
+        assert f"{package}: " in printed
+
+
+def test_missing_optional_package_names_the_extra():
+    with pytest.raises(ImportError, match=r"pip install 'skidyn\[plot\]'"):
+        import_optional("no_such_package_of_skidyn.pyplot", extra="plot")
+
+
+def test_broken_optional_package_is_not_called_missing(tmp_path, monkeypatch):
+    (tmp_path / "broken_optional.py").write_text("import no_such_dependency\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(ModuleNotFoundError, match="no_such_dependency"):
+        import_optional("broken_optional", extra="plot")
