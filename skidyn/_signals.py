@@ -73,6 +73,8 @@ class Signals:
         Torque that the transmission carries: the rigid-body part of the model (N m or N).
     model_torque : ndarray of shape (n_samples, n_joints) or None
         Torque of the whole model so far (N m or N).
+    smooth_torque : ndarray of shape (n_samples, n_joints) or None
+        The model's torque without dry friction, which jumps at reversals (N m or N).
     inertial_parameters : ndarray of shape (n_bodies, 10) or None
         Parameters of the rigid body where effects need them; the robot's own if None.
     """
@@ -87,6 +89,7 @@ class Signals:
     robot: Robot | None = None
     load: Array | None = None
     model_torque: Array | None = None
+    smooth_torque: Array | None = None
     inertial_parameters: Array | None = None
 
     def __post_init__(self) -> None:
@@ -129,7 +132,10 @@ class Signals:
 
     def take(self, rows: slice | NDArray[Any]) -> Signals:
         """The same signals on some rows."""
-        per_sample = ("q", "dq", "ddq", "trajectory", "time", "temperature", "load", "model_torque")
+        per_sample = (
+            *("q", "dq", "ddq", "trajectory", "time", "temperature"),
+            *("load", "model_torque", "smooth_torque"),
+        )
         values = {name: getattr(self, name) for name in per_sample}
         return replace(self, **{k: None if v is None else v[rows] for k, v in values.items()})
 

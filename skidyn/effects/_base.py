@@ -1,0 +1,341 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What an effect is: a small declarative class, linear in its coefficients."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidyn._exceptions import EffectError
+from skidyn._signals import Signals
+
+Array = NDArray[np.float64]
+#: Where an effect acts: on each joint by itself, on a pair of joints, or on the whole robot.
+Scope = Literal["joint", "pair", "robot"]
+
+
+@dataclass(frozen=True)
+class Coefficient:
+    """A linear coefficient of an effect.
+
+    Attributes
+    ----------
+    name : str
+        Symbol, such as ``"Fc"``.
+    unit : str
+        Unit for a revolute joint; for a slider ``N m`` becomes ``N`` and ``rad`` becomes ``m``.
+    sign : {0, 1}
+        1 where physics allows no negative value.
+    """
+
+    name: str
+    unit: str
+    sign: int = 0
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A parameter that enters an effect nonlinearly and is searched on a grid, then refined.
+
+    Attributes
+    ----------
+    name : str
+        Symbol, such as ``"stribeck_velocity"``.
+    unit : str
+        Unit for a revolute joint.
+    grid : tuple of float
+        Values tried first, for a revolute joint; lengths are a tenth of it in m for sliders
+        when ``scales`` is True.
+    low, high : float
+        Range of the refined value.
+    spacing : {"log", "linear"}
+        How refinement steps: by factors or by differences.
+    scales : bool
+        Whether the value is an angle or angular velocity, so that it scales for sliders.
+    """
+
+    name: str
+    unit: str
+    grid: tuple[float, ...]
+    low: float
+    high: float
+    spacing: Literal["log", "linear"] = "log"
+    scales: bool = True
+
+
+@dataclass(frozen=True)
+class Term:
+    """An effect on certain joints with certain shape parameters: one block of regressor columns.
+
+    Attributes
+    ----------
+    kind : str
+        Kind of the effect, a name of the catalogue.
+    joints : tuple of int
+        Joints, counted from 0; all joints for an effect of the whole robot.
+    shape : mapping of str to object
+        Values of the shape parameters; empty where the effect has none.
+    """
+
+    kind: str
+    joints: tuple[int, ...]
+    shape: Mapping[str, Any] = field(default_factory=dict)
+
+    def __hash__(self) -> int:
+        return hash((self.kind, self.joints, tuple(sorted(map(str, self.shape.items())))))
+
+    def __str__(self) -> str:
+        joints = ", ".join(str(j + 1) for j in self.joints)
+        shape = "".join(f", {k}={_short(v)}" for k, v in self.shape.items())
+        return f"{self.kind}(joint {joints}{shape})"
+
+
+def _short(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+class Effect:
+    """Base class of physical effects.
+
+    Subclasses state what the effect is in class attributes and give its columns. To add an
+    effect, write such a class in a file of ``skidyn/effects`` and list it in the catalogue (or
+    call :func:`skidyn.effects.register_effect` from your own code).
+
+    Attributes
+    ----------
+    kind : str
+        Name in the vocabulary.
+    title : str
+        Name for people.
+    formula : str
+        Torque in LaTeX.
+    coefficients : tuple of Coefficient
+        What is fitted linearly, one per column.
+    shapes : tuple of Shape
+        What enters nonlinearly.
+    scope : {"joint", "pair", "robot"}
+        Where it acts.
+    search : {"grid", "spectrum", "trajectories"}
+        How its shape is found: on a grid, as a line in the spectrum over joint angle, or as a
+        split of the trajectories into those that have it and those that do not.
+    family : str
+        Effects of one family are often told apart only by special motion (``"hysteresis"``).
+    needs : tuple of str
+        Optional signals it needs: ``"temperature"``, ``"time"``, ``"load"``, ``"model_torque"``,
+        ``"robot"``.
+    simplicity : int
+        Rank among rivals that explain the data equally well; the lower is named.
+    rivals : tuple of str
+        Kinds it is easily confused with.
+    separating_motion : str
+        Motion that tells it from its rivals.
+    reference : str
+        Paper or book.
+
+    Examples
+    --------
+    >>> class AirDrag(Effect):
+    ...     kind = "air_drag"
+    ...     title = "Air drag"
+    ...     formula = r"c\\,\\dot q\\,|\\dot q|"
+    ...     coefficients = (Coefficient("c", "N m s^2/rad^2", sign=1),)
+    ...     def columns(self, signals, joint):
+    ...         dq = signals.dq[:, joint]
+    ...         return (dq * abs(dq))[:, None]
+    >>> AirDrag().describe()["kind"]
+    'air_drag'
+    """
+
+    kind: ClassVar[str] = ""
+    title: ClassVar[str] = ""
+    formula: ClassVar[str] = ""
+    coefficients: ClassVar[tuple[Coefficient, ...]] = ()
+    shapes: ClassVar[tuple[Shape, ...]] = ()
+    scope: ClassVar[Scope] = "joint"
+    search: ClassVar[Literal["grid", "spectrum", "trajectories"]] = "grid"
+    family: ClassVar[str] = ""
+    needs: ClassVar[tuple[str, ...]] = ()
+    simplicity: ClassVar[int] = 50
+    rivals: ClassVar[tuple[str, ...]] = ()
+    separating_motion: ClassVar[str] = ""
+    reference: ClassVar[str] = ""
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        """Columns of the effect on its own joint.
+
+        Parameters
+        ----------
+        signals : Signals
+            Motion.
+        joint : int
+            Joint, counted from 0.
+        **shape : float
+            Values of the shape parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_samples, n_coefficients)
+        """
+        raise NotImplementedError
+
+    def torque_columns(
+        self, signals: Signals, joints: Sequence[int], **shape: Any
+    ) -> dict[int, Array]:
+        """Columns in the torque row of every joint that the effect reaches.
+
+        Parameters
+        ----------
+        signals : Signals
+            Motion.
+        joints : sequence of int
+            Joints of the term.
+        **shape : float
+            Values of the shape parameters.
+
+        Returns
+        -------
+        dict of int to ndarray of shape (n_samples, n_coefficients)
+        """
+        (joint,) = joints
+        return {joint: self.columns(signals, joint, **shape)}
+
+    def not_shown(self, signals: Signals, joint: int) -> str | None:
+        """Why this data cannot show the effect on a joint; None where it can.
+
+        Parameters
+        ----------
+        signals : Signals
+            Motion.
+        joint : int
+            Joint, counted from 0.
+
+        Returns
+        -------
+        str or None
+        """
+        if "temperature" in self.needs and signals.temperature is None:
+            return "no temperature is logged"
+        if "time" in self.needs and signals.time is None:
+            return "no time is logged"
+        if np.ptp(signals.q[:, joint]) < 1e-6 * signals.unit[joint]:
+            return f"joint {joint + 1} does not move"
+        return None
+
+    def sites(self, signals: Signals) -> list[tuple[int, ...]]:
+        """Joints or groups of joints on which the effect could act.
+
+        Parameters
+        ----------
+        signals : Signals
+            Motion.
+
+        Returns
+        -------
+        list of tuple of int
+        """
+        n = signals.n_joints
+        if self.scope == "robot":
+            return [tuple(range(n))]
+        if self.scope == "pair":
+            alike = [j for j in range(n) if not signals.prismatic[j]]
+            return list(itertools.combinations(alike, 2))
+        return [(j,) for j in range(n)]
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        """Shape parameters to try first.
+
+        Parameters
+        ----------
+        signals : Signals
+            Motion.
+        joints : sequence of int
+            Joints of the term.
+
+        Returns
+        -------
+        list of dict
+        """
+        axes = []
+        for shape in self.shapes:
+            unit = signals.unit[joints[0]] if shape.scales else 1.0
+            axes.append([value * unit for value in shape.grid])
+        names = [shape.name for shape in self.shapes]
+        return [dict(zip(names, values, strict=True)) for values in itertools.product(*axes)]
+
+    def parameters(
+        self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
+    ) -> dict[str, Any]:
+        """Physical parameters from fitted coefficients and shape parameters.
+
+        Parameters
+        ----------
+        coefficients : ndarray of shape (n_coefficients,)
+            Fitted values.
+        shape : mapping
+            Shape parameters.
+        signals : Signals, optional
+            Motion the term was fitted on.
+
+        Returns
+        -------
+        dict of str to float
+        """
+        values: dict[str, Any] = {
+            c.name: float(v) for c, v in zip(self.coefficients, coefficients, strict=True)
+        }
+        return values | dict(shape)
+
+    def units(self, prismatic: bool = False) -> dict[str, str]:
+        """Unit of every coefficient and shape parameter.
+
+        Parameters
+        ----------
+        prismatic : bool, default=False
+            Whether the joint slides.
+
+        Returns
+        -------
+        dict of str to str
+        """
+        units = {c.name: c.unit for c in self.coefficients}
+        units |= {s.name: s.unit for s in self.shapes}
+        if not prismatic:
+            return units
+        return {k: u.replace("N m", "N").replace("rad", "m") for k, u in units.items()}
+
+    def describe(self) -> dict[str, Any]:
+        """Everything the catalogue, the report and the documentation print.
+
+        Returns
+        -------
+        dict
+        """
+        return {
+            "kind": self.kind,
+            "title": self.title,
+            "formula": self.formula,
+            "coefficients": [(c.name, c.unit, c.sign) for c in self.coefficients],
+            "shapes": [(s.name, s.unit, s.low, s.high) for s in self.shapes],
+            "scope": self.scope,
+            "needs": list(self.needs),
+            "rivals": list(self.rivals),
+            "separating_motion": self.separating_motion,
+            "reference": self.reference,
+        }
+
+    def check(self) -> None:
+        """Refuse an incomplete declaration.
+
+        Raises
+        ------
+        EffectError
+            A class attribute is missing.
+        """
+        for name in ("kind", "title", "formula", "coefficients"):
+            if not getattr(self, name):
+                raise EffectError(f"effect class {type(self).__name__} lacks `{name}`")

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Friction that depends on the joint's own velocity."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from skidyn._signals import Signals
+from skidyn.effects._base import Array, Coefficient, Effect, Shape
+
+_ARMSTRONG = "Armstrong-Helouvry, Dupont, Canudas de Wit (1994), Automatica 30(7), 1083-1138."
+
+
+class Viscous(Effect):
+    """Friction proportional to velocity."""
+
+    kind = "viscous"
+    title = "Viscous friction"
+    formula = r"F_v\,\dot q"
+    coefficients = (Coefficient("Fv", "N m s/rad", sign=1),)
+    simplicity = 1
+    rivals = ("nonlinear_viscous", "asymmetric_friction", "coulomb")
+    separating_motion = "sweeps at several constant speeds in both directions"
+    reference = _ARMSTRONG
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        return signals.dq[:, [joint]]
+
+
+class Coulomb(Effect):
+    """Dry friction of constant size against the motion."""
+
+    kind = "coulomb"
+    title = "Coulomb friction"
+    formula = r"F_c\,\mathrm{sign}(\dot q)"
+    coefficients = (Coefficient("Fc", "N m", sign=1),)
+    simplicity = 2
+    rivals = ("stribeck", "dahl", "nonlinear_viscous")
+    separating_motion = "slow sweeps with reversals, below 0.1 rad/s"
+    reference = _ARMSTRONG
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        return signals.sign[:, [joint]]
+
+
+class Stribeck(Effect):
+    """Extra dry friction at low speed that fades as the lubricant film builds up."""
+
+    kind = "stribeck"
+    title = "Stribeck friction"
+    formula = r"\Delta F\,e^{-(|\dot q|/v_s)^\delta}\,\mathrm{sign}(\dot q)"
+    coefficients = (Coefficient("dF", "N m"),)
+    shapes = (
+        Shape("vs", "rad/s", (0.03, 0.05, 0.075, 0.11, 0.16, 0.25), 0.01, 1.0),
+        Shape("delta", "1", (2.0,), 0.4, 2.6, scales=False),
+    )
+    simplicity = 8
+    rivals = ("coulomb", "nonlinear_viscous", "lugre", "dahl")
+    separating_motion = "constant-speed sweeps from 0.01 to 0.5 rad/s in both directions"
+    reference = _ARMSTRONG
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        speed = np.abs(signals.dq[:, joint]) / shape["vs"]
+        return (np.exp(-(speed ** shape["delta"])) * signals.sign[:, joint])[:, None]
+
+
+class AsymmetricFriction(Effect):
+    """The part of friction that has another size in each direction."""
+
+    kind = "asymmetric_friction"
+    title = "Direction-dependent friction"
+    formula = r"\Delta F_v\,|\dot q| + \Delta F_c"
+    coefficients = (Coefficient("dFv", "N m s/rad"), Coefficient("dFc", "N m"))
+    simplicity = 11
+    rivals = ("offset", "viscous")
+    separating_motion = "equal sweeps in both directions at two speeds or more"
+    reference = "Janot, Gautier, Brunot (2019), Nonlinear System Identification Benchmarks (EMPS)."
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        return np.column_stack([np.abs(signals.dq[:, joint]), np.ones(signals.n_samples)])
+
+
+class NonlinearViscous(Effect):
+    """Friction that grows with a power of velocity other than one."""
+
+    kind = "nonlinear_viscous"
+    title = "Nonlinear viscous friction"
+    formula = r"c\,|\dot q|^p\,\mathrm{sign}(\dot q)"
+    coefficients = (Coefficient("c", "N m (s/rad)^p"),)
+    shapes = (Shape("power", "1", (0.5, 2.0, 3.0), 0.15, 4.5, scales=False),)
+    simplicity = 9
+    rivals = ("viscous", "stribeck", "coulomb")
+    separating_motion = "sweeps that reach the highest speed the joint allows"
+    reference = "Waiboer, Aarts, Jonker (2005), Multibody Dynamics, ECCOMAS."
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        speed = np.abs(signals.dq[:, joint])
+        return (speed ** shape["power"] * signals.sign[:, joint])[:, None]

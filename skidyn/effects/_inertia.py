@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Inertia on the motor side."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from skidyn._signals import Signals
+from skidyn.effects._base import Array, Coefficient, Effect
+
+
+class RotorInertia(Effect):
+    """Inertia of the motor's rotor, seen through the gear."""
+
+    kind = "rotor_inertia"
+    title = "Rotor inertia"
+    formula = r"I_a\,\ddot q"
+    coefficients = (Coefficient("Ia", "kg m^2", sign=1),)
+    simplicity = 3
+    rivals = ("joint_elasticity", "time_delay")
+    separating_motion = "accelerations in several poses; on the first joint it cannot be told"
+    reference = "Gautier, Khalil (1990), IEEE TRA 6(3), 368-373."
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        return signals.ddq[:, [joint]]
+
+    def units(self, prismatic: bool = False) -> dict[str, str]:
+        return {"Ia": "kg" if prismatic else "kg m^2"}

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Effects that are periodic in the joint's own position."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from skidyn._signals import Signals
+from skidyn.effects._base import Array, Coefficient, Effect, Shape
+
+
+class PositionDependentFriction(Effect):
+    """Dry friction whose level changes along the joint's travel."""
+
+    kind = "position_dependent_friction"
+    title = "Position-dependent friction"
+    formula = r"A\cos(n q - \varphi)\,\mathrm{sign}(\dot q)"
+    coefficients = (Coefficient("a", "N m"), Coefficient("b", "N m"))
+    shapes = (Shape("n", "1/rad", (1.0, 2.0), 0.3, 100.0, spacing="linear", scales=False),)
+    simplicity = 22
+    rivals = ("load_dependent_friction", "coulomb")
+    separating_motion = "slow sweeps over the whole travel in both directions"
+    reference = "Armstrong (1988), ICRA, 1422-1427."
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        waves = (15.0, 30.0, 60.0) if signals.prismatic[joints[0]] else (1.0, 2.0)
+        return [{"n": n} for n in waves]
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        phase = shape["n"] * signals.q[:, joint]
+        sign = signals.sign[:, joint]
+        return np.column_stack([np.cos(phase) * sign, np.sin(phase) * sign])
+
+    def parameters(
+        self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
+    ) -> dict[str, Any]:
+        a, b = coefficients
+        return {"A": float(np.hypot(a, b)), "phase": float(np.arctan2(b, a)), **shape}
+
+
+class TorqueRipple(Effect):
+    """Torque periodic in the joint angle: cogging, gear teeth, the wave of a harmonic drive."""
+
+    kind = "torque_ripple"
+    title = "Torque ripple"
+    formula = r"A\sin(N q - \varphi)"
+    coefficients = (Coefficient("a", "N m"), Coefficient("b", "N m"))
+    shapes = (Shape("N", "1/rad", (), 8.0, 420.0, spacing="linear", scales=False),)
+    # Averaging over windows of time would remove a fast ripple, so it is looked for in the
+    # residual at the full rate, as a line in its spectrum over joint angle.
+    search = "spectrum"
+    simplicity = 20
+    rivals = ("position_dependent_friction",)
+    separating_motion = "slow constant-speed sweeps, so that the ripple stays below the sample rate"
+    reference = "Gandhi, Thorp (2005), IEEE TCST 13(4); Tuttle, Seering (1996), IEEE TRA 12(3)."
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        phase = shape["N"] * signals.q[:, joint]
+        return np.column_stack([np.sin(phase), np.cos(phase)])
+
+    def not_shown(self, signals: Signals, joint: int) -> str | None:
+        if signals.prismatic[joint]:
+            return f"joint {joint + 1} slides"
+        return super().not_shown(signals, joint)
+
+    def parameters(
+        self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
+    ) -> dict[str, Any]:
+        a, b = coefficients
+        return {"A": float(np.hypot(a, b)), "phase": float(np.arctan2(-b, a)), **shape}

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Faults of the logged torque itself: its gain, its delay, its limit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from skidyn._signals import Signals
+from skidyn.effects._base import Array, Coefficient, Effect, Shape
+
+
+def time_derivative(values: Array, signals: Signals) -> Array:
+    """Derivative over time within each segment, by central differences (per second)."""
+    rate = np.zeros_like(values)
+    for rows in signals.segments:
+        if rows.stop - rows.start >= 2:
+            rate[rows] = np.gradient(values[rows], signals.clock[rows])
+    return rate
+
+
+class TorqueGain(Effect):
+    """The logged torque is too large or too small by a factor."""
+
+    kind = "torque_gain"
+    title = "Torque gain"
+    formula = r"\varepsilon\,\tau_\mathrm{model}"
+    coefficients = (Coefficient("epsilon", "1"),)
+    needs = ("model_torque",)
+    simplicity = 5
+    rivals = ("payload", "load_dependent_friction")
+    separating_motion = "a known payload carried through the same motion"
+    reference = "Gautier, Briot (2014), ASME JDSMC 136(5): drive gains from a known payload."
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        assert signals.model_torque is not None
+        return signals.model_torque[:, [joint]]
+
+
+class TimeDelay(Effect):
+    """The torque channel lags behind the motion channels."""
+
+    kind = "time_delay"
+    title = "Time delay of the torque"
+    formula = r"-d\,\dot\tau_\mathrm{model}"
+    coefficients = (Coefficient("delay", "s"),)
+    needs = ("model_torque", "time")
+    simplicity = 6
+    rivals = ("joint_elasticity", "rotor_inertia", "viscous")
+    separating_motion = "fast motion with sharp changes of torque"
+    reference = "Ljung (1999), System Identification, chapter 14."
+
+    def sites(self, signals: Signals) -> list[tuple[int, ...]]:
+        # One bus delays all joints alike; a single slow sensor delays its own joint.
+        together = [tuple(range(signals.n_joints))] if signals.n_joints > 1 else []
+        return together + super().sites(signals)
+
+    def torque_columns(
+        self, signals: Signals, joints: Sequence[int], **shape: Any
+    ) -> dict[int, Array]:
+        assert signals.model_torque is not None
+        # Dry friction jumps at a reversal: its derivative is a spike that only the reversal rows
+        # see. What lags visibly is the smooth part.
+        smooth = signals.smooth_torque if signals.smooth_torque is not None else signals.model_torque
+        return {j: -time_derivative(smooth[:, [j]], signals) for j in joints}
+
+
+class Saturation(Effect):
+    """The logged or delivered torque is cut off at a limit."""
+
+    kind = "saturation"
+    title = "Torque saturation"
+    formula = r"-c\,\mathrm{sign}(\tau)\max(0,\,|\tau| - L)"
+    coefficients = (Coefficient("share", "1", sign=1),)
+    shapes = (Shape("limit", "N m", (0.97, 0.93, 0.88, 0.8, 0.7, 0.6), 1e-9, np.inf, scales=False),)
+    needs = ("model_torque",)
+    simplicity = 15
+    rivals = ("torque_gain",)
+    separating_motion = "motion at lower torque, which the limit leaves alone"
+    reference = "Swevers, Verdonck, De Schutter (2007), IEEE Control Systems 27(5), 58-71."
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        assert signals.model_torque is not None
+        highest = float(np.quantile(np.abs(signals.model_torque[:, joints[0]]), 0.999))
+        return [{"limit": share * highest} for share in self.shapes[0].grid if highest > 0]
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        assert signals.model_torque is not None
+        torque = signals.model_torque[:, joint]
+        return (-np.sign(torque) * np.maximum(0.0, np.abs(torque) - shape["limit"]))[:, None]
+
+    def parameters(
+        self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
+    ) -> dict[str, Any]:
+        return {"limit": shape["limit"], "share": float(coefficients[0])}

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Torque that depends on the joint's own position, or on nothing at all."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from skidyn._signals import Signals
+from skidyn.effects._base import Array, Coefficient, Effect, Shape
+
+
+class Offset(Effect):
+    """Constant torque: a sensor or current zero, an unbalanced drive."""
+
+    kind = "offset"
+    title = "Torque offset"
+    formula = r"\tau_0"
+    coefficients = (Coefficient("tau0", "N m"),)
+    simplicity = 0
+    rivals = ("asymmetric_friction", "spring", "temperature_offset")
+    separating_motion = "poses in which gravity acts with both signs; the sensor zeroed anew"
+    reference = "Gautier, Khalil (1988), ICRA."
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        recording = shape.get("trajectory")
+        if recording is None:
+            return np.ones((signals.n_samples, 1))
+        # The sensor was zeroed anew: this offset belongs to one recording.
+        return (signals.trajectory == recording).astype(float)[:, None]
+
+
+class Spring(Effect):
+    """Linear spring between the joint's two links."""
+
+    kind = "spring"
+    title = "Spring"
+    formula = r"k\,(q - q_0)"
+    coefficients = (Coefficient("k", "N m/rad"), Coefficient("tau0", "N m"))
+    simplicity = 4
+    rivals = ("nonlinear_spring", "gravity_compensator", "offset", "end_stop")
+    separating_motion = "slow motion over the whole travel"
+    reference = "Siciliano, Sciavicco, Villani, Oriolo (2009), Robotics, Springer."
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        return np.column_stack([signals.q[:, joint], np.ones(signals.n_samples)])
+
+    def parameters(
+        self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
+    ) -> dict[str, Any]:
+        k, tau0 = map(float, coefficients)
+        return {"k": k, "q0": -tau0 / k if k else 0.0}
+
+
+class NonlinearSpring(Effect):
+    """Spring that stiffens or softens: a cubic in position."""
+
+    kind = "nonlinear_spring"
+    title = "Nonlinear spring"
+    formula = r"k_1 x + k_2 x^2 + k_3 x^3 + \tau_0,\quad x = q - q_m"
+    coefficients = (
+        Coefficient("k1", "N m/rad"),
+        Coefficient("k2", "N m/rad^2"),
+        Coefficient("k3", "N m/rad^3"),
+        Coefficient("tau0", "N m"),
+    )
+    simplicity = 29
+    rivals = ("spring", "gravity_compensator", "end_stop")
+    separating_motion = "slow motion over the whole travel"
+    reference = "Madsen, Bargsten, Brixius (2020), Nonlinear joint stiffness identification."
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        # Powers of the distance from the middle of the travel keep the columns well conditioned.
+        q = signals.q[:, joints[0]]
+        return [{"q_middle": float((q.min() + q.max()) / 2)}]
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        x = signals.q[:, joint] - shape["q_middle"]
+        return np.column_stack([x, x**2, x**3, np.ones_like(x)])
+
+
+class GravityCompensator(Effect):
+    """Coil spring with a lever, or a counterweight: trigonometric in the joint's own position."""
+
+    kind = "gravity_compensator"
+    title = "Gravity compensator"
+    formula = r"a_1\sin q + b_1\cos q + a_2\sin 2q + b_2\cos 2q + \tau_0"
+    coefficients = (
+        Coefficient("a1", "N m"),
+        Coefficient("b1", "N m"),
+        Coefficient("a2", "N m"),
+        Coefficient("b2", "N m"),
+        Coefficient("tau0", "N m"),
+    )
+    simplicity = 30
+    rivals = ("nonlinear_spring", "spring")
+    separating_motion = "slow motion over the whole travel"
+    reference = "Jubien, Gautier (2013), IFAC; Dietz et al. (2018), coil spring balancers."
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        q = signals.q[:, joint]
+        return np.column_stack(
+            [np.sin(q), np.cos(q), np.sin(2 * q), np.cos(2 * q), np.ones_like(q)]
+        )
+
+    def not_shown(self, signals: Signals, joint: int) -> str | None:
+        if signals.prismatic[joint]:
+            return f"joint {joint + 1} slides"
+        return super().not_shown(signals, joint)
+
+
+class EndStop(Effect):
+    """One-sided elastic contact beyond a position: bumper, hose, cable pulled tight."""
+
+    kind = "end_stop"
+    title = "End stop"
+    formula = r"k\,\max(0,\ s\,(q - q_\mathrm{lim}))"
+    coefficients = (Coefficient("k", "N m/rad"),)
+    shapes = (Shape("q_lim", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),)
+    simplicity = 10
+    rivals = ("spring", "nonlinear_spring")
+    separating_motion = "slow approach to both ends of the travel"
+    reference = "Siciliano, Sciavicco, Villani, Oriolo (2009), Robotics, Springer."
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        q = signals.q[:, joints[0]]
+        shares = (0.80, 0.84, 0.88, 0.92, 0.95)
+        return [
+            {"q_lim": float(side * np.quantile(side * q, share)), "side": side}
+            for share in shares
+            for side in (1.0, -1.0)
+        ]
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        beyond = shape["side"] * (signals.q[:, joint] - shape["q_lim"])
+        return np.maximum(0.0, beyond)[:, None]
+
+    def parameters(
+        self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
+    ) -> dict[str, Any]:
+        return {"k": float(coefficients[0]) * shape["side"], **shape}

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Friction and offsets that follow a temperature, or time where none is logged."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from skidyn._signals import Signals
+from skidyn.effects._base import Array, Coefficient, Effect
+
+#: Temperature at which the derivatives are stated, in degrees Celsius.
+REFERENCE_TEMPERATURE = 30.0
+_BITTENCOURT = "Bittencourt, Wernholt, Sander-Tavallaey, Brogardh (2010), IROS, 4548-4554."
+
+
+def _warmth(signals: Signals, joint: int) -> Array:
+    assert signals.temperature is not None
+    return signals.temperature[:, joint] - REFERENCE_TEMPERATURE
+
+
+def _constant_temperature(signals: Signals, joint: int) -> str | None:
+    if signals.temperature is not None and np.ptp(signals.temperature[:, joint]) < 0.5:
+        return f"the temperature of joint {joint + 1} changes by less than 0.5 degrees"
+    return None
+
+
+class TemperatureFriction(Effect):
+    """Viscous and Coulomb friction that change with a logged temperature."""
+
+    kind = "temperature_friction"
+    title = "Temperature-dependent friction"
+    formula = r"\left(\tfrac{dF_v}{dT}\dot q + \tfrac{dF_c}{dT}\mathrm{sign}\,\dot q\right)(T-T_0)"
+    coefficients = (
+        Coefficient("dFv_dT", "N m s/(rad K)"),
+        Coefficient("dFc_dT", "N m/K"),
+        Coefficient("d2Fv_dT2", "N m s/(rad K^2)"),
+    )
+    needs = ("temperature",)
+    simplicity = 14
+    rivals = ("friction_drift", "temperature_offset")
+    separating_motion = "the same sweep on the cold and on the warm robot"
+    reference = _BITTENCOURT
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        warm = _warmth(signals, joint)
+        dq = signals.dq[:, joint]
+        return np.column_stack([warm * dq, warm * signals.sign[:, joint], warm**2 * dq])
+
+    def not_shown(self, signals: Signals, joint: int) -> str | None:
+        return super().not_shown(signals, joint) or _constant_temperature(signals, joint)
+
+
+class TemperatureOffset(Effect):
+    """Torque offset that changes with a logged temperature."""
+
+    kind = "temperature_offset"
+    title = "Temperature-dependent offset"
+    formula = r"\tfrac{d\tau}{dT}\,(T - T_0) + \tau_0"
+    coefficients = (Coefficient("dtau_dT", "N m/K"), Coefficient("tau0", "N m"))
+    needs = ("temperature",)
+    simplicity = 13
+    rivals = ("offset", "temperature_friction")
+    separating_motion = "one pose held or one sweep repeated while the robot warms up"
+    reference = _BITTENCOURT
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        return np.column_stack([_warmth(signals, joint), np.ones(signals.n_samples)])
+
+    def not_shown(self, signals: Signals, joint: int) -> str | None:
+        return super().not_shown(signals, joint) or _constant_temperature(signals, joint)
+
+
+class FrictionDrift(Effect):
+    """Friction that changes slowly over the log where no temperature is logged."""
+
+    kind = "friction_drift"
+    title = "Friction drift"
+    formula = r"\left(a\,\dot q + b\,\mathrm{sign}\,\dot q\right)x + c\,\dot q\,x^2,\ x = (t-t_0)/s"
+    coefficients = (
+        Coefficient("dFv", "N m s/rad"),
+        Coefficient("dFc", "N m"),
+        Coefficient("d2Fv", "N m s/rad"),
+    )
+    needs = ("time",)
+    simplicity = 31
+    rivals = ("temperature_friction",)
+    separating_motion = "the same sweep at the start and at the end of the session"
+    reference = _BITTENCOURT
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        # The reference time and span belong to the log; they are kept with the term so that
+        # another log is predicted on the same time axis.
+        clock = signals.clock
+        span = max(float(np.ptp(clock)) / 2, 1e-9)
+        return [{"t0": float(clock.mean()), "span": span}]
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        x = (signals.clock - shape["t0"]) / shape["span"]
+        dq = signals.dq[:, joint]
+        return np.column_stack([x * dq, x * signals.sign[:, joint], x**2 * dq])
+
+    def not_shown(self, signals: Signals, joint: int) -> str | None:
+        if signals.temperature is not None:
+            return "a temperature is logged, which tells more than time"
+        return super().not_shown(signals, joint)
+
+    def parameters(
+        self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
+    ) -> dict[str, Any]:
+        return super().parameters(coefficients, shape, signals)

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the tool carries or touches, in all or in some of the trajectories."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from skidyn._signals import Signals
+from skidyn.effects._base import Array, Coefficient, Effect, Shape
+
+
+def _inside(signals: Signals, shape: Mapping[str, Any]) -> Array:
+    """1 on the samples of the term's trajectories, 0 elsewhere; all of them without a list."""
+    chosen = shape.get("trajectories")
+    if chosen is None:
+        return np.ones((signals.n_samples, 1))
+    return np.isin(signals.trajectory, list(chosen)).astype(float)[:, None]
+
+
+class _ToolEffect(Effect):
+    scope = "robot"
+    needs = ("robot",)
+    #: The trajectories that carry it are found by a split of the per-trajectory estimates.
+    search = "trajectories"
+
+    def not_shown(self, signals: Signals, joint: int) -> str | None:
+        if len(np.unique(signals.trajectory)) < 3:
+            return "fewer than three trajectories to compare"
+        return None
+
+
+class Payload(_ToolEffect):
+    """A rigid body fixed to the last link."""
+
+    kind = "payload"
+    title = "Payload"
+    formula = r"Y_n(q, \dot q, \ddot q)\,\pi_\mathrm{payload}"
+    coefficients = (
+        Coefficient("mass", "kg"),
+        Coefficient("mcx", "kg m"),
+        Coefficient("mcy", "kg m"),
+        Coefficient("mcz", "kg m"),
+        *(Coefficient(name, "kg m^2") for name in ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")),
+    )
+    simplicity = 28
+    rivals = ("external_wrench", "torque_gain")
+    separating_motion = "the same motion with and without the payload, in poses that turn it over"
+    reference = "Khalil, Gautier, Lemoine (2007), ICRA, 1943-1948."
+
+    def torque_columns(
+        self, signals: Signals, joints: Sequence[int], **shape: Any
+    ) -> dict[int, Array]:
+        robot = signals.robot
+        assert robot is not None
+        regressor = robot.torque_regressor(signals.q, signals.dq, signals.ddq)[:, :, -10:]
+        inside = _inside(signals, shape)
+        return {j: regressor[:, j] * inside for j in joints}
+
+    def parameters(
+        self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
+    ) -> dict[str, Any]:
+        mass = float(coefficients[0])
+        com = [float(v) / mass if mass else 0.0 for v in coefficients[1:4]]
+        return {"mass": mass, "com": com, **shape}
+
+    def units(self, prismatic: bool = False) -> dict[str, str]:
+        return {"mass": "kg", "com": "m"}
+
+
+class ExternalWrench(_ToolEffect):
+    """A constant force on the tool: a hose, a spring balancer, a hand that pulls."""
+
+    kind = "external_wrench"
+    title = "External force at the tool"
+    formula = r"-J_n(q)^\top f"
+    coefficients = (Coefficient("fx", "N"), Coefficient("fy", "N"), Coefficient("fz", "N"))
+    simplicity = 27
+    rivals = ("payload", "environment_contact")
+    separating_motion = "the tool moved through several orientations while the force acts"
+    reference = "Khatib (1987), IEEE JRA 3(1), 43-53."
+
+    def torque_columns(
+        self, signals: Signals, joints: Sequence[int], **shape: Any
+    ) -> dict[int, Array]:
+        assert signals.robot is not None
+        jacobian = signals.robot.jacobian(signals.q)
+        inside = _inside(signals, shape)
+        return {j: -jacobian[:, :3, j] * inside for j in joints}
+
+    def parameters(
+        self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
+    ) -> dict[str, Any]:
+        return {"force": [float(v) for v in coefficients], **shape}
+
+    def units(self, prismatic: bool = False) -> dict[str, str]:
+        return {"force": "N"}
+
+
+class EnvironmentContact(Effect):
+    """A soft plane that the tool presses into."""
+
+    kind = "environment_contact"
+    title = "Contact with the environment"
+    formula = r"-J_n(q)^\top n\,k\,\max(0,\ z_0 - n^\top p(q))"
+    coefficients = (Coefficient("k", "N/m", sign=1),)
+    shapes = (Shape("z0", "m", (), -np.inf, np.inf, spacing="linear", scales=False),)
+    scope = "robot"
+    needs = ("robot",)
+    simplicity = 26
+    rivals = ("external_wrench", "end_stop")
+    separating_motion = "the same path away from the surface"
+    reference = "Khatib (1987), IEEE JRA 3(1), 43-53."
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        assert signals.robot is not None
+        position, _ = signals.robot.forward_kinematics(signals.q)
+        return [
+            {
+                "z0": float(side * np.quantile(side * position[:, axis], share)),
+                "side": side,
+                "axis": axis,
+            }
+            for axis in range(3)
+            for side in (1.0, -1.0)
+            for share in (0.05, 0.1, 0.15, 0.2, 0.3)
+        ]
+
+    def torque_columns(
+        self, signals: Signals, joints: Sequence[int], **shape: Any
+    ) -> dict[int, Array]:
+        robot = signals.robot
+        assert robot is not None
+        axis, side = int(shape["axis"]), shape["side"]
+        position, _ = robot.forward_kinematics(signals.q)
+        depth = np.maximum(0.0, side * (shape["z0"] - position[:, axis]))
+        pressed = -side * depth[:, None] * robot.jacobian(signals.q)[:, axis, :]
+        return {j: pressed[:, [j]] for j in joints}
