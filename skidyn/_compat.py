@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Private and experimental names of scikit-learn: the only module that touches them.
+
+scikit-learn validates parameters through names that are private, and its progress callbacks (new
+in 1.9) may change without deprecation. What skidyn needs of both is collected here, so that a new
+release is answered in one place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from sklearn.base import _fit_context as fit_context
+from sklearn.utils._param_validation import HasMethods, Interval, StrOptions
+
+try:
+    from sklearn.callback import CallbackSupportMixin
+except ImportError:  # scikit-learn 1.8 has no callbacks
+
+    class CallbackSupportMixin:  # type: ignore[no-redef]
+        """Stand-in that supports no callbacks."""
+
+
+__all__ = [
+    "CallbackSupportMixin",
+    "FitProgress",
+    "HasMethods",
+    "Interval",
+    "StrOptions",
+    "fit_context",
+    "fit_progress",
+]
+
+
+class FitProgress:
+    """Tells scikit-learn's callbacks how far a fit is, for example a progress bar.
+
+    Parameters
+    ----------
+    estimator : estimator
+        The estimator that is being fitted.
+    context : object or None
+        Its callback context; None where scikit-learn has no callbacks.
+    """
+
+    def __init__(self, estimator: Any, context: Any) -> None:
+        self._estimator = estimator
+        self._context = context
+        self._step: Any = None
+
+    def begin_step(self) -> None:
+        """Announce the next step, such as an epoch."""
+        if self._context is not None:
+            self._step = self._context.subcontext(task_name="epoch")
+            self._step.call_on_fit_task_begin(estimator=self._estimator)
+
+    def end_step(self) -> bool:
+        """Announce its end; True when a callback asks to stop the fit."""
+        if self._step is None:
+            return False
+        return bool(self._step.call_on_fit_task_end(estimator=self._estimator))
+
+
+@contextmanager
+def fit_progress(estimator: Any, n_steps: int, X: Any, y: Any) -> Iterator[FitProgress]:
+    """Progress of one fit; ``fit`` must be decorated with :func:`fit_context`.
+
+    Parameters
+    ----------
+    estimator : estimator
+        Derives from ``CallbackSupportMixin``.
+    n_steps : int
+        Steps at most.
+    X, y : array-like
+        What is fitted, handed to the callbacks.
+
+    Yields
+    ------
+    FitProgress
+        Its methods mark the steps.
+    """
+    if not hasattr(estimator, "_init_callback_context"):
+        yield FitProgress(estimator, None)
+        return
+    context = estimator._init_callback_context(max_subtasks=n_steps)
+    context.call_on_fit_task_begin(estimator=estimator, X=X, y=y)
+    yield FitProgress(estimator, context)
+    context.call_on_fit_task_end(estimator=estimator, X=X, y=y)

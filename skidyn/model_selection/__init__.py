@@ -1,0 +1,15 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Cross-validation that respects recordings, and a guard against splits that do not."""
+
+from skidyn.model_selection._leakage import LeakageGuard, LeakageWarning, leakage_report
+from skidyn.model_selection._learning_curve import trajectory_learning_curve
+from skidyn.model_selection._split import PhaseKFold, TrajectoryKFold
+
+__all__ = [
+    "LeakageGuard",
+    "LeakageWarning",
+    "PhaseKFold",
+    "TrajectoryKFold",
+    "leakage_report",
+    "trajectory_learning_curve",
+]

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import numpy as np
+import pytest
+from sklearn.linear_model import LinearRegression
+from sklearn.metrics import mean_absolute_error, mean_squared_error, r2_score
+from sklearn.model_selection import cross_validate
+
+from skidyn.metrics import SCORERS, joint_error_table, percent_improvement, rmse_over_range
+
+
+@pytest.fixture
+def torques():
+    rng = np.random.default_rng(0)
+    true = rng.normal(size=(50, 3)) * [1.0, 10.0, 0.1]
+    return true, true + 0.1 * rng.normal(size=true.shape)
+
+
+def test_table_agrees_with_scikit_learn(torques):
+    true, pred = torques
+    table = joint_error_table(true, pred, joint_names=["a", "b", "c"])
+    per_joint = {"multioutput": "raw_values"}
+    for row, reference in (
+        ("MSE", mean_squared_error(true, pred, **per_joint)),
+        ("MAE", mean_absolute_error(true, pred, **per_joint)),
+        ("R2", r2_score(true, pred, **per_joint)),
+    ):
+        np.testing.assert_allclose([table[row][name] for name in "abc"], reference)
+        assert table[row]["mean"] == pytest.approx(np.mean(reference))
+
+
+def test_errors_are_ordered_as_they_must_be(torques):
+    table = joint_error_table(*torques)
+    for joint in ("J1", "J2", "J3"):
+        assert table["min"][joint] <= table["MAE"][joint]
+        assert table["MAE"][joint] <= table["RMSE"][joint] <= table["max"][joint]
+
+
+def test_range_of_the_whole_log_can_be_given(torques):
+    true, pred = torques
+    part = rmse_over_range(true[:5], pred[:5], torque_range=np.ptp(true, axis=0))
+    assert part < rmse_over_range(true[:5], pred[:5])
+
+
+def test_messages_name_the_joint_and_the_row():
+    with pytest.raises(ValueError, match="joint 2 has no range"):
+        rmse_over_range([[0.0, 1.0], [1.0, 1.0]], np.zeros((2, 2)))
+    with pytest.raises(ValueError, match="y_pred is not finite in row 1"):
+        rmse_over_range([0.0, 1.0], [0.0, np.nan])
+    with pytest.raises(ValueError, match="shape"):
+        rmse_over_range([0.0, 1.0], [[0.0, 1.0]])
+    with pytest.raises(ValueError, match="not positive"):
+        percent_improvement(0.0, 1.0)
+
+
+def test_scorers_work_in_cross_validation(torques):
+    true, pred = torques
+    result = cross_validate(LinearRegression(), pred, true, scoring=SCORERS, cv=3)
+    assert (result["test_neg_rmse_over_range"] <= 0).all()
+    largest, mean = (
+        result[f"test_neg_{name}"] for name in ("max_absolute_error", "mean_absolute_error")
+    )
+    assert (largest <= mean).all()
