@@ -17,7 +17,7 @@ def time_derivative(values: Array, signals: Signals) -> Array:
     rate = np.zeros_like(values)
     for rows in signals.segments:
         if rows.stop - rows.start >= 2:
-            rate[rows] = np.gradient(values[rows], signals.clock[rows])
+            rate[rows] = np.gradient(values[rows], signals.clock[rows], axis=0)
     return rate
 
 
