@@ -45,7 +45,7 @@ docs: $(VENV)/.docs
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
 
 clean:
-	rm -rf $(VENV) build dist docs/_build docs/gallery docs/api/generated
+	rm -rf $(VENV) build dist docs/_build docs/gallery docs/api
 
 # torch first and alone, so that the chosen build is the one that stays
 $(VENV)/.torch:

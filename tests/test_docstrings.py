@@ -16,6 +16,12 @@ import skidyn
 numpydoc_validate = pytest.importorskip("numpydoc.validate", reason="needs skidyn[test]")
 
 REPOSITORY = Path(__file__).resolve().parents[1]
+PAGES = sorted(
+    page
+    for folder in ("docs", "docs/user_guide", "docs/contributing")
+    for page in (REPOSITORY / folder).glob("*.rst")
+    if ">>>" in page.read_text(encoding="utf-8")
+)
 MODULES = sorted(
     module.name
     for module in pkgutil.walk_packages(skidyn.__path__, "skidyn.")
@@ -63,3 +69,11 @@ def test_examples_of_docstrings_run(name):
     module = importlib.import_module(name)
     flags = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
     assert doctest.testmod(module, optionflags=flags).failed == 0
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: path.stem)
+def test_examples_of_the_user_guide_run(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # some pages write files
+    flags = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+    result = doctest.testfile(str(page), module_relative=False, optionflags=flags, encoding="utf-8")
+    assert result.failed == 0

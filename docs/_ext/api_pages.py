@@ -38,7 +38,7 @@ def write(path: Path, text: str) -> None:
 
 def write_pages(app: Sphinx, config: Any) -> None:
     """Write the pages before Sphinx looks for documents."""
-    folder = Path(app.srcdir) / "api" / "generated"
+    folder = Path(app.srcdir) / "api"
     for page in api_reference.PAGES:
         write(folder / f"{page.module}.rst", page_text(page))
     title = "API reference\n=============\n\nEvery public name, module by module.\n\n"
