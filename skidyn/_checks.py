@@ -1,0 +1,241 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Checks that a table is a log at all: what would make every later result wrong is refused here."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from skidyn._exceptions import LogError, LogWarning
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: Columns of a log that hold numbers of one signal.
+SIGNAL_COLUMN = re.compile(r"(q|dq|ddq|tau|temp)(\d+)")
+
+
+def warn_about_log(message: str) -> None:
+    """Issue a LogWarning that points at the caller of the public function."""
+    warnings.warn(message, LogWarning, stacklevel=3)
+
+
+def count_joints(frame: pd.DataFrame, source: str = "the log") -> int:
+    """Number of joints of a log from its columns ``q1 .. qn``.
+
+    Parameters
+    ----------
+    frame : DataFrame
+        Table with columns ``q1 .. qn``.
+    source : str, default="the log"
+        Name for messages.
+
+    Returns
+    -------
+    int
+
+    Raises
+    ------
+    LogError
+        No positions, or a joint without one.
+    """
+    numbers = sorted(
+        int(hit[1]) for name in frame.columns if (hit := re.fullmatch(r"q(\d+)", str(name)))
+    )
+    if not numbers:
+        raise LogError(
+            f"{source} has no joint positions. Recognised are q1, q_<joint>, position_1 and alike; "
+            f"it has: {', '.join(map(str, frame.columns))}. Name them with "
+            "columns={'q': ['first', 'second', ...]}."
+        )
+    if numbers != list(range(1, len(numbers) + 1)):
+        absent = sorted(set(range(1, numbers[-1] + 1)) - set(numbers))
+        raise LogError(
+            f"{source} has q{numbers[-1]} but lacks {', '.join(f'q{k}' for k in absent)}."
+        )
+    return len(numbers)
+
+
+def require_columns(
+    frame: pd.DataFrame,
+    n_joints: int,
+    quantities: Sequence[str] = ("q", "tau"),
+    source: str = "the log",
+) -> None:
+    """Raise unless the quantities are there for every joint and not for further ones.
+
+    Parameters
+    ----------
+    frame : DataFrame
+        The log.
+    n_joints : int
+        Number of joints of the robot.
+    quantities : sequence of str
+        Quantities that must be there.
+    source : str, default="the log"
+        Name for messages.
+
+    Raises
+    ------
+    LogError
+        Columns are missing, occur twice, or belong to a joint that the robot does not have.
+    """
+    names = [str(name) for name in frame.columns]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise LogError(f"{source} has the column(s) {', '.join(twice)} more than once; keep one.")
+    present = {hit[1] for name in names if (hit := SIGNAL_COLUMN.fullmatch(name))}
+    for quantity in dict.fromkeys([*quantities, *sorted(present)]):
+        found = {
+            int(hit[2]) for n in names if (hit := SIGNAL_COLUMN.fullmatch(n)) and hit[1] == quantity
+        }
+        missing = sorted(set(range(1, n_joints + 1)) - found)
+        surplus = sorted(found - set(range(1, n_joints + 1)))
+        if missing:
+            raise LogError(
+                f"{source} lacks {', '.join(f'{quantity}{k}' for k in missing)}: {n_joints} joints "
+                f"need {quantity}1..{quantity}{n_joints}. It has: {', '.join(names)}."
+            )
+        if surplus:
+            raise LogError(
+                f"{source} has {', '.join(f'{quantity}{k}' for k in surplus)}, but there are "
+                f"{n_joints} joints. Load the robot that the log is of, or take the columns to "
+                "use with columns={...}."
+            )
+
+
+def as_numbers(frame: pd.DataFrame, names: Sequence[str], source: str = "the log") -> pd.DataFrame:
+    """Copy with the named columns as float64.
+
+    Parameters
+    ----------
+    frame : DataFrame
+        The log.
+    names : sequence of str
+        Columns that must hold numbers.
+    source : str, default="the log"
+        Name for messages.
+
+    Returns
+    -------
+    DataFrame
+
+    Raises
+    ------
+    LogError
+        A cell is no number; the message names column, row and content.
+    """
+    frame = frame.copy()
+    for name in names:
+        column = frame[name]
+        if column.dtype.kind in "fiub":
+            frame[name] = column.astype(np.float64)
+            continue
+        if column.dtype.kind == "M":
+            raise LogError(
+                f"{source}: column {name!r} holds dates. Only the time column may; it is then "
+                "counted in seconds from its first row."
+            )
+        cells = column.to_numpy(dtype=object)
+        for row, cell in enumerate(cells):
+            try:
+                cells[row] = np.nan if cell is None else float(cell)
+            except (TypeError, ValueError):
+                raise LogError(
+                    f"{source}: column {name!r} holds {cell!r} in row {row} where a number is "
+                    "expected. Mend or remove that row, or leave the column out."
+                ) from None
+        frame[name] = cells.astype(np.float64)
+    return frame
+
+
+def handle_missing(
+    frame: pd.DataFrame,
+    names: Sequence[str],
+    missing: Literal["error", "drop"],
+    source: str = "the log",
+) -> pd.DataFrame:
+    """Refuse rows with NaN or infinite values, or drop them and say how many.
+
+    Parameters
+    ----------
+    frame : DataFrame
+        The log.
+    names : sequence of str
+        Columns that must be finite.
+    missing : {"error", "drop"}
+        What to do with rows that are not.
+    source : str, default="the log"
+        Name for messages.
+
+    Returns
+    -------
+    DataFrame
+
+    Raises
+    ------
+    LogError
+        Rows are not finite and ``missing="error"``, or none is left.
+    """
+    finite = np.isfinite(frame[list(names)].to_numpy())
+    bad = ~finite.all(axis=1)
+    if not bad.any():
+        return frame
+    counts = {name: int(n) for name, n in zip(names, (~finite).sum(axis=0), strict=True) if n}
+    told = ", ".join(f"{name}: {n}" for name, n in list(counts.items())[:8])
+    told += ", ..." if len(counts) > 8 else ""
+    message = (
+        f"{source}: {int(bad.sum())} of {len(frame)} rows hold NaN or infinite values ({told}; "
+        f"first in row {int(np.argmax(bad))})."
+    )
+    if missing == "error":
+        raise LogError(
+            f"{message} Mend them, or pass missing='drop' to leave these rows out; derivatives "
+            "and filters then do not cross the holes."
+        )
+    if bad.all():
+        raise LogError(f"{message} No row is left.")
+    warn_about_log(f"{message} They are left out.")
+    return frame[~bad].reset_index(drop=True)
+
+
+def check_time_order(
+    time: np.ndarray, trajectory: np.ndarray, source: str = "the log"
+) -> np.ndarray:
+    """Rows to keep so that time increases strictly within each trajectory.
+
+    Parameters
+    ----------
+    time : ndarray of shape (n_samples,), s
+        Time of each row.
+    trajectory : ndarray of shape (n_samples,)
+        Trajectory of each row.
+    source : str, default="the log"
+        Name for messages.
+
+    Returns
+    -------
+    ndarray of shape (n_samples,) of bool
+        False where a row has the time of the row before it.
+
+    Raises
+    ------
+    LogError
+        Time goes backwards inside a trajectory.
+    """
+    same = trajectory[1:] == trajectory[:-1]
+    steps = np.diff(time)
+    back = np.flatnonzero(same & (steps < 0))
+    if len(back):
+        row = int(back[0]) + 1
+        raise LogError(
+            f"{source}: time goes backwards in {len(back)} place(s), first in row {row} "
+            f"({time[row]:.6g} s after {time[row - 1]:.6g} s, trajectory {trajectory[row]}). If a "
+            "new recording begins there, give the rows a trajectory column; if rows are in "
+            "disorder, sort them by time."
+        )
+    return np.r_[True, ~(same & (steps == 0))]

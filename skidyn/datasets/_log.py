@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reading a log: one function for all formats."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from skidyn._checks import warn_about_log
+from skidyn._exceptions import LogError
+from skidyn._optional import import_optional
+from skidyn.datasets._log_files import (
+    MAX_BYTES,
+    Channel,
+    read_csv_channels,
+    read_npz_channels,
+    read_parquet_channels,
+)
+from skidyn.datasets._log_quality import check_log
+from skidyn.datasets._log_table import ColumnMap, TableOptions, build_table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from skidyn.robots import Robot
+
+PathLike = str | os.PathLike[str]
+
+
+def read_log(
+    path: PathLike | Sequence[PathLike],
+    *,
+    robot: Robot | None = None,
+    columns: ColumnMap | None = None,
+    units: Mapping[str, str] | None = None,
+    drive_gains: Sequence[float] | None = None,
+    topics: Sequence[str] | None = None,
+    rate: float | None = None,
+    resample_rate: float | None = None,
+    missing: Literal["error", "drop"] = "error",
+    split_gaps: float | Literal["auto"] | None = "auto",
+    split_dwells: float | None = None,
+    check: bool = True,
+    max_bytes: int = MAX_BYTES,
+) -> pd.DataFrame:
+    """Read recordings of a robot into one table in SI units.
+
+    Parameters
+    ----------
+    path : path or sequence of paths
+        CSV or text (``.csv .tsv .txt .dat``), Parquet (``.parquet``), Feather, NumPy (``.npz``),
+        HDF5 (``.h5 .hdf5``), MATLAB (``.mat``), MCAP (``.mcap``), ROS 1 bag (``.bag``), ROS 2 bag
+        (its folder, or ``.db3``). Several files become several trajectories.
+    robot : Robot, optional
+        Its joint names are looked for and order the columns; the log is checked against its
+        limits and its gravity.
+    columns : mapping, optional
+        Which columns hold which signals, where names do not tell: ``{"q1": "pos_a"}``,
+        ``{"q": ["pos_a", "pos_b"]}``, ``{"tau": "effort_{joint}"}``, ``{"time": 0}``.
+    units : mapping, optional
+        Units that are not SI, per quantity or column: ``{"q": "deg", "time": "ms", "q3": "mm"}``.
+    drive_gains : sequence of float, N m/A or N/A, optional
+        Torque per ampere and joint, to read a log of currents (``i1 .. in``) as torques.
+    topics : sequence of str, optional
+        Topics of a bag or groups of an HDF5 file to read; all that hold joint states if None.
+    rate : float, Hz, optional
+        Sampling rate of logs without a time column.
+    resample_rate : float, Hz, optional
+        Rate of the common clock where signals of one file have several; that of the positions if
+        None.
+    missing : {"error", "drop"}, default="error"
+        Rows with NaN or infinite values: refuse the log, or leave them out with a warning.
+    split_gaps : float, s, "auto" or None, default="auto"
+        A time step longer than this begins a new trajectory; ``"auto"``: longer than 20 median
+        steps and 0.2 s, in logs that have no trajectory column of their own.
+    split_dwells : float, s, optional
+        Cut a trajectory in the middle of each rest longer than this.
+    check : bool, default=True
+        Judge the quality of the log (:func:`check_log`) and warn of what looks wrong.
+    max_bytes : int
+        Largest size of one file once unpacked.
+
+    Returns
+    -------
+    DataFrame
+        ``time`` (s), ``trajectory``, ``q1 .. qn`` (rad or m), ``dq1 .. dqn``, ``ddq1 .. ddqn``
+        where recorded, ``tau1 .. taun`` (N m or N), ``temp1 .. tempn`` (degrees Celsius) where
+        recorded, then further numeric columns under their own names. ``attrs`` holds
+        ``joint_names``, ``files`` (one per trajectory) and ``notes``.
+
+    Raises
+    ------
+    LogError
+        The log cannot be used as it is; the message says why and what to do.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from skidyn.datasets import read_log
+    >>> folder = tempfile.TemporaryDirectory()
+    >>> file = pathlib.Path(folder.name, "log.csv")
+    >>> rows = ["t;pos 1;vel 1;torque 1", "0,0;0,1;1;2,0", "0,1;0,2;1;2,1"]
+    >>> _ = file.write_text(chr(10).join(rows))
+    >>> read_log(file, check=False).columns.tolist()
+    ['time', 'trajectory', 'q1', 'dq1', 'tau1']
+    >>> folder.cleanup()
+    """
+    pandas = import_optional("pandas", extra="io")
+    paths = [path] if isinstance(path, (str, os.PathLike)) else list(path)
+    if not paths:
+        raise LogError("no file to read: the list of paths is empty.")
+    options = TableOptions(
+        robot, columns, units, drive_gains, rate, resample_rate, missing, split_gaps, split_dwells
+    )
+    tables: list[pd.DataFrame] = []
+    files: list[str] = []
+    notes: list[str] = []
+    joints: list[str] = []
+    for file in map(Path, paths):
+        table, match = build_table(_read_channels(file, topics, max_bytes), str(file), options)
+        if tables:
+            _refuse_other_columns(table, match.joint_names, tables[0], joints, file)
+        joints = match.joint_names
+        notes += [note for note in match.notes if note not in notes]
+        _, number = np.unique(table["trajectory"], return_inverse=True)
+        if len(paths) > 1:
+            table["trajectory"] = number + len(files)
+        files += [str(file)] * (int(number.max()) + 1)
+        tables.append(table)
+    frame = pandas.concat(tables, ignore_index=True) if len(tables) > 1 else tables[0]
+    frame.attrs = {"joint_names": joints, "files": files, "notes": notes}
+    for note in notes:
+        warn_about_log(note)
+    if check:
+        for message in check_log(frame, robot).warnings:
+            warn_about_log(message)
+    return frame
+
+
+def _refuse_other_columns(
+    table: pd.DataFrame,
+    joints: Sequence[str],
+    first: pd.DataFrame,
+    first_joints: Sequence[str],
+    file: Path,
+) -> None:
+    """Files of one log must hold the same signals of the same joints."""
+    if list(joints) != list(first_joints):
+        raise LogError(
+            f"{file}: its joints ({', '.join(joints)}) are not those of the first file "
+            f"({', '.join(first_joints)}). Pass robot= or columns= to say which belong together."
+        )
+    differing = sorted(set(map(str, table.columns)) ^ set(map(str, first.columns)))
+    if differing:
+        raise LogError(
+            f"{file}: {', '.join(differing)} is in this file or in the first one but not in both."
+        )
+
+
+def _read_channels(path: Path, topics: Sequence[str] | None, max_bytes: int) -> list[Channel]:
+    if not path.exists():
+        raise LogError(f"{path}: no such file.")
+    suffix = path.suffix.lower()
+    tables: dict[str, Callable[[Path, int], list[Channel]]] = {
+        **dict.fromkeys((".csv", ".tsv", ".txt", ".dat"), read_csv_channels),
+        **dict.fromkeys((".parquet", ".feather", ".arrow"), read_parquet_channels),
+        ".npz": read_npz_channels,
+    }
+    if suffix in tables:
+        return tables[suffix](path, max_bytes)
+    raise LogError(
+        f"{path}: unknown kind of log {suffix or 'without suffix'!r}. Known are .csv .tsv .txt "
+        ".dat .parquet .feather .npz .h5 .hdf5 .mat .mcap .bag .db3 and folders of ROS 2 bags."
+    )

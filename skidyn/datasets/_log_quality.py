@@ -1,0 +1,319 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How good a log is: clock, resolution, consistency and excitation, before any model is fitted."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from skidyn._checks import as_numbers, check_time_order, count_joints, require_columns
+from skidyn._exceptions import LogError
+from skidyn._signals import find_segments
+from skidyn.datasets._log_measures import (
+    excited,
+    longest_plateau_share,
+    position_step,
+    repeated_rows,
+    rest_share,
+    reversals,
+    torque_delay,
+    velocity_consistency,
+)
+from skidyn.datasets._log_suspicions import clock_suspicions, joint_suspicions, unit_suspicions
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from skidyn.robots import Robot
+
+
+@dataclass(frozen=True)
+class JointQuality:
+    """Quality of the signals of one joint.
+
+    Attributes
+    ----------
+    name : str
+        Joint.
+    resolution : float, rad or m
+        Step of the position sensor; NaN where positions are not visibly quantised.
+    position_range : tuple of float, rad or m
+        Smallest and largest position.
+    position_coverage : float
+        Share of the range between the limits that was visited; NaN without limits.
+    largest_velocity : float, rad/s or m/s
+        Largest absolute velocity.
+    reversals : int
+        How often the direction of motion changes.
+    rest_share : float
+        Share of rows in which the joint does not move.
+    torque_range : tuple of float, N m or N
+        Smallest and largest torque.
+    saturated_share : float
+        Share of rows in which the torque stays at its extreme value.
+    velocity_slope, velocity_correlation : float
+        Velocity against differentiated position; both are 1 in a consistent log.
+    torque_delay : float, s
+        Time by which torque lags motion (positive: torque is late); NaN where it cannot be told.
+    excited : bool
+        Whether the joint moves enough for its own parameters to be identified.
+    """
+
+    name: str
+    resolution: float
+    position_range: tuple[float, float]
+    position_coverage: float
+    largest_velocity: float
+    reversals: int
+    rest_share: float
+    torque_range: tuple[float, float]
+    saturated_share: float
+    velocity_slope: float
+    velocity_correlation: float
+    torque_delay: float
+    excited: bool
+
+
+@dataclass(frozen=True)
+class LogQuality:
+    """What :func:`check_log` found.
+
+    Attributes
+    ----------
+    n_samples, n_trajectories : int
+        Size of the log.
+    duration : float, s
+        Recorded time, gaps left out.
+    rate : float, Hz
+        Median sampling rate.
+    jitter : float
+        Spread of the time steps: half the width between their 5 % and 95 % quantiles, relative to
+        the median step; median over trajectories.
+    gaps : int
+        Steps longer than 5 median steps inside a trajectory.
+    largest_gap : float, s
+        Longest step inside a trajectory.
+    repeated_rows : int
+        Rows in which no position changes although joints move: the recorder polled faster than
+        the robot reported.
+    joints : tuple of JointQuality
+        One per joint.
+    warnings : tuple of str
+        What looks wrong, each with its evidence.
+    """
+
+    n_samples: int
+    n_trajectories: int
+    duration: float
+    rate: float
+    jitter: float
+    gaps: int
+    largest_gap: float
+    repeated_rows: int
+    joints: tuple[JointQuality, ...]
+    warnings: tuple[str, ...] = field(default=())
+
+    def to_dict(self) -> dict[str, Any]:
+        """Contents as plain numbers, lists and text for JSON; NaN becomes None.
+
+        Returns
+        -------
+        dict
+        """
+        plain = _plain(asdict(self))
+        assert isinstance(plain, dict)
+        return plain
+
+    def __str__(self) -> str:
+        lines = [
+            f"{self.n_samples} samples in {self.n_trajectories} trajectories, "
+            f"{self.duration:.1f} s at {self.rate:.4g} Hz (jitter {100 * self.jitter:.2g} %)",
+            f"gaps: {self.gaps} (longest step {self.largest_gap:.3g} s), "
+            f"repeated rows: {self.repeated_rows}",
+            "",
+            "joint            position range     coverage  max speed  reversals  at rest  "
+            "torque range       dq/q'  delay ms",
+        ]
+        lines += [_line(joint) for joint in self.joints]
+        lines += ["", *(f"! {message}" for message in self.warnings)]
+        return "\n".join(lines).rstrip()
+
+
+def check_log(frame: pd.DataFrame, robot: Robot | None = None) -> LogQuality:
+    """Judge the quality of a log.
+
+    Parameters
+    ----------
+    frame : DataFrame
+        ``time`` (s), ``trajectory`` (optional), ``q1 ..`` (rad or m), ``dq1 ..``, ``tau1 ..`` (N m
+        or N), as :func:`read_log` returns it.
+    robot : Robot, optional
+        For its limits (coverage, units) and its dynamics (delay, currents taken for torques).
+
+    Returns
+    -------
+    LogQuality
+        Numbers per log and joint, and what looks wrong with the evidence. Nothing is changed in
+        ``frame``.
+
+    Raises
+    ------
+    LogError
+        Columns are missing, hold no numbers, or do not fit the robot; time goes backwards.
+
+    Examples
+    --------
+    >>> from skidyn.datasets import check_log, load_planar_arm, make_hidden_effect_log
+    >>> log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=2, duration=2.0)
+    >>> quality = check_log(log.frame, log.robot)
+    >>> quality.n_samples, round(quality.rate), quality.gaps
+    (400, 100, 0)
+    """
+    n = count_joints(frame)
+    if robot is not None and robot.n_joints != n:
+        raise LogError(
+            f"the log has {n} joints, the robot has {robot.n_joints} "
+            f"({', '.join(robot.joint_names)}). If the log covers part of the robot, load it with "
+            "Robot.from_urdf(..., joints=[...])."
+        )
+    require_columns(frame, n, ("q", "dq", "tau"))
+    if "time" not in frame.columns:
+        raise LogError("the log has no time column.")
+    blocks = {name: [f"{name}{k + 1}" for k in range(n)] for name in ("q", "dq", "tau")}
+    numbers = as_numbers(frame, ["time", *blocks["q"], *blocks["dq"], *blocks["tau"]])
+    time = numbers["time"].to_numpy()
+    q, dq, tau = (numbers[blocks[name]].to_numpy() for name in ("q", "dq", "tau"))
+    trajectory = (
+        frame["trajectory"].to_numpy() if "trajectory" in frame else np.zeros(len(frame), int)
+    )
+    finite = np.isfinite(np.column_stack([time, q, dq, tau])).all(axis=1)
+    messages = []
+    if not finite.all():
+        messages.append(
+            f"{int((~finite).sum())} of {len(frame)} rows hold NaN or infinite values and are left "
+            "out of this report."
+        )
+        time, q, dq, tau, trajectory = (a[finite] for a in (time, q, dq, tau, trajectory))
+    if len(time) < 2:
+        raise LogError(f"the log has {len(time)} finite row(s); at least two are needed.")
+    unique = check_time_order(time, trajectory)
+    if not unique.all():
+        messages.append(f"{int((~unique).sum())} row(s) repeat the time of the row before.")
+        time, q, dq, tau, trajectory = (a[unique] for a in (time, q, dq, tau, trajectory))
+    names = list(frame.attrs.get("joint_names", ())) if robot is None else list(robot.joint_names)
+    if len(names) != n:
+        names = [f"joint {k + 1}" for k in range(n)]
+    clock = _clock(time, trajectory)
+    joints = _joints(names, time, q, dq, tau, trajectory, robot)
+    repeated = repeated_rows(q, dq, trajectory)
+    n_trajectories = len(np.unique(trajectory))
+    messages += clock_suspicions(clock, repeated, len(time), n_trajectories)
+    messages += unit_suspicions(joints, q, dq, tau, time, trajectory, robot)
+    messages += joint_suspicions(joints, n)
+    return LogQuality(
+        n_samples=len(time),
+        n_trajectories=n_trajectories,
+        repeated_rows=repeated,
+        joints=tuple(joints),
+        warnings=tuple(messages),
+        **clock,
+    )
+
+
+def _clock(time: np.ndarray, trajectory: np.ndarray) -> dict[str, Any]:
+    """Rate, jitter and gaps over all trajectories."""
+    steps = np.diff(time)[trajectory[1:] == trajectory[:-1]]
+    if len(steps) == 0:
+        raise LogError("every trajectory of the log has a single row; nothing moves in it.")
+    median = float(np.median(steps))
+    gap = steps > 5 * median
+    return {
+        "duration": float(steps[~gap].sum()),
+        "rate": 1 / median,
+        "jitter": _jitter(time, trajectory),
+        "gaps": int(gap.sum()),
+        "largest_gap": float(steps.max()),
+    }
+
+
+def _jitter(time: np.ndarray, trajectory: np.ndarray) -> float:
+    """Median over segments of the relative spread of the time steps."""
+    spreads = []
+    for rows in find_segments(trajectory, time):
+        steps = np.diff(time[rows])
+        if len(steps):
+            low, middle, high = np.quantile(steps, [0.05, 0.5, 0.95])
+            spreads.append((high - low) / 2 / middle)
+    return float(np.median(spreads))
+
+
+def _joints(
+    names: list[str],
+    time: np.ndarray,
+    q: np.ndarray,
+    dq: np.ndarray,
+    tau: np.ndarray,
+    trajectory: np.ndarray,
+    robot: Robot | None,
+) -> list[JointQuality]:
+    segments = find_segments(trajectory, time)
+    delays = np.full(q.shape[1], np.nan)
+    if robot is not None:
+        delays = torque_delay(time, q, dq, tau, segments, robot)
+    joints = []
+    for k, name in enumerate(names):
+        slope, correlation = velocity_consistency(time, q[:, k], dq[:, k], segments)
+        span = float(np.ptp(q[:, k]))
+        coverage = np.nan
+        if robot is not None:
+            low, high = robot.position_limits[k]
+            coverage = span / (high - low) if np.isfinite(high - low) and high > low else np.nan
+        joints.append(
+            JointQuality(
+                name=name,
+                resolution=position_step(q[:, k]),
+                position_range=(float(q[:, k].min()), float(q[:, k].max())),
+                position_coverage=float(coverage),
+                largest_velocity=float(np.abs(dq[:, k]).max()),
+                reversals=reversals(dq[:, k], segments),
+                rest_share=rest_share(dq[:, k]),
+                torque_range=(float(tau[:, k].min()), float(tau[:, k].max())),
+                saturated_share=longest_plateau_share(tau[:, k], segments),
+                velocity_slope=slope,
+                velocity_correlation=correlation,
+                torque_delay=float(delays[k]),
+                excited=excited(q[:, k], dq[:, k], segments),
+            )
+        )
+    return joints
+
+
+def _line(joint: JointQuality) -> str:
+    """One joint as a line of the printed report."""
+    (low, high), (weak, strong) = joint.position_range, joint.torque_range
+    return (
+        f"{joint.name[:15]:15s} {low:8.3f} .. {high:7.3f} {_percent(joint.position_coverage)} "
+        f"{joint.largest_velocity:10.3f} {joint.reversals:10d} {_percent(joint.rest_share)} "
+        f"{weak:8.2f} .. {strong:7.2f} {_number(joint.velocity_slope, 7)} "
+        f"{_number(1e3 * joint.torque_delay, 8, 1)}"
+    )
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:8.0f} %" if np.isfinite(share) else "         -"
+
+
+def _number(value: float, width: int, digits: int = 3) -> str:
+    return f"{value:{width}.{digits}f}" if np.isfinite(value) else "-".rjust(width)
