@@ -51,11 +51,11 @@ clean:
 $(VENV)/.torch:
 	$(PYTHON) -m venv $(VENV)
 	@echo "Installing $(TORCH) into $(VENV) ..."
-	$(PIP) "$(TORCH)"
+	@$(PIP) "$(TORCH)"
 	@touch $@
 
 # one stamp per extra: .venv/.test is newer than pyproject.toml when skidyn[test] is installed
 $(VENV)/.%: pyproject.toml setup.cfg | $(VENV)/.torch
 	@echo "Installing skidyn[$*] into $(VENV) ..."
-	$(PIP) --editable ".[$*]"
+	@$(PIP) --editable ".[$*]"
 	@touch $@
