@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is public: importable, in ``__all__`` in order, and on exactly one API page."""
+"""What is public: importable, documented, and on exactly one API page."""
 
 import importlib
 import importlib.util
@@ -26,18 +26,16 @@ def api_pages():
     return {page.module: page for page in module.PAGES}
 
 
-def test_all_of_the_package_is_sorted_and_there():
-    assert skidyn.__all__ == sorted(skidyn.__all__)
+def test_all_of_the_package_is_there():
     for name in skidyn.__all__:
         assert getattr(skidyn, name) is not None
     assert dir(skidyn) == skidyn.__all__
 
 
 @pytest.mark.parametrize("name", SUBMODULES)
-def test_all_of_a_module_is_sorted_and_there(name):
+def test_all_of_a_module_is_there(name):
     module = importlib.import_module(f"skidyn.{name}")
     assert module.__doc__
-    assert list(module.__all__) == sorted(module.__all__), "sort __all__"
     missing = [symbol for symbol in module.__all__ if not hasattr(module, symbol)]
     assert not missing
 
@@ -63,6 +61,10 @@ def test_every_public_symbol_is_on_its_api_page_once(name):
     assert max(listed.values()) == 1
 
 
-@pytest.mark.parametrize("source", sorted(REPOSITORY.glob("skidyn/**/*.py")), ids=str)
+@pytest.mark.parametrize(
+    "source",
+    sorted(REPOSITORY.glob("skidyn/**/*.py")),
+    ids=lambda path: str(path.relative_to(REPOSITORY)),
+)
 def test_every_source_file_states_its_licence(source):
     assert source.read_text(encoding="utf-8").startswith("# SPDX-License-Identifier: BSD-3-Clause")
