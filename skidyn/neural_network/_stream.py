@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Prediction of a log that arrives bit by bit."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.utils.validation import validate_data
+
+if TYPE_CHECKING:
+    from skidyn.neural_network._base import SequenceRegressor
+
+Array = NDArray[np.float64]
+
+
+class TorqueStream:
+    """Predicts new rows of a log; remembers no more of the past than the network reads.
+
+    Parameters
+    ----------
+    estimator : estimator
+        A fitted recurrent regressor; made by its ``stream`` method.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skidyn.neural_network import LSTMRegressor
+    >>> X = np.random.default_rng(0).normal(size=(50, 2))
+    >>> model = LSTMRegressor(window=5, max_epochs=1, random_state=0).fit(X, X[:, 0])
+    >>> stream = model.stream()
+    >>> parts = [stream.predict(X[i : i + 7]) for i in range(0, 50, 7)]
+    >>> bool(np.allclose(np.concatenate(parts), model.predict(X), atol=1e-6))
+    True
+    """
+
+    def __init__(self, estimator: SequenceRegressor) -> None:
+        self._estimator = estimator
+        self._past = np.empty((0, estimator.n_features_in_))
+
+    def predict(self, X: Any) -> Array:
+        """Predict the next rows.
+
+        Parameters
+        ----------
+        X : DataFrame or array-like of shape (n_new_samples, n_features)
+            Rows that follow those of the last call.
+
+        Returns
+        -------
+        y : ndarray of shape (n_new_samples,) or (n_new_samples, n_outputs), N m (N if prismatic)
+            Their torque, as ``predict`` of the whole log gives it.
+        """
+        estimator = self._estimator
+        new = validate_data(estimator, X, reset=False, dtype=np.float64)
+        log = np.concatenate([self._past, new])
+        torque = estimator._predict_array(log)[len(self._past) :]
+        last = estimator._keys().segments(log)[-1]
+        # the current window and the one before it; cut at a window's edge, so the grid stays
+        n_windows = (last.stop - last.start) // estimator.window
+        keep_from = last.start + max(0, n_windows - 1) * estimator.window
+        self._past = log[keep_from:]
+        return torque

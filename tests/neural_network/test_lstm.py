@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import pickle
+
+import numpy as np
+import polars as pl
+import pytest
+import torch
+from sklearn.base import clone
+from sklearn.ensemble import BaggingRegressor, ExtraTreesRegressor
+from sklearn.model_selection import GridSearchCV, GroupKFold, cross_val_predict, cross_val_score
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+from sklearn.utils.estimator_checks import parametrize_with_checks
+
+from skidyn.model_selection import TrajectoryKFold
+from skidyn.neural_network import LSTMRegressor, NDLRegressor
+
+SMALL = {"window": 8, "hidden_size": 12, "max_epochs": 15, "random_state": 0}
+
+SEQUENCE = {
+    "check_methods_sample_order_invariance": "the order of rows is time, so it matters",
+    "check_methods_subset_invariance": "a row is predicted from the rows before it as well",
+    "check_sample_weight_equivalence_on_dense_data": (
+        "a removed row is missing from the history of its successors, a row of weight 0 is not"
+    ),
+}
+
+
+@parametrize_with_checks(
+    [
+        LSTMRegressor(window=3, hidden_size=8, max_epochs=40, learning_rate=0.03, random_state=0),
+        NDLRegressor(
+            window=3, hidden_size=8, dropout=0, max_epochs=40, learning_rate=0.03, random_state=0
+        ),
+    ],
+    expected_failed_checks=lambda estimator: SEQUENCE,
+)
+def test_scikit_learn_contract(estimator, check):
+    check(estimator)
+
+
+def test_learns_what_needs_memory(make_log):
+    X, y = make_log(n_trajectories=18)
+    cv = TrajectoryKFold(2)
+    model = LSTMRegressor(**SMALL | {"max_epochs": 40, "learning_rate": 0.02})
+    recurrent = cross_val_score(model, X, y, cv=cv).mean()
+    static = cross_val_score(ExtraTreesRegressor(20, random_state=0), X, y, cv=cv).mean()
+    assert recurrent > 0.95 and 1 - recurrent < 0.5 * (1 - static)
+
+
+def test_prediction_depends_on_the_past_of_the_segment_alone(log):
+    X, y = log
+    model = LSTMRegressor(**SMALL).fit(X, y)
+    whole = model.predict(X)
+    assert whole.dtype == np.float64 and whole.shape == y.shape
+    for n in (1, 60, 121, 500):
+        np.testing.assert_allclose(model.predict(X[:n]), whole[:n], atol=1e-6)
+    alone = X["trajectory"] == 3
+    np.testing.assert_allclose(model.predict(X[alone]), whole[alone], atol=1e-6)
+    # a gap in time separates as a new trajectory number does
+    gap = X[X["trajectory"] == 0].copy()
+    gap.loc[60:, "time"] += 9.0
+    np.testing.assert_allclose(model.predict(gap)[60:], model.predict(gap[60:]), atol=1e-6)
+
+
+@pytest.mark.parametrize("step", [1, 5, 8, 37])
+def test_stream_gives_the_numbers_of_the_whole_log(log, step):
+    X, y = log
+    model = LSTMRegressor(**SMALL | {"max_epochs": 2}).fit(X, y)
+    X = X[:260]
+    stream = model.stream()
+    parts = [stream.predict(X[i : i + step]) for i in range(0, len(X), step)]
+    np.testing.assert_allclose(np.concatenate(parts), model.predict(X), atol=1e-5)
+    assert len(stream._past) <= 3 * model.window
+
+
+def test_bit_equal_for_any_number_of_processes_and_global_state_untouched(log):
+    X, y = log[0].to_numpy(), log[1]
+    member = NDLRegressor(**SMALL | {"max_epochs": 2}, trajectory=0, time=1, resample="trajectory")
+    before = torch.get_rng_state()
+    one, two = (
+        BaggingRegressor(member, 2, bootstrap=False, random_state=0, n_jobs=n).fit(X, y).predict(X)
+        for n in (1, 2)
+    )
+    np.testing.assert_array_equal(one, two)
+    assert torch.equal(before, torch.get_rng_state())
+
+
+def test_rows_of_weight_zero_are_not_learned_but_read(log):
+    X, y = log
+    spoiled = y.copy()
+    out = (X["trajectory"] >= 6).to_numpy()
+    spoiled[out] += 1000.0
+    model = LSTMRegressor(**SMALL)
+    weighted = clone(model).fit(X, spoiled, sample_weight=(~out).astype(float))
+    assert np.abs(weighted.predict(X) - y).mean() < 1.0
+
+
+def test_early_stopping_holds_trajectories_out_and_keeps_the_best(log):
+    X, y = log
+    model = LSTMRegressor(**SMALL | {"max_epochs": 200}, early_stopping=True, n_iter_no_change=3)
+    model.fit(X[::3], np.random.default_rng(0).normal(size=(len(X[::3]), 2)))
+    assert model.n_iter_ == len(model.validation_curve_) < 200
+    one = X["trajectory"] == 0
+    assert model.fit(X[one], y[one]).n_iter_ > 0
+    with pytest.raises(ValueError, match="too few"):
+        model.fit(X[:1], y[:1])
+
+
+def test_tables_pipelines_and_searches(log):
+    X, y = log
+    model = LSTMRegressor(**SMALL | {"max_epochs": 3})
+    expected = model.fit(X, y).predict(X)
+    polars = pl.from_pandas(X)
+    np.testing.assert_array_equal(clone(model).fit(polars, y).predict(polars), expected)
+    by_position = model.set_params(trajectory=0, time=1).fit(X.to_numpy(), y)
+    np.testing.assert_array_equal(by_position.predict(X.to_numpy()), expected)
+    assert "LSTMRegressor" in model._repr_html_()
+    pipeline = make_pipeline(StandardScaler().set_output(transform="pandas"), clone(model))
+    pipeline.set_params(lstmregressor__trajectory="trajectory", lstmregressor__time=None)
+    search = GridSearchCV(pipeline, {"lstmregressor__window": [2, 8]}, cv=TrajectoryKFold(2))
+    assert search.fit(X, y).best_params_["lstmregressor__window"] in (2, 8)
+    by_group = cross_val_predict(pipeline, X, y, cv=GroupKFold(2), groups=X["trajectory"])
+    np.testing.assert_array_equal(
+        by_group, cross_val_predict(pipeline, X, y, cv=TrajectoryKFold(2))
+    )
+
+
+def test_one_network_per_joint_ignores_the_other_joints(log):
+    X, y = log
+    model = LSTMRegressor(**SMALL | {"max_epochs": 3}, per_joint=True)
+    both = model.fit(X, y).predict(X)
+    first = clone(model).fit(X, y * [1.0, -7.0]).predict(X)
+    np.testing.assert_array_equal(both[:, 0], first[:, 0])
+
+
+def test_stored_as_plain_arrays(log):
+    X, y = log
+    model = NDLRegressor(**SMALL | {"max_epochs": 2}, per_joint=True).fit(X, y)
+    expected = model.predict(X)
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(model)).predict(X), expected)
+    skops = pytest.importorskip("skops.io")
+    text = skops.dumps(model)
+    types = skops.get_untrusted_types(data=text)
+    assert all(name.startswith("skidyn.") for name in types)
+    np.testing.assert_array_equal(skops.loads(text, trusted=types).predict(X), expected)
+
+
+def test_callback_follows_every_epoch_and_can_stop(log):
+    callback = pytest.importorskip("sklearn.callback")
+    epochs = []
+
+    class StopAfterTwo:
+        def setup(self, estimator, context): ...
+        def teardown(self, estimator, context): ...
+        def on_fit_task_begin(self, estimator, context, **kwargs): ...
+
+        def on_fit_task_end(self, estimator, context, **kwargs):
+            epochs.append(context.task_name)
+            return len(epochs) == 2
+
+    assert isinstance(StopAfterTwo(), callback.FitCallback)
+    model = LSTMRegressor(**SMALL).set_callbacks(StopAfterTwo()).fit(*log)
+    assert model.n_iter_ == 2 and epochs == ["epoch", "epoch", "fit"]
+
+
+def test_divergence_is_an_error(log):
+    X, y = log
+    with pytest.raises(ValueError, match="lower learning_rate"):
+        LSTMRegressor(**SMALL | {"learning_rate": 1e30}).fit(X, y)
