@@ -5,6 +5,7 @@
 #   make test   run the tests
 #   make lint   ruff, codespell, mypy and the documentation build with warnings as errors
 #   make docs   build the documentation into docs/_build/html
+#   make wheel  build a wheel into dist/ and check that it holds the whole package
 #   make clean  remove what these targets made
 #
 # Choose another build of torch with, for example, `make demo TORCH=torch`.
@@ -23,7 +24,7 @@ export MKL_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export MPLBACKEND ?= Agg
 
-.PHONY: demo test lint format docs clean
+.PHONY: demo test lint format docs wheel clean
 
 demo: $(VENV)/.demo
 	$(BIN)/python -m skidyn demo
@@ -43,6 +44,11 @@ format: $(VENV)/.lint
 
 docs: $(VENV)/.docs
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
+
+wheel: $(VENV)/.torch
+	rm -rf build dist
+	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
+	$(BIN)/python .ci/check_wheel.py dist/skidyn-*.whl
 
 clean:
 	rm -rf $(VENV) build dist docs/_build docs/gallery docs/api
