@@ -26,3 +26,7 @@ class RobotDescriptionError(SkidynError):
 
 class LogWarning(UserWarning):
     """A log can be used, but something about it looks wrong; the message holds the evidence."""
+
+
+class RobotDescriptionWarning(UserWarning):
+    """A URDF can be used, but something in it is physically impossible."""

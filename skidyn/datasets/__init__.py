@@ -3,5 +3,24 @@
 
 from skidyn.datasets._log import read_log
 from skidyn.datasets._log_quality import JointQuality, LogQuality, check_log
+from skidyn.datasets._robots import (
+    load_panda,
+    load_planar_arm,
+    load_scara,
+    load_srs_arm,
+    load_ur5,
+    load_ur10e,
+)
 
-__all__ = ["JointQuality", "LogQuality", "check_log", "read_log"]
+__all__ = [
+    "JointQuality",
+    "LogQuality",
+    "check_log",
+    "load_panda",
+    "load_planar_arm",
+    "load_scara",
+    "load_srs_arm",
+    "load_ur5",
+    "load_ur10e",
+    "read_log",
+]

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Run a tape with NumPy on many samples at once.
+
+A program is bound once to fixed buffers: one contiguous row of ``chunk`` samples per live value, and
+a list of ufunc calls that write into them. Rows are re-used as soon as their value is dead, so that
+a chunk stays in the cache; samples run along the last axis, so that every call is one contiguous
+loop.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from skidyn._exceptions import SkidynError
+from skidyn.rigid_body._recursion import Program
+from skidyn.rigid_body._tape import Node, operands
+
+_UFUNCS: dict[str, Callable] = {
+    "add": np.add,
+    "sub": np.subtract,
+    "mul": np.multiply,
+    "neg": np.negative,
+    "sin": np.sin,
+    "cos": np.cos,
+}
+
+
+class BoundProgram:
+    """A program with its buffers for chunks of a fixed size.
+
+    Attributes
+    ----------
+    inputs : dict of str to ndarray of shape (n, chunk)
+        To be filled before :meth:`run`; ``"parameter"`` has shape (n, 1).
+    outputs : ndarray of shape ``program.shape + (chunk,)``
+        Filled by :meth:`run`; entries that vanish for every motion stay zero.
+    """
+
+    def __init__(self, program: Program, chunk: int, dtype: np.dtype) -> None:
+        self.chunk = chunk
+        self.dtype = dtype
+        self.outputs = np.zeros((*program.shape, chunk), dtype)
+        self._nodes = program.tape.nodes
+        self._live = program.tape.live(program.outputs.values())
+        self.inputs = self._input_buffers()
+        self._values: dict[int, np.ndarray] = {}
+        self._uniform_calls: list[tuple[Callable, tuple]] = []
+        self._calls: list[tuple[Callable, tuple]] = []
+        self._bind(program)
+
+    def _input_buffers(self) -> dict[str, np.ndarray]:
+        sizes: dict[str, int] = {}
+        for index in self._live:
+            if self._nodes[index][0] == "input":
+                _, name, position = self._nodes[index]
+                sizes[name] = max(sizes.get(name, 0), position + 1)
+        return {
+            name: np.zeros((size, 1 if name == "parameter" else self.chunk), self.dtype)
+            for name, size in sizes.items()
+        }
+
+    def _bind(self, program: Program) -> None:
+        """Give every live value a row and list the calls that fill the rows."""
+        uniform = self._uniform()
+        targets: dict[int, np.ndarray] = {}
+        copies: list[tuple[np.ndarray, int]] = []
+        for key, scalar in program.outputs.items():
+            row = self.outputs[key]
+            computed = self._nodes[scalar.index][0] not in ("input", "constant")
+            if computed and scalar.index not in uniform and scalar.index not in targets:
+                targets[scalar.index] = row
+            else:
+                copies.append((row, scalar.index))
+        last_use = {i: index for index in self._live for i in operands(self._nodes[index])}
+        free: list[np.ndarray] = []
+        for index in self._live:
+            node = self._nodes[index]
+            if index in uniform or node[0] == "input":
+                self._values[index] = self._leaf(node)
+                continue
+            arguments = tuple(self._values[i] for i in operands(node))
+            for i in set(operands(node)):
+                if last_use[i] == index and i not in uniform and i not in targets:
+                    if self._nodes[i][0] != "input":
+                        free.append(self._values[i])
+            row = targets.get(index)
+            if row is None:
+                row = free.pop() if free else np.empty(self.chunk, self.dtype)
+            self._values[index] = row
+            self._calls.append((_UFUNCS[node[0]], (*arguments, row)))
+        for row, index in copies:
+            self._calls.append((np.copyto, (row, self._values[index])))
+
+    def _uniform(self) -> set[int]:
+        """Values that are the same for every sample: constants and functions of parameters."""
+        uniform: set[int] = set()
+        for index in self._live:
+            node = self._nodes[index]
+            if node[0] == "constant" or node[:2] == ("input", "parameter"):
+                uniform.add(index)
+            elif operands(node) and uniform.issuperset(operands(node)):
+                uniform.add(index)
+        return uniform
+
+    def _leaf(self, node: Node) -> np.ndarray:
+        if node[0] == "constant":
+            return np.array([node[1]], self.dtype)
+        if node[0] == "input":
+            return self.inputs[node[1]][node[2]]
+        value = np.empty(1, self.dtype)
+        arguments = tuple(self._values[i] for i in operands(node))
+        self._uniform_calls.append((_UFUNCS[node[0]], (*arguments, value)))
+        return value
+
+    def set_parameters(self, parameters: np.ndarray) -> None:
+        """Set the inertial parameters, shape (n_bodies, 10)."""
+        buffer = self.inputs.get("parameter")
+        if buffer is not None:
+            buffer[:, 0] = parameters.ravel()[: len(buffer)]
+            for function, arguments in self._uniform_calls:
+                function(*arguments)
+
+    def run(self, signals: dict[str, np.ndarray], rows: slice) -> int:
+        """Evaluate the outputs at some rows of the signals; the number of rows is returned."""
+        size = 0
+        for name, values in signals.items():
+            buffer = self.inputs.get(name)
+            part = values[rows]
+            size = len(part)
+            if buffer is not None:
+                buffer[:, :size] = part.T[: len(buffer)]
+        for function, arguments in self._calls:
+            function(*arguments)
+        return size
+
+
+def chunk_size(n_samples: int, limit: int) -> int:
+    """Power of two that holds the samples, at most ``limit``: small calls get small buffers."""
+    size = 64
+    while size < min(n_samples, limit):
+        size *= 2
+    return min(size, limit)
+
+
+def evaluate_rows(
+    bound: BoundProgram,
+    signals: dict[str, np.ndarray],
+    n_samples: int,
+    out: np.ndarray | None = None,
+) -> np.ndarray:
+    """All outputs with the samples first, shape ``(n_samples, *program.shape)``.
+
+    The memory keeps the samples last; what is returned is a view.
+    """
+    shape = (*bound.outputs.shape[:-1], n_samples)
+    if out is not None and (out.shape != shape or out.dtype != bound.dtype):
+        raise SkidynError(
+            f"out has shape {out.shape} and type {out.dtype}; expected {shape} of {bound.dtype}."
+        )
+    result = np.empty(shape, bound.dtype) if out is None else out
+    for start in range(0, n_samples, bound.chunk):
+        rows = slice(start, min(start + bound.chunk, n_samples))
+        size = bound.run(signals, rows)
+        result[..., rows] = bound.outputs[..., :size]
+    return np.moveaxis(result, -1, 0)

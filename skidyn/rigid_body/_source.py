@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Write a tape as straight-line program text, for Python and for C."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+from skidyn.rigid_body._recursion import Program
+from skidyn.rigid_body._tape import operands
+
+_OPERATORS = {"add": "+", "sub": "-", "mul": "*"}
+
+#: Name of an input in the generated text, for example ``q[3]``.
+InputName = Callable[[str, int], str]
+
+
+def subscript(name: str, position: int) -> str:
+    """Input as an element of an array of that name."""
+    return f"{name}[{position}]"
+
+
+def statements(
+    program: Program, *, input_name: InputName = subscript, prefix: str = "", suffix: str = ""
+) -> tuple[list[str], dict[tuple[int, ...], str]]:
+    """Assignments that compute the outputs, and the expression of every output.
+
+    Parameters
+    ----------
+    program : Program
+    input_name : callable, default=subscript
+        Text of the input ``(name, position)``.
+    prefix, suffix : str, default=""
+        Written before and after every assignment, such as ``"double "`` and ``";"``.
+
+    Returns
+    -------
+    lines : list of str
+    outputs : dict of tuple to str
+        Variable or number that holds each output.
+    """
+    nodes = program.tape.nodes
+    names: dict[int, str] = {}
+    lines = []
+    for index in program.tape.live(program.outputs.values()):
+        node = nodes[index]
+        if node[0] == "constant":
+            # Parentheses keep "a - -1.5" readable and legal everywhere.
+            names[index] = repr(node[1]) if node[1] >= 0 else f"({node[1]!r})"
+            continue
+        if node[0] == "input":
+            names[index] = input_name(node[1], node[2])
+            continue
+        terms = [names[i] for i in operands(node)]
+        if node[0] == "neg":
+            text = f"-{terms[0]}"
+        elif node[0] in ("sin", "cos"):
+            text = f"{node[0]}({terms[0]})"
+        else:
+            text = f"{terms[0]} {_OPERATORS[node[0]]} {terms[1]}"
+        names[index] = f"v{index}"
+        lines.append(f"{prefix}{names[index]} = {text}{suffix}")
+    return lines, {key: names[scalar.index] for key, scalar in program.outputs.items()}
+
+
+def renumber(lines: list[str]) -> list[str]:
+    """Number the variables ``v..`` of generated lines from 0, without gaps."""
+    numbers: dict[str, str] = {}
+
+    def rename(match: re.Match) -> str:
+        return numbers.setdefault(match.group(), f"v{len(numbers)}")
+
+    return [re.sub(r"\bv\d+\b", rename, line) for line in lines]

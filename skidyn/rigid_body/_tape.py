@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Symbolic scalars that record arithmetic on a tape and simplify it as it is written down.
+
+A rigid-body recursion is written once, in ordinary Python arithmetic, and run on these scalars. What
+is left on the tape is the recursion of one particular robot: products with 0 and 1 are gone, no
+expression is computed twice, and what does not reach an output is dropped when the tape is read
+(:meth:`Tape.live`). The back ends (NumPy, torch, Python text, C text) only read tapes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable
+
+#: One entry of a tape: the operation and its operands. Operands are indices of earlier entries,
+#: except for ``("input", name, index)`` and ``("constant", value)``.
+Node = tuple
+
+UNARY = frozenset({"neg", "sin", "cos"})
+BINARY = frozenset({"add", "sub", "mul"})
+
+
+class Tape:
+    """A growing list of operations without repetitions.
+
+    Examples
+    --------
+    >>> tape = Tape()
+    >>> x = tape.input("x")
+    >>> y = 0.0 * x + (x + 1.0) * (1.0 + x)
+    >>> [tape.nodes[i][0] for i in tape.live([y])]
+    ['input', 'constant', 'add', 'mul']
+    """
+
+    def __init__(self) -> None:
+        self.nodes: list[Node] = []
+        self._index: dict[Node, int] = {}
+
+    def record(self, *node: Hashable) -> Scalar:
+        """Scalar of a node; a node recorded before is reused (common subexpressions)."""
+        index = self._index.get(node)
+        if index is None:
+            index = self._index[node] = len(self.nodes)
+            self.nodes.append(node)
+        return Scalar(self, index)
+
+    def input(self, name: str, index: int = 0) -> Scalar:
+        """Scalar that a back end fills in, such as ``("q", 3)``."""
+        return self.record("input", name, index)
+
+    def constant(self, value: float) -> Scalar:
+        """Scalar with a fixed value."""
+        return self.record("constant", float(value) + 0.0)  # -0.0 and 0.0 are one node
+
+    def live(self, outputs: Iterable[Scalar]) -> list[int]:
+        """Indices of all nodes that the outputs need, operands before their users."""
+        needed: set[int] = set()
+        stack = [output.index for output in outputs]
+        while stack:
+            index = stack.pop()
+            if index not in needed:
+                needed.add(index)
+                stack.extend(operands(self.nodes[index]))
+        return sorted(needed)
+
+
+def operands(node: Node) -> tuple[int, ...]:
+    """Indices of the nodes that a node is computed from."""
+    return node[1:] if node[0] in BINARY or node[0] in UNARY else ()
+
+
+class Scalar:
+    """A number on a tape; arithmetic with it records operations."""
+
+    __slots__ = ("index", "tape")
+
+    def __init__(self, tape: Tape, index: int) -> None:
+        self.tape = tape
+        self.index = index
+
+    @property
+    def node(self) -> Node:
+        """The entry of the tape."""
+        return self.tape.nodes[self.index]
+
+    @property
+    def value(self) -> float | None:
+        """The value of a constant, None for anything else."""
+        node = self.node
+        return node[1] if node[0] == "constant" else None
+
+    def is_zero(self) -> bool:
+        """Whether the scalar is known to vanish."""
+        return self.value == 0.0
+
+    def _other(self, other: Scalar | float) -> Scalar:
+        return other if isinstance(other, Scalar) else self.tape.constant(other)
+
+    def _operand(self) -> Scalar:
+        """The only operand of a negation."""
+        return Scalar(self.tape, self.node[1])
+
+    def __neg__(self) -> Scalar:
+        if self.value is not None:
+            return self.tape.constant(-self.value)
+        if self.node[0] == "neg":
+            return self._operand()
+        if self.node[0] == "sub":
+            return Scalar(self.tape, self.node[2]) - Scalar(self.tape, self.node[1])
+        return self.tape.record("neg", self.index)
+
+    def __add__(self, other: Scalar | float) -> Scalar:
+        other = self._other(other)
+        if self.value is not None and other.value is not None:
+            return self.tape.constant(self.value + other.value)
+        if self.is_zero():
+            return other
+        if other.is_zero():
+            return self
+        if other.node[0] == "neg":
+            return self - other._operand()
+        if self.node[0] == "neg":
+            return other - self._operand()
+        return self.tape.record("add", *sorted((self.index, other.index)))
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Scalar | float) -> Scalar:
+        other = self._other(other)
+        if self.value is not None and other.value is not None:
+            return self.tape.constant(self.value - other.value)
+        if other.is_zero():
+            return self
+        if self.is_zero():
+            return -other
+        if self.index == other.index:
+            return self.tape.constant(0.0)
+        if other.node[0] == "neg":
+            return self + other._operand()
+        if self.node[0] == "neg":
+            return -(self._operand() + other)
+        return self.tape.record("sub", self.index, other.index)
+
+    def __rsub__(self, other: float) -> Scalar:
+        return self._other(other) - self
+
+    def __mul__(self, other: Scalar | float) -> Scalar:
+        other = self._other(other)
+        if self.value is not None and other.value is not None:
+            return self.tape.constant(self.value * other.value)
+        for factor, rest in ((self, other), (other, self)):
+            if factor.value == 0.0:
+                return factor
+            if factor.value == 1.0:
+                return rest
+            if factor.value == -1.0:
+                return -rest
+            if factor.node[0] == "neg":
+                return -(factor._operand() * rest)
+        return self.tape.record("mul", *sorted((self.index, other.index)))
+
+    __rmul__ = __mul__
+
+    def sin(self) -> Scalar:
+        """Sine of an angle in rad."""
+        return self.tape.record("sin", self.index)
+
+    def cos(self) -> Scalar:
+        """Cosine of an angle in rad."""
+        return self.tape.record("cos", self.index)
