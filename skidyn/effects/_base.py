@@ -120,9 +120,11 @@ class Effect:
         What enters nonlinearly.
     scope : {"joint", "pair", "robot"}
         Where it acts.
-    search : {"grid", "spectrum", "trajectories"}
-        How its shape is found: on a grid, as a line in the spectrum over joint angle, or as a
-        split of the trajectories into those that have it and those that do not.
+    search : {"grid", "spectrum", "trajectories", "clock"}
+        How its shape is found: on a grid, as a line in the spectrum over joint angle or over time,
+        or as a split of the trajectories into those that have it and those that do not.
+    nameless : bool
+        Whether it stands for something no name of the vocabulary describes (``unknown``).
     family : str
         Effects of one family are often told apart only by special motion (``"hysteresis"``).
     needs : tuple of str
@@ -157,7 +159,8 @@ class Effect:
     coefficients: ClassVar[tuple[Coefficient, ...]] = ()
     shapes: ClassVar[tuple[Shape, ...]] = ()
     scope: ClassVar[Scope] = "joint"
-    search: ClassVar[Literal["grid", "spectrum", "trajectories"]] = "grid"
+    search: ClassVar[Literal["grid", "spectrum", "trajectories", "clock"]] = "grid"
+    nameless: ClassVar[bool] = False
     family: ClassVar[str] = ""
     needs: ClassVar[tuple[str, ...]] = ()
     simplicity: ClassVar[int] = 50

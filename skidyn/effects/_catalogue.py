@@ -20,6 +20,7 @@ from skidyn.effects._gravity import BaseTilt
 from skidyn.effects._hysteresis import Dahl, LuGre, MaxwellSlip
 from skidyn.effects._inertia import RotorInertia
 from skidyn.effects._load import LoadDependentFriction
+from skidyn.effects._nameless import NAMELESS
 from skidyn.effects._position import PositionDependentFriction, TorqueRipple
 from skidyn.effects._sensor import Saturation, TimeDelay, TorqueGain
 from skidyn.effects._springs import EndStop, GravityCompensator, NonlinearSpring, Offset, Spring
@@ -61,14 +62,14 @@ _CLASSES: tuple[type[Effect], ...] = (
     ExternalWrench,
     EnvironmentContact,
 )
-_CATALOGUE: dict[str, Effect] = {cls.kind: cls() for cls in _CLASSES}
+_CATALOGUE: dict[str, Effect] = {cls.kind: cls() for cls in (*_CLASSES, *NAMELESS)}
 
 #: What users may write for a term: a kind, a kind with joints counted from 1, or a Term.
 TermSpec = str | tuple[str, Sequence[int]] | Term
 
 
 def list_effects() -> list[str]:
-    """Kinds of the catalogue.
+    """Kinds of the catalogue, without the nameless functions that stand for ``unknown``.
 
     Returns
     -------
@@ -79,7 +80,7 @@ def list_effects() -> list[str]:
     >>> "dahl" in list_effects()
     True
     """
-    return list(_CATALOGUE)
+    return [kind for kind, effect in _CATALOGUE.items() if not effect.nameless]
 
 
 def get_effect(kind: str) -> Effect:
@@ -108,6 +109,11 @@ def get_effect(kind: str) -> Effect:
         return _CATALOGUE[kind]
     except KeyError:
         raise EffectError(f"no effect {kind!r}; the catalogue has {', '.join(_CATALOGUE)}") from None
+
+
+def nameless_kinds() -> list[str]:
+    """Nameless functions that the diagnosis tries when no name fits."""
+    return [kind for kind, effect in _CATALOGUE.items() if effect.nameless]
 
 
 def register_effect(effect: Effect | type[Effect]) -> None:

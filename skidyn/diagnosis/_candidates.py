@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Candidates: terms of the catalogue, and nameless functions of the signals, with their rows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from skidyn._signals import Array
+from skidyn.diagnosis._problem import Problem
+from skidyn.effects import Term, get_effect
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """Something that might be missing.
+
+    Attributes
+    ----------
+    kind : str
+        Kind of the effect, ``"unknown"`` for a nameless function.
+    term : Term
+        Term that would be added.
+    rows : dict of int to ndarray of shape (n_rows_j, n_coefficients)
+        Averaged columns, per joint it reaches.
+    variables : tuple of str
+        Signals a nameless function depends on.
+    n_shapes : int
+        Shape parameters that are refined; they count as parameters.
+    """
+
+    kind: str
+    term: Term
+    rows: dict[int, Array]
+    variables: tuple[str, ...] = ()
+    n_shapes: int = 0
+    columns: dict[int, Array] = field(default_factory=dict, repr=False)
+
+    @property
+    def width(self) -> int:
+        """Number of coefficients."""
+        return next(iter(self.rows.values())).shape[1]
+
+    @property
+    def joints(self) -> tuple[int, ...]:
+        """Joints of the term, from 0."""
+        return self.term.joints
+
+    @property
+    def site(self) -> tuple[str, tuple[int, ...]]:
+        """Kind and joints: what can be added once."""
+        return self.kind, self.term.joints
+
+
+def catalogue_candidates(problem: Problem, kinds: Iterable[str]) -> list[Candidate]:
+    """Terms on the grid of every kind that this data can show and the model lacks.
+
+    Parameters
+    ----------
+    problem : Problem
+        With the load and model torque of the current fit.
+    kinds : iterable of str
+        Kinds of the catalogue.
+
+    Returns
+    -------
+    list of Candidate
+    """
+    present = {(term.kind, term.joints) for term in problem.terms}
+    candidates = []
+    for kind in kinds:
+        effect = get_effect(kind)
+        if effect.search != "grid" or ("robot" in effect.needs and problem.robot is None):
+            continue
+        if "load" in effect.needs and problem.robot is None:
+            continue
+        for joints in effect.sites(problem.signals):
+            hidden = [effect.not_shown(problem.signals, j) for j in joints]
+            # An effect of the whole robot shows as soon as one joint shows it.
+            if (kind, joints) in present or all(hidden) or (len(joints) < 3 and any(hidden)):
+                continue
+            for shape in effect.grid(problem.signals, joints):
+                term = Term(kind, joints, shape)
+                rows = problem.term_rows(term)
+                candidates.append(Candidate(kind, term, rows, n_shapes=len(effect.shapes)))
+    return candidates

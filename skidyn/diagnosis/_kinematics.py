@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Position, velocity and acceleration from logged positions, smoothed alike and without delay."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.signal import savgol_filter
+
+from skidyn._signals import Array, Signals
+
+#: Order of the local polynomial; quartic keeps accelerations unbiased over the window.
+ORDER = 4
+#: Highest cut-off in Hz, and the largest share of the sampling rate.
+HIGHEST_CUTOFF, CUTOFF_SHARE = 32.0, 0.3
+#: Relative spread of time steps above which positions are interpolated to an even grid first.
+EVEN_STEPS = 1e-3
+
+
+@dataclass(frozen=True)
+class SmoothedMotion:
+    """Smoothed motion and where it can be trusted.
+
+    Attributes
+    ----------
+    signals : Signals
+        With smoothed q, dq and ddq.
+    valid : ndarray of shape (n_samples,) of bool
+        False near the ends of a segment, where the polynomial is one-sided.
+    half_width : int
+        Half the width of the smoothing window, in samples.
+    cutoff : float
+        Cut-off of the smoother in Hz.
+    rate : float
+        Sampling rate in Hz.
+    """
+
+    signals: Signals
+    valid: NDArray[np.bool_]
+    half_width: int
+    cutoff: float
+    rate: float
+
+
+def sampling_rate(signals: Signals) -> float:
+    """Median sampling rate in Hz (1 where no time is logged)."""
+    steps = np.concatenate([np.diff(signals.clock[rows]) for rows in signals.segments])
+    steps = steps[steps > 0]
+    return 1.0 / float(np.median(steps)) if len(steps) else 1.0
+
+
+def smooth_motion(signals: Signals, cutoff: float | None = None) -> SmoothedMotion:
+    """Replace q, dq and ddq by a zero-phase local polynomial fit to the positions.
+
+    Parameters
+    ----------
+    signals : Signals
+        Logged motion; dq and ddq are not used.
+    cutoff : float, Hz, optional
+        Cut-off; by default 30 % of the sampling rate, at most 32 Hz.
+
+    Returns
+    -------
+    SmoothedMotion
+    """
+    rate = sampling_rate(signals)
+    cutoff = min(HIGHEST_CUTOFF, CUTOFF_SHARE * rate) if cutoff is None else cutoff
+    # Cut-off of a Savitzky-Golay filter of this order and half width (Schafer 2011, IEEE SPM 28).
+    half = int(np.clip(round(((ORDER + 1) / (2 * cutoff / rate) + 4.6) / 3.2), 4, 60))
+    q, dq, ddq = (np.array(x, dtype=float) for x in (signals.q, signals.dq, signals.ddq))
+    valid = np.ones(signals.n_samples, dtype=bool)
+    edge = max(2, half // 2)
+    for rows in signals.segments:
+        if rows.stop - rows.start <= 2 * half + 1:
+            valid[rows] = False  # too short to smooth; kept as logged, and not used
+            continue
+        q[rows], dq[rows], ddq[rows] = _local_polynomial(
+            signals.clock[rows], signals.q[rows], rate, half
+        )
+        valid[rows.start : rows.start + edge] = False
+        valid[rows.stop - edge : rows.stop] = False
+    smoothed = signals.with_(q=q, dq=dq, ddq=ddq)
+    return SmoothedMotion(smoothed, valid, half, cutoff, rate)
+
+
+def _local_polynomial(time: Array, q: Array, rate: float, half: int) -> list[Array]:
+    """Smoothed position and its two derivatives at the given times."""
+    step = 1.0 / rate
+    # Times that are equal or step back cannot be interpolated over; they belong to data checks.
+    even = np.ptp(np.diff(time)) < EVEN_STEPS * step or np.any(np.diff(time) <= 0)
+    grid = time if even else np.arange(time[0], time[-1] + step / 2, step)
+    values = q if even else CubicSpline(time, q)(grid)
+    smoothed = [
+        savgol_filter(values, 2 * half + 1, ORDER, deriv=k, delta=step, axis=0) for k in range(3)
+    ]
+    if even:
+        return smoothed
+    inside = np.clip(time, grid[0], grid[-1])
+    return [CubicSpline(grid, x)(inside) for x in smoothed]

@@ -1,0 +1,361 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The regression problem behind a diagnosis: rows, folds, the model so far and its fit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve, qr
+
+from skidyn._signals import Array, Signals
+from skidyn.diagnosis._kinematics import SmoothedMotion, smooth_motion
+from skidyn.effects import Term, get_effect
+from skidyn.evidence._rows import Rows, sliding_samples, window_rows
+from skidyn.robots import Robot
+
+#: Columns of the rigid body weaker than this (relative, after pivoting) are dependent on others.
+RANK_TOLERANCE = 2e-6
+#: Diagonal added to normalised normal equations, far below any information in the data.
+RIDGE = 1e-9
+#: Folds: whole trajectories where there are more than this many, else blocks of them.
+FEW_TRAJECTORIES, FEWEST_BLOCKS, MOST_FOLDS = 6, 8, 20
+#: Share of the smoother's half width that is left out around rest and reversals.
+MARGIN = 0.75
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A weighted least-squares fit of the model with some terms.
+
+    Attributes
+    ----------
+    terms : tuple of Term
+        Terms beside the rigid body, in the order of the coefficients.
+    coefficients : ndarray of shape (n_coefficients,)
+        First the rigid body's independent parameters, then those of the terms.
+    covariance : ndarray of shape (n_coefficients, n_coefficients)
+        For independent rows of unit weight; inflate it for autocorrelation.
+    residual : list of ndarray of shape (n_rows_j,)
+        Residual of the averaged rows of every joint, N m or N.
+    sigma : ndarray of shape (n_joints,)
+        Noise of one row of every joint, by which the rows were weighted.
+    """
+
+    terms: tuple[Term, ...]
+    coefficients: Array
+    covariance: Array
+    residual: list[Array]
+    sigma: Array
+
+    @property
+    def noise(self) -> Array:
+        """Root mean square of the residual rows of every joint."""
+        return np.array([np.sqrt(np.mean(r**2)) + 1e-300 if len(r) else 1.0 for r in self.residual])
+
+
+@dataclass
+class Problem:
+    """Torque to be explained by a rigid body and terms, as averaged rows.
+
+    Attributes
+    ----------
+    robot : Robot or None
+        Its rigid body is part of the model when ``rigid_body`` is True.
+    motion : SmoothedMotion
+        Smoothed motion.
+    signals : Signals
+        Motion with the load and model torque of the current fit.
+    torque : ndarray of shape (n_samples, n_joints)
+        Measured torque, less what a fixed model explains.
+    terms : tuple of Term
+        Effects that the user's model has already.
+    rows : Rows
+        Averaging windows.
+    fold : list of ndarray
+        Fold of every row, per joint; rows are sorted by it.
+    n_folds : int
+        Number of folds.
+    whole_trajectories : bool
+        Whether folds are whole trajectories.
+    rigid_body : bool
+        Whether rigid-body parameters are identified together with the effects.
+    """
+
+    robot: Robot | None
+    motion: SmoothedMotion
+    signals: Signals
+    torque: Array
+    terms: tuple[Term, ...]
+    rows: Rows
+    fold: list[NDArray[np.int64]]
+    n_folds: int
+    whole_trajectories: bool
+    rigid_body: bool
+    rigid_index: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    rigid_rows: list[Array] = field(default_factory=list)
+    _cache: dict[Term, dict[int, Array]] = field(default_factory=dict, repr=False)
+
+    @property
+    def n_joints(self) -> int:
+        """Number of joints."""
+        return self.signals.n_joints
+
+    @property
+    def target(self) -> list[Array]:
+        """Averaged torque of every joint."""
+        return [self.rows.average(self.torque[:, j], j) for j in range(self.n_joints)]
+
+    def term_rows(self, term: Term) -> dict[int, Array]:
+        """Averaged columns of a term, per joint it reaches."""
+        if term not in self._cache:
+            self._cache[term] = self.average(term_columns(self.signals, term))
+        return self._cache[term]
+
+    def average(self, columns: dict[int, Array]) -> dict[int, Array]:
+        """Averaged rows of columns given at every sample."""
+        return {j: self.rows.average(block, j) for j, block in columns.items()}
+
+    def design(self, blocks: Sequence[dict[int, Array]]) -> list[Array]:
+        """Rigid-body columns and blocks of columns side by side, per joint."""
+        design = []
+        for j in range(self.n_joints):
+            n_rows = int(self.rows.counts[j])
+            parts = [self.rigid_rows[j]]
+            parts += [b[j] if j in b else np.zeros((n_rows, width(b))) for b in blocks]
+            design.append(np.hstack(parts))
+        return design
+
+    def fit(self, terms: Iterable[Term], sigma: Array | None = None, passes: int = 1) -> Fit:
+        """Weighted least squares of the rigid body and terms.
+
+        Parameters
+        ----------
+        terms : iterable of Term
+            Every effect of the model.
+        sigma : ndarray of shape (n_joints,), optional
+            Noise of one row of every joint; found from a fit of each joint by itself if None.
+        passes : int, default=1
+            Times the noise is estimated anew from the residual and the fit repeated.
+
+        Returns
+        -------
+        Fit
+        """
+        terms = tuple(terms)
+        design = self.design([self.term_rows(t) for t in terms])
+        target = self.target
+        if sigma is None:
+            sigma = np.array([_own_noise(a, y) for a, y in zip(design, target, strict=True)])
+        fit = _weighted(terms, design, target, sigma)
+        for _ in range(passes - 1):
+            fit = _weighted(terms, design, target, fit.noise)
+        return fit
+
+    def inertial_parameters(self, fit: Fit) -> Array | None:
+        """Rigid-body parameters of a fit, zeros for those the data regroups, (n_bodies, 10)."""
+        if self.robot is None or not self.rigid_body:
+            return None if self.robot is None else self.robot.inertial_parameters
+        parameters = np.zeros(10 * self.robot.n_bodies)
+        parameters[self.rigid_index] = fit.coefficients[: len(self.rigid_index)]
+        return parameters.reshape(-1, 10)
+
+    def rigid_torque(self, fit: Fit) -> Array:
+        """Rigid-body torque of a fit at every sample, N m or N."""
+        if self.robot is None:
+            return np.zeros_like(self.torque)
+        s = self.signals
+        return self.robot.inverse_dynamics(
+            s.q, s.dq, s.ddq, parameters=self.inertial_parameters(fit)
+        )
+
+    def term_torque(self, fit: Fit, terms: Iterable[Term] | None = None) -> Array:
+        """Torque of some terms of a fit at every sample, N m or N."""
+        wanted = None if terms is None else set(terms)
+        torque = np.zeros_like(self.torque)
+        at = len(self.rigid_index)
+        for term in fit.terms:
+            k = len(get_effect(term.kind).coefficients)
+            if wanted is None or term in wanted:
+                for j, block in term_columns(self.signals, term).items():
+                    torque[:, j] += block @ fit.coefficients[at : at + k]
+            at += k
+        return torque
+
+    def explained(self, fit: Fit) -> Array:
+        """Torque that a fit explains at every sample, N m or N."""
+        rigid = self.rigid_torque(fit) if self.rigid_body else 0.0
+        return rigid + self.term_torque(fit)
+
+    def with_fit(self, fit: Fit) -> None:
+        """Hand the load and the model torque of a fit to the effects that need them."""
+        load = self.rigid_torque(fit)
+        torque = self.explained(fit)
+        dry = [t for t in fit.terms if t.kind in ("coulomb", "stribeck", "offset")]
+        self.signals = self.signals.with_(
+            load=load,
+            model_torque=torque,
+            smooth_torque=torque - self.term_torque(fit, dry),
+            inertial_parameters=self.inertial_parameters(fit),
+        )
+        self._cache = {
+            term: rows
+            for term, rows in self._cache.items()
+            if not {"load", "model_torque", "robot"} & set(get_effect(term.kind).needs)
+        }
+
+
+def term_columns(signals: Signals, term: Term) -> dict[int, Array]:
+    """Columns of a term at every sample, per joint it reaches."""
+    return get_effect(term.kind).torque_columns(signals, term.joints, **term.shape)
+
+
+def width(block: dict[int, Array]) -> int:
+    """Number of columns of a block."""
+    return next(iter(block.values())).shape[1]
+
+
+def make_problem(
+    signals: Signals,
+    torque: Array,
+    *,
+    robot: Robot | None,
+    rigid_body: bool,
+    terms: Iterable[Term],
+    smooth: bool = True,
+) -> Problem:
+    """Set up rows, folds and rigid-body columns.
+
+    Parameters
+    ----------
+    signals : Signals
+        Logged motion.
+    torque : ndarray of shape (n_samples, n_joints), N m or N
+        Torque to be explained.
+    robot : Robot or None
+        Robot.
+    rigid_body : bool
+        Whether rigid-body parameters are to be identified.
+    terms : iterable of Term
+        Effects of the user's model.
+    smooth : bool, default=True
+        Derive velocity and acceleration from the positions; False takes the given ones.
+
+    Returns
+    -------
+    Problem
+    """
+    motion = smooth_motion(signals)
+    if not smooth:
+        motion = SmoothedMotion(signals, motion.valid, motion.half_width, motion.cutoff, motion.rate)
+    margin = max(1, round(MARGIN * motion.half_width))
+    use = sliding_samples(motion.signals, motion.valid, margin)
+    rows = window_rows(motion.signals, use, motion.rate)
+    rows, fold, n_folds, whole = _folds(rows)
+    problem = Problem(
+        robot,
+        motion,
+        motion.signals.with_(robot=robot),
+        torque,
+        tuple(terms),
+        rows,
+        fold,
+        n_folds,
+        whole,
+        rigid_body and robot is not None,
+    )
+    problem.rigid_rows = [np.zeros((n, 0)) for n in rows.counts]
+    if problem.rigid_body:
+        _add_rigid_body(problem)
+    return problem
+
+
+def _add_rigid_body(problem: Problem) -> None:
+    """Average the torque regressor chunk by chunk and keep its independent columns."""
+    robot, signals = problem.robot, problem.signals
+    assert robot is not None
+    n, p = problem.n_joints, 10 * robot.n_bodies
+    rows = [np.zeros((count, p)) for count in problem.rows.counts]
+    for chunk, regressor in robot.iter_torque_regressor(signals.q, signals.dq, signals.ddq):
+        for j in range(n):
+            rows[j] += problem.rows.weights[j][:, chunk] @ regressor[j].T
+    stacked = np.vstack(rows)
+    size = np.linalg.norm(stacked, axis=0)
+    moved = np.flatnonzero(size > 1e-9 * size.max())
+    triangle, pivots = qr(stacked[:, moved] / size[moved], mode="r", pivoting=True)
+    diagonal = np.abs(np.diag(triangle))
+    rank = int(np.sum(diagonal > RANK_TOLERANCE * diagonal[0]))
+    problem.rigid_index = np.sort(moved[pivots[:rank]])
+    problem.rigid_rows = [block[:, problem.rigid_index] for block in rows]
+
+
+def _folds(rows: Rows) -> tuple[Rows, list[NDArray[np.int64]], int, bool]:
+    """Assign rows to folds and sort them; blocks of few trajectories lose the rows at borders."""
+    names = np.unique(np.concatenate(rows.trajectory))
+    whole = len(names) > FEW_TRAJECTORIES
+    blocks = 1 if whole else max(2, -(-FEWEST_BLOCKS // max(1, len(names))))
+    ends = {}
+    for name in names:
+        times = [t[k == name] for t, k in zip(rows.time, rows.trajectory, strict=True)]
+        times = np.concatenate(times)
+        ends[name] = np.linspace(times.min(), times.max() + 1e-9, blocks + 1)
+    n_folds = min(len(names) * blocks, MOST_FOLDS) if whole else len(names) * blocks
+    fold, order = [], []
+    for time, trajectory in zip(rows.time, rows.trajectory, strict=True):
+        label = np.searchsorted(names, trajectory) * blocks
+        keep = np.ones(len(time), dtype=bool)
+        for name in names:
+            inside = np.flatnonzero(trajectory == name)
+            edges = ends[name][1:-1]
+            label[inside] += np.searchsorted(edges, time[inside], side="right")
+            for edge in edges:
+                near = np.abs(time[inside] - edge) < WINDOW_GUARD
+                keep[inside[near]] = False
+        label = label * n_folds // (len(names) * blocks)
+        index = np.flatnonzero(keep)
+        index = index[np.argsort(label[index], kind="stable")]
+        fold.append(label[index])
+        order.append(index)
+    sorted_rows = Rows(
+        [w.tocsr()[i].tocsc() for w, i in zip(rows.weights, order, strict=True)],
+        [x[i] for x, i in zip(rows.trajectory, order, strict=True)],
+        [x[i] for x, i in zip(rows.time, order, strict=True)],
+        [x[i] for x, i in zip(rows.quarter, order, strict=True)],
+        rows.sliding,
+    )
+    return sorted_rows, fold, n_folds, whole
+
+
+#: Rows whose middle is nearer than this to the border between two blocks are dropped, in s.
+WINDOW_GUARD = 1 / 16
+
+
+def _own_noise(design: Array, target: Array) -> float:
+    """Residual of a joint fitted by itself, which never hides what other joints spoil."""
+    if not len(target):
+        return 1.0
+    size = np.linalg.norm(design, axis=0)
+    used = size > 0
+    scaled = design[:, used] / size[used]
+    solution = np.linalg.lstsq(scaled, target, rcond=1e-7)[0]
+    return float(np.sqrt(np.mean((target - scaled @ solution) ** 2))) + 1e-9
+
+
+def _weighted(
+    terms: tuple[Term, ...], design: list[Array], target: list[Array], sigma: Array
+) -> Fit:
+    a = np.vstack([block / s for block, s in zip(design, sigma, strict=True)])
+    y = np.concatenate([t / s for t, s in zip(target, sigma, strict=True)])
+    size = np.linalg.norm(a, axis=0)
+    size[size == 0] = 1.0
+    gram = (a / size).T @ (a / size) + RIDGE * np.eye(a.shape[1])
+    factor = cho_factor(gram)
+    scaled = cho_solve(factor, (a / size).T @ y)
+    # One refinement step recovers the accuracy that forming the Gram matrix costs.
+    scaled += cho_solve(factor, (a / size).T @ (y - a @ (scaled / size)))
+    coefficients = scaled / size
+    covariance = cho_solve(factor, np.eye(len(size))) / size[:, None] / size
+    residual = [t - block @ coefficients for block, t in zip(design, target, strict=True)]
+    return Fit(terms, coefficients, covariance, residual, np.asarray(sigma, dtype=float))

@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Held-out error of every candidate, with the whole model refitted, from fold Gram matrices.
+
+Leaving a fold out needs no second pass over the rows: its Gram matrix is subtracted. Adding a
+candidate needs no refit of the model: the model's columns are swept out of the candidate's (block
+elimination), so a candidate costs one small solve a fold.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from skidyn._signals import Array
+from skidyn.diagnosis._candidates import Candidate
+from skidyn.diagnosis._problem import RIDGE, Problem
+
+#: Diagonal added to a candidate's swept block: what the model already spans brings nothing.
+CANDIDATE_RIDGE = 1e-6
+
+
+@dataclass(frozen=True)
+class _Group:
+    """Candidates that reach the same joints with the same number of columns."""
+
+    index: NDArray[np.int64]
+    rows: dict[int, Array]  # (n_rows_j, n_candidates * n_columns)
+    width: int
+    own: Array  # (n_folds, n_candidates, width, width)
+    target: Array  # (n_folds, n_candidates * width)
+
+
+class Screen:
+    """Cross-validated error drops of candidates.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows and folds.
+    sigma : ndarray of shape (n_joints,)
+        Noise of one row of every joint.
+    candidates : list of Candidate
+        What might be missing.
+    target : list of ndarray
+        Averaged torque of every joint.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        sigma: Array,
+        candidates: Sequence[Candidate],
+        target: Sequence[Array],
+    ) -> None:
+        self.problem = problem
+        self.sigma = sigma
+        self.target = [y / s for y, s in zip(target, sigma, strict=True)]
+        self.edges = [
+            np.searchsorted(fold, np.arange(problem.n_folds + 1)) for fold in problem.fold
+        ]
+        self.candidates = list(candidates)
+        self._groups = self._group()
+
+    def _folded(self, a: Array, b: Array, joint: int) -> Array:
+        """Products a.T @ b of every fold, shape (n_folds, columns of a, columns of b)."""
+        edges = self.edges[joint]
+        return np.stack(
+            [a[i:j].T @ b[i:j] for i, j in zip(edges[:-1], edges[1:], strict=True)]
+        )
+
+    def _group(self) -> list[_Group]:
+        members: dict[tuple[tuple[int, ...], int], list[int]] = defaultdict(list)
+        for i, candidate in enumerate(self.candidates):
+            members[tuple(sorted(candidate.rows)), candidate.width].append(i)
+        groups = []
+        for (joints, k), index in members.items():
+            rows = {
+                j: np.hstack([self.candidates[i].rows[j] for i in index]) / self.sigma[j]
+                for j in joints
+            }
+            own = np.zeros((self.problem.n_folds, len(index), k, k))
+            target = np.zeros((self.problem.n_folds, len(index) * k))
+            for j, block in rows.items():
+                edges = self.edges[j]
+                for f, (a, b) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+                    part = block[a:b].reshape(b - a, len(index), k)
+                    own[f] += np.einsum("rck,rcl->ckl", part, part, optimize=True)
+                    target[f] += block[a:b].T @ self.target[j][a:b]
+            groups.append(_Group(np.array(index), rows, k, own, target))
+        return groups
+
+    def model(self, blocks: Sequence[dict[int, Array]]) -> _Model:
+        """Prepare the model with some blocks of columns added to the rigid body."""
+        design = [
+            block / s for block, s in zip(self.problem.design(blocks), self.sigma, strict=True)
+        ]
+        gram = sum(self._folded(a, a, j) for j, a in enumerate(design))
+        cross = sum(
+            self._folded(a, y[:, None], j)[:, :, 0]
+            for j, (a, y) in enumerate(zip(design, self.target, strict=True))
+        )
+        square = sum(
+            self._folded(y[:, None], y[:, None], j)[:, 0, 0] for j, y in enumerate(self.target)
+        )
+        return _Model(design, np.asarray(gram), np.asarray(cross), np.asarray(square))
+
+    def held_out(self, model: _Model) -> Array:
+        """Squared error of every fold when it is left out, in units of the noise, (n_folds,)."""
+        errors = np.empty(len(model.square))
+        for f, train in enumerate(model.training()):
+            b = train.solution
+            errors[f] = model.square[f] - 2 * b @ model.cross[f] + b @ model.gram[f] @ b
+        return errors
+
+    def step(self, model: _Model, wanted: NDArray[np.bool_] | None = None) -> Array:
+        """Held-out error of every fold after each candidate is added, (n_candidates, n_folds).
+
+        Candidates that are not ``wanted`` get infinity.
+        """
+        n_folds = self.problem.n_folds
+        errors = np.full((len(self.candidates), n_folds), np.inf)
+        trained = list(model.training())
+        for group in self._groups:
+            pick = np.arange(len(group.index))
+            if wanted is not None:
+                pick = pick[wanted[group.index]]
+                if not len(pick):
+                    continue
+            columns = (pick[:, None] * group.width + np.arange(group.width)).ravel()
+            cross = sum(
+                self._folded(model.design[j], block[:, columns], j)
+                for j, block in group.rows.items()
+            )
+            own, target = group.own[:, pick], group.target[:, columns]
+            for f, train in enumerate(trained):
+                errors[group.index[pick], f] = _swept_error(
+                    model, train, f, np.asarray(cross), own, target
+                )
+        return errors
+
+
+@dataclass(frozen=True)
+class _Train:
+    """The model fitted without one fold."""
+
+    factor: tuple[Array, bool]
+    scale: Array
+    solution: Array
+
+    def solve(self, right: Array) -> Array:
+        """Solve the normal equations for a matrix of right-hand sides."""
+        scale = self.scale[:, None]
+        return cho_solve(self.factor, right / scale, check_finite=False) / scale
+
+
+@dataclass(frozen=True)
+class _Model:
+    design: list[Array]
+    gram: Array  # (n_folds, p, p)
+    cross: Array  # (n_folds, p)
+    square: Array  # (n_folds,)
+
+    def training(self) -> list[_Train]:
+        """The model fitted without each fold in turn."""
+        total, cross = self.gram.sum(0), self.cross.sum(0)
+        scale = np.sqrt(np.diag(total))
+        scale[scale == 0] = 1.0
+        ridge = RIDGE * np.eye(len(scale))
+        trained = []
+        for gram, part in zip(self.gram, self.cross, strict=True):
+            normal = (total - gram) / scale[:, None] / scale + ridge
+            factor = cho_factor(normal, check_finite=False)
+            solution = cho_solve(factor, (cross - part) / scale, check_finite=False) / scale
+            trained.append(_Train(factor, scale, solution))
+        return trained
+
+
+def _swept_error(
+    model: _Model, train: _Train, fold: int, cross: Array, own: Array, target: Array
+) -> Array:
+    """Held-out error of one fold for every candidate of a group, shape (n_candidates,)."""
+    n, k = own.shape[1], own.shape[2]
+    outside = cross.sum(0) - cross[fold]
+    right = target.sum(0) - target[fold]
+    swept = train.solve(outside)  # model coefficients that mimic each candidate column
+    b = train.solution
+    # What the candidate adds to the training rows beyond the model.
+    parts = outside.reshape(-1, n, k)
+    mimic = swept.reshape(-1, n, k)
+    block = own.sum(0) - own[fold] - np.einsum("pck,pcl->ckl", parts, mimic, optimize=True)
+    gradient = (right - outside.T @ b).reshape(n, k)
+    diagonal = np.einsum("ckk->ck", own.sum(0))
+    block = block + np.eye(k) * (CANDIDATE_RIDGE * diagonal + 1e-12)[:, None, :]
+    gain = np.linalg.solve(block, gradient[:, :, None])[:, :, 0]
+    # The same change judged on the fold left out.
+    gram, here = model.gram[fold], cross[fold]
+    base = model.square[fold] - 2 * b @ model.cross[fold] + b @ gram @ b
+    remainder = model.cross[fold] - gram @ b
+    slope = (target[fold] - here.T @ b - swept.T @ remainder).reshape(n, k)
+    here3 = here.reshape(-1, n, k)
+    mixed = np.einsum("pck,pcl->ckl", mimic, here3, optimize=True)
+    bent = (gram @ swept).reshape(-1, n, k)
+    curve = (
+        own[fold] - mixed - mixed.transpose(0, 2, 1)
+        + np.einsum("pck,pcl->ckl", mimic, bent, optimize=True)
+    )
+    linear = np.einsum("ck,ck->c", gain, slope)
+    return base - 2 * linear + np.einsum("ck,ckl,cl->c", gain, curve, gain, optimize=True)

@@ -1,0 +1,516 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which effects are missing: add the best kind, refit, repeat until nothing significant is left."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from scipy.stats import chi2
+
+from skidyn._signals import Array
+from skidyn.diagnosis._candidates import Candidate, catalogue_candidates
+from skidyn.diagnosis._clock import clock_line
+from skidyn.diagnosis._problem import Fit, Problem
+from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
+from skidyn.diagnosis._screen import Screen
+from skidyn.diagnosis._spectrum import find_lines
+from skidyn.diagnosis._split import split_effects, trajectory_offsets
+from skidyn.effects import Term, get_effect
+from skidyn.effects._catalogue import nameless_kinds
+from skidyn.effects._nameless import NamelessEffect
+
+UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Thresholds of the search; the defaults are what is shipped, for every robot and effect.
+
+    Attributes
+    ----------
+    significance : float
+        Chance of a false candidate over the whole catalogue (Bonferroni).
+    relative_gate : float
+        A drop of squared error smaller than this share is no finding.
+    agreeing_folds : float
+        Share of folds in which a candidate must lower the error.
+    least_gain : float
+        Least penalised gain of a finding (twice a log-likelihood).
+    second_same, second_any : float
+        A later finding must bring this share of the first one's gain, on the same joints or
+        anywhere: what is smaller is mostly the first effect's imperfect shape.
+    unknown_handicap : float
+        Share by which a nameless function must beat a named effect.
+    simpler_share : float
+        A simpler kind is named if it falls behind by less than this share.
+    max_findings : int
+        Kinds added at most.
+    finalists : int
+        Kinds compared with noise re-estimated; the first ``refined`` of them with shape refined.
+    """
+
+    significance: float = 1e-4
+    relative_gate: float = 0.003
+    agreeing_folds: float = 0.5
+    least_gain: float = 55.0
+    second_same: float = 0.06
+    second_any: float = 0.015
+    unknown_handicap: float = 0.03
+    simpler_share: float = 0.05
+    max_findings: int = 4
+    finalists: int = 8
+    refined: int = 4
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A kind of effect on certain joints, as an explanation of the residual.
+
+    Attributes
+    ----------
+    kind : str
+        Kind, ``"unknown"`` for nameless functions.
+    candidates : tuple of Candidate
+        Its terms.
+    gain : ndarray of shape (n_joints,)
+        Twice the held-out log-likelihood gain by joint.
+    score : float
+        Gain less the price of its parameters.
+    n_parameters : int
+        Coefficients and shape parameters.
+    errors : ndarray of shape (n_folds, n_joints) or None
+        Held-out squared error with it; None where it was judged otherwise.
+    torque : ndarray of shape (n_samples, n_joints) or None
+        Torque to be taken off at the full rate (ripple).
+    """
+
+    kind: str
+    candidates: tuple[Candidate, ...]
+    gain: Array
+    score: float
+    n_parameters: int
+    errors: Array | None = None
+    torque: Array | None = None
+
+    @property
+    def joints(self) -> tuple[int, ...]:
+        """Joints of its terms, from 0."""
+        return tuple(sorted({j for c in self.candidates for j in c.joints}))
+
+    @property
+    def variables(self) -> tuple[str, ...]:
+        """Signals of nameless functions."""
+        return tuple(sorted({v for c in self.candidates for v in c.variables}))
+
+
+@dataclass
+class Step:
+    """One step of the search: the ranked explanations and the one that was added."""
+
+    ranking: list[Hypothesis]
+    added: Hypothesis | None
+
+
+@dataclass
+class SearchResult:
+    """What the search found.
+
+    Attributes
+    ----------
+    findings : list of Hypothesis
+        Added kinds, in order.
+    steps : list of Step
+        Every step with its ranking.
+    fit : Fit
+        Last fit.
+    ripple : ndarray of shape (n_samples, n_joints)
+        Torque of the ripple found, N m.
+    inflation : ndarray of shape (n_joints,)
+        Variance inflation by the residual's autocorrelation.
+    """
+
+    findings: list[Hypothesis]
+    steps: list[Step]
+    fit: Fit
+    ripple: Array
+    inflation: Array
+    candidates: list[Candidate] = field(default_factory=list)
+
+
+def variance_inflation(problem: Problem, residual: Sequence[Array], lags: int = 12) -> Array:
+    """How much more a slow column's coefficient varies than with independent rows, by joint.
+
+    One plus twice the sum of the residual's autocorrelations up to the first small one.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows.
+    residual : sequence of ndarray
+        Residual rows of every joint.
+    lags : int, default=12
+        Largest lag in rows.
+
+    Returns
+    -------
+    ndarray of shape (n_joints,)
+    """
+    inflation = np.ones(problem.n_joints)
+    for j, r in enumerate(residual):
+        power, lagged = 1e-30, np.zeros(lags)
+        for name in np.unique(problem.rows.trajectory[j]):
+            x = r[problem.rows.trajectory[j] == name]
+            power += x @ x
+            for lag in range(1, min(lags, len(x))):
+                lagged[lag] += x[:-lag] @ x[lag:]
+        for rho in lagged[1:] / power:
+            if rho < 0.05:
+                break
+            inflation[j] += 2 * rho
+    return inflation
+
+
+def search(problem: Problem, kinds: Sequence[str], settings: Settings) -> SearchResult:
+    """Find the missing effects.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows, folds and the user's model.
+    kinds : sequence of str
+        Kinds of the catalogue to try.
+    settings : Settings
+        Thresholds.
+
+    Returns
+    -------
+    SearchResult
+    """
+    return _Search(problem, kinds, settings).run()
+
+
+class _Search:
+    def __init__(self, problem: Problem, kinds: Sequence[str], settings: Settings) -> None:
+        self.problem = problem
+        self.settings = settings
+        self.kinds = list(kinds)
+        self.ripple = np.zeros_like(problem.torque)
+        self.chosen: list[Candidate] = []
+        self.findings: list[Hypothesis] = []
+        base = problem.fit(problem.terms, passes=3)
+        problem.with_fit(base)
+        self.fit = base
+        self.pool = catalogue_candidates(problem, self.kinds)
+        self.pool += _nameless_candidates(problem, problem.torque - problem.explained(base))
+        self.n_tests = len(self.pool)
+
+    # ---------------------------------------------------------------- state of the model so far
+    @property
+    def target(self) -> list[Array]:
+        rows, torque = self.problem.rows, self.problem.torque - self.ripple
+        return [rows.average(torque[:, j], j) for j in range(self.problem.n_joints)]
+
+    @property
+    def blocks(self) -> list[dict[int, Array]]:
+        own = [self.problem.term_rows(term) for term in self.problem.terms]
+        return own + [c.rows for c in self.chosen]
+
+    def refit(self) -> None:
+        problem = replace_torque(self.problem, self.problem.torque - self.ripple)
+        terms = (*self.problem.terms, *(c.term for c in self.chosen))
+        self.fit = problem.fit(terms, sigma=self.fit.noise)
+
+    # ---------------------------------------------------------------- the loop
+    def run(self) -> SearchResult:
+        steps = []
+        first: Array | None = None
+        for _ in range(self.settings.max_findings):
+            self.inflation = variance_inflation(self.problem, self.fit.residual)
+            self.sigma = self.fit.noise
+            ranking = self.rank()
+            best = self.pick(ranking)
+            if best is None or not self.worth(best, first):
+                steps.append(Step(ranking, None))
+                break
+            steps.append(Step([best, *(h for h in ranking if h is not best)], best))
+            if first is None:
+                first = np.maximum(best.gain, 0)
+            self.add(best)
+            self.prune(best, first)
+            self.refit()
+        inflation = variance_inflation(self.problem, self.fit.residual)
+        return SearchResult(self.findings, steps, self.fit, self.ripple, inflation, self.pool)
+
+    def worth(self, best: Hypothesis, first: Array | None) -> bool:
+        """Whether an explanation is more than noise, and more than a shadow of the first one."""
+        if best.score < self.settings.least_gain:
+            return False
+        if first is None:
+            return True
+        rows = sorted({j for c in best.candidates for j in c.rows} | set(best.joints))
+        same, anywhere = first[rows].sum(), first.sum()
+        return best.score >= max(
+            self.settings.second_same * same, self.settings.second_any * anywhere
+        )
+
+    def add(self, best: Hypothesis) -> None:
+        if best.torque is not None:
+            self.ripple = self.ripple + best.torque
+        else:
+            self.chosen += best.candidates
+        self.findings.append(best)
+        taken = {c.site for c in best.candidates}
+        self.pool = [c for c in self.pool if c.site not in taken]
+
+    def prune(self, newest: Hypothesis, first: Array) -> None:
+        """Drop an earlier kind that the newest one made needless."""
+        reach = {j for c in newest.candidates for j in (*c.joints, *c.rows)}
+        limit = max(30.0, 0.02 * first.sum())
+        for old in [h for h in self.findings if h is not newest and h.torque is None]:
+            if not reach & set(old.joints):
+                continue
+            without = [c for c in self.chosen if c not in old.candidates]
+            errors = [
+                profile_error(
+                    self.problem,
+                    [*map(self.problem.term_rows, self.problem.terms), *(c.rows for c in some)],
+                    self.sigma,
+                    self.target,
+                )
+                for some in (without, self.chosen)
+            ]
+            gain = log_likelihood_gain(errors[0], errors[1], self.problem.rows.counts).sum()
+            if gain < limit:
+                self.chosen = without
+                self.findings.remove(old)
+
+    # ---------------------------------------------------------------- ranking
+    def rank(self) -> list[Hypothesis]:
+        """Explanations of the residual, best first."""
+        rough = self._greedy_by_kind() + self._splits()
+        rough.sort(key=lambda item: item[1])
+        ranking = self._finals([candidates for candidates, _ in rough[: self.settings.finalists]])
+        ranking += self._ripples()
+        ranking += self._offsets_between_recordings()
+        return sorted(ranking, key=lambda h: -h.score)
+
+    def pick(self, ranking: list[Hypothesis]) -> Hypothesis | None:
+        """The best explanation, or a simpler one that is as good within its standard error."""
+        if not ranking:
+            return None
+        best = ranking[0]
+        for rival in ranking[1:]:
+            if best.errors is None or rival.errors is None:
+                continue
+            if rival.n_parameters > best.n_parameters or _simplicity(rival) >= _simplicity(best):
+                continue
+            variance = best.errors.sum(0) / np.maximum(self.problem.rows.counts, 1)
+            behind = ((rival.errors - best.errors) / variance).sum(1)
+            error = behind.std(ddof=1) * np.sqrt(len(behind))
+            cap = self.settings.simpler_share * best.score
+            if behind.sum() < min(max(error, 6.0), cap):
+                best = rival
+        return best
+
+    def _limit(self, n_columns: int, joints: Sequence[int], n_rows: int) -> float:
+        """Least drop of squared error (in noise units) that is not chance."""
+        chance = float(chi2.isf(self.settings.significance / self.n_tests, n_columns))
+        inflated = float(self.inflation[list(joints)].max()) * chance
+        return max(inflated, 2 * self.settings.relative_gate * n_rows)
+
+    def _candidate_limit(self, candidate: Candidate) -> float:
+        counts = self.problem.rows.counts
+        n_rows = int(counts[list(candidate.joints)].sum())
+        return self._limit(candidate.width, tuple(candidate.rows), n_rows)
+
+    def _greedy_by_kind(self) -> list[tuple[list[Candidate], float]]:
+        """For each kind, terms added joint by joint while each lowers the held-out error."""
+        screen = Screen(self.problem, self.sigma, self.pool, self.target)
+        kinds = np.array([c.kind for c in self.pool])
+        base_model = screen.model(self.blocks)
+        base = screen.held_out(base_model)
+        first = screen.step(base_model)
+        found = []
+        for kind in dict.fromkeys(kinds):
+            chosen, drop = self._greedy(screen, kinds == kind, base, first)
+            if chosen:
+                found.append((chosen, -(drop - 2 * sum(c.width for c in chosen))))
+        return found
+
+    def _greedy(
+        self, screen: Screen, wanted: Array, base: Array, first: Array
+    ) -> tuple[list[Candidate], float]:
+        pool, errors, now = wanted.copy(), first, base
+        chosen: list[Candidate] = []
+        widths = np.array([c.width for c in self.pool])
+        while pool.any():
+            drops = np.where(pool, now.sum() - errors.sum(1) - 2 * widths, -np.inf)
+            i = int(np.argmax(drops))
+            candidate, drop = self.pool[i], now - errors[i]
+            agree = float((drop > 0).mean())
+            if drop.sum() <= self._candidate_limit(candidate):
+                break
+            if agree < self.settings.agreeing_folds:
+                break
+            chosen.append(candidate)
+            now = errors[i]
+            pool &= self._still_open(candidate, chosen)
+            if pool.any():
+                model = screen.model([*self.blocks, *(c.rows for c in chosen)])
+                errors = screen.step(model, pool)
+        return chosen, float(base.sum() - now.sum())
+
+    def _still_open(self, added: Candidate, chosen: list[Candidate]) -> Array:
+        """Which candidates may join one of the same kind."""
+        if len(added.joints) == self.problem.n_joints and self.problem.n_joints > 1:
+            return np.zeros(len(self.pool), dtype=bool)  # acts on the whole robot already
+        if added.kind == UNKNOWN:
+            same = {added.variables}
+            if len(chosen) >= 3:
+                return np.zeros(len(self.pool), dtype=bool)
+            return np.array(
+                [
+                    set(c.variables) == set(v) and c.joints != added.joints
+                    for c in self.pool
+                    for v in same
+                ]
+            )
+        taken = {c.joints for c in chosen}
+        whole = self.problem.n_joints > 1
+        return np.array(
+            [
+                c.joints not in taken and not (whole and len(c.joints) == self.problem.n_joints)
+                for c in self.pool
+            ]
+        )
+
+    def _splits(self) -> list[tuple[list[Candidate], float]]:
+        """Payloads and tool forces of some trajectories, once."""
+        if any(get_effect(c.term.kind).search == "trajectories" for c in self.chosen):
+            return []
+        found = []
+        n_joints, n_rows = self.problem.n_joints, int(self.problem.rows.counts.sum())
+        splits = split_effects(self.problem, self.kinds, self.blocks, self.sigma, self.target)
+        for split in splits:
+            candidate = split.candidate
+            limit = 1.5 * self._limit(candidate.width, range(n_joints), n_rows)
+            if split.drop.sum() > limit and np.all(split.drop > 0):
+                count = candidate.width + len(np.unique(self.problem.signals.trajectory)) // 2
+                found.append(([candidate], -(float(split.drop.sum()) - 2 * count)))
+        return found
+
+    def _finals(self, rough: list[list[Candidate]]) -> list[Hypothesis]:
+        """Compare the best kinds with their shape refined and the noise re-estimated."""
+        before = profile_error(self.problem, self.blocks, self.sigma, self.target)
+        price = 2 * float(self.inflation.max())
+        ranking = []
+        for i, candidates in enumerate(rough):
+            kind = candidates[0].kind
+            if i < self.settings.refined:
+                candidates = refine(
+                    self.problem, self.blocks, candidates, self.sigma, self.target
+                )
+            blocks = [*self.blocks, *(c.rows for c in candidates)]
+            after = profile_error(self.problem, blocks, self.sigma, self.target)
+            gain = log_likelihood_gain(before, after, self.problem.rows.counts)
+            count = self._n_parameters(candidates)
+            score = float(gain.sum()) - price * count
+            if kind == UNKNOWN:
+                score = score * (1 - self.settings.unknown_handicap) - 2 * price * count
+            ranking.append(Hypothesis(kind, tuple(candidates), gain, score, count, after))
+        return ranking
+
+    def _n_parameters(self, candidates: Sequence[Candidate]) -> int:
+        count = sum(c.width + c.n_shapes for c in candidates)
+        if any("trajectories" in c.term.shape for c in candidates):
+            count += len(np.unique(self.problem.signals.trajectory)) // 2
+        return count
+
+    def _ripples(self) -> list[Hypothesis]:
+        """Torque ripple, judged on the residual at the full rate."""
+        if "torque_ripple" not in self.kinds:
+            return []
+        problem = self.problem
+        terms = (*problem.terms, *(c.term for c in self.chosen))
+        fit = replace(self.fit, terms=terms)
+        residual = problem.torque - self.ripple - problem.explained(fit)
+        best: dict[int, Any] = {}
+        known = [c for h in self.findings for c in h.candidates if c.kind == "torque_ripple"]
+        for line in find_lines(problem, residual):
+            old = [c for c in known if c.joints == (line.joint,)]
+            if any(abs(c.term.shape["N"] - line.waves) < 1 for c in old):
+                continue
+            n_rows = int(problem.rows.counts[line.joint])
+            strong = line.gain.sum() > max(40.0, 2 * self.settings.relative_gate * n_rows)
+            agree = (line.gain > 0).mean() >= 0.6
+            if strong and agree and (
+                line.joint not in best or line.gain.sum() > best[line.joint].gain.sum()
+            ):
+                best[line.joint] = line
+        if not best:
+            return []
+        gain, torque = np.zeros(problem.n_joints), np.zeros_like(problem.torque)
+        candidates = []
+        for joint, line in best.items():
+            gain[joint] = line.gain.sum()
+            term = Term("torque_ripple", (joint,), {"N": line.waves})
+            columns = get_effect("torque_ripple").columns(problem.signals, joint, N=line.waves)
+            torque[:, joint] = columns @ line.coefficients
+            candidates.append(Candidate("torque_ripple", term, problem.term_rows(term)))
+        count = 3 * len(candidates)
+        score = float(gain.sum()) - 2 * count
+        return [Hypothesis("torque_ripple", tuple(candidates), gain, score, count, None, torque)]
+
+    def _offsets_between_recordings(self) -> list[Hypothesis]:
+        """A sensor that was zeroed anew before some recording."""
+        if "offset" not in self.kinds or any("trajectory" in c.term.shape for c in self.chosen):
+            return []
+        found = trajectory_offsets(self.problem, self.blocks, self.target)
+        found = {j: item for j, item in found.items() if item[1] > 60}
+        if not found:
+            return []
+        gain = np.zeros(self.problem.n_joints)
+        for j, (_, value) in found.items():
+            gain[j] = value
+        candidates = tuple(c for some, _ in found.values() for c in some)
+        score = 0.8 * float(gain.sum()) - 10 * len(found)
+        return [Hypothesis("offset", candidates, gain, score, len(candidates))]
+
+
+def replace_torque(problem: Problem, torque: Array) -> Problem:
+    """The same problem with another torque to explain."""
+    return replace(problem, torque=torque)
+
+
+def _simplicity(hypothesis: Hypothesis) -> int:
+    if hypothesis.kind == UNKNOWN:
+        return 100
+    return get_effect(hypothesis.kind).simplicity
+
+
+def _nameless_candidates(problem: Problem, residual: Array) -> list[Candidate]:
+    """Nameless functions of the signals for every joint."""
+    candidates = []
+    for kind in nameless_kinds():
+        effect = get_effect(kind)
+        assert isinstance(effect, NamelessEffect)
+        for joint in range(problem.n_joints):
+            if effect.not_shown(problem.signals, joint):
+                continue
+            shapes = effect.grid(problem.signals, (joint,))
+            if effect.search == "clock":
+                line = clock_line(
+                    problem.signals,
+                    residual[:, joint],
+                    problem.rows.sliding[:, joint],
+                    problem.motion.rate,
+                )
+                shapes = [] if line is None else [{"frequency": line}]
+            for shape in shapes:
+                term = Term(kind, (joint,), shape)
+                names = effect.variables(joint, shape)
+                candidates.append(Candidate(UNKNOWN, term, problem.term_rows(term), names))
+    return candidates

@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Torque ripple: lines in the spectrum of the residual over joint angle, at the full rate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from skidyn._signals import Array
+from skidyn.diagnosis._problem import Problem
+
+#: Angle covered by the spectrum in rad and its number of bins; sets resolution and range.
+SPAN, BINS = 4 * np.pi, 32768
+#: Waves per rad searched.
+LOWEST, HIGHEST = 8.0, 420.0
+#: Chance of one false line over all joints and waves.
+FALSE_LINE = 1e-6
+#: Width in bins of the running median that gives the local noise level.
+MEDIAN_WIDTH = 161
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line in the spectrum of a joint's residual over its angle.
+
+    Attributes
+    ----------
+    joint : int
+        Joint, from 0.
+    waves : float
+        Periods per rad times 2 pi: the N of sin(N q).
+    gain : ndarray of shape (n_trajectories,)
+        Twice the held-out log-likelihood gain, by trajectory.
+    coefficients : ndarray of shape (2,)
+        Of sin(N q) and cos(N q), N m.
+    """
+
+    joint: int
+    waves: float
+    gain: Array
+    coefficients: Array
+
+
+def find_lines(problem: Problem, residual: Array) -> list[Line]:
+    """The strongest lines of each joint that stand out of the local noise level.
+
+    Parameters
+    ----------
+    problem : Problem
+        Motion and the samples that slide.
+    residual : ndarray of shape (n_samples, n_joints), N m
+        Measured torque less the model.
+
+    Returns
+    -------
+    list of Line
+    """
+    threshold = np.log(2 * HIGHEST * problem.n_joints / FALSE_LINE)
+    lines = []
+    for joint in range(problem.n_joints):
+        use = problem.rows.sliding[:, joint]
+        if problem.signals.prismatic[joint] or use.sum() < 100:
+            continue
+        q, r = problem.signals.q[:, joint], residual[:, joint]
+        for waves, height in _peaks(q[use], r[use]):
+            if height < threshold:
+                continue
+            line = _test_line(problem, joint, waves, use, r)
+            if line.gain.sum() > 0 and _explained_share(q[use], r[use], line) <= 0.2:
+                # A weak line cannot gain more than its height over the local noise tells.
+                cap = 2.4 * height / line.gain.sum()
+                line = Line(joint, waves, line.gain * min(1.0, cap), line.coefficients)
+            lines.append(line)
+    return lines
+
+
+def _spectrum(q: Array, r: Array) -> tuple[Array, Array]:
+    """Power over waves per SPAN, and its local noise level."""
+    bins = np.floor((q + SPAN / 2) / SPAN * BINS).astype(int) % BINS
+    power = np.abs(np.fft.rfft(np.bincount(bins, r, BINS))) ** 2
+    power = power[: int(HIGHEST * SPAN / (2 * np.pi))]
+    # The median of exponentially distributed power is log 2 times its mean.
+    level = median_filter(power, MEDIAN_WIDTH, mode="nearest") / np.log(2) + 1e-30
+    return power, level
+
+
+def _peaks(q: Array, r: Array, count: int = 2) -> list[tuple[float, float]]:
+    """Waves and heights (power over the level that stays without the line) of the top lines."""
+    power, level = _spectrum(q, r)
+    ratio = power / level
+    ratio[: int(LOWEST * SPAN / (2 * np.pi))] = 0.0
+    peaks = []
+    for _ in range(count):
+        k = int(np.argmax(ratio))
+        ratio[max(0, k - 8) : k + 9] = 0.0
+        fine = np.linspace(k / 2 - 0.5, k / 2 + 0.5, 21)
+        waves = float(fine[int(np.argmax([np.abs(np.exp(-1j * w * q) @ r) for w in fine]))])
+        block = np.column_stack([np.sin(waves * q), np.cos(waves * q)])
+        rest = r - block @ np.linalg.lstsq(block, r, rcond=None)[0]
+        peaks.append((waves, float(power[k] / _spectrum(q, rest)[1][k])))
+    return peaks
+
+
+def _test_line(
+    problem: Problem, joint: int, waves: float, use: NDArray[np.bool_], r: Array
+) -> Line:
+    q, trajectory = problem.signals.q[:, joint], problem.signals.trajectory
+    block = np.column_stack([np.sin(waves * q), np.cos(waves * q)])
+    gram, cross = {}, {}
+    for name in np.unique(trajectory):
+        here = use & (trajectory == name)
+        gram[name], cross[name] = block[here].T @ block[here], block[here].T @ r[here]
+    total, right = sum(gram.values()), sum(cross.values())
+    drop = []
+    for name in gram:
+        b = np.linalg.lstsq(total - gram[name], right - cross[name], rcond=None)[0]
+        if len(gram) == 1:
+            b = np.linalg.lstsq(total, right, rcond=None)[0]
+        drop.append(2 * b @ cross[name] - b @ gram[name] @ b)
+    before = float(np.sum(r[use] ** 2))
+    change = np.array(drop)
+    gain = use.sum() * np.log(before / max(before - change.sum(), 1e-12 * before))
+    shares = change / change.sum() * gain if change.sum() > 0 else 0 * change
+    return Line(joint, waves, shares, np.linalg.lstsq(total, right, rcond=None)[0])
+
+
+def _explained_share(q: Array, r: Array, line: Line) -> float:
+    wave = line.coefficients @ np.array([np.sin(line.waves * q), np.cos(line.waves * q)])
+    return 1 - float(np.sum((r - wave) ** 2) / np.sum(r**2))

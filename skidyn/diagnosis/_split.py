@@ -1,0 +1,222 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Effects that some trajectories have and others do not: payloads, tool forces, new offsets.
+
+Leaving whole trajectories out cannot judge them: what a trajectory carries is seen in that
+trajectory alone. They are judged on interleaved quarters of every trajectory instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidyn._signals import Array
+from skidyn.diagnosis._candidates import Candidate
+from skidyn.diagnosis._problem import Problem
+from skidyn.effects import Term, get_effect
+
+#: Coefficients of each trajectory's own estimate: mass and first moments, or the force.
+_LEADING = {"payload": 4, "external_wrench": 3}
+#: Largest gaps between the sorted estimates that are tried as the border of the split.
+CUTS = 3
+QUARTERS = 4
+
+
+@dataclass(frozen=True)
+class Split:
+    """An effect in some trajectories.
+
+    Attributes
+    ----------
+    candidate : Candidate
+        Term with its trajectories.
+    drop : ndarray of shape (4,)
+        Held-out drop of squared error by quarter, in units of the noise.
+    """
+
+    candidate: Candidate
+    drop: Array
+
+
+def split_effects(
+    problem: Problem,
+    kinds: Sequence[str],
+    blocks: Sequence[dict[int, Array]],
+    sigma: Array,
+    target: Sequence[Array],
+) -> list[Split]:
+    """Best split of the trajectories for each kind of effect that needs one.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows.
+    kinds : sequence of str
+        Kinds to try; those without ``search = "trajectories"`` are passed over.
+    blocks : sequence of dict
+        Columns of the model beside the rigid body.
+    sigma : ndarray of shape (n_joints,)
+        Noise of one row.
+    target : sequence of ndarray
+        Averaged torque.
+
+    Returns
+    -------
+    list of Split
+    """
+    names = np.unique(np.concatenate(problem.rows.trajectory))
+    if problem.robot is None or len(names) < 3:
+        return []
+    design = [a / s for a, s in zip(problem.design(blocks), sigma, strict=True)]
+    y = [t / s for t, s in zip(target, sigma, strict=True)]
+    found = []
+    for kind in kinds:
+        if get_effect(kind).search != "trajectories":
+            continue
+        term = Term(kind, tuple(range(problem.n_joints)))
+        rows = {j: b / sigma[j] for j, b in problem.term_rows(term).items()}
+        own = _own_estimates(problem, design, y, rows, names, _LEADING[kind])
+        best: tuple[Array, list[Any]] | None = None
+        for chosen in _splits(kind, own, names):
+            drop = _quarter_drop(problem, design, y, rows, chosen)
+            if best is None or drop.sum() > best[0].sum():
+                best = drop, chosen
+        if best is not None:
+            shape = {"trajectories": tuple(int(name) for name in best[1])}
+            split = Term(kind, term.joints, shape)
+            found.append(Split(Candidate(kind, split, problem.term_rows(split)), best[0]))
+    return found
+
+
+def _own_estimates(
+    problem: Problem,
+    design: list[Array],
+    y: list[Array],
+    rows: dict[int, Array],
+    names: NDArray[Any],
+    leading: int,
+) -> Array:
+    """The effect's leading coefficients, estimated for every trajectory with a common model."""
+    p = design[0].shape[1]
+    size = p + leading * len(names)
+    gram, cross = np.zeros((size, size)), np.zeros(size)
+    for j, block in rows.items():
+        for i, name in enumerate(names):
+            here = problem.rows.trajectory[j] == name
+            a = np.hstack([design[j][here], block[here, :leading]])
+            index = np.r_[np.arange(p), p + leading * i + np.arange(leading)]
+            gram[np.ix_(index, index)] += a.T @ a
+            cross[index] += a.T @ y[j][here]
+    scale = np.sqrt(np.diag(gram))
+    scale[scale == 0] = 1.0
+    # A payload in all trajectories is part of the arm: only differences can be estimated.
+    ridge = np.r_[np.full(p, 1e-9), np.full(size - p, 1e-4)]
+    solution = np.linalg.solve(gram / scale[:, None] / scale + np.diag(ridge), cross / scale)
+    return (solution / scale)[p:].reshape(len(names), leading)
+
+
+def _splits(kind: str, own: Array, names: NDArray[Any]) -> list[list[Any]]:
+    """Groups of trajectories worth trying: those beyond a gap in the estimates."""
+    if kind == "payload":
+        score = own[:, 0]
+    else:
+        away = own - np.median(own, axis=0)
+        score = away @ np.linalg.svd(away, full_matrices=False)[2][0]
+    order = np.argsort(score)
+    groups = []
+    for cut in np.argsort(-np.diff(score[order]))[:CUTS]:
+        above, below = names[order[cut + 1 :]], names[order[: cut + 1]]
+        # A payload adds mass; a force acts in the smaller group.
+        if kind == "payload":
+            groups.append(list(above))
+        else:
+            groups += [list(g) for g in (above, below) if len(g) <= len(names) / 2]
+    return groups
+
+
+def _quarter_drop(
+    problem: Problem,
+    design: list[Array],
+    y: list[Array],
+    rows: dict[int, Array],
+    chosen: Sequence[Any],
+) -> Array:
+    """Held-out drop of squared error by quarter when the chosen trajectories get the effect."""
+    p = design[0].shape[1]
+    k = next(iter(rows.values())).shape[1]
+    grams = np.zeros((QUARTERS, p + k + 1, p + k + 1))
+    for j in range(problem.n_joints):
+        inside = np.isin(problem.rows.trajectory[j], chosen).astype(float)[:, None]
+        a = np.column_stack([design[j], rows[j] * inside, y[j]])
+        for f in range(QUARTERS):
+            here = a[problem.rows.quarter[j] == f]
+            grams[f] += here.T @ here
+    without = np.arange(p)
+    both = np.arange(p + k)
+    errors = [held_out_error(grams, columns) for columns in (without, both)]
+    return errors[0] - errors[1]
+
+
+def held_out_error(grams: Array, columns: NDArray[np.int64]) -> Array:
+    """Squared error of every fold left out, from Gram matrices of [columns | torque]."""
+    total = grams.sum(0)
+    scale = np.sqrt(np.diag(total))
+    scale[scale == 0] = 1.0
+    scale[-1] = 1.0
+    scaled = grams / scale[:, None] / scale
+    total = scaled.sum(0)
+    ridge = 10 * 1e-9 * np.eye(len(columns))
+    errors = np.empty(len(grams))
+    for f, gram in enumerate(scaled):
+        train = total - gram
+        block = np.ix_(columns, columns)
+        b = np.linalg.solve(train[block] + ridge, train[columns, -1])
+        errors[f] = gram[-1, -1] - 2 * b @ gram[columns, -1] + b @ gram[block] @ b
+    return errors
+
+
+def trajectory_offsets(
+    problem: Problem, blocks: Sequence[dict[int, Array]], target: Sequence[Array]
+) -> dict[int, tuple[list[Candidate], float]]:
+    """Offsets that differ between recordings, by joint, with twice their log-likelihood gain.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows.
+    blocks : sequence of dict
+        Columns of the model beside the rigid body.
+    target : sequence of ndarray
+        Averaged torque.
+
+    Returns
+    -------
+    dict of int to (list of Candidate, float)
+    """
+    names = np.unique(np.concatenate(problem.rows.trajectory))
+    if len(names) < 2:
+        return {}
+    found = {}
+    for j, (design, y) in enumerate(zip(problem.design(blocks), target, strict=True)):
+        ones = problem.rows.average(np.ones(problem.signals.n_samples), j)
+        inside = problem.rows.trajectory[j][:, None] == names
+        a = np.hstack([design[:, np.abs(design).max(0, initial=0) > 0], ones[:, None] * inside])
+        p = a.shape[1] - len(names)
+        full = np.column_stack([a, y])
+        quarter = problem.rows.quarter[j]
+        parts = [full[quarter == f] for f in range(QUARTERS)]
+        grams = np.stack([part.T @ part for part in parts])
+        before = held_out_error(grams, np.arange(p)).sum()
+        after = held_out_error(grams, np.arange(a.shape[1])).sum()
+        gain = len(y) * np.log(before / after) - 2 * len(names)
+        terms = [Term("offset", (j,), {"trajectory": int(name)}) for name in names]
+        candidates = [
+            Candidate("offset", t, {j: (ones * inside[:, i])[:, None]}, ("trajectory",))
+            for i, t in enumerate(terms)
+        ]
+        found[j] = (candidates, float(gain))
+    return found

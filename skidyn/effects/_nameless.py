@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Nameless functions of one or two signals: what the diagnosis tries when no name fits.
+
+They are terms like any other, so a model that adopts one fits, predicts and is stored as usual.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from skidyn._signals import Array, Signals
+from skidyn.effects._base import Coefficient, Effect
+
+#: Share of the samples left outside the knots at either end, where a spline would be unsupported.
+_OUTSIDE = 0.002
+
+
+def _coefficients(count: int) -> tuple[Coefficient, ...]:
+    return tuple(Coefficient(f"c{i + 1}", "N m") for i in range(count))
+
+
+class NamelessEffect(Effect):
+    """A smooth function of the signals in :attr:`depends_on`."""
+
+    nameless = True
+    #: Signals it depends on: ``own`` joint, the ``other`` joint or time.
+    depends_on: ClassVar[tuple[str, ...]] = ()
+
+    def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
+        """Names of the signals, joints counted from 1.
+
+        Parameters
+        ----------
+        joint : int
+            Joint on which it acts, from 0.
+        shape : dict
+            Shape parameters of the term.
+
+        Returns
+        -------
+        tuple of str
+        """
+        other = int(shape.get("other", joint))
+        names = []
+        for name in self.depends_on:
+            signal, _, of = name.partition("_")
+            names.append(signal if not of else f"{signal}{(joint if of == 'own' else other) + 1}")
+        return tuple(dict.fromkeys(names))
+
+    def others(self, signals: Signals, joint: int) -> list[dict[str, Any]]:
+        """Grid over the other joints."""
+        return [{"other": k} for k in range(signals.n_joints) if k != joint]
+
+
+class _Spline(NamelessEffect):
+    signal: ClassVar[str] = "q"
+    n_splines: ClassVar[int] = 10
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        x = getattr(signals, self.signal)[:, joints[0]]
+        low, high = np.quantile(x, [_OUTSIDE, 1 - _OUTSIDE])
+        return [{"low": float(low), "high": float(high)}] if high > low else []
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        x = getattr(signals, self.signal)[:, joint]
+        low, high = shape["low"], shape["high"]
+        degree = 3
+        inner = np.linspace(low, high, self.n_splines - degree + 1)
+        knots = np.r_[[low] * degree, inner, [high] * degree]
+        inside = np.clip(x, low, high - 1e-9 * (high - low))
+        # The first spline is left out: together they add up to a constant.
+        return BSpline.design_matrix(inside, knots, degree).toarray()[:, 1:]
+
+
+class FunctionOfPosition(_Spline):
+    """A smooth function of the joint's own position."""
+
+    kind = "function_of_position"
+    title = "Function of position"
+    formula = r"f(q_j)"
+    coefficients = _coefficients(29)
+    depends_on = ("q_own",)
+    signal, n_splines = "q", 30
+
+
+class FunctionOfVelocity(_Spline):
+    """A smooth function of the joint's own velocity."""
+
+    kind = "function_of_velocity"
+    title = "Function of velocity"
+    formula = r"f(\dot q_j)"
+    coefficients = _coefficients(9)
+    depends_on = ("dq_own",)
+    signal, n_splines = "dq", 10
+
+
+class FrictionOverPosition(NamelessEffect):
+    """Friction that varies with the joint's own position."""
+
+    kind = "friction_over_position"
+    title = "Friction that varies with position"
+    formula = r"f(q_j)\,\dot q_j + g(q_j)\,\mathrm{sign}\,\dot q_j"
+    coefficients = _coefficients(6)
+    depends_on = ("q_own", "dq_own")
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        x = signals.q[:, joint] / signals.unit[joint]
+        dq, sign = signals.dq[:, joint], signals.sign[:, joint]
+        waves = [np.cos(x), np.sin(x), np.cos(2 * x), np.sin(2 * x)]
+        return np.column_stack([*(w * dq for w in waves), *(w * sign for w in waves[:2])])
+
+
+class _WithOther(NamelessEffect):
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        return self.others(signals, joints[0])
+
+
+class FunctionOfTwoPositions(_WithOther):
+    """A smooth torque that depends on two positions: a cable, a hose, a closed chain."""
+
+    kind = "function_of_two_positions"
+    title = "Function of two positions"
+    formula = r"f(q_j, q_k)"
+    coefficients = _coefficients(6)
+    depends_on = ("q_own", "q_other")
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        k = int(shape["other"])
+        x, y = (signals.q[:, i] / signals.unit[i] for i in (joint, k))
+        return np.column_stack(
+            [np.cos(x - y), np.sin(x - y), np.cos(x + y), np.sin(x + y), np.sin(y), np.cos(y)]
+        )
+
+
+class FrictionOverOtherPosition(_WithOther):
+    """Friction of one joint that varies with the position of another."""
+
+    kind = "friction_over_other_position"
+    title = "Friction that varies with another joint's position"
+    formula = r"f(q_k)\,\mathrm{sign}\,\dot q_j + g(q_k)\,\dot q_j"
+    coefficients = _coefficients(4)
+    depends_on = ("dq_own", "q_other")
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        k = int(shape["other"])
+        y = signals.q[:, k] / signals.unit[k]
+        motion = (signals.sign[:, joint], signals.dq[:, joint])
+        return np.column_stack([wave * m for m in motion for wave in (np.cos(y), np.sin(y))])
+
+
+class FunctionOfTwoVelocities(_WithOther):
+    """Drag of one joint that depends on the velocity of another."""
+
+    kind = "function_of_two_velocities"
+    title = "Function of two velocities"
+    formula = r"f(\dot q_j, \dot q_k)"
+    coefficients = _coefficients(6)
+    depends_on = ("dq_own", "dq_other")
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        k = int(shape["other"])
+        dq, sign = signals.dq[:, joint], signals.sign[:, joint]
+        other, other_sign = signals.dq[:, k], signals.sign[:, k]
+        return np.column_stack(
+            [
+                dq * np.abs(other),
+                np.abs(dq) * other,
+                sign * np.abs(other),
+                np.abs(dq) * other_sign,
+                other,
+                other_sign,
+            ]
+        )
+
+
+class ClockPeriodic(NamelessEffect):
+    """A torque periodic in time: a fan, mains hum, a pump."""
+
+    kind = "clock_periodic"
+    title = "Periodic in time"
+    formula = r"a\sin(2\pi f t) + b\cos(2\pi f t)"
+    coefficients = _coefficients(2)
+    depends_on = ("time",)
+    needs = ("time",)
+    search = "clock"
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        phase = 2 * np.pi * shape["frequency"] * signals.clock
+        return np.column_stack([np.sin(phase), np.cos(phase)])
+
+
+NAMELESS: tuple[type[NamelessEffect], ...] = (
+    FunctionOfPosition,
+    FunctionOfVelocity,
+    FrictionOverPosition,
+    FunctionOfTwoPositions,
+    FrictionOverOtherPosition,
+    FunctionOfTwoVelocities,
+    ClockPeriodic,
+)

@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Rows of the regression: torque and every column averaged over the same short windows.
+
+Each row is a Hann-weighted sum over a window of time, scaled to unit noise gain. The same weights
+act on the torque and on every regressor column (parallel filtering: Gautier 1997, ICRA), so the
+linear model still holds exactly. Only valid samples enter: sticking and reversals, which do not
+define sliding friction, are left out without smearing them into their neighbours. With windows
+half overlapping the rows are nearly independent, and there are few of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
+from scipy.sparse import csc_matrix
+
+from skidyn._signals import Array, Signals
+
+#: Width of a window in s; wide enough for a few samples where the log is slow.
+WINDOW = 1 / 8
+FEWEST_SAMPLES = 6
+#: A window counts if at least this share of its weight falls on valid samples.
+LEAST_WEIGHT = 0.35
+#: Below this velocity (in units of ``Signals.unit`` per s) a joint counts as resting.
+REST = 0.01
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Averaging windows of every joint.
+
+    Attributes
+    ----------
+    weights : list of csc_matrix of shape (n_rows_j, n_samples)
+        Per joint, the weights of every row.
+    trajectory : list of ndarray of shape (n_rows_j,)
+        Trajectory of every row.
+    time : list of ndarray of shape (n_rows_j,)
+        Middle of every window in s.
+    quarter : list of ndarray of shape (n_rows_j,)
+        0 to 3: interleaved eighths of each segment, for folds within trajectories.
+    sliding : ndarray of shape (n_samples, n_joints) of bool
+        Samples that enter.
+    """
+
+    weights: list[csc_matrix]
+    trajectory: list[NDArray[np.int64]]
+    time: list[Array]
+    quarter: list[NDArray[np.int64]]
+    sliding: NDArray[np.bool_]
+
+    @property
+    def n_joints(self) -> int:
+        """Number of joints."""
+        return len(self.weights)
+
+    @property
+    def counts(self) -> NDArray[np.int64]:
+        """Number of rows of every joint."""
+        return np.array([w.shape[0] for w in self.weights])
+
+    def average(self, values: Array, joint: int) -> Array:
+        """Rows of a joint from values at every sample, shape (n_samples,) or (n_samples, k)."""
+        return np.asarray(self.weights[joint] @ values)
+
+
+def sliding_samples(signals: Signals, valid: NDArray[np.bool_], margin: int) -> NDArray[np.bool_]:
+    """Samples at which a joint slides: neither at rest nor near a reversal.
+
+    Parameters
+    ----------
+    signals : Signals
+        Smoothed motion.
+    valid : ndarray of shape (n_samples,) of bool
+        Samples where the motion can be trusted.
+    margin : int
+        Samples left out on each side, the reach of the smoother.
+
+    Returns
+    -------
+    ndarray of shape (n_samples, n_joints) of bool
+    """
+    sliding = np.zeros(signals.q.shape, dtype=bool)
+    for rows in signals.segments:
+        for joint in range(signals.n_joints):
+            velocity = signals.dq[rows, joint]
+            still = np.abs(velocity) <= REST * signals.unit[joint]
+            turns = np.flatnonzero(np.diff(np.sign(velocity)))
+            still[turns] = True
+            still[np.minimum(turns + 1, len(still) - 1)] = True
+            if margin > 0:
+                still = binary_dilation(still, iterations=margin)
+            sliding[rows, joint] = ~still & valid[rows]
+    return sliding
+
+
+def window_rows(
+    signals: Signals, use: NDArray[np.bool_], rate: float, window: float = WINDOW
+) -> Rows:
+    """Averaging windows over the samples that may enter.
+
+    Parameters
+    ----------
+    signals : Signals
+        Motion.
+    use : ndarray of shape (n_samples, n_joints) of bool
+        Samples that may enter.
+    rate : float
+        Sampling rate in Hz.
+    window : float, s, default=1/8
+        Width of the window; widened to hold six samples.
+
+    Returns
+    -------
+    Rows
+    """
+    width = max(window, FEWEST_SAMPLES / rate)
+    spans = [_windows(signals.clock[rows], rows.start, width) for rows in signals.segments]
+    weights, trajectory, time, quarter = [], [], [], []
+    for joint in range(signals.n_joints):
+        parts = [_weigh(span, use[:, joint]) for span in spans]
+        weights.append(_stack([part[0] for part in parts], signals.n_samples))
+        keep = [part[1] for part in parts]
+        labels = [
+            np.full(int(k.sum()), signals.trajectory[rows.start])
+            for k, rows in zip(keep, signals.segments, strict=True)
+        ]
+        trajectory.append(np.concatenate(labels))
+        time.append(np.concatenate([s.middle[k] for s, k in zip(spans, keep, strict=True)]))
+        eighths = [
+            (np.arange(len(k)) * 8 // max(1, len(k)) % 4)[k] for k in keep
+        ]
+        quarter.append(np.concatenate(eighths))
+    return Rows(weights, trajectory, time, quarter, use)
+
+
+@dataclass(frozen=True)
+class _Windows:
+    """All windows of one segment before samples are left out (flat, one entry per weight)."""
+
+    middle: Array
+    row: NDArray[np.int64]
+    sample: NDArray[np.int64]
+    weight: Array
+
+
+def _windows(time: Array, offset: int, width: float) -> _Windows:
+    middle = np.arange(time[0] + width / 2, time[-1] - width / 2 + 1e-9, width / 2)
+    first = np.searchsorted(time, middle - width / 2)
+    last = np.searchsorted(time, middle + width / 2)
+    length = last - first
+    row = np.repeat(np.arange(len(middle)), length)
+    within = np.arange(len(row)) - np.repeat(np.cumsum(length) - length, length)
+    sample = np.repeat(first, length) + within
+    weight = np.cos(np.pi * (time[sample] - middle[row]) / width) ** 2
+    return _Windows(middle, row, sample + offset, weight)
+
+
+Entries = tuple[NDArray[np.int64], NDArray[np.int64], Array, int]
+
+
+def _weigh(span: _Windows, use: NDArray[np.bool_]) -> tuple[Entries, NDArray[np.bool_]]:
+    """Weights on the samples in use, scaled to unit noise gain, and which windows are kept."""
+    n = len(span.middle)
+    kept = use[span.sample]
+    row, sample, weight = span.row[kept], span.sample[kept], span.weight[kept]
+    full = np.bincount(span.row, span.weight, minlength=n)
+    total = np.bincount(row, weight, minlength=n)
+    keep = (total > 0) & (total >= LEAST_WEIGHT * full)
+    gain = np.sqrt(np.bincount(row, weight**2, minlength=n))
+    inside = keep[row]
+    number = np.cumsum(keep) - 1
+    row, sample = row[inside], sample[inside]
+    return (number[row], sample, weight[inside] / gain[row], int(keep.sum())), keep
+
+
+def _stack(parts: list[Entries], n_samples: int) -> csc_matrix:
+    shift = np.cumsum([0, *(part[3] for part in parts)])
+    row = np.concatenate([part[0] + s for part, s in zip(parts, shift[:-1], strict=True)])
+    sample = np.concatenate([part[1] for part in parts])
+    value = np.concatenate([part[2] for part in parts])
+    return csc_matrix((value, (row, sample)), shape=(int(shift[-1]), n_samples))
