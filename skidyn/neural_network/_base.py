@@ -16,8 +16,8 @@ from skidyn._columns import ColumnSpec
 from skidyn._compat import CallbackSupportMixin, Interval, StrOptions, fit_context, fit_progress
 from skidyn.neural_network._engine import TrainingPlan, run, train
 from skidyn.neural_network._network import LSTMNetwork, from_arrays
-from skidyn.neural_network._scaling import scaling_of
 from skidyn.neural_network._stream import TorqueStream
+from skidyn.preprocessing._affine import scaling_of
 from skidyn.preprocessing._keys import Keys, resolve_keys
 
 Array = NDArray[np.float64]

@@ -1,0 +1,290 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Committee of networks whose hidden layer is random and stays as it is."""
+
+from __future__ import annotations
+
+from numbers import Integral, Real
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.utils import check_random_state
+from sklearn.utils.parallel import Parallel, delayed
+from sklearn.utils.validation import _check_sample_weight, check_is_fitted, validate_data
+
+from skidyn._columns import ColumnSpec
+from skidyn._compat import Interval, StrOptions, fit_context
+from skidyn.preprocessing._affine import scaling_of
+from skidyn.preprocessing._keys import Keys, resolve_keys
+
+Array = NDArray[Any]
+
+#: Rows whose hidden activations are held at once.
+CHUNK = 2048
+#: Above this p the ridge is too weak for the rounding of single precision.
+LARGEST_SINGLE_PRECISION_P = 0.99
+
+
+class ELMCommittee(RegressorMixin, BaseEstimator):
+    """Committee of extreme learning machines, learned exactly in one pass or online.
+
+    Each member has a random hidden layer of rectifiers that stays as it is; only the linear output
+    layer is learned, by ridge regression on the hidden activations. All that the fit needs of the
+    data are their second moments, so ``partial_fit`` on parts of a log gives the machine that
+    ``fit`` on the whole log gives (with the same scaling of the inputs).
+
+    Parameters
+    ----------
+    n_estimators : int, default=10
+        Members.
+    n_hidden : int, default=500
+        Hidden units of each member.
+    p : float in (0, 1], default=0.5
+        Strength of the data against the prior: the ridge is ``(1 - p) / p`` on the mean second
+        moment of the activations.
+    scaling : {"standard", "minmax", None}, default="standard"
+        Scaling of the inputs before the random layer, fixed by the first call of ``fit`` or
+        ``partial_fit``; None takes them as they are.
+    n_jobs : int, default=None
+        Members computed at the same time (threads).
+    trajectory, time : int, str or None, default="auto"
+        Key columns of X, which are no features.
+    random_state : int, RandomState or None, default=None
+        Draws the hidden layers.
+
+    Attributes
+    ----------
+    hidden_weights_ : ndarray of shape (n_estimators, n_inputs, n_hidden)
+        Weights of the hidden layers, uniform in (-1, 1).
+    hidden_bias_ : ndarray of shape (n_estimators, n_hidden)
+        Weights of the constant input 1.
+    coef_ : ndarray of shape (n_estimators, n_hidden, n_outputs), N m (N if prismatic)
+        Weights of the output layers.
+    intercept_ : ndarray of shape (n_estimators, n_outputs), N m (N if prismatic)
+        Outputs are learned about their mean, which the ridge does not shrink.
+    n_samples_seen_ : float
+        Rows learned, or sum of their weights.
+    n_features_in_ : int
+        Columns of X.
+    feature_names_in_ : ndarray of str
+        Their names, where X has names.
+
+    References
+    ----------
+    .. [1] V. Bargsten, J. de Gea Fernandez, Y. Kassahun, "Experimental Robot Inverse Dynamics
+       Identification Using Classical and Machine Learning Techniques", eq. 4.
+    .. [2] G.-B. Huang, Q.-Y. Zhu, C.-K. Siew, "Extreme learning machine: Theory and applications",
+       Neurocomputing 70, 2006.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skidyn.committee import ELMCommittee
+    >>> X = np.random.default_rng(0).uniform(-1, 1, size=(500, 2))
+    >>> y = np.sin(3 * X[:, 0]) + X[:, 1] ** 2
+    >>> committee = ELMCommittee(p=0.99, random_state=0).fit(X, y)
+    >>> bool(committee.score(X, y) > 0.95)
+    True
+    >>> torque, spread = committee.predict(X[:3] + 10, return_std=True)
+    >>> bool((spread > committee.predict(X[:3], return_std=True)[1]).all())
+    True
+    """
+
+    _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
+        "n_estimators": [Interval(Integral, 1, None, closed="left")],
+        "n_hidden": [Interval(Integral, 1, None, closed="left")],
+        "p": [Interval(Real, 0, 1, closed="right")],
+        "scaling": [StrOptions({"standard", "minmax"}), None],
+        "n_jobs": [Integral, None],
+        "trajectory": [str, Integral, None],
+        "time": [str, Integral, None],
+        "random_state": ["random_state"],
+    }
+
+    def __init__(
+        self,
+        n_estimators: int = 10,
+        *,
+        n_hidden: int = 500,
+        p: float = 0.5,
+        scaling: str | None = "standard",
+        n_jobs: int | None = None,
+        trajectory: ColumnSpec = "auto",
+        time: ColumnSpec = "auto",
+        random_state: Any = None,
+    ) -> None:
+        self.n_estimators = n_estimators
+        self.n_hidden = n_hidden
+        self.p = p
+        self.scaling = scaling
+        self.n_jobs = n_jobs
+        self.trajectory = trajectory
+        self.time = time
+        self.random_state = random_state
+
+    def __sklearn_tags__(self) -> Any:
+        tags = super().__sklearn_tags__()
+        tags.target_tags.multi_output = True
+        return tags
+
+    @fit_context(prefer_skip_nested_validation=True)
+    def fit(self, X: Any, y: Any, sample_weight: Any = None) -> ELMCommittee:
+        """Learn a log, forgetting what was learned before.
+
+        Parameters
+        ----------
+        X : DataFrame or array-like of shape (n_samples, n_features)
+            Features, with or without key columns.
+        y : array-like of shape (n_samples,) or (n_samples, n_outputs), N m (N if prismatic)
+            Torque.
+        sample_weight : array-like of shape (n_samples,), default=None
+            Weight of each row.
+
+        Returns
+        -------
+        self : object
+            The fitted committee.
+        """
+        return self._learn(X, y, sample_weight, first=True)
+
+    @fit_context(prefer_skip_nested_validation=True)
+    def partial_fit(self, X: Any, y: Any, sample_weight: Any = None) -> ELMCommittee:
+        """Learn more rows, keeping what was learned before.
+
+        Parameters
+        ----------
+        X : DataFrame or array-like of shape (n_samples, n_features)
+            Features, with or without key columns.
+        y : array-like of shape (n_samples,) or (n_samples, n_outputs), N m (N if prismatic)
+            Torque.
+        sample_weight : array-like of shape (n_samples,), default=None
+            Weight of each row.
+
+        Returns
+        -------
+        self : object
+            The fitted committee.
+        """
+        return self._learn(X, y, sample_weight, first=not hasattr(self, "coef_"))
+
+    def _learn(self, X: Any, y: Any, sample_weight: Any, first: bool) -> ELMCommittee:
+        X, y = validate_data(
+            self, X, y, reset=first, multi_output=True, y_numeric=True, dtype=np.float64
+        )
+        weight = np.ones(len(X))
+        if sample_weight is not None:
+            weight = _check_sample_weight(sample_weight, X, dtype=np.float64)
+        if not (weight > 0).any():
+            raise ValueError("all sample weights are zero; at least one must be positive.")
+        inputs = X[:, list(self._keys().features)]
+        targets = y.reshape(len(y), -1)
+        if first:
+            self._start(inputs, targets.shape[1], y.ndim == 1, weight)
+        elif targets.shape[1] != self.coef_.shape[2]:
+            raise ValueError(
+                f"y has {targets.shape[1]} outputs; the rows learned before had "
+                f"{self.coef_.shape[2]}."
+            )
+        scaled = self._scaled(inputs)
+        self.n_samples_seen_ += float(weight.sum())
+        Parallel(n_jobs=self.n_jobs, prefer="threads")(
+            delayed(self._learn_member)(k, scaled, targets, weight)
+            for k in range(len(self.hidden_bias_))
+        )
+        return self
+
+    def _start(self, inputs: Array, n_outputs: int, one_dimensional: bool, weight: Array) -> None:
+        rng = check_random_state(self.random_state)
+        n_inputs, members, size = inputs.shape[1], self.n_estimators, self.n_hidden
+        if self.scaling is None:
+            self._offset, self._scale = np.zeros(n_inputs), np.ones(n_inputs)
+        else:
+            self._offset, self._scale = scaling_of(inputs[weight > 0], self.scaling)
+        self.hidden_weights_ = rng.uniform(-1, 1, size=(members, n_inputs, size))
+        self.hidden_bias_ = rng.uniform(-1, 1, size=(members, size))
+        self.coef_ = np.zeros((members, size, n_outputs))
+        self.intercept_ = np.zeros((members, n_outputs))
+        self.n_samples_seen_ = 0.0
+        self._one_dimensional = one_dimensional
+        # weighted sums of h h', h t', h and t over all rows seen; h: activations, t: targets
+        self._hh = np.zeros((members, size, size))
+        self._ht = np.zeros((members, size, n_outputs))
+        self._h = np.zeros((members, size))
+        self._t = np.zeros((members, n_outputs))
+
+    def _learn_member(self, k: int, scaled: Array, targets: Array, weight: Array) -> None:
+        """Add the moments of new rows, then solve for the output layer."""
+        for i in range(0, len(scaled), CHUNK):
+            rows = slice(i, i + CHUNK)
+            root = np.sqrt(weight[rows, None]).astype(scaled.dtype)
+            h = self._hidden(k, scaled[rows]) * root
+            t = targets[rows] * root
+            self._hh[k] += h.T @ h
+            self._ht[k] += h.T.astype(np.float64) @ t
+            self._h[k] += (h * root).sum(axis=0, dtype=np.float64)
+            self._t[k] += (t * root).sum(axis=0)
+        n = self.n_samples_seen_
+        h_mean, t_mean = self._h[k] / n, self._t[k] / n
+        covariance = self._hh[k] / n - np.outer(h_mean, h_mean)
+        # the share of the trace only keeps the factorisation possible where p = 1
+        ridge = (1 - self.p) / self.p + 1e-10 * np.trace(covariance)
+        covariance[np.diag_indices_from(covariance)] += max(ridge, np.finfo(float).tiny)
+        cross = self._ht[k] / n - np.outer(h_mean, t_mean)
+        self.coef_[k] = linalg.solve(covariance, cross, assume_a="pos")
+        self.intercept_[k] = t_mean - h_mean @ self.coef_[k]
+
+    def predict(self, X: Any, return_std: bool = False) -> Any:
+        """Predict the torque as the mean of the members.
+
+        Parameters
+        ----------
+        X : DataFrame or array-like of shape (n_samples, n_features)
+            As in fit.
+        return_std : bool, default=False
+            Return the spread of the members as well: small where the data pinned them down.
+
+        Returns
+        -------
+        y : ndarray of shape (n_samples,) or (n_samples, n_outputs), N m (N if prismatic)
+            Predicted torque.
+        std : ndarray of the same shape, N m (N if prismatic)
+            Standard deviation over the members; only with ``return_std=True``.
+        """
+        check_is_fitted(self)
+        X = validate_data(self, X, reset=False, dtype=np.float64)
+        scaled = self._scaled(X[:, list(self._keys().features)])
+        members = np.stack(
+            Parallel(n_jobs=self.n_jobs, prefer="threads")(
+                delayed(self._predict_member)(k, scaled) for k in range(len(self.hidden_bias_))
+            )
+        )
+        if self._one_dimensional:
+            members = members[..., 0]
+        return (members.mean(axis=0), members.std(axis=0)) if return_std else members.mean(axis=0)
+
+    def _predict_member(self, k: int, scaled: Array) -> Array:
+        coef = self.coef_[k].astype(scaled.dtype)
+        parts = [
+            self._hidden(k, scaled[i : i + CHUNK]) @ coef for i in range(0, len(scaled), CHUNK)
+        ]
+        return np.concatenate(parts).astype(np.float64) + self.intercept_[k]
+
+    def _hidden(self, k: int, scaled: Array) -> Array:
+        h = scaled @ self.hidden_weights_[k].astype(scaled.dtype)
+        h += self.hidden_bias_[k].astype(scaled.dtype)
+        return np.maximum(h, 0, out=h)
+
+    def _scaled(self, inputs: Array) -> Array:
+        dtype = np.float32 if self.p <= LARGEST_SINGLE_PRECISION_P else np.float64
+        return ((inputs - self._offset) / self._scale).astype(dtype)
+
+    def _keys(self) -> Keys:
+        names = getattr(self, "feature_names_in_", None)
+        return resolve_keys(
+            None if names is None else list(names),
+            self.n_features_in_,
+            trajectory=self.trajectory,
+            time=self.time,
+        )
