@@ -6,6 +6,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from skidyn._signals import Array
 from skidyn.diagnosis._problem import Problem
 from skidyn.effects import Term, get_effect
@@ -40,6 +42,11 @@ class Candidate:
     def width(self) -> int:
         """Number of coefficients."""
         return next(iter(self.rows.values())).shape[1]
+
+    @property
+    def signs(self) -> Array:
+        """1 for every coefficient that physics forbids to be negative, else 0."""
+        return np.array([c.sign for c in get_effect(self.term.kind).coefficients])
 
     @property
     def joints(self) -> tuple[int, ...]:

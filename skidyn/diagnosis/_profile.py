@@ -117,7 +117,7 @@ def refine(
         if not shapes or get_effect(candidate.kind).search != "grid":
             continue
         others = [c.rows for k, c in enumerate(refined) if k != i]
-        gain = _Gain(problem, [*fixed, *others], sigma, target)
+        gain = _Gain(problem, [*fixed, *others], sigma, target, candidate.signs)
         refined[i] = _pattern_search(problem, candidate, shapes, gain)
     return refined
 
@@ -131,8 +131,10 @@ class _Gain:
         blocks: Sequence[dict[int, Array]],
         sigma: Array,
         target: Sequence[Array],
+        signs: Array,
     ) -> None:
         self.sigma = sigma
+        self.signs = signs
         self.design = [a / s for a, s in zip(problem.design(blocks), sigma, strict=True)]
         y = [t / s for t, s in zip(target, sigma, strict=True)]
         gram = sum(a.T @ a for a in self.design)
@@ -152,7 +154,10 @@ class _Gain:
         slope = sum(block.T @ self.residual[j] for j, block in z.items())
         k = len(swept)
         swept = swept + (RIDGE * np.trace(own) + 1e-12) * np.eye(k)
-        return float(slope @ np.linalg.solve(swept, slope))
+        coefficients = np.linalg.solve(swept, slope)
+        if np.any(coefficients * self.signs < 0):
+            return -np.inf  # a shape at which the effect would do what physics forbids
+        return float(slope @ coefficients)
 
 
 def _pattern_search(

@@ -33,6 +33,7 @@ class _Group:
     width: int
     own: Array  # (n_folds, n_candidates, width, width)
     target: Array  # (n_folds, n_candidates * width)
+    signs: Array  # (n_candidates, width)
 
 
 class Screen:
@@ -91,7 +92,8 @@ class Screen:
                     part = block[a:b].reshape(b - a, len(index), k)
                     own[f] += np.einsum("rck,rcl->ckl", part, part, optimize=True)
                     target[f] += block[a:b].T @ self.target[j][a:b]
-            groups.append(_Group(np.array(index), rows, k, own, target))
+            signs = np.array([self.candidates[i].signs for i in index])
+            groups.append(_Group(np.array(index), rows, k, own, target, signs))
         return groups
 
     def model(self, blocks: Sequence[dict[int, Array]]) -> _Model:
@@ -120,11 +122,12 @@ class Screen:
     def step(self, model: _Model, wanted: NDArray[np.bool_] | None = None) -> Array:
         """Held-out error of every fold after each candidate is added, (n_candidates, n_folds).
 
-        Candidates that are not ``wanted`` get infinity.
+        Candidates that are not ``wanted``, and those whose coefficients come out with a sign that
+        physics forbids, get infinity.
         """
         n_folds = self.problem.n_folds
         errors = np.full((len(self.candidates), n_folds), np.inf)
-        trained = list(model.training())
+        *trained, whole = [*model.training(), model.fitted()]
         for group in self._groups:
             pick = np.arange(len(group.index))
             if wanted is not None:
@@ -141,6 +144,10 @@ class Screen:
                 errors[group.index[pick], f] = _swept_error(
                     model, train, f, np.asarray(cross), own, target
                 )
+            signs = group.signs[pick]
+            if signs.any():
+                gain = _gain(whole, np.asarray(cross).sum(0), own.sum(0), target.sum(0))[0]
+                errors[group.index[pick[np.any(gain * signs < 0, axis=1)]]] = np.inf
         return errors
 
 
@@ -167,17 +174,50 @@ class _Model:
 
     def training(self) -> list[_Train]:
         """The model fitted without each fold in turn."""
-        total, cross = self.gram.sum(0), self.cross.sum(0)
+        return [self._fit(g, c) for g, c in zip(self.gram, self.cross, strict=True)]
+
+    def fitted(self) -> _Train:
+        """The model fitted to all folds."""
+        return self._fit(0.0, 0.0)
+
+    def _fit(self, gram: Array | float, cross: Array | float) -> _Train:
+        total = self.gram.sum(0)
         scale = np.sqrt(np.diag(total))
         scale[scale == 0] = 1.0
-        ridge = RIDGE * np.eye(len(scale))
-        trained = []
-        for gram, part in zip(self.gram, self.cross, strict=True):
-            normal = (total - gram) / scale[:, None] / scale + ridge
-            factor = cho_factor(normal, check_finite=False)
-            solution = cho_solve(factor, (cross - part) / scale, check_finite=False) / scale
-            trained.append(_Train(factor, scale, solution))
-        return trained
+        normal = (total - gram) / scale[:, None] / scale + RIDGE * np.eye(len(scale))
+        factor = cho_factor(normal, check_finite=False)
+        right = (self.cross.sum(0) - cross) / scale
+        return _Train(factor, scale, cho_solve(factor, right, check_finite=False) / scale)
+
+
+def _gain(train: _Train, cross: Array, own: Array, target: Array) -> tuple[Array, Array]:
+    """Coefficients of every candidate beside the fitted model, and how the model mimics it.
+
+    Parameters
+    ----------
+    train : _Train
+        Model fitted to some rows.
+    cross : ndarray of shape (p, n_candidates * width)
+        Products of the model's columns and the candidates' on these rows.
+    own : ndarray of shape (n_candidates, width, width)
+        Gram matrix of each candidate.
+    target : ndarray of shape (n_candidates * width,)
+        Products of the candidates' columns and the torque.
+
+    Returns
+    -------
+    gain : ndarray of shape (n_candidates, width)
+    swept : ndarray of shape (p, n_candidates * width)
+    """
+    n, k = own.shape[:2]
+    swept = train.solve(cross)
+    block = own - np.einsum(
+        "pck,pcl->ckl", cross.reshape(-1, n, k), swept.reshape(-1, n, k), optimize=True
+    )
+    gradient = (target - cross.T @ train.solution).reshape(n, k)
+    diagonal = np.einsum("ckk->ck", own)
+    block = block + np.eye(k) * (CANDIDATE_RIDGE * diagonal + 1e-12)[:, None, :]
+    return np.linalg.solve(block, gradient[:, :, None])[:, :, 0], swept
 
 
 def _swept_error(
@@ -185,18 +225,11 @@ def _swept_error(
 ) -> Array:
     """Held-out error of one fold for every candidate of a group, shape (n_candidates,)."""
     n, k = own.shape[1], own.shape[2]
-    outside = cross.sum(0) - cross[fold]
-    right = target.sum(0) - target[fold]
-    swept = train.solve(outside)  # model coefficients that mimic each candidate column
+    gain, swept = _gain(
+        train, cross.sum(0) - cross[fold], own.sum(0) - own[fold], target.sum(0) - target[fold]
+    )
     b = train.solution
-    # What the candidate adds to the training rows beyond the model.
-    parts = outside.reshape(-1, n, k)
     mimic = swept.reshape(-1, n, k)
-    block = own.sum(0) - own[fold] - np.einsum("pck,pcl->ckl", parts, mimic, optimize=True)
-    gradient = (right - outside.T @ b).reshape(n, k)
-    diagonal = np.einsum("ckk->ck", own.sum(0))
-    block = block + np.eye(k) * (CANDIDATE_RIDGE * diagonal + 1e-12)[:, None, :]
-    gain = np.linalg.solve(block, gradient[:, :, None])[:, :, 0]
     # The same change judged on the fold left out.
     gram, here = model.gram[fold], cross[fold]
     base = model.square[fold] - 2 * b @ model.cross[fold] + b @ gram @ b

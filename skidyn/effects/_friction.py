@@ -51,7 +51,7 @@ class Stribeck(Effect):
     kind = "stribeck"
     title = "Stribeck friction"
     formula = r"\Delta F\,e^{-(|\dot q|/v_s)^\delta}\,\mathrm{sign}(\dot q)"
-    coefficients = (Coefficient("dF", "N m"),)
+    coefficients = (Coefficient("dF", "N m", sign=1),)
     shapes = (
         Shape("vs", "rad/s", (0.03, 0.05, 0.075, 0.11, 0.16, 0.25), 0.01, 1.0),
         Shape("delta", "1", (2.0,), 0.4, 2.6, scales=False),

@@ -114,7 +114,7 @@ class Dahl(Effect):
     kind = "dahl"
     title = "Dahl friction (pre-sliding)"
     formula = r"F\,h,\quad \tfrac{dh}{dq} = \tfrac{1}{\delta}\,(1 - h\,\mathrm{sign}\,\dot q)"
-    coefficients = (Coefficient("F", "N m"),)
+    coefficients = (Coefficient("F", "N m", sign=1),)
     shapes = (
         Shape("presliding", "rad", (0.008, 0.014, 0.022, 0.035, 0.055, 0.09), 0.005, 0.5),
     )
@@ -134,7 +134,7 @@ class LuGre(Effect):
     kind = "lugre"
     title = "LuGre friction"
     formula = r"\left(F_c + \Delta F\,e^{-(\dot q/v_s)^2}\right) h,\quad h\ \text{as in Dahl}"
-    coefficients = (Coefficient("F", "N m"), Coefficient("dF", "N m"))
+    coefficients = (Coefficient("F", "N m", sign=1), Coefficient("dF", "N m"))
     shapes = (
         Shape("presliding", "rad", (0.008, 0.014, 0.022), 0.005, 0.5),
         Shape("vs", "rad/s", (0.05, 0.1, 0.16), 0.01, 1.0),

@@ -38,7 +38,7 @@ class Spring(Effect):
     kind = "spring"
     title = "Spring"
     formula = r"k\,(q - q_0)"
-    coefficients = (Coefficient("k", "N m/rad"), Coefficient("tau0", "N m"))
+    coefficients = (Coefficient("k", "N m/rad", sign=1), Coefficient("tau0", "N m"))
     simplicity = 4
     rivals = ("nonlinear_spring", "gravity_compensator", "offset", "end_stop")
     separating_motion = "slow motion over the whole travel"
@@ -116,8 +116,8 @@ class EndStop(Effect):
 
     kind = "end_stop"
     title = "End stop"
-    formula = r"k\,\max(0,\ s\,(q - q_\mathrm{lim}))"
-    coefficients = (Coefficient("k", "N m/rad"),)
+    formula = r"s\,k\,\max(0,\ s\,(q - q_\mathrm{lim})),\quad s = \pm 1"
+    coefficients = (Coefficient("k", "N m/rad", sign=1),)
     shapes = (Shape("q_lim", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),)
     simplicity = 10
     rivals = ("spring", "nonlinear_spring")
@@ -135,9 +135,4 @@ class EndStop(Effect):
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         beyond = shape["side"] * (signals.q[:, joint] - shape["q_lim"])
-        return np.maximum(0.0, beyond)[:, None]
-
-    def parameters(
-        self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
-    ) -> dict[str, Any]:
-        return {"k": float(coefficients[0]) * shape["side"], **shape}
+        return (shape["side"] * np.maximum(0.0, beyond))[:, None]

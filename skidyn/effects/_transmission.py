@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
-from scipy.signal import savgol_filter
+from scipy.signal import bilinear, lfilter, lfilter_zi, savgol_filter
 
 from skidyn._signals import Signals
-from skidyn.effects._base import Array, Coefficient, Effect
+from skidyn.effects._base import Array, Coefficient, Effect, Shape
 
 #: Width over which the load is smoothed before it is differentiated twice, in s.
 _SMOOTHING = 0.08
@@ -31,6 +31,41 @@ def _smooth_derivatives(values: Array, signals: Signals) -> tuple[Array, Array, 
     return result  # type: ignore[return-value]
 
 
+def _oscillator(load: Array, signals: Signals, resonance: float, damping: float) -> Array:
+    """Wind-up of a spring-mass under a load, times the stiffness.
+
+    The link swings on its spring: far below the resonance the wind-up follows the load, near it the
+    wind-up is larger and late.
+
+    Parameters
+    ----------
+    load : ndarray of shape (n_samples,), N m or N
+        Torque of the rigid body if nothing gave way.
+    signals : Signals
+        For its segments and clock.
+    resonance : float, Hz
+        With the motor held.
+    damping : float
+        Damping ratio.
+
+    Returns
+    -------
+    ndarray of shape (n_samples,), N m or N
+    """
+    omega = 2 * np.pi * resonance
+    wind_up = np.zeros_like(load)
+    for rows in signals.segments:
+        if rows.stop - rows.start < 7:
+            continue
+        rate = 1.0 / float(np.median(np.diff(signals.clock[rows])))
+        # The swing of a link faster than the sampling cannot be seen; it follows at once.
+        w = min(omega, rate)
+        b, a = bilinear([1.0], [1 / w**2, 2 * damping / w, 1.0], rate)
+        start = lfilter_zi(b, a) * load[rows.start]
+        wind_up[rows] = lfilter(b, a, load[rows], zi=start)[0]
+    return wind_up
+
+
 class _LinkSideEffect(Effect):
     """The link is displaced from the logged position by ``-c s(load)``.
 
@@ -42,7 +77,7 @@ class _LinkSideEffect(Effect):
     #: Displacement used for the finite difference, rad or m.
     _step: ClassVar[float] = 1e-3
 
-    def displacement(self, signals: Signals, joint: int) -> Array:
+    def displacement(self, signals: Signals, joint: int, **shape: Any) -> Array:
         """Displacement of the link for a unit coefficient, shape (n_samples,)."""
         raise NotImplementedError
 
@@ -51,7 +86,7 @@ class _LinkSideEffect(Effect):
     ) -> dict[int, Array]:
         assert signals.robot is not None
         (joint,) = joints
-        derivatives = _smooth_derivatives(self.displacement(signals, joint), signals)
+        derivatives = _smooth_derivatives(self.displacement(signals, joint, **shape), signals)
         scale = self._step * signals.unit[joint] / (np.abs(derivatives[0]).max() + 1e-300)
         moved = [signals.q.copy(), signals.dq.copy(), signals.ddq.copy()]
         for values, change in zip(moved, derivatives, strict=True):
@@ -71,23 +106,27 @@ class JointElasticity(_LinkSideEffect):
     title = "Joint elasticity"
     formula = r"\tau(q - \tau_\mathrm{load}/K) - \tau(q)"
     coefficients = (Coefficient("compliance", "rad/(N m)", sign=1),)
+    shapes = (
+        Shape("resonance", "Hz", (25.0, 10.0, 6.5, 4.5, 3.2), 1.0, 100.0, scales=False),
+        Shape("damping", "1", (0.05,), 0.005, 1.0, scales=False),
+    )
     simplicity = 19
     rivals = ("time_delay", "rotor_inertia", "backlash", "base_tilt")
     separating_motion = "fast reversals with a heavy load, near the first resonance"
     reference = "Spong (1987), ASME JDSMC 109(4), 310-319."
 
-    def displacement(self, signals: Signals, joint: int) -> Array:
+    def displacement(self, signals: Signals, joint: int, **shape: Any) -> Array:
         assert signals.load is not None
-        return signals.load[:, joint]
+        return _oscillator(signals.load[:, joint], signals, **shape)
 
     def parameters(
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
     ) -> dict[str, Any]:
         compliance = float(coefficients[0])
-        return {"K": 1.0 / compliance if abs(compliance) > 1e-12 else 1e12}
+        return {"K": 1.0 / compliance if abs(compliance) > 1e-12 else 1e12, **shape}
 
     def units(self, prismatic: bool = False) -> dict[str, str]:
-        return {"K": "N/m" if prismatic else "N m/rad"}
+        return {"K": "N/m" if prismatic else "N m/rad", "resonance": "Hz", "damping": "1"}
 
 
 class Backlash(_LinkSideEffect):
@@ -102,7 +141,7 @@ class Backlash(_LinkSideEffect):
     separating_motion = "slow motion through poses in which the load changes sign"
     reference = "Nordin, Gutman (2002), Automatica 38(10), 1633-1649."
 
-    def displacement(self, signals: Signals, joint: int) -> Array:
+    def displacement(self, signals: Signals, joint: int, **shape: Any) -> Array:
         assert signals.load is not None
         load = signals.load[:, joint]
         # The flank changes over a finite torque; 12 % of the usual load keeps it differentiable.

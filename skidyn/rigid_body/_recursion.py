@@ -271,7 +271,8 @@ def trace_inverse_dynamics(
     ddq = [tape.input("ddq", i) for i in range(tree.n_joints)] if with_acceleration else zeros
     motions = _motions(joints, dq, ddq, [tape.constant(g) for g in gravity])
     used = np.ones((tree.n_bodies, 10), bool) if parameters_used is None else parameters_used
-    forces, moments = [], []
+    forces: list[Vector] = []
+    moments: list[Vector] = []
     for body, motion in enumerate(motions):
         parameters = [
             tape.input("parameter", 10 * body + k) if used[body, k] else tape.constant(0.0)
