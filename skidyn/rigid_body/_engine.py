@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from skidyn.rigid_body._canonical import CanonicalModel, canonicalize
 from skidyn.rigid_body._numpy import BoundProgram, chunk_size, evaluate_rows
 from skidyn.rigid_body._recursion import (
     Program,
@@ -59,14 +61,18 @@ class Engine:
 
     def _trace(self, kind: str, *options: Any) -> Program:
         if kind == "inverse_dynamics":
-            gravity, velocity, acceleration = options
+            gravity, velocity, acceleration, sparse = options
             return trace_inverse_dynamics(
-                self.tree, gravity, with_velocity=velocity, with_acceleration=acceleration
+                self.canonical.tree,
+                self.canonical.gravity(gravity),
+                with_velocity=velocity,
+                with_acceleration=acceleration,
+                parameters_used=self._own_parameters != 0 if sparse else self._structure,
             )
         if kind == "torque_regressor":
             return trace_torque_regressor(self.tree, *options)
         if kind == "mass_matrix":
-            return trace_mass_matrix(self.tree)
+            return trace_mass_matrix(self.canonical.tree, self._structure)
         return {"pose": trace_pose, "jacobian": trace_jacobian}[kind](self.tree, *options)
 
     def _bound(self, n_samples: int, limit: int, dtype: Any, *key: Any) -> BoundProgram:
@@ -89,7 +95,8 @@ class Engine:
         """Outputs of a program for all samples, samples first (a view of memory samples last)."""
         n_samples = len(signals["q"])
         bound = self._bound(n_samples, CHUNK, dtype, *key)
-        bound.set_parameters(self.parameters if parameters is None else parameters)
+        if parameters is not None:
+            bound.set_parameters(parameters)
         return evaluate_rows(bound, signals, n_samples, out)
 
     def iter_chunks(
@@ -104,6 +111,47 @@ class Engine:
             yield rows, bound.outputs[..., :size]
 
     @cached_property
+    def canonical(self) -> CanonicalModel:
+        """The tree in the frames that take the fewest operations."""
+        return canonicalize(self.tree)
+
+    @cached_property
+    def _structure(self) -> np.ndarray:
+        """Canonical parameters that may differ from zero, for some inertial parameters."""
+        return np.abs(self.canonical.kept).sum(axis=2) > 0
+
+    @cached_property
+    def _own_parameters(self) -> np.ndarray:
+        """The robot's parameters in canonical frames, without rounding dust."""
+        own = np.array(self.canonical.parameters(self.parameters))
+        own[np.abs(own) < 1e-16 * np.abs(own).max(initial=0.0)] = 0.0
+        return own
+
+    def inverse_dynamics(
+        self,
+        signals: dict[str, np.ndarray],
+        gravity: Any = None,
+        *,
+        parameters: np.ndarray | None = None,
+        dtype: Any = np.float64,
+    ) -> np.ndarray:
+        """Joint torques; signals that are left out vanish."""
+        key = self.gravity_key(gravity), "dq" in signals, "ddq" in signals, parameters is None
+        own = self._own_parameters
+        if parameters is not None:
+            own = np.array(self.canonical.parameters(parameters))
+        return self.evaluate(signals, "inverse_dynamics", *key, parameters=own, dtype=dtype)
+
+    def mass_matrix(
+        self, signals: dict[str, np.ndarray], parameters: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Joint-space inertia matrices."""
+        own = self._own_parameters
+        if parameters is not None:
+            own = np.array(self.canonical.parameters(parameters))
+        return self.evaluate(signals, "mass_matrix", parameters=own)
+
+    @cached_property
     def _gravity_key(self) -> tuple[float, ...]:
         return tuple(float(g) for g in self.gravity)
 
@@ -111,18 +159,34 @@ class Engine:
         """Gravity as a key of the program cache."""
         return self._gravity_key if gravity is None else tuple(float(g) for g in gravity)
 
-    def evaluate_torch(
-        self, signals: dict[str, torch.Tensor], *key: Any, parameters: Any = None
+    def inverse_dynamics_torch(
+        self, signals: dict[str, torch.Tensor], parameters: Any = None
     ) -> torch.Tensor:
-        """Outputs of a program for a batch of tensors, differentiable."""
+        """Joint torques of a batch of tensors, differentiable in signals and parameters."""
         import torch
 
         from skidyn.rigid_body._torch import evaluate
 
-        reference = signals["q"]
+        like = signals["q"]
         if parameters is None:
-            parameters = torch.tensor(
-                self.parameters, dtype=reference.dtype, device=reference.device
-            )
-        inputs = {**signals, "parameter": parameters.reshape(-1)}
-        return evaluate(self.program(*key), inputs)
+            own = torch.tensor(self._own_parameters, dtype=like.dtype, device=like.device)
+        else:
+            own = torch.stack(self._canonical_torch(like).parameters(parameters))
+        program = self.program("inverse_dynamics", self.gravity_key(), True, True, False)
+        return evaluate(program, {**signals, "parameter": own.reshape(-1)})
+
+    def _canonical_torch(self, like: torch.Tensor) -> CanonicalModel:
+        """The canonical model with its parameter maps as tensors."""
+        import torch
+
+        maps = {
+            name: torch.tensor(getattr(self.canonical, name), dtype=like.dtype, device=like.device)
+            for name in ("kept", "moved", "reframed")
+        }
+        return replace(self.canonical, **maps)
+
+    def torque_regressor_torch(self, signals: dict[str, torch.Tensor]) -> torch.Tensor:
+        """Regressor of a batch of tensors, differentiable."""
+        from skidyn.rigid_body._torch import evaluate
+
+        return evaluate(self.program("torque_regressor", self.gravity_key()), signals)

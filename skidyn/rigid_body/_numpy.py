@@ -10,6 +10,7 @@ loop.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -89,7 +90,7 @@ class BoundProgram:
             if row is None:
                 row = free.pop() if free else np.empty(self.chunk, self.dtype)
             self._values[index] = row
-            self._calls.append((_UFUNCS[node[0]], (*arguments, row)))
+            self._calls.append(_call(node[0], arguments, row))
         for row, index in copies:
             self._calls.append((np.copyto, (row, self._values[index])))
 
@@ -134,6 +135,19 @@ class BoundProgram:
         for function, arguments in self._calls:
             function(*arguments)
         return size
+
+
+def _call(
+    operation: str, arguments: tuple[np.ndarray, ...], row: np.ndarray
+) -> tuple[Callable, tuple]:
+    """A function and its arguments that write the result of an operation into a row."""
+    if operation in ("sin", "cos") and row.dtype == np.float64:
+        # In float64 torch's sine is three times as fast as NumPy's; in float32 it is the slower.
+        import torch
+
+        function = partial(getattr(torch, operation), out=torch.from_numpy(row))
+        return function, (torch.from_numpy(arguments[0]),)
+    return _UFUNCS[operation], (*arguments, row)
 
 
 def chunk_size(n_samples: int, limit: int) -> int:

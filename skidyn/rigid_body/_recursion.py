@@ -26,7 +26,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -203,8 +203,12 @@ def _motions(
     velocities: Sequence[Scalar],
     accelerations: Sequence[Scalar],
     gravity: Vector,
-) -> list[_Motion]:
-    """Outward recursion: motion of every body."""
+) -> Iterator[_Motion]:
+    """Outward recursion: motion of every body, one after the other.
+
+    Handed out at once, so that a user's operations stand next to those they depend on: the fewer
+    values are alive at a time, the more of them stay in the cache.
+    """
     motions: list[_Motion] = []
     for joint in joints:
         dq = joint.multiplier * velocities[joint.coordinate]
@@ -223,7 +227,7 @@ def _motions(
             dw = _add(_add(dw, _scale(ddq, joint.axis)), _cross(w, turning))
             w = _add(w, turning)
         motions.append(_Motion(w, dw, a))
-    return motions
+        yield motions[-1]
 
 
 def _moment_map(motion: _Motion) -> list[Vector]:
@@ -238,6 +242,16 @@ def _moment_map(motion: _Motion) -> list[Vector]:
         [-yz, dw[1], xy],
         [yy - zz, -B[0][1], B[0][2]],
         [yz, -xz, dw[2]],
+    ]
+
+
+def _parameters(tape: Tape, body: int, used: np.ndarray | None) -> list[Scalar]:
+    """The ten inertial parameters of a body; those that are not used are zero."""
+    return [
+        tape.input("parameter", 10 * body + k)
+        if used is None or used[body, k]
+        else tape.constant(0.0)
+        for k in range(10)
     ]
 
 
@@ -270,14 +284,10 @@ def trace_inverse_dynamics(
     dq = [tape.input("dq", i) for i in range(tree.n_joints)] if with_velocity else zeros
     ddq = [tape.input("ddq", i) for i in range(tree.n_joints)] if with_acceleration else zeros
     motions = _motions(joints, dq, ddq, [tape.constant(g) for g in gravity])
-    used = np.ones((tree.n_bodies, 10), bool) if parameters_used is None else parameters_used
     forces: list[Vector] = []
     moments: list[Vector] = []
     for body, motion in enumerate(motions):
-        parameters = [
-            tape.input("parameter", 10 * body + k) if used[body, k] else tape.constant(0.0)
-            for k in range(10)
-        ]
+        parameters = _parameters(tape, body, parameters_used)
         mass, first_moment, inertia = parameters[0], parameters[1:4], parameters[4:]
         force = _add(_scale(mass, motion.acceleration), _times(motion.B, first_moment))
         moment = _cross(first_moment, motion.acceleration)
@@ -336,13 +346,15 @@ def _power(motion: _Motion, moment_map: list[Vector], s: Vector, v: Vector) -> l
     return [_dot(v, motion.acceleration), *first_moments, *(_dot(s, c) for c in moment_map)]
 
 
-def trace_mass_matrix(tree: KinematicTree) -> Program:
+def trace_mass_matrix(
+    tree: KinematicTree, parameters_used: np.ndarray | None = None
+) -> Program:
     """Joint-space inertia matrix by composite rigid bodies [1]_; outputs keyed ``(row, column)``."""
     tape = Tape()
     joints = _joints(tape, tree)
     composite = []
     for body in range(tree.n_bodies):
-        p = [tape.input("parameter", 10 * body + k) for k in range(10)]
+        p = _parameters(tape, body, parameters_used)
         inertia = [[p[4], p[5], p[6]], [p[5], p[7], p[8]], [p[6], p[8], p[9]]]
         composite.append((p[0], p[1:4], inertia))
     outputs: dict[tuple[int, ...], Scalar] = {}

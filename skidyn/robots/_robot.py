@@ -236,32 +236,28 @@ class Robot:
         ndarray of shape (n_samples, n_joints)
             N m; N for prismatic joints.
         """
-        key = "inverse_dynamics", self._engine.gravity_key(gravity), True, True
         signals = self._signals(q=q, dq=dq, ddq=ddq)
-        return self._engine.evaluate(
-            signals, *key, parameters=self._parameters(parameters), dtype=dtype
+        return self._engine.inverse_dynamics(
+            signals, gravity, parameters=self._parameters(parameters), dtype=dtype
         )
 
     def gravity_torque(
         self, q: Any, *, parameters: Any = None, gravity: Sequence[float] | None = None
     ) -> np.ndarray:
         """Joint torques that hold the robot at rest, shape (n_samples, n_joints), N m or N."""
-        key = "inverse_dynamics", self._engine.gravity_key(gravity), False, False
-        signals = self._signals(q=q)
-        return self._engine.evaluate(signals, *key, parameters=self._parameters(parameters))
+        return self._engine.inverse_dynamics(
+            self._signals(q=q), gravity, parameters=self._parameters(parameters)
+        )
 
     def coriolis_torque(self, q: Any, dq: Any, *, parameters: Any = None) -> np.ndarray:
         """Centrifugal and Coriolis torques, shape (n_samples, n_joints), N m or N."""
-        key = "inverse_dynamics", (0.0, 0.0, 0.0), True, False
-        signals = self._signals(q=q, dq=dq)
-        return self._engine.evaluate(signals, *key, parameters=self._parameters(parameters))
+        return self._engine.inverse_dynamics(
+            self._signals(q=q, dq=dq), (0.0, 0.0, 0.0), parameters=self._parameters(parameters)
+        )
 
     def mass_matrix(self, q: Any, *, parameters: Any = None) -> np.ndarray:
         """Joint-space inertia matrix, shape (n_samples, n_joints, n_joints), kg m^2 (kg m, kg)."""
-        signals = self._signals(q=q)
-        return self._engine.evaluate(
-            signals, "mass_matrix", parameters=self._parameters(parameters)
-        )
+        return self._engine.mass_matrix(self._signals(q=q), self._parameters(parameters))
 
     def forward_dynamics(self, q: Any, dq: Any, tau: Any, *, parameters: Any = None) -> np.ndarray:
         """Joint accelerations that torques cause, without friction.
@@ -395,17 +391,14 @@ class Robot:
 
         Works in the precision and on the device of ``q``; ``parameters`` may require gradients.
         """
-        key = "inverse_dynamics", self._engine.gravity_key(), True, True
-        return self._engine.evaluate_torch(
-            {"q": q, "dq": dq, "ddq": ddq}, *key, parameters=parameters
-        )
+        signals = {"q": q, "dq": dq, "ddq": ddq}
+        return self._engine.inverse_dynamics_torch(signals, parameters)
 
     def torque_regressor_torch(
         self, q: torch.Tensor, dq: torch.Tensor, ddq: torch.Tensor
     ) -> torch.Tensor:
         """Differentiable :meth:`torque_regressor`, shape (n_samples, n_joints, 10 * n_bodies)."""
-        key = "torque_regressor", self._engine.gravity_key()
-        return self._engine.evaluate_torch({"q": q, "dq": dq, "ddq": ddq}, *key)
+        return self._engine.torque_regressor_torch({"q": q, "dq": dq, "ddq": ddq})
 
     def _signals(self, **signals: Any) -> dict[str, np.ndarray]:
         """Signals as float64 arrays of one shape (n_samples, n_joints)."""
@@ -426,9 +419,9 @@ class Robot:
             arrays[name] = array
         return arrays
 
-    def _parameters(self, parameters: Any) -> np.ndarray:
+    def _parameters(self, parameters: Any) -> np.ndarray | None:
         if parameters is None:
-            return self.inertial_parameters
+            return None
         array = np.asarray(parameters, dtype=np.float64)
         if array.size != 10 * self.n_bodies:
             raise SkidynError(
