@@ -109,8 +109,10 @@ class SequenceRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         if not (weight > 0).any():
             raise ValueError("all sample weights are zero; at least one must be positive.")
         trajectories = keys.trajectories(X)
+        self._in_bag = np.ones(len(X), dtype=bool)  # for BLLRegressor: trajectories drawn
         if self.resample == "trajectory":
-            weight = weight * _trajectory_bootstrap(trajectories, weight, rng)
+            drawn = _trajectory_bootstrap(trajectories, weight, rng)
+            weight, self._in_bag = weight * drawn, drawn > 0
         validation = None
         if self.early_stopping:
             validation = _held_out_rows(trajectories, weight, self.validation_fraction, rng)
@@ -156,8 +158,6 @@ class SequenceRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
                 self.loss_curve_ += training.loss_curve
                 self.validation_curve_ += training.validation_curve
         self.n_iter_ = len(self.loss_curve_)
-        # rows that no weight excluded: BLLRegressor asks which rows a member has not seen
-        self._in_bag = used
 
     def _plan(self, seed: int) -> TrainingPlan:
         return TrainingPlan(

@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""One regressor per joint, which sees that joint's own signals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from numbers import Integral
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.base import BaseEstimator, MetaEstimatorMixin, RegressorMixin, clone
+from sklearn.ensemble import HistGradientBoostingRegressor
+from sklearn.utils.parallel import Parallel, delayed
+from sklearn.utils.validation import check_is_fitted, validate_data
+
+from skidyn._columns import Columns, ColumnSpec, resolve_columns
+from skidyn._compat import HasMethods, fit_context
+from skidyn.preprocessing._keys import resolve_keys
+
+Array = NDArray[np.float64]
+
+
+class OwnJointRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
+    """One regressor per joint on that joint's position, velocity, acceleration and travel.
+
+    What a good physical model leaves over is mostly friction inside single joints. A learner that
+    sees only the joint it speaks of cannot fit accidental relations between joints, needs less
+    data and transfers better to new motions. The travel since the last reversal of motion (rad or
+    m) is added, because pre-sliding friction depends on it.
+
+    Parameters
+    ----------
+    estimator : estimator, default=None
+        Regressor of one joint; a small, cautious gradient boosting if None.
+    joint_names : sequence of str, default=None
+        Names of the joints for columns named ``q_<joint>``; ``q1, q2, ..`` or columns by position
+        need none.
+    n_jobs : int, default=None
+        Joints fitted at the same time.
+    trajectory, time : int, str or None, default="auto"
+        Key columns of X.
+
+    Attributes
+    ----------
+    estimators_ : list of estimators
+        One per joint.
+    n_features_in_ : int
+        Columns of X.
+    feature_names_in_ : ndarray of str
+        Their names, where X has names.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skidyn.hybrid import OwnJointRegressor
+    >>> from sklearn.linear_model import Ridge
+    >>> X = np.random.default_rng(0).normal(size=(50, 6))  # q, dq, ddq of two joints
+    >>> OwnJointRegressor(Ridge()).fit(X, X[:, 2:4]).predict(X).shape
+    (50, 2)
+    """
+
+    _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
+        "estimator": [HasMethods(["fit", "predict"]), None],
+        "joint_names": ["array-like", None],
+        "n_jobs": [Integral, None],
+        "trajectory": [str, Integral, None],
+        "time": [str, Integral, None],
+    }
+
+    def __init__(
+        self,
+        estimator: Any = None,
+        *,
+        joint_names: Sequence[str] | None = None,
+        n_jobs: int | None = None,
+        trajectory: ColumnSpec = "auto",
+        time: ColumnSpec = "auto",
+    ) -> None:
+        self.estimator = estimator
+        self.joint_names = joint_names
+        self.n_jobs = n_jobs
+        self.trajectory = trajectory
+        self.time = time
+
+    def __sklearn_tags__(self) -> Any:
+        tags = super().__sklearn_tags__()
+        tags.target_tags.multi_output = True
+        return tags
+
+    @fit_context(prefer_skip_nested_validation=False)
+    def fit(self, X: Any, y: Any) -> OwnJointRegressor:
+        """Fit one regressor per joint.
+
+        Parameters
+        ----------
+        X : DataFrame or array-like of shape (n_samples, n_features)
+            Positions, velocities and accelerations of all joints, with key columns.
+        y : array-like of shape (n_samples,) or (n_samples, n_joints), N m (N if prismatic)
+            Torque, or what a physical model leaves over.
+
+        Returns
+        -------
+        self : object
+            The fitted regressor.
+        """
+        X, y = validate_data(self, X, y, multi_output=True, y_numeric=True, dtype=np.float64)
+        self._one_dimensional = y.ndim == 1
+        targets = y.reshape(len(y), -1)
+        self._columns = self._resolve(targets.shape[1])
+        base = _cautious_boosting() if self.estimator is None else self.estimator
+        features = self._features(X)
+        self.estimators_ = Parallel(n_jobs=self.n_jobs)(
+            delayed(clone(base).fit)(own, targets[:, j]) for j, own in enumerate(features)
+        )
+        return self
+
+    def _resolve(self, n_joints: int) -> Columns:
+        names = getattr(self, "feature_names_in_", None)
+        joints = self.joint_names
+        if joints is None:
+            joints = [str(j + 1) for j in range(n_joints)]
+        return resolve_columns(
+            None if names is None else list(names),
+            self.n_features_in_,
+            list(joints),
+            trajectory=self.trajectory,
+            time=self.time,
+        )
+
+    def _features(self, X: Array) -> list[Array]:
+        columns = self._columns
+        assert columns.ddq is not None
+        keys = resolve_keys(None, X.shape[1], trajectory=columns.trajectory, time=columns.time)
+        segments = keys.segments(X)
+        own = []
+        for q, dq, ddq in zip(columns.q, columns.dq, columns.ddq, strict=True):
+            travel = _travel_since_reversal(X[:, q], X[:, dq], segments)
+            own.append(np.c_[X[:, [q, dq, ddq]], travel])
+        return own
+
+    def predict(self, X: Any) -> Array:
+        """Predict the torque of every row.
+
+        Parameters
+        ----------
+        X : DataFrame or array-like of shape (n_samples, n_features)
+            As in fit.
+
+        Returns
+        -------
+        y : ndarray of shape (n_samples,) or (n_samples, n_joints), N m (N if prismatic)
+            Predicted torque.
+        """
+        check_is_fitted(self)
+        X = validate_data(self, X, reset=False, dtype=np.float64)
+        torque = np.stack(
+            [
+                estimator.predict(own)
+                for estimator, own in zip(self.estimators_, self._features(X), strict=True)
+            ],
+            axis=1,
+        )
+        return torque[:, 0] if self._one_dimensional else torque
+
+
+def _cautious_boosting() -> HistGradientBoostingRegressor:
+    return HistGradientBoostingRegressor(
+        max_iter=100,
+        learning_rate=0.05,
+        max_leaf_nodes=15,
+        min_samples_leaf=200,
+        l2_regularization=10.0,
+        early_stopping=False,
+        random_state=0,
+    )
+
+
+def _travel_since_reversal(position: Array, velocity: Array, segments: list[slice]) -> Array:
+    """Signed distance from where the joint last changed direction within its segment."""
+    travel = np.empty_like(position)
+    for segment in segments:
+        q, direction = position[segment], np.sign(velocity[segment])
+        turned = np.r_[True, direction[1:] != direction[:-1]]
+        turn = np.maximum.accumulate(np.where(turned, np.arange(len(q)), 0))
+        travel[segment] = q - q[turn]
+    return travel

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How far a sample is from the training samples."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.distance import cdist
+
+Array = NDArray[np.float64]
+
+#: Training samples that stand for all.
+REFERENCES = 500
+#: Held-out samples of the training log that count as inside.
+INSIDE = 0.99
+#: Rows compared with the references at once.
+CHUNK = 4096
+
+
+def references(features: Array, scale: Array) -> Array:
+    """Evenly spaced rows of the training features, scaled."""
+    rows = np.unique(np.linspace(0, len(features) - 1, REFERENCES).astype(int))
+    return features[rows] / scale
+
+
+def distances(features: Array, scale: Array, reference: Array) -> Array:
+    """Distance to the nearest reference, in standard deviations per feature, root mean square."""
+    scaled = features / scale
+    parts = [
+        cdist(scaled[i : i + CHUNK], reference).min(axis=1) for i in range(0, len(scaled), CHUNK)
+    ]
+    return np.concatenate(parts) / np.sqrt(features.shape[1])
+
+
+class TrainingRange:
+    """Region around the training samples, and how a learned part fades out beyond it.
+
+    Attributes
+    ----------
+    scale, reference : ndarray
+        Standard deviation of the features, and reference samples divided by it.
+    radius : float
+        Distance within which held-out training samples lie.
+    held_out_novelty : ndarray of shape (n_samples,)
+        Novelty of the training samples when their fold is held out.
+    """
+
+    def __init__(self, features: Array, folds: list[Any]) -> None:
+        spread = features.std(axis=0)
+        self.scale = np.where(spread > 0, spread, 1.0)
+        self.reference = references(features, self.scale)
+        distance = np.zeros(len(features))
+        for train, test in folds:
+            near = references(features[train], self.scale)
+            distance[test] = distances(features[test], self.scale, near)
+        self.radius = max(float(np.quantile(distance, INSIDE)), 1e-6)
+        self.held_out_novelty = distance / self.radius
+
+    def novelty(self, features: Array) -> Array:
+        """Distance from the training samples in radii: above 1 is outside."""
+        return distances(features, self.scale, self.reference) / self.radius
+
+
+def fade(novelty: Array) -> Array:
+    """Share of the learned part that is kept: all inside, nothing beyond two radii."""
+    return np.clip(2.0 - novelty, 0.0, 1.0)

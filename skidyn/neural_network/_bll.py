@@ -1,0 +1,328 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Bagged LSTM networks under a meta-regressor (BLL)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from numbers import Integral
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.base import BaseEstimator, MetaEstimatorMixin, RegressorMixin, clone
+from sklearn.compose import TransformedTargetRegressor
+from sklearn.ensemble import BaggingRegressor
+from sklearn.linear_model import RidgeCV
+from sklearn.neural_network import MLPRegressor
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+from sklearn.utils import check_random_state
+from sklearn.utils.validation import (
+    _check_sample_weight,
+    check_is_fitted,
+    has_fit_parameter,
+    validate_data,
+)
+
+from skidyn._columns import ColumnSpec
+from skidyn._compat import HasMethods, Interval, StrOptions, fit_context
+from skidyn.model_selection._split import held_out_folds
+from skidyn.neural_network._lstm import LSTMRegressor
+from skidyn.preprocessing._keys import Keys, resolve_keys
+
+Array = NDArray[np.float64]
+
+#: Folds of the stacking where the bootstrap leaves no trajectory out.
+BLOCKS = 3
+
+
+class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
+    """Bagged LSTM networks, stacked by a meta-regressor (BLL).
+
+    Members are trained on bootstraps of the log; their mean is the input of a meta-regressor,
+    which is trained on predictions for trajectories that the averaged members have not seen. (The
+    paper [1]_ trains it on the rows that it then reports.)
+
+    To learn what a physical model leaves over, put it into :class:`skidyn.hybrid.HybridRegressor`:
+    ``HybridRegressor(physics, BLLRegressor())``.
+
+    Parameters
+    ----------
+    estimator : estimator, default=None
+        Member; :class:`LSTMRegressor` if None. Its key columns are set from those given here. With
+        ``per_joint=True`` of the member each output has networks of its own.
+    final_estimator : estimator, default=None
+        Meta-regressor; a linear one (ridge) if None.
+    n_estimators : int, default=10
+        Members.
+    resample : {"trajectory", "window"}, default="trajectory"
+        Draw whole trajectories or single target rows with replacement. Rows that are not drawn
+        still serve as history.
+    cv : int, cross-validator or None, default=None
+        How the meta-regressor gets honest inputs. None takes each trajectory's mean over the
+        members whose bootstrap left it out, which costs no training; a number (or a
+        cross-validator) trains the members again without each fold. With ``resample="window"``, or
+        fewer than three trajectories, None means 3 folds, by trajectory or, of a single one, by
+        blocks of rows.
+    n_jobs : int, default=None
+        Members trained at the same time (processes).
+    trajectory, time : int, str or None, default="auto"
+        Key columns of X.
+    random_state : int, RandomState or None, default=None
+        Seeds members and bootstraps; the result does not depend on `n_jobs`.
+
+    Attributes
+    ----------
+    bagging_ : BaggingRegressor
+        The members, in ``bagging_.estimators_``.
+    final_estimator_ : estimator
+        The meta-regressor.
+    n_stacked_ : int
+        Rows that had an honest prediction and trained the meta-regressor.
+    n_features_in_ : int
+        Columns of X.
+    feature_names_in_ : ndarray of str
+        Their names, where X has names.
+
+    References
+    ----------
+    .. [1] Y. Tao et al., "Robot hybrid inverse dynamics model compensation method based on the BLL
+       residual prediction algorithm", Robotica 43, 2025, doi:10.1017/S0263574724001905.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skidyn.neural_network import BLLRegressor, LSTMRegressor
+    >>> X = np.c_[np.repeat(np.arange(4), 50), np.random.default_rng(0).normal(size=(200, 2))]
+    >>> member = LSTMRegressor(window=4, hidden_size=8, max_epochs=5)
+    >>> bll = BLLRegressor(member, n_estimators=3, trajectory=0, random_state=0)
+    >>> torque, spread = bll.fit(X, X[:, 1:]).predict(X, return_std=True)
+    >>> torque.shape, spread.shape
+    ((200, 2), (200, 2))
+    """
+
+    __metadata_request__fit = {"sample_weight": True}
+
+    _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
+        "estimator": [HasMethods(["fit", "predict"]), None],
+        "final_estimator": [HasMethods(["fit", "predict"]), None],
+        "n_estimators": [Interval(Integral, 1, None, closed="left")],
+        "resample": [StrOptions({"trajectory", "window"})],
+        "cv": [Interval(Integral, 2, None, closed="left"), HasMethods(["split"]), None],
+        "n_jobs": [Integral, None],
+        "trajectory": [str, Integral, None],
+        "time": [str, Integral, None],
+        "random_state": ["random_state"],
+    }
+
+    def __init__(
+        self,
+        estimator: Any = None,
+        final_estimator: Any = None,
+        *,
+        n_estimators: int = 10,
+        resample: str = "trajectory",
+        cv: Any = None,
+        n_jobs: int | None = None,
+        trajectory: ColumnSpec = "auto",
+        time: ColumnSpec = "auto",
+        random_state: Any = None,
+    ) -> None:
+        self.estimator = estimator
+        self.final_estimator = final_estimator
+        self.n_estimators = n_estimators
+        self.resample = resample
+        self.cv = cv
+        self.n_jobs = n_jobs
+        self.trajectory = trajectory
+        self.time = time
+        self.random_state = random_state
+
+    @classmethod
+    def from_table_iii(cls, **parameters: Any) -> BLLRegressor:
+        """Make the BLL of the paper's table III.
+
+        One LSTM with 32 cells per joint, learning rate 0.01, 130 epochs, batches of 32, window
+        bootstrap, and the meta-network 100-50-25 with rectifiers. The paper gives neither the
+        number of members (10 here) nor the window (10 rows here).
+
+        Parameters
+        ----------
+        **parameters : dict
+            Other parameters, or changed ones.
+
+        Returns
+        -------
+        bll : BLLRegressor
+
+        Examples
+        --------
+        >>> from skidyn.neural_network import BLLRegressor
+        >>> BLLRegressor.from_table_iii(n_estimators=5).estimator.max_epochs
+        130
+        """
+        member = LSTMRegressor(
+            window=10,
+            hidden_size=32,
+            learning_rate=0.01,
+            max_epochs=130,
+            batch_size=32,
+            per_joint=True,
+        )
+        network = MLPRegressor(
+            hidden_layer_sizes=(100, 50, 25), learning_rate_init=0.01, early_stopping=True
+        )
+        head = TransformedTargetRegressor(
+            make_pipeline(StandardScaler(), network), transformer=StandardScaler()
+        )
+        defaults = {"estimator": member, "final_estimator": head, "resample": "window"}
+        return cls(**(defaults | parameters))
+
+    def __sklearn_tags__(self) -> Any:
+        tags = super().__sklearn_tags__()
+        tags.target_tags.multi_output = True
+        return tags
+
+    @fit_context(prefer_skip_nested_validation=False)
+    def fit(self, X: Any, y: Any, sample_weight: Any = None) -> BLLRegressor:
+        """Train the members and the meta-regressor.
+
+        Parameters
+        ----------
+        X : DataFrame or array-like of shape (n_samples, n_features)
+            Features, with key columns; rows of a trajectory in order of time.
+        y : array-like of shape (n_samples,) or (n_samples, n_outputs), N m (N if prismatic)
+            Torque, or what a physical model leaves over.
+        sample_weight : array-like of shape (n_samples,), default=None
+            Weight of each row: members draw rows in proportion to it.
+
+        Returns
+        -------
+        self : object
+            The fitted regressor.
+        """
+        table = X
+        X, y = validate_data(self, X, y, multi_output=True, y_numeric=True, dtype=np.float64)
+        if sample_weight is not None:
+            sample_weight = _check_sample_weight(sample_weight, X, dtype=np.float64)
+        keys = self._keys()
+        rng = check_random_state(self.random_state)
+        bagging = self._bagging(keys, sample_weight is not None, int(rng.randint(2**31 - 1)))
+        self.bagging_ = _fit(clone(bagging), X, y, sample_weight)
+        trajectories = keys.trajectories(X)
+        out_of_bag = self.cv is None and self.resample == "trajectory"
+        if out_of_bag and len(np.unique(trajectories)) > 2:
+            inputs = _out_of_bag_means(self.bagging_, X)
+        else:
+            folds = self._folds(table, X, y, trajectories)
+            inputs = _cross_fitted_means(bagging, X, y, sample_weight, folds)
+        for member in self.bagging_.estimators_:
+            member.__dict__.pop("_in_bag", None)  # one flag per row, not needed any more
+        honest = np.isfinite(inputs).all(axis=1)
+        if not honest.any():  # too few rows to hold any out: stack what there is
+            inputs, honest = _member_mean(self.bagging_, X), np.ones(len(X), dtype=bool)
+        self.n_stacked_ = int(honest.sum())
+        head = RidgeCV() if self.final_estimator is None else clone(self.final_estimator)
+        if "random_state" in head.get_params():
+            head.set_params(random_state=int(rng.randint(2**31 - 1)))
+        weight = None if sample_weight is None else sample_weight[honest]
+        self.final_estimator_ = _fit(head, inputs[honest], y[honest], weight)
+        return self
+
+    def _bagging(self, keys: Keys, weighted: bool, seed: int) -> BaggingRegressor:
+        member = LSTMRegressor() if self.estimator is None else clone(self.estimator)
+        names = member.get_params()
+        # BaggingRegressor hands arrays down, so the keys are given by position
+        for name, position in (("trajectory", keys.trajectory), ("time", keys.time)):
+            if name in names:
+                member.set_params(**{name: position})
+        if self.resample == "trajectory":
+            if "resample" not in names:
+                raise ValueError(
+                    f"{type(member).__name__} has no parameter 'resample', which draws "
+                    "trajectories; use resample='window'."
+                )
+            member.set_params(resample="trajectory")
+        return BaggingRegressor(
+            member,
+            n_estimators=self.n_estimators,
+            # scikit-learn's bagging honours weights by drawing rows in proportion to them
+            bootstrap=weighted or self.resample == "window",
+            n_jobs=self.n_jobs,
+            random_state=seed,
+        )
+
+    def _folds(self, table: Any, X: Array, y: Array, trajectories: NDArray[Any]) -> Iterable[Any]:
+        if hasattr(self.cv, "split"):
+            return list(self.cv.split(table, y))
+        member = LSTMRegressor() if self.estimator is None else self.estimator
+        guard = int(getattr(member, "window", 0))
+        return held_out_folds(trajectories, self.cv or BLOCKS, guard=guard)
+
+    def _keys(self) -> Keys:
+        names = getattr(self, "feature_names_in_", None)
+        return resolve_keys(
+            None if names is None else list(names),
+            self.n_features_in_,
+            trajectory=self.trajectory,
+            time=self.time,
+        )
+
+    def predict(self, X: Any, return_std: bool = False) -> Any:
+        """Predict the torque of every row.
+
+        Parameters
+        ----------
+        X : DataFrame or array-like of shape (n_samples, n_features)
+            As in fit.
+        return_std : bool, default=False
+            Return the spread of the members as well.
+
+        Returns
+        -------
+        y : ndarray of shape (n_samples,) or (n_samples, n_outputs), N m (N if prismatic)
+            Predicted torque.
+        std : ndarray of the same shape, N m (N if prismatic)
+            Standard deviation over the members; only with ``return_std=True``.
+        """
+        check_is_fitted(self)
+        X = validate_data(self, X, reset=False, dtype=np.float64)
+        members = np.stack([member.predict(X) for member in self.bagging_.estimators_])
+        mean = members.mean(axis=0)
+        torque = self.final_estimator_.predict(mean.reshape(len(X), -1)).reshape(mean.shape)
+        return (torque, members.std(axis=0)) if return_std else torque
+
+
+def _fit(estimator: Any, X: Any, y: Any, sample_weight: Array | None) -> Any:
+    if sample_weight is None:
+        return estimator.fit(X, y)
+    if not has_fit_parameter(estimator, "sample_weight"):
+        raise ValueError(f"{type(estimator).__name__} takes no sample_weight; fit without it.")
+    return estimator.fit(X, y, sample_weight=sample_weight)
+
+
+def _member_mean(bagging: BaggingRegressor, X: Array) -> Array:
+    members = [member.predict(X).reshape(len(X), -1) for member in bagging.estimators_]
+    return np.mean(members, axis=0)
+
+
+def _out_of_bag_means(bagging: BaggingRegressor, X: Array) -> Array:
+    """Mean over the members that have not seen a row; nan where every member has."""
+    total: Any = 0.0
+    count = np.zeros((len(X), 1))
+    for member in bagging.estimators_:
+        unseen = ~member._in_bag[:, None]
+        total = total + np.where(unseen, member.predict(X).reshape(len(X), -1), 0.0)
+        count += unseen
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def _cross_fitted_means(
+    bagging: BaggingRegressor, X: Array, y: Array, weight: Array | None, folds: Iterable[Any]
+) -> Array:
+    """Mean over members trained without the row's fold; nan where a row is in no test fold."""
+    means = np.full((len(X), y[:1].size), np.nan)
+    for train, test in folds:
+        part = None if weight is None else weight[train]
+        means[test] = _member_mean(_fit(clone(bagging), X[train], y[train], part), X[test])
+    return means

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import pickle
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.base import clone
+from sklearn.ensemble import ExtraTreesRegressor
+from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.model_selection import GridSearchCV, KFold, ShuffleSplit, cross_val_predict
+from sklearn.neighbors import KNeighborsRegressor
+from sklearn.utils.estimator_checks import parametrize_with_checks
+
+from skidyn.hybrid import HybridRegressor
+from skidyn.model_selection import PhaseKFold, TrajectoryKFold
+
+TREES = ExtraTreesRegressor(15, min_samples_leaf=5, random_state=0)
+
+
+@parametrize_with_checks(
+    [HybridRegressor(Ridge(), ExtraTreesRegressor(10, random_state=0), cv=3)],
+    expected_failed_checks=lambda estimator: {
+        "check_sample_weight_equivalence_on_dense_data": (
+            "removing rows changes folds, reference samples and the draws of the learner"
+        )
+    },
+)
+def test_scikit_learn_contract(estimator, check):
+    check(estimator)
+
+
+def make_log(n_trajectories=10, n_rows=100, seed=0, hidden=(1.0, 0.0), noise=0.1):
+    """Two joints; a linear model misses a wave of the first joint's position."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(n_rows) * 0.02
+    frames, torques = [], []
+    for k in range(n_trajectories):
+        speed, phase = rng.uniform(1, 4, 2), rng.uniform(0, 6, 2)
+        q, dq = np.sin(speed * t[:, None] + phase), speed * np.cos(speed * t[:, None] + phase)
+        torque = 3 * dq + np.sin(5 * q) * hidden
+        # noise that is coloured, as residuals of real logs are
+        coloured = np.apply_along_axis(np.convolve, 0, rng.normal(size=q.shape), np.ones(20) / 4.5)
+        torques.append(torque + noise * coloured[:n_rows])
+        frames.append(pd.DataFrame(np.c_[q, dq], columns=["q1", "q2", "dq1", "dq2"]))
+        frames[-1] = frames[-1].assign(trajectory=k, time=t)
+    return pd.concat(frames, ignore_index=True), np.concatenate(torques)
+
+
+def rmse(y, prediction):
+    return np.sqrt(((y - prediction) ** 2).mean(axis=0))
+
+
+def test_learns_the_joint_that_hides_something_and_leaves_the_other_alone():
+    X, y = make_log()
+    hybrid = HybridRegressor(LinearRegression(), TREES).fit(X, y)
+    assert hybrid.learned_weight_[0] > 0.8 and hybrid.learned_weight_[1] == 0
+    assert hybrid.gain_[0] > 0.5 and hybrid.p_value_[0] < 0.01
+    held_out, truth = make_log(seed=1)
+    before = rmse(truth, hybrid.physics_.predict(held_out))
+    after = rmse(truth, hybrid.predict(held_out))
+    assert after[0] < 0.5 * before[0] and after[1] == before[1]
+    np.testing.assert_allclose(
+        hybrid.predict(held_out) - hybrid.physics_.predict(held_out),
+        hybrid.learned_torque(held_out),
+    )
+
+
+def test_adds_nothing_to_complete_physics():
+    kept = 0
+    for seed in range(10):
+        X, y = make_log(6, 60, seed=seed, hidden=(0.0, 0.0))
+        hybrid = HybridRegressor(LinearRegression(), KNeighborsRegressor(5), cv=3).fit(X, y)
+        kept += (hybrid.learned_weight_ > 0).sum()
+    assert kept <= 2  # of 20 joints, at a level of 5 %
+
+
+def test_fades_out_of_range_and_says_so():
+    X, y = make_log()
+    hybrid = HybridRegressor(LinearRegression(), TREES).fit(X, y)
+    assert hybrid.outside_range(X).mean() < 0.05
+    far = X.copy()
+    far[["q1", "q2"]] += 10.0
+    assert hybrid.outside_range(far).all()
+    np.testing.assert_array_equal(hybrid.predict(far), hybrid.physics_.predict(far))
+
+
+def test_single_periodic_recording_takes_its_folds_from_the_phase():
+    X, y = make_log(1, 1000)
+    hybrid = HybridRegressor(LinearRegression(), TREES, cv=PhaseKFold(5, period=20.0))
+    assert hybrid.fit(X, y).predict(X).shape == y.shape
+    with pytest.raises(ValueError, match="exactly once"):
+        hybrid.set_params(cv=ShuffleSplit(2)).fit(X, y)
+
+
+def test_tables_searches_and_storage():
+    X, y = make_log(6, 60)
+    hybrid = HybridRegressor(LinearRegression(), TREES, cv=3)
+    expected = hybrid.fit(X, y).predict(X)
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(hybrid)).predict(X), expected)
+    grid = {"learner__min_samples_leaf": [5, 50], "physics__fit_intercept": [True]}
+    search = GridSearchCV(hybrid, grid, cv=TrajectoryKFold(2)).fit(X, y)
+    assert search.best_params_["learner__min_samples_leaf"] == 5
+    assert cross_val_predict(hybrid, X, y[:, 0], cv=TrajectoryKFold(2)).shape == (len(X),)
+    assert "HybridRegressor" in hybrid._repr_html_()
+    array = clone(hybrid).set_params(trajectory=4, time=5, cv=KFold(3)).fit(X.to_numpy(), y)
+    assert array.predict(X.to_numpy()).shape == y.shape
+
+
+def test_weights_need_learners_that_take_them():
+    X, y = make_log(4, 30)
+    hybrid = HybridRegressor(LinearRegression(), KNeighborsRegressor(), cv=2)
+    with pytest.raises(ValueError, match="KNeighborsRegressor takes no sample_weight"):
+        hybrid.fit(X, y, sample_weight=np.ones(len(X)))

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import pickle
+
+import numpy as np
+import pytest
+from sklearn.base import clone
+from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.model_selection import GridSearchCV, cross_val_score
+from sklearn.utils.estimator_checks import parametrize_with_checks
+
+from skidyn.model_selection import TrajectoryKFold
+from skidyn.neural_network import BLLRegressor, LSTMRegressor
+
+MEMBER = LSTMRegressor(window=6, hidden_size=8, max_epochs=3)
+SEQUENCE = {
+    "check_methods_sample_order_invariance": "the order of rows is time, so it matters",
+    "check_methods_subset_invariance": "a row is predicted from the rows before it as well",
+    "check_sample_weight_equivalence_on_dense_data": (
+        "a removed row is missing from the history of its successors, a row of weight 0 is not"
+    ),
+}
+
+
+@parametrize_with_checks(
+    [
+        BLLRegressor(
+            LSTMRegressor(window=2, hidden_size=8, max_epochs=25, learning_rate=0.03),
+            n_estimators=2,
+            random_state=0,
+        )
+    ],
+    expected_failed_checks=lambda estimator: SEQUENCE,
+)
+def test_scikit_learn_contract(estimator, check):
+    check(estimator)
+
+
+@pytest.mark.parametrize("resample", ["trajectory", "window"])
+def test_bit_equal_for_any_number_of_processes(log, resample):
+    X, y = log
+    bll = BLLRegressor(MEMBER, n_estimators=2, resample=resample, random_state=0)
+    torque, spread = bll.fit(X, y).predict(X, return_std=True)
+    assert spread.shape == y.shape and (spread >= 0).all() and spread.max() > 0
+    parallel = clone(bll).set_params(n_jobs=2).fit(X, y)
+    np.testing.assert_array_equal(parallel.predict(X), torque)
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(bll)).predict(X), torque)
+
+
+def test_meta_regressor_sees_honest_predictions_only(log):
+    """On pure noise an honest head learns to predict nothing."""
+    X, y = log
+    noise = np.random.default_rng(0).normal(size=y.shape)
+    member = LSTMRegressor(window=6, hidden_size=32, max_epochs=40, learning_rate=0.03)
+    bll = BLLRegressor(member, LinearRegression(), n_estimators=3, random_state=0).fit(X, noise)
+    members = np.mean([m.predict(X.to_numpy()) for m in bll.bagging_.estimators_], axis=0)
+    assert members.std() > 0.3  # the members learned the noise by heart
+    assert np.abs(bll.final_estimator_.coef_).max() < 0.4
+    assert 0 < bll.n_stacked_ < len(X)
+
+
+def test_folds_for_the_meta_regressor(log):
+    X, y = log
+    bll = BLLRegressor(MEMBER, n_estimators=2, cv=2, random_state=0)
+    assert bll.fit(X, y).n_stacked_ == len(X)
+    assert clone(bll).set_params(cv=TrajectoryKFold(2)).fit(X, y).n_stacked_ == len(X)
+    one = X["trajectory"] == 0
+    assert clone(bll).set_params(cv=None).fit(X[one], y[one]).n_stacked_ == one.sum()
+
+
+def test_searches_reach_into_the_member(log):
+    X, y = log
+    bll = BLLRegressor(MEMBER, n_estimators=2, random_state=0)
+    search = GridSearchCV(bll, {"estimator__window": [2, 6]}, cv=TrajectoryKFold(2)).fit(X, y)
+    assert search.best_estimator_.bagging_.estimators_[0].window in (2, 6)
+    assert np.isfinite(cross_val_score(bll, X, y, cv=TrajectoryKFold(2))).all()
+
+
+def test_table_iii():
+    bll = BLLRegressor.from_table_iii(n_estimators=4)
+    assert bll.n_estimators == 4 and bll.resample == "window"
+    member = bll.estimator
+    assert (member.hidden_size, member.max_epochs, member.batch_size) == (32, 130, 32)
+    assert member.learning_rate == 0.01 and member.per_joint
+    assert bll.final_estimator.regressor[-1].hidden_layer_sizes == (100, 50, 25)
+
+
+def test_paper_head_and_weights(log):
+    X, y = log
+    bll = BLLRegressor.from_table_iii(n_estimators=1, random_state=0)
+    bll.set_params(estimator__max_epochs=2, final_estimator__regressor__mlpregressor__max_iter=5)
+    with pytest.warns(UserWarning, match="Maximum iterations"):
+        assert bll.fit(X, y).predict(X).shape == y.shape
+    with pytest.raises(ValueError, match="takes no sample_weight"):
+        bll.fit(X, y, sample_weight=np.ones(len(X)))
+
+
+def test_members_that_cannot_draw_trajectories(log):
+    with pytest.raises(ValueError, match="use resample='window'"):
+        BLLRegressor(Ridge()).fit(*log)
