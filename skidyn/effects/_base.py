@@ -125,6 +125,8 @@ class Effect:
         or as a split of the trajectories into those that have it and those that do not.
     nameless : bool
         Whether it stands for something no name of the vocabulary describes (``unknown``).
+    drawn_against : {"q", "dq", "ddq", "load", "temperature", "time"}
+        Signal against which reports draw it.
     family : str
         Effects of one family are often told apart only by special motion (``"hysteresis"``).
     needs : tuple of str
@@ -161,6 +163,7 @@ class Effect:
     scope: ClassVar[Scope] = "joint"
     search: ClassVar[Literal["grid", "spectrum", "trajectories", "clock"]] = "grid"
     nameless: ClassVar[bool] = False
+    drawn_against: ClassVar[str] = "q"
     family: ClassVar[str] = ""
     needs: ClassVar[tuple[str, ...]] = ()
     simplicity: ClassVar[int] = 50

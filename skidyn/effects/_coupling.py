@@ -43,6 +43,7 @@ class CoupledFriction(_PairEffect):
     """Friction of a shaft that turns with the sum of two joint velocities."""
 
     kind = "coupled_friction"
+    drawn_against = "dq"
     title = "Coupled friction"
     formula = r"F_v\,\dot x + F_c\,\mathrm{sign}\,\dot x,\quad \dot x = \dot q_i + r\,\dot q_j"
     coefficients = (Coefficient("Fc", "N m", sign=1), Coefficient("Fv", "N m s/rad", sign=1))
@@ -60,6 +61,7 @@ class CoupledInertia(_PairEffect):
     """Inertia of a shaft that turns with the sum of two joint velocities."""
 
     kind = "coupled_inertia"
+    drawn_against = "ddq"
     title = "Coupled inertia"
     formula = r"I_a\,(\ddot q_i + r\,\ddot q_j)"
     coefficients = (Coefficient("Ia", "kg m^2", sign=1),)

@@ -17,6 +17,7 @@ class Viscous(Effect):
     """Friction proportional to velocity."""
 
     kind = "viscous"
+    drawn_against = "dq"
     title = "Viscous friction"
     formula = r"F_v\,\dot q"
     coefficients = (Coefficient("Fv", "N m s/rad", sign=1),)
@@ -33,6 +34,7 @@ class Coulomb(Effect):
     """Dry friction of constant size against the motion."""
 
     kind = "coulomb"
+    drawn_against = "dq"
     title = "Coulomb friction"
     formula = r"F_c\,\mathrm{sign}(\dot q)"
     coefficients = (Coefficient("Fc", "N m", sign=1),)
@@ -49,6 +51,7 @@ class Stribeck(Effect):
     """Extra dry friction at low speed that fades as the lubricant film builds up."""
 
     kind = "stribeck"
+    drawn_against = "dq"
     title = "Stribeck friction"
     formula = r"\Delta F\,e^{-(|\dot q|/v_s)^\delta}\,\mathrm{sign}(\dot q)"
     coefficients = (Coefficient("dF", "N m", sign=1),)
@@ -70,6 +73,7 @@ class AsymmetricFriction(Effect):
     """The part of friction that has another size in each direction."""
 
     kind = "asymmetric_friction"
+    drawn_against = "dq"
     title = "Direction-dependent friction"
     formula = r"\Delta F_v\,|\dot q| + \Delta F_c"
     coefficients = (Coefficient("dFv", "N m s/rad"), Coefficient("dFc", "N m"))
@@ -86,6 +90,7 @@ class NonlinearViscous(Effect):
     """Friction that grows with a power of velocity other than one."""
 
     kind = "nonlinear_viscous"
+    drawn_against = "dq"
     title = "Nonlinear viscous friction"
     formula = r"c\,|\dot q|^p\,\mathrm{sign}(\dot q)"
     coefficients = (Coefficient("c", "N m (s/rad)^p"),)

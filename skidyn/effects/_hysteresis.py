@@ -112,6 +112,7 @@ class Dahl(Effect):
     """Friction that builds up over a short way after each reversal."""
 
     kind = "dahl"
+    drawn_against = "dq"
     title = "Dahl friction (pre-sliding)"
     formula = r"F\,h,\quad \tfrac{dh}{dq} = \tfrac{1}{\delta}\,(1 - h\,\mathrm{sign}\,\dot q)"
     coefficients = (Coefficient("F", "N m", sign=1),)
@@ -132,6 +133,7 @@ class LuGre(Effect):
     """Bristles whose strength follows a Stribeck curve."""
 
     kind = "lugre"
+    drawn_against = "dq"
     title = "LuGre friction"
     formula = r"\left(F_c + \Delta F\,e^{-(\dot q/v_s)^2}\right) h,\quad h\ \text{as in Dahl}"
     coefficients = (Coefficient("F", "N m", sign=1), Coefficient("dF", "N m"))
@@ -155,6 +157,7 @@ class MaxwellSlip(Effect):
     """Several spring-slider elements in parallel."""
 
     kind = "maxwell_slip"
+    drawn_against = "dq"
     title = "Maxwell-slip friction"
     formula = r"\sum_i F_i\,h_i,\quad \dot h_i = \dot q/\delta_i\ \text{while}\ |h_i| < 1"
     coefficients = (

@@ -13,6 +13,7 @@ class RotorInertia(Effect):
     """Inertia of the motor's rotor, seen through the gear."""
 
     kind = "rotor_inertia"
+    drawn_against = "ddq"
     title = "Rotor inertia"
     formula = r"I_a\,\ddot q"
     coefficients = (Coefficient("Ia", "kg m^2", sign=1),)

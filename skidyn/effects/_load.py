@@ -15,6 +15,7 @@ class LoadDependentFriction(Effect):
     """Gear friction proportional to the transmitted torque."""
 
     kind = "load_dependent_friction"
+    drawn_against = "load"
     title = "Load-dependent friction"
     formula = r"\mu\,|\tau_\mathrm{load}|\,\mathrm{sign}(\dot q)"
     coefficients = (Coefficient("mu", "1", sign=1),)

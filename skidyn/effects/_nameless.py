@@ -91,6 +91,7 @@ class FunctionOfVelocity(_Spline):
     """A smooth function of the joint's own velocity."""
 
     kind = "function_of_velocity"
+    drawn_against = "dq"
     title = "Function of velocity"
     formula = r"f(\dot q_j)"
     coefficients = _coefficients(9)
@@ -102,6 +103,7 @@ class FrictionOverPosition(NamelessEffect):
     """Friction that varies with the joint's own position."""
 
     kind = "friction_over_position"
+    drawn_against = "q"
     title = "Friction that varies with position"
     formula = r"f(q_j)\,\dot q_j + g(q_j)\,\mathrm{sign}\,\dot q_j"
     coefficients = _coefficients(6)
@@ -140,6 +142,7 @@ class FrictionOverOtherPosition(_WithOther):
     """Friction of one joint that varies with the position of another."""
 
     kind = "friction_over_other_position"
+    drawn_against = "dq"
     title = "Friction that varies with another joint's position"
     formula = r"f(q_k)\,\mathrm{sign}\,\dot q_j + g(q_k)\,\dot q_j"
     coefficients = _coefficients(4)
@@ -156,6 +159,7 @@ class FunctionOfTwoVelocities(_WithOther):
     """Drag of one joint that depends on the velocity of another."""
 
     kind = "function_of_two_velocities"
+    drawn_against = "dq"
     title = "Function of two velocities"
     formula = r"f(\dot q_j, \dot q_k)"
     coefficients = _coefficients(6)
@@ -181,6 +185,7 @@ class ClockPeriodic(NamelessEffect):
     """A torque periodic in time: a fan, mains hum, a pump."""
 
     kind = "clock_periodic"
+    drawn_against = "time"
     title = "Periodic in time"
     formula = r"a\sin(2\pi f t) + b\cos(2\pi f t)"
     coefficients = _coefficients(2)

@@ -25,6 +25,7 @@ class TorqueGain(Effect):
     """The logged torque is too large or too small by a factor."""
 
     kind = "torque_gain"
+    drawn_against = "load"
     title = "Torque gain"
     formula = r"\varepsilon\,\tau_\mathrm{model}"
     coefficients = (Coefficient("epsilon", "1"),)
@@ -43,6 +44,7 @@ class TimeDelay(Effect):
     """The torque channel lags behind the motion channels."""
 
     kind = "time_delay"
+    drawn_against = "ddq"
     title = "Time delay of the torque"
     formula = r"-d\,\dot\tau_\mathrm{model}"
     coefficients = (Coefficient("delay", "s"),)
@@ -71,6 +73,7 @@ class Saturation(Effect):
     """The logged or delivered torque is cut off at a limit."""
 
     kind = "saturation"
+    drawn_against = "load"
     title = "Torque saturation"
     formula = r"-c\,\mathrm{sign}(\tau)\max(0,\,|\tau| - L)"
     coefficients = (Coefficient("share", "1", sign=1),)

@@ -31,6 +31,7 @@ class TemperatureFriction(Effect):
     """Viscous and Coulomb friction that change with a logged temperature."""
 
     kind = "temperature_friction"
+    drawn_against = "temperature"
     title = "Temperature-dependent friction"
     formula = r"\left(\tfrac{dF_v}{dT}\dot q + \tfrac{dF_c}{dT}\mathrm{sign}\,\dot q\right)(T-T_0)"
     coefficients = (
@@ -57,6 +58,7 @@ class TemperatureOffset(Effect):
     """Torque offset that changes with a logged temperature."""
 
     kind = "temperature_offset"
+    drawn_against = "temperature"
     title = "Temperature-dependent offset"
     formula = r"\tfrac{d\tau}{dT}\,(T - T_0) + \tau_0"
     coefficients = (Coefficient("dtau_dT", "N m/K"), Coefficient("tau0", "N m"))
@@ -77,6 +79,7 @@ class FrictionDrift(Effect):
     """Friction that changes slowly over the log where no temperature is logged."""
 
     kind = "friction_drift"
+    drawn_against = "time"
     title = "Friction drift"
     formula = r"\left(a\,\dot q + b\,\mathrm{sign}\,\dot q\right)x + c\,\dot q\,x^2,\ x = (t-t_0)/s"
     coefficients = (

@@ -36,6 +36,7 @@ class Payload(_ToolEffect):
     """A rigid body fixed to the last link."""
 
     kind = "payload"
+    drawn_against = "q"
     title = "Payload"
     formula = r"Y_n(q, \dot q, \ddot q)\,\pi_\mathrm{payload}"
     coefficients = (
@@ -74,6 +75,7 @@ class ExternalWrench(_ToolEffect):
     """A constant force on the tool: a hose, a spring balancer, a hand that pulls."""
 
     kind = "external_wrench"
+    drawn_against = "time"
     title = "External force at the tool"
     formula = r"-J_n(q)^\top f"
     coefficients = (Coefficient("fx", "N"), Coefficient("fy", "N"), Coefficient("fz", "N"))

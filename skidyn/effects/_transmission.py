@@ -103,6 +103,7 @@ class JointElasticity(_LinkSideEffect):
     """A gear that winds up under load, with the encoder on the motor side."""
 
     kind = "joint_elasticity"
+    drawn_against = "load"
     title = "Joint elasticity"
     formula = r"\tau(q - \tau_\mathrm{load}/K) - \tau(q)"
     coefficients = (Coefficient("compliance", "rad/(N m)", sign=1),)
@@ -133,6 +134,7 @@ class Backlash(_LinkSideEffect):
     """Play between motor and link: the link lies on the flank that the load presses on."""
 
     kind = "backlash"
+    drawn_against = "load"
     title = "Backlash"
     formula = r"\tau(q - \tfrac{g}{2}\,\mathrm{sign}\,\tau_\mathrm{load}) - \tau(q)"
     coefficients = (Coefficient("gap", "rad", sign=1),)

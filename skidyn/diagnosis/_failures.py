@@ -1,0 +1,222 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where a model fails: by joint, trajectory and regime."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidyn._signals import Array, Signals
+from skidyn.evidence._rows import REST
+
+#: The first five exclude each other; the others lie across them.
+REGIMES = ("rest", "reversal", "slow", "medium", "fast", "loaded", "warm")
+#: Slow and fast as shares of the speed that a joint exceeds in 5 % of its motion.
+SLOW, FAST = 0.25, 0.7
+#: A regime fails if its error is this much larger than the joint's, and this share of it.
+LARGER, SHARE = 1.25, 0.15
+
+_WHERE = {
+    "rest": "while it stands still",
+    "reversal": "around its reversals",
+    "slow": "at low speed",
+    "medium": "at medium speed",
+    "fast": "at high speed",
+    "loaded": "under high load",
+    "warm": "when it is warm, or late in the session",
+}
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A regime in which a joint's error stands out.
+
+    Attributes
+    ----------
+    joint : int
+        Joint, counted from 1.
+    regime : str
+        One of ``"rest"``, ``"reversal"``, ``"slow"``, ``"medium"``, ``"fast"``, ``"loaded"``,
+        ``"warm"``.
+    rmse : float
+        Root mean square error in the regime, N m or N.
+    share_of_error : float
+        Share of the joint's squared error.
+    share_of_time : float
+        Share of the samples.
+    sentence : str
+        The same in words.
+    """
+
+    joint: int
+    regime: str
+    rmse: float
+    share_of_error: float
+    share_of_time: float
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Measured against predicted torque; the prediction never saw the sample's trajectory.
+
+    Attributes
+    ----------
+    signals : Signals
+        Smoothed motion.
+    measured, predicted : ndarray of shape (n_samples, n_joints)
+        Torque, N m or N.
+    sliding : ndarray of shape (n_samples, n_joints) of bool
+        Samples away from rest and reversals, on which effects are judged.
+    joint_names : tuple of str
+        Names of the joints.
+    """
+
+    signals: Signals
+    measured: Array
+    predicted: Array
+    sliding: NDArray[np.bool_]
+    joint_names: tuple[str, ...]
+
+    @property
+    def residual(self) -> Array:
+        """Measured less predicted torque, N m or N."""
+        return self.measured - self.predicted
+
+    def rmse(self, sliding: bool = False) -> Array:
+        """Root mean square error of every joint.
+
+        Parameters
+        ----------
+        sliding : bool, default=False
+            Only samples away from rest and reversals.
+
+        Returns
+        -------
+        ndarray of shape (n_joints,), N m or N
+        """
+        use = self.sliding if sliding else np.ones_like(self.sliding)
+        square = np.where(use, self.residual**2, 0.0).sum(0)
+        return np.sqrt(square / np.maximum(use.sum(0), 1))
+
+    def table(self) -> list[dict[str, Any]]:
+        """Errors of every joint and trajectory.
+
+        Returns
+        -------
+        list of dict
+            With ``joint`` (from 1), ``name``, ``trajectory``, ``rmse``, ``mae`` (N m or N) and
+            ``relative`` (rmse over the rms of the measured torque).
+        """
+        rows = []
+        for name in np.unique(self.signals.trajectory):
+            here = self.signals.trajectory == name
+            for j, joint in enumerate(self.joint_names):
+                r, tau = self.residual[here, j], self.measured[here, j]
+                rmse = float(np.sqrt(np.mean(r**2)))
+                scale = float(np.sqrt(np.mean(tau**2)))
+                rows.append(
+                    {
+                        "joint": j + 1,
+                        "name": joint,
+                        "trajectory": int(name),
+                        "rmse": rmse,
+                        "mae": float(np.mean(np.abs(r))),
+                        "relative": rmse / scale if scale > 0 else np.inf,
+                    }
+                )
+        return rows
+
+
+def regimes(comparison: Comparison) -> dict[str, NDArray[np.bool_]]:
+    """Which samples lie in which regime, per joint.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        Measured against predicted torque.
+
+    Returns
+    -------
+    dict of str to ndarray of shape (n_samples, n_joints) of bool
+    """
+    s = comparison.signals
+    speed = np.abs(s.dq)
+    rest = speed <= REST * s.unit
+    high = np.array(
+        [np.quantile(v[~r], 0.95) if (~r).any() else 1.0 for v, r in zip(speed.T, rest.T, strict=True)]
+    )
+    reversal = ~rest & ~comparison.sliding
+    moving = ~rest & ~reversal
+    load = np.abs(comparison.measured if s.load is None else s.load)
+    if s.temperature is not None:
+        warmth = s.temperature
+    else:
+        warmth = np.repeat(s.clock[:, None], s.n_joints, axis=1)
+    return {
+        "rest": rest,
+        "reversal": reversal,
+        "slow": moving & (speed < SLOW * high),
+        "medium": moving & (speed >= SLOW * high) & (speed <= FAST * high),
+        "fast": moving & (speed > FAST * high),
+        "loaded": moving & (load > np.quantile(load, 0.8, axis=0)),
+        "warm": moving & (warmth > np.quantile(warmth, 0.8, axis=0)),
+    }
+
+
+def error_map(comparison: Comparison) -> Array:
+    """Root mean square error by joint and regime, NaN where a regime does not occur.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        Measured against predicted torque.
+
+    Returns
+    -------
+    ndarray of shape (n_joints, n_regimes), N m or N
+    """
+    square = comparison.residual**2
+    table = np.full((square.shape[1], len(REGIMES)), np.nan)
+    for k, inside in enumerate(regimes(comparison).values()):
+        count = inside.sum(0)
+        mean = np.where(inside, square, 0.0).sum(0) / np.maximum(count, 1)
+        table[:, k] = np.where(count > 0, np.sqrt(mean), np.nan)
+    return table
+
+
+def find_failures(comparison: Comparison) -> list[Failure]:
+    """Regimes in which the error stands out, the largest share of a joint's error first.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        Measured against predicted torque.
+
+    Returns
+    -------
+    list of Failure
+    """
+    square = comparison.residual**2
+    total = np.maximum(square.sum(0), 1e-300)
+    inside = regimes(comparison)
+    found = []
+    for j, name in enumerate(comparison.joint_names):
+        whole = float(np.sqrt(total[j] / len(square)))
+        for regime, mask in inside.items():
+            here = mask[:, j]
+            if not here.any():
+                continue
+            error, time = float(square[here, j].sum() / total[j]), float(here.mean())
+            rmse = float(np.sqrt(square[here, j].mean()))
+            if rmse < LARGER * whole or error < SHARE:
+                continue
+            sentence = (
+                f"Joint {j + 1} ({name}): {error:.0%} of the squared error occurs "
+                f"{_WHERE[regime]} ({time:.0%} of the time; {rmse:.3g} against {whole:.3g} overall)."
+            )
+            found.append(Failure(j + 1, regime, rmse, error, time, sentence))
+    return sorted(found, key=lambda f: (-f.share_of_error, f.joint))

@@ -1,0 +1,304 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Findings: the missing effects in numbers, words and curves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from scipy.stats import chi2
+
+from skidyn._signals import Array
+from skidyn.diagnosis._candidates import Candidate
+from skidyn.diagnosis._problem import Problem
+from skidyn.diagnosis._search import UNKNOWN, Hypothesis, Step
+from skidyn.effects import Term, get_effect
+
+#: Another kind with at least this share of the best one's score is a rival.
+RIVAL_SHARE = 0.8
+#: Points of a curve.
+BINS = 40
+
+
+@dataclass(frozen=True)
+class Finding:
+    """An effect that the model lacks.
+
+    Attributes
+    ----------
+    kind : str
+        Kind of the vocabulary, ``"unknown"`` for something no name describes.
+    title : str
+        Name for people.
+    joints : tuple of int
+        Joints, counted from 1.
+    parameters : dict
+        ``{name: {"value", "low", "high", "unit"}}``, lists over the joints where there are several.
+    variables : tuple of str
+        Signals that an unknown effect depends on.
+    error_drop : float
+        Share of the held-out squared error on these joints that adding it removes.
+    q_value : float
+        False-discovery rate at which it is reported.
+    rivals : tuple of str
+        Kinds this data cannot tell it from.
+    separating_motion : str
+        Motion that would.
+    sentence : str
+        All of it in words.
+    code : str
+        Line of Python that adds it.
+    terms : tuple of Term
+        Terms to add to a model.
+    curves : list of dict
+        Effect and partial residual against its main signal, for each joint.
+    """
+
+    kind: str
+    title: str
+    joints: tuple[int, ...]
+    parameters: dict[str, dict[str, Any]]
+    variables: tuple[str, ...]
+    error_drop: float
+    q_value: float
+    rivals: tuple[str, ...]
+    separating_motion: str
+    sentence: str
+    code: str
+    terms: tuple[Term, ...]
+    curves: list[dict[str, Any]] = field(default_factory=list, repr=False)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As in the report file."""
+        return {
+            "kind": self.kind,
+            "joints": list(self.joints),
+            "parameters": self.parameters,
+            "variables": list(self.variables),
+            "error_drop": self.error_drop,
+            "q_value": self.q_value,
+            "rivals": list(self.rivals),
+            "separating_motion": self.separating_motion,
+            "sentence": self.sentence,
+        }
+
+
+def rivals_of(step: Step) -> tuple[str, ...]:
+    """Kinds that explain nearly as much of the same joints as the one added."""
+    best = step.added
+    assert best is not None
+    own = set(best.joints)
+    kinds = [
+        h.kind
+        for h in step.ranking
+        if h is not best and h.score >= RIVAL_SHARE * best.score and own & set(h.joints)
+    ]
+    return tuple(dict.fromkeys(k for k in kinds if k != best.kind))
+
+
+def q_values(hypotheses: Sequence[Hypothesis], inflation: Array, n_tests: int) -> list[float]:
+    """Benjamini-Hochberg false-discovery rates over everything that was tried.
+
+    Parameters
+    ----------
+    hypotheses : sequence of Hypothesis
+        Findings.
+    inflation : ndarray of shape (n_joints,)
+        Variance inflation of the residual.
+    n_tests : int
+        Number of candidates tried.
+
+    Returns
+    -------
+    list of float
+    """
+    p = np.array(
+        [
+            chi2.sf(max(h.gain.sum(), 0) / inflation.max(), max(1, h.n_parameters))
+            for h in hypotheses
+        ]
+    )
+    order = np.argsort(p)
+    q = np.empty(len(p))
+    running = 1.0
+    for rank in range(len(p), 0, -1):
+        i = order[rank - 1]
+        running = min(running, p[i] * n_tests / rank)
+        q[i] = running
+    return [float(x) for x in q]
+
+
+def make_finding(
+    problem: Problem,
+    hypothesis: Hypothesis,
+    rivals: tuple[str, ...],
+    q_value: float,
+    error_drop: float,
+    intervals: dict[Term, dict[str, Any]],
+) -> Finding:
+    """Put a hypothesis into words and numbers."""
+    candidates = sorted(hypothesis.candidates, key=lambda c: c.joints)
+    unknown = hypothesis.kind == UNKNOWN
+    effect = get_effect(candidates[0].term.kind)
+    joints = _joints(problem, hypothesis, candidates)
+    parameters = {} if unknown else _parameters(problem, candidates, intervals)
+    title = _unknown_title(hypothesis) if unknown else effect.title
+    code = _code(hypothesis, joints, candidates)
+    sentence = _sentence(title, joints, parameters, error_drop, rivals, effect.separating_motion)
+    return Finding(
+        hypothesis.kind,
+        title,
+        joints,
+        parameters,
+        hypothesis.variables,
+        error_drop,
+        q_value,
+        rivals,
+        effect.separating_motion,
+        sentence,
+        code,
+        tuple(c.term for c in candidates),
+    )
+
+
+def _joints(
+    problem: Problem, hypothesis: Hypothesis, candidates: Sequence[Candidate]
+) -> tuple[int, ...]:
+    if hypothesis.kind == "payload":
+        return (problem.n_joints,)
+    return tuple(sorted({j + 1 for c in candidates for j in c.joints}))
+
+
+def _unknown_title(hypothesis: Hypothesis) -> str:
+    names = " and ".join(hypothesis.variables)
+    return f"Something that depends on {names}"
+
+
+def _parameters(
+    problem: Problem, candidates: Sequence[Candidate], intervals: dict[Term, dict[str, Any]]
+) -> dict[str, dict[str, Any]]:
+    effect = get_effect(candidates[0].term.kind)
+    table: dict[str, dict[str, Any]] = {}
+    for candidate in candidates:
+        units = effect.units(bool(problem.signals.prismatic[candidate.joints[0]]))
+        for name, value in intervals[candidate.term].items():
+            triple = value if isinstance(value, tuple) and len(value) == 3 else None
+            row = table.setdefault(
+                name, {"value": [], "low": [], "high": [], "unit": units.get(name, "")}
+            )
+            numbers = triple if triple and name != "trajectories" else (value, None, None)
+            for key, number in zip(("value", "low", "high"), numbers, strict=True):
+                row[key].append(number)
+    if len(candidates) == 1:
+        return {n: {k: v[0] if k != "unit" else v for k, v in r.items()} for n, r in table.items()}
+    return table
+
+
+def _code(
+    hypothesis: Hypothesis, joints: tuple[int, ...], candidates: Sequence[Candidate]
+) -> str:
+    if hypothesis.kind == UNKNOWN or any(c.term.shape.get("trajectories") for c in candidates):
+        return "model = diagnosis.model"
+    return f'model = diagnosis.add("{hypothesis.kind}", joints={list(joints)})'
+
+
+def _sentence(
+    title: str,
+    joints: tuple[int, ...],
+    parameters: dict[str, dict[str, Any]],
+    drop: float,
+    rivals: tuple[str, ...],
+    motion: str,
+) -> str:
+    where = f"joint {joints[0]}" if len(joints) == 1 else f"joints {', '.join(map(str, joints))}"
+    first = next(iter(parameters.items()), None)
+    what = ""
+    if first is not None and not isinstance(first[1]["value"], list):
+        name, row = first
+        if isinstance(row["value"], float) and row["low"] is not None:
+            half = (row["high"] - row["low"]) / 2
+            what = f": {name} = {row['value']:.3g} ± {half:.2g} {row['unit']}"
+    text = f"{title} on {where}{what}. Adding it removes {drop:.0%} of the held-out squared error"
+    if rivals:
+        text += f"; this data hardly tells it from {', '.join(rivals)} ({motion} would)"
+    return text + "."
+
+
+def effect_curves(
+    problem: Problem, terms: Sequence[Term], torque: dict[Term, Array], residual: Array
+) -> list[dict[str, Any]]:
+    """Effect and partial residual against the effect's main signal, binned.
+
+    Parameters
+    ----------
+    problem : Problem
+        Motion.
+    terms : sequence of Term
+        Terms of one finding.
+    torque : dict of Term to ndarray of shape (n_samples, n_joints)
+        Contribution of each term, N m or N.
+    residual : ndarray of shape (n_samples, n_joints)
+        Held-out residual of the final model, N m or N.
+
+    Returns
+    -------
+    list of dict
+        ``joint`` (from 1), ``variable``, ``x``, ``effect``, ``measured`` (effect plus residual),
+        ``low`` and ``high`` (its quartiles).
+    """
+    curves = []
+    reached = sorted({j for t in terms for j in _reached(torque[t])})
+    for j in reached:
+        own = [t for t in terms if np.any(torque[t][:, j])]
+        effect = sum(torque[t][:, j] for t in own)
+        name, x, unit = _main_signal(problem, own[0], j)
+        use = problem.rows.sliding[:, j]
+        if use.sum() < 5 * BINS:
+            continue
+        edges = np.quantile(x[use], np.linspace(0, 1, BINS + 1))
+        index = np.clip(np.searchsorted(edges, x[use], side="right") - 1, 0, BINS - 1)
+        partial = np.asarray(effect)[use] + residual[use, j]
+        quartiles = np.array(
+            [
+                np.quantile(partial[index == b], [0.25, 0.5, 0.75])
+                if (index == b).any()
+                else [np.nan] * 3
+                for b in range(BINS)
+            ]
+        )
+        count = np.maximum(np.bincount(index, minlength=BINS), 1)
+        curves.append(
+            {
+                "joint": j + 1,
+                "variable": name,
+                "unit": unit,
+                "x": np.bincount(index, x[use], BINS) / count,
+                "effect": np.bincount(index, np.asarray(effect)[use], BINS) / count,
+                "measured": quartiles[:, 1],
+                "low": quartiles[:, 0],
+                "high": quartiles[:, 2],
+            }
+        )
+    return curves
+
+
+def _reached(torque: Array) -> list[int]:
+    return [int(j) for j in np.flatnonzero(np.any(torque != 0, axis=0))]
+
+
+def _main_signal(problem: Problem, term: Term, joint: int) -> tuple[str, Array, str]:
+    """Signal against which an effect is drawn."""
+    s = problem.signals
+    against = get_effect(term.kind).drawn_against
+    slides = bool(s.prismatic[joint])
+    length = "m" if slides else "rad"
+    if against == "temperature" and s.temperature is not None:
+        return f"temp{joint + 1}", s.temperature[:, joint], "°C"
+    if against == "load" and s.load is not None:
+        return f"load{joint + 1}", s.load[:, joint], "N" if slides else "N m"
+    if against in ("q", "dq", "ddq"):
+        unit = {"q": length, "dq": f"{length}/s", "ddq": f"{length}/s²"}[against]
+        return f"{against}{joint + 1}", getattr(s, against)[:, joint], unit
+    return "time", s.clock, "s"

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Noise floor: the part of the residual that no smooth function of the motion predicts.
+
+A flexible learner (random Fourier features of position, velocity, direction and acceleration of all
+joints, ridge regression; Rahimi, Recht 2007) is trained on the residual rows of all folds but one.
+What it predicts on the fold it never saw is explainable; the rest is called noise. It is an upper
+bound: effects with memory stay in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.linalg import eigh
+
+from skidyn._signals import Array
+from skidyn.diagnosis._problem import Problem
+
+FEATURES = 200
+#: Lengths over which the learned function varies, in standard deviations of its inputs.
+LENGTHS = (2.0, 6.0)
+RIDGES = 10.0 ** np.arange(-3.0, 4.0)
+
+
+def predictable_share(problem: Problem, residual: Sequence[Array], random_state: int = 0) -> Array:
+    """Share of the residual rows' squared error that is predictable on held-out folds.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows and folds.
+    residual : sequence of ndarray of shape (n_rows_j,)
+        Residual rows of every joint.
+    random_state : int, default=0
+        Seed of the random features.
+
+    Returns
+    -------
+    ndarray of shape (n_joints,)
+        Between 0 and 1.
+    """
+    share = np.zeros(problem.n_joints)
+    for j, r in enumerate(residual):
+        if len(r) < 4 * problem.n_folds:
+            continue
+        inputs = _inputs(problem, j)
+        best = 0.0
+        for length in LENGTHS:
+            rng = np.random.default_rng(random_state)
+            frequency = rng.normal(size=(inputs.shape[1], FEATURES // 2)) / length
+            phase = inputs @ frequency
+            features = np.column_stack([inputs, np.cos(phase), np.sin(phase)])
+            best = max(best, _held_out_share(features, r, problem.fold[j], problem.n_folds))
+        share[j] = best
+    return share
+
+
+def _inputs(problem: Problem, joint: int) -> Array:
+    """Averaged signals at the rows of a joint, standardised."""
+    s = problem.signals
+    raw = np.column_stack([s.q, s.dq, s.sign[:, joint], s.ddq[:, joint]])
+    weight = problem.rows.average(np.ones(s.n_samples), joint)[:, None]
+    x = problem.rows.average(raw, joint) / weight
+    scale = x.std(0)
+    keep = scale > 1e-9
+    return (x[:, keep] - x[:, keep].mean(0)) / scale[keep]
+
+
+def _held_out_share(features: Array, r: Array, fold: Array, n_folds: int) -> float:
+    """Best share over ridges, errors summed over the folds left out."""
+    grams = np.array([features[fold == f].T @ features[fold == f] for f in range(n_folds)])
+    cross = np.array([features[fold == f].T @ r[fold == f] for f in range(n_folds)])
+    total, right = grams.sum(0), cross.sum(0)
+    drop = np.zeros(len(RIDGES))
+    for f in range(n_folds):
+        values, vectors = eigh(total - grams[f])
+        rotated = vectors.T @ (right - cross[f])
+        for k, ridge in enumerate(RIDGES):
+            b = vectors @ (rotated / (np.maximum(values, 0) + ridge * len(r) / n_folds))
+            drop[k] += 2 * b @ cross[f] - b @ grams[f] @ b
+    return float(np.clip(drop.max() / (r @ r), 0.0, 1.0))

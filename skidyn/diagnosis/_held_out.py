@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Residual of every sample under a model that never saw its fold."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from skidyn._signals import Array
+from skidyn.diagnosis._problem import RIDGE, Problem, term_columns
+from skidyn.effects import Term, get_effect
+
+
+def left_out_coefficients(
+    problem: Problem, design: Sequence[Array], sigma: Array, target: Sequence[Array]
+) -> tuple[Array, Array]:
+    """Coefficients of the whole fit and of the fits that leave one fold out.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows and folds.
+    design : sequence of ndarray of shape (n_rows_j, n_coefficients)
+        Columns of every joint.
+    sigma : ndarray of shape (n_joints,)
+        Noise of one row.
+    target : sequence of ndarray
+        Averaged torque.
+
+    Returns
+    -------
+    whole : ndarray of shape (n_coefficients,)
+    left_out : ndarray of shape (n_folds, n_coefficients)
+    """
+    p = design[0].shape[1]
+    grams, cross = np.zeros((problem.n_folds, p, p)), np.zeros((problem.n_folds, p))
+    for j, (block, y) in enumerate(zip(design, target, strict=True)):
+        edges = np.searchsorted(problem.fold[j], np.arange(problem.n_folds + 1))
+        for f, (a, b) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+            part = block[a:b] / sigma[j]
+            grams[f] += part.T @ part
+            cross[f] += part.T @ (y[a:b] / sigma[j])
+    total, right = grams.sum(0), cross.sum(0)
+    scale = np.sqrt(np.diag(total))
+    scale[scale == 0] = 1.0
+
+    def solve(gram: Array, r: Array) -> Array:
+        normal = gram / scale[:, None] / scale + RIDGE * np.eye(p)
+        return cho_solve(cho_factor(normal), r / scale) / scale
+
+    left = [solve(total - g, right - c) for g, c in zip(grams, cross, strict=True)]
+    return solve(total, right), np.array(left)
+
+
+def sample_folds(problem: Problem) -> NDArray[np.int64]:
+    """Fold of every sample, from the rows of its trajectory nearest in time."""
+    signals = problem.signals
+    fold = np.zeros(signals.n_samples, dtype=np.int64)
+    joint = int(np.argmax(problem.rows.counts))
+    for name in np.unique(signals.trajectory):
+        rows = np.flatnonzero(problem.rows.trajectory[joint] == name)
+        here = np.flatnonzero(signals.trajectory == name)
+        if not len(rows):
+            continue  # no row of it entered the fit: any fold leaves it out
+        order = rows[np.argsort(problem.rows.time[joint][rows])]
+        middle = problem.rows.time[joint][order]
+        edges = (middle[1:] + middle[:-1]) / 2
+        fold[here] = problem.fold[joint][order][np.searchsorted(edges, signals.clock[here])]
+    return fold
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Held-out prediction of a model.
+
+    Attributes
+    ----------
+    residual : ndarray of shape (n_samples, n_joints)
+        Torque less the prediction of a model fitted without the sample's fold, N m or N.
+    torque : dict of Term to ndarray of shape (n_samples, n_joints)
+        Contribution of every term of the model, fitted to all data, N m or N.
+    """
+
+    residual: Array
+    torque: dict[Term, Array]
+
+
+def held_out_residual(problem: Problem, terms: Sequence[Term], sigma: Array) -> HeldOut:
+    """Residual of every sample under the model fitted without its fold.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows, folds and torque.
+    terms : sequence of Term
+        Every effect of the model.
+    sigma : ndarray of shape (n_joints,)
+        Noise of one row.
+
+    Returns
+    -------
+    HeldOut
+    """
+    design = problem.design([problem.term_rows(t) for t in terms])
+    whole, left = left_out_coefficients(problem, design, sigma, problem.target)
+    fold = sample_folds(problem)
+    prediction = np.zeros_like(problem.torque)
+    n_rigid = len(problem.rigid_index)
+    if problem.rigid_body and problem.robot is not None:
+        s = problem.signals
+        for f, coefficients in enumerate(left):
+            here = fold == f
+            parameters = np.zeros(10 * problem.robot.n_bodies)
+            parameters[problem.rigid_index] = coefficients[:n_rigid]
+            prediction[here] = problem.robot.inverse_dynamics(
+                s.q[here], s.dq[here], s.ddq[here], parameters=parameters.reshape(-1, 10)
+            )
+    torque = {}
+    at = n_rigid
+    for term in terms:
+        k = len(get_effect(term.kind).coefficients)
+        own = np.zeros_like(problem.torque)
+        for j, block in term_columns(problem.signals, term).items():
+            prediction[:, j] += np.einsum("ik,ik->i", block, left[fold, at : at + k])
+            own[:, j] += block @ whole[at : at + k]
+        torque[term] = own
+        at += k
+    return HeldOut(problem.torque - prediction, torque)

@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the data could still hide: the largest magnitude of every effect that was not found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.stats import norm
+
+from skidyn._signals import Array
+from skidyn.diagnosis._candidates import Candidate
+from skidyn.diagnosis._problem import RIDGE, Problem
+from skidyn.effects import get_effect, list_effects
+
+#: Chance of finding an effect of the stated magnitude.
+POWER = 0.8
+#: A column of which less than this share is new to the model cannot be told from it.
+NEW_SHARE = 1e-4
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Largest magnitude of an effect that this data could hide.
+
+    Attributes
+    ----------
+    kind : str
+        Kind of the effect.
+    joint : int
+        Joint, counted from 1.
+    largest_hidden : float or None
+        Of the effect's first coefficient; None if the data cannot show the effect at all.
+    unit : str
+        Its unit.
+    sentence : str
+        The same in words.
+    """
+
+    kind: str
+    joint: int
+    largest_hidden: float | None
+    unit: str
+    sentence: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """As a dictionary for JSON."""
+        return asdict(self)
+
+
+def find_limits(
+    problem: Problem,
+    candidates: Sequence[Candidate],
+    blocks: Sequence[dict[int, Array]],
+    sigma: Array,
+    inflation: Array,
+    least_gain: float,
+) -> list[Limit]:
+    """Limits of the effects on single joints that were tried and not found.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows.
+    candidates : sequence of Candidate
+        What was tried.
+    blocks : sequence of dict
+        Columns of the final model beside the rigid body.
+    sigma, inflation : ndarray of shape (n_joints,)
+        Noise of one row and its variance inflation.
+    least_gain : float
+        Twice the log-likelihood gain at which a finding is reported.
+
+    Returns
+    -------
+    list of Limit
+    """
+    design = [a / s for a, s in zip(problem.design(blocks), sigma, strict=True)]
+    gram = np.asarray(sum(a.T @ a for a in design))
+    scale = np.sqrt(np.diag(gram))
+    scale[scale == 0] = 1.0
+    factor = cho_factor(gram / scale[:, None] / scale + RIDGE * np.eye(len(scale)))
+    needed = np.sqrt(least_gain) + norm.ppf(POWER)
+    limits: dict[tuple[str, int], Limit] = {}
+    for candidate in candidates:
+        effect = get_effect(candidate.term.kind)
+        if len(candidate.joints) != 1 or effect.nameless:
+            continue
+        joint = candidate.joints[0]
+        own, swept = _information(candidate, design, sigma, scale, factor)
+        unit = effect.units(bool(problem.signals.prismatic[joint]))
+        first = effect.coefficients[0]
+        text = unit.get(first.name, first.unit)
+        if swept < NEW_SHARE * own:
+            sentence = (
+                f"This data cannot tell {effect.title.lower()} of joint {joint + 1} from what the "
+                f"model has. It would show with {effect.separating_motion}."
+            )
+            new = Limit(effect.kind, joint + 1, None, text, sentence)
+        else:
+            largest = float(needed * np.sqrt(inflation[joint] / swept))
+            sentence = (
+                f"{effect.title} of joint {joint + 1}: absent, or {first.name} below "
+                f"{largest:.3g} {text}."
+            )
+            new = Limit(effect.kind, joint + 1, largest, text, sentence)
+        old = limits.get((effect.kind, joint))
+        # Among the shapes tried, the statement must hold for the one hardest to see.
+        if old is None or (old.largest_hidden or np.inf) < (new.largest_hidden or np.inf):
+            limits[effect.kind, joint] = new
+    return sorted(
+        [*limits.values(), *_not_shown(problem)], key=lambda limit: (limit.joint, limit.kind)
+    )
+
+
+def _information(
+    candidate: Candidate, design: Sequence[Array], sigma: Array, scale: Array, factor: Any
+) -> tuple[float, float]:
+    """Squared size of the first column before and after the model and the other columns."""
+    z = {j: block / sigma[j] for j, block in candidate.rows.items()}
+    cross = np.asarray(sum(design[j].T @ block for j, block in z.items())) / scale[:, None]
+    own = np.asarray(sum(block.T @ block for block in z.values()))
+    swept = own - cross.T @ cho_solve(factor, cross)
+    if len(own) == 1:
+        return float(own[0, 0]), float(max(swept[0, 0], 0.0))
+    others = swept[1:, 1:] + 1e-9 * np.diag(np.diag(own)[1:] + 1e-300)
+    rest = swept[0, 0] - swept[0, 1:] @ np.linalg.solve(others, swept[1:, 0])
+    return float(own[0, 0]), float(max(rest, 0.0))
+
+
+def _not_shown(problem: Problem) -> list[Limit]:
+    """Effects whose signal is missing or does not vary."""
+    limits = []
+    for kind in list_effects():
+        effect = get_effect(kind)
+        if effect.scope != "joint":
+            continue
+        for joint in range(problem.n_joints):
+            reason = effect.not_shown(problem.signals, joint)
+            if reason:
+                unit = effect.units(bool(problem.signals.prismatic[joint]))
+                sentence = (
+                    f"This data cannot show {effect.title.lower()} of joint {joint + 1}: {reason}."
+                )
+                first = effect.coefficients[0]
+                text = unit.get(first.name, first.unit)
+                limits.append(Limit(kind, joint + 1, None, text, sentence))
+    return limits
