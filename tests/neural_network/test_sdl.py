@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import pickle
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.base import clone
+from sklearn.utils.estimator_checks import parametrize_with_checks
+
+from skidyn.datasets import load_planar_arm
+from skidyn.neural_network import SDLRegressor
+from skidyn.preprocessing._keys import Keys
+from skidyn.robots import Robot
+
+PENDULUM = """
+<robot name="pendulum"><link name="base"/>
+  <link name="rod"><inertial><origin xyz="0 0 -0.5"/><mass value="2"/>
+    <inertia ixx="0.1" iyy="0.1" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="swing" type="continuous"><parent link="base"/><child link="rod"/></joint>
+</robot>"""
+
+
+class AnyWidth(SDLRegressor):
+    """For the common tests, whose tables are of any width: one joint, columns taken in turn."""
+
+    def _keys(self):
+        return Keys(None, None, tuple(range(self.n_features_in_)))
+
+    def _state(self, X):
+        columns = np.resize(np.arange(X.shape[1]), 3)
+        return tuple(X[:, [c]] for c in columns)
+
+    def __sklearn_tags__(self):
+        tags = super().__sklearn_tags__()
+        tags.target_tags.multi_output = False
+        tags.regressor_tags.poor_score = True  # their data are no pendulum's
+        return tags
+
+
+@parametrize_with_checks(
+    [AnyWidth(Robot.from_urdf(PENDULUM), window=3, hidden_size=8, max_epochs=5, random_state=0)],
+    expected_failed_checks=lambda estimator: {
+        "check_supervised_y_2d": "the torque of one joint may be given as a column",
+        "check_methods_sample_order_invariance": "the order of rows is time, so it matters",
+        "check_methods_subset_invariance": "a row is predicted from the rows before it as well",
+        "check_sample_weight_equivalence_on_dense_data": (
+            "a removed row is missing from the history of its successors, a row of weight 0 is not"
+        ),
+    },
+)
+def test_scikit_learn_contract(estimator, check):
+    check(estimator)
+
+
+@pytest.fixture(scope="module")
+def arm_log():
+    """The arm has other inertial parameters than its description, and friction."""
+    robot = load_planar_arm()
+    rng = np.random.default_rng(0)
+    t = np.arange(150) * 0.02
+    frames, torques = [], []
+    for k in range(8):
+        speed, phase = rng.uniform(1, 4, 2), rng.uniform(0, 6, 2)
+        angle = speed * t[:, None] + phase
+        q, dq, ddq = np.sin(angle), speed * np.cos(angle), -(speed**2) * np.sin(angle)
+        torque = robot.inverse_dynamics(q, dq, ddq, parameters=1.3 * robot.inertial_parameters)
+        torques.append(torque + 0.5 * np.tanh(dq / 0.1))
+        names = [f"{s}{j}" for s in ("q", "dq", "ddq") for j in (1, 2)]
+        frames.append(pd.DataFrame(np.c_[q, dq, ddq], columns=names).assign(trajectory=k))
+    return robot, pd.concat(frames, ignore_index=True), np.concatenate(torques)
+
+
+def fitted(arm_log, **parameters):
+    robot, X, y = arm_log
+    settings = {"window": 8, "hidden_size": 12, "max_epochs": 10, "random_state": 0} | parameters
+    return SDLRegressor(robot, **settings).fit(X, y)
+
+
+def test_rigid_body_and_network_are_optimised_together(arm_log):
+    robot, X, y = arm_log
+    joint = fitted(arm_log, max_epochs=30)
+    frozen = fitted(arm_log, max_epochs=30, rigid_body="frozen")
+    start = frozen.inertial_parameters_
+    np.testing.assert_array_equal(start, frozen.initial_inertial_parameters_)
+    np.testing.assert_array_equal(joint.initial_inertial_parameters_, start)
+    assert np.abs(joint.inertial_parameters_ - start).max() > 1e-4
+    for model in (joint, frozen):
+        assert model.score(X, y) > 0.97
+    # identified parameters, not the description's, although friction disturbs them
+    nominal = robot.inverse_dynamics(*(X[[f"{s}1", f"{s}2"]] for s in ("q", "dq", "ddq")))
+    assert np.abs(frozen.rigid_body_torque(X) - y).mean() < 0.6 * np.abs(nominal - y).mean()
+
+
+@pytest.mark.parametrize("residual", [True, False])
+def test_falls_back_on_the_rigid_body_far_from_the_data(arm_log, residual):
+    _, X, _ = arm_log
+    model = fitted(arm_log, residual=residual)
+    assert model.outside_range(X).mean() < 0.05
+    far = X.copy()
+    far[["dq1", "dq2"]] *= 10.0
+    far[["ddq1", "ddq2"]] *= 100.0
+    far["q1"] += 3.0
+    outside = model.outside_range(far)
+    assert outside.mean() > 0.9
+    gone = np.abs(model.predict(far) - model.rigid_body_torque(far)).max(axis=1) < 1e-9
+    assert gone.mean() > 0.8
+    inside = np.abs(model.predict(X) - model.rigid_body_torque(X)).max(axis=1)
+    assert np.median(inside) > 0.05
+
+
+def test_contract_of_columns_and_storage(arm_log):
+    robot, X, y = arm_log
+    model = fitted(arm_log, max_epochs=2, early_stopping=True, resample="trajectory")
+    expected = model.predict(X)
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(model)).predict(X), expected)
+    shuffled = X[X.columns[::-1]]
+    np.testing.assert_array_equal(clone(model).fit(shuffled, y).predict(shuffled), expected)
+    with pytest.raises(ValueError, match="y has 1 columns; the robot has 2 joints"):
+        clone(model).fit(X, y[:, 0])
+    with pytest.raises(ValueError, match="lacks the column"):
+        clone(model).fit(X.drop(columns="ddq2"), y)
+    array = X.to_numpy()
+    by_position = clone(model).set_params(trajectory=6).fit(array, y)
+    np.testing.assert_array_equal(by_position.predict(array), expected)
