@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import threading
+from collections import OrderedDict
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -29,6 +31,9 @@ if TYPE_CHECKING:
 #: Samples per chunk. Below about a thousand the cost of a ufunc call shows; far above, the rows of
 #: a chunk no longer fit into the second-level cache.
 CHUNK = 4096
+
+#: Sets of buffers that a thread keeps between calls.
+KEPT = 6
 
 
 class Engine:
@@ -75,14 +80,20 @@ class Engine:
             return trace_mass_matrix(self.canonical.tree, self._structure)
         return {"pose": trace_pose, "jacobian": trace_jacobian}[kind](self.tree, *options)
 
-    def _bound(self, n_samples: int, limit: int, dtype: Any, *key: Any) -> BoundProgram:
-        """Program bound to buffers of this thread."""
-        cache: dict[tuple, BoundProgram] = self._local.__dict__.setdefault("cache", {})
-        chunk = chunk_size(n_samples, limit)
-        full = (chunk, np.dtype(dtype), *key)
-        if full not in cache:
-            cache[full] = BoundProgram(self.program(*key), chunk, np.dtype(dtype))
-        return cache[full]
+    @contextmanager
+    def _borrowed(self, chunk: int, dtype: Any, *key: Any) -> Iterator[BoundProgram]:
+        """Program with buffers that nobody else uses meanwhile, kept for the next call."""
+        free: OrderedDict[tuple, BoundProgram] = self._local.__dict__.setdefault(
+            "free", OrderedDict()
+        )
+        name = (chunk, np.dtype(dtype), *key)
+        bound = free.pop(name, None) or BoundProgram(self.program(*key), chunk, np.dtype(dtype))
+        try:
+            yield bound
+        finally:
+            free[name] = bound
+            while len(free) > KEPT:
+                free.popitem(last=False)
 
     def evaluate(
         self,
@@ -94,21 +105,21 @@ class Engine:
     ) -> np.ndarray:
         """Outputs of a program for all samples, samples first (a view of memory samples last)."""
         n_samples = len(signals["q"])
-        bound = self._bound(n_samples, CHUNK, dtype, *key)
-        if parameters is not None:
-            bound.set_parameters(parameters)
-        return evaluate_rows(bound, signals, n_samples, out)
+        with self._borrowed(chunk_size(n_samples, CHUNK), dtype, *key) as bound:
+            if parameters is not None:
+                bound.set_parameters(parameters)
+            return evaluate_rows(bound, signals, n_samples, out)
 
     def iter_chunks(
         self, signals: dict[str, np.ndarray], chunk: int, *key: Any, dtype: Any = np.float64
     ) -> Iterator[tuple[slice, np.ndarray]]:
         """Yield ``(rows, outputs)``; the outputs are a view of a buffer that is used again."""
         n_samples = len(signals["q"])
-        bound = BoundProgram(self.program(*key), min(chunk, max(n_samples, 1)), np.dtype(dtype))
-        for start in range(0, n_samples, bound.chunk):
-            rows = slice(start, min(start + bound.chunk, n_samples))
-            size = bound.run(signals, rows)
-            yield rows, bound.outputs[..., :size]
+        with self._borrowed(min(chunk, chunk_size(n_samples, chunk)), dtype, *key) as bound:
+            for start in range(0, n_samples, bound.chunk):
+                rows = slice(start, min(start + bound.chunk, n_samples))
+                size = bound.run(signals, rows)
+                yield rows, bound.outputs[..., :size]
 
     @cached_property
     def canonical(self) -> CanonicalModel:
