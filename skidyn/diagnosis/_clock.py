@@ -10,7 +10,7 @@ from scipy.ndimage import median_filter
 from skidyn._signals import Array, Signals
 
 #: Lowest and highest frequency in Hz, points of the spectrum, height over the local median.
-LOWEST, HIGHEST, POINTS, HEIGHT = 1.5, 25.0, 4096, 4.0
+LOWEST, HIGHEST, POINTS, HEIGHT = 0.3, 25.0, 4096, 4.0
 #: Samples used for the coherent refinement.
 COHERENT = 2500
 

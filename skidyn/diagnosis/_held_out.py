@@ -125,7 +125,10 @@ def held_out_residual(problem: Problem, terms: Sequence[Term], sigma: Array) -> 
         k = len(get_effect(term.kind).coefficients)
         own = np.zeros_like(problem.torque)
         for j, block in term_columns(problem.signals, term).items():
-            prediction[:, j] += np.einsum("ik,ik->i", block, left[fold, at : at + k])
+            # What one recording alone can tell is not held out with it.
+            own_only = "trajectory" in term.shape
+            coefficients = whole[None, at : at + k] if own_only else left[fold, at : at + k]
+            prediction[:, j] += (block * coefficients).sum(1)
             own[:, j] += block @ whole[at : at + k]
         torque[term] = own
         at += k

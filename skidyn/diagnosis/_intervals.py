@@ -60,7 +60,9 @@ def parameter_intervals(
         k = len(effect.coefficients)
         value = effect.parameters(whole[start : start + k], term.shape, problem.signals)
         replicates = []
-        for coefficients in left:
+        # Without its recording an offset of that recording alone is not determined.
+        seen = np.all(np.abs(left[:, start : start + k]) > 1e-12, axis=1)
+        for coefficients in left[seen] if seen.sum() > 2 else left:
             shape = dict(term.shape)
             for column, (owner, name, log) in enumerate(owners):
                 if owner == i:

@@ -86,7 +86,7 @@ def split_effects(
             if best is None or drop.sum() > best[0].sum():
                 best = drop, chosen
         if best is not None:
-            shape = {"trajectories": tuple(int(name) for name in best[1])}
+            shape = {"trajectories": tuple(sorted(int(name) for name in best[1]))}
             split = Term(kind, term.joints, shape)
             found.append(Split(Candidate(kind, split, problem.term_rows(split)), best[0]))
     return found

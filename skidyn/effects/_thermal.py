@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -81,11 +81,15 @@ class FrictionDrift(Effect):
     kind = "friction_drift"
     drawn_against = "time"
     title = "Friction drift"
-    formula = r"\left(a\,\dot q + b\,\mathrm{sign}\,\dot q\right)x + c\,\dot q\,x^2,\ x = (t-t_0)/s"
+    formula = (
+        r"(a\,\dot q + b\,\mathrm{sign}\,\dot q)\,x + (c\,\dot q + d\,\mathrm{sign}\,\dot q)\,x^2,"
+        r"\quad x = (t-t_0)/s"
+    )
     coefficients = (
         Coefficient("dFv", "N m s/rad"),
         Coefficient("dFc", "N m"),
         Coefficient("d2Fv", "N m s/rad"),
+        Coefficient("d2Fc", "N m"),
     )
     needs = ("time",)
     simplicity = 31
@@ -103,14 +107,10 @@ class FrictionDrift(Effect):
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         x = (signals.clock - shape["t0"]) / shape["span"]
         dq = signals.dq[:, joint]
-        return np.column_stack([x * dq, x * signals.sign[:, joint], x**2 * dq])
+        sign = signals.sign[:, joint]
+        return np.column_stack([x * dq, x * sign, x**2 * dq, x**2 * sign])
 
     def not_shown(self, signals: Signals, joint: int) -> str | None:
         if signals.temperature is not None:
             return "a temperature is logged, which tells more than time"
         return super().not_shown(signals, joint)
-
-    def parameters(
-        self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
-    ) -> dict[str, Any]:
-        return super().parameters(coefficients, shape, signals)
