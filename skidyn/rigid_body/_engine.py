@@ -23,6 +23,7 @@ from skidyn.rigid_body._recursion import (
     trace_pose,
     trace_torque_regressor,
 )
+from skidyn.rigid_body._scalar import ScalarFunction
 from skidyn.rigid_body._tree import KinematicTree
 
 if TYPE_CHECKING:
@@ -30,7 +31,10 @@ if TYPE_CHECKING:
 
 #: Samples per chunk. Below about a thousand the cost of a ufunc call shows; far above, the rows of
 #: a chunk no longer fit into the second-level cache.
-CHUNK = 4096
+CHUNK = 5120
+
+#: Up to this many samples are run one by one.
+FEW = 8
 
 #: Sets of buffers that a thread keeps between calls.
 KEPT = 6
@@ -48,6 +52,7 @@ class Engine:
         self.parameters = parameters
         self.gravity = gravity
         self._programs: dict[tuple, Program] = {}
+        self._scalars: dict[tuple, ScalarFunction] = {}
         self._local = threading.local()
 
     def __getstate__(self) -> dict[str, Any]:
@@ -65,6 +70,11 @@ class Engine:
         return self._programs[key]
 
     def _trace(self, kind: str, *options: Any) -> Program:
+        if kind == "fixed_inverse_dynamics":
+            gravity, velocity, acceleration = options
+            return self.fixed_inverse_dynamics(
+                self.parameters, gravity, with_velocity=velocity, with_acceleration=acceleration
+            )
         if kind == "inverse_dynamics":
             gravity, velocity, acceleration, sparse = options
             return trace_inverse_dynamics(
@@ -95,6 +105,24 @@ class Engine:
             while len(free) > KEPT:
                 free.popitem(last=False)
 
+    def _is_small(self, signals: dict[str, np.ndarray], dtype: Any) -> bool:
+        """Whether straight-line Python beats NumPy: few samples of a robot that is not huge."""
+        return len(signals["q"]) <= FEW and dtype is np.float64 and self.tree.n_bodies <= 16
+
+    def _scalar(self, *key: Any) -> ScalarFunction:
+        if key not in self._scalars:
+            self._scalars[key] = ScalarFunction(self.program(*key))
+        return self._scalars[key]
+
+    def torque_regressor(
+        self, signals: dict[str, np.ndarray], *, dtype: Any, out: np.ndarray | None
+    ) -> np.ndarray:
+        """Torque per unit of every inertial parameter, samples first."""
+        key = "torque_regressor", self.gravity_key()
+        if out is None and self._is_small(signals, dtype):
+            return self._scalar(*key)(signals)
+        return self.evaluate(signals, *key, dtype=dtype, out=out)
+
     def evaluate(
         self,
         signals: dict[str, np.ndarray],
@@ -121,6 +149,17 @@ class Engine:
                 size = bound.run(signals, rows)
                 yield rows, bound.outputs[..., :size]
 
+    def fixed_inverse_dynamics(
+        self, parameters: np.ndarray, gravity: Any = None, **options: bool
+    ) -> Program:
+        """Inverse dynamics with the numbers of the inertial parameters written into it."""
+        return trace_inverse_dynamics(
+            self.canonical.tree,
+            self.canonical.gravity(self.gravity_key(gravity)),
+            parameters=_without_dust(np.array(self.canonical.parameters(parameters))),
+            **options,
+        )
+
     @cached_property
     def canonical(self) -> CanonicalModel:
         """The tree in the frames that take the fewest operations."""
@@ -134,9 +173,7 @@ class Engine:
     @cached_property
     def _own_parameters(self) -> np.ndarray:
         """The robot's parameters in canonical frames, without rounding dust."""
-        own = np.array(self.canonical.parameters(self.parameters))
-        own[np.abs(own) < 1e-16 * np.abs(own).max(initial=0.0)] = 0.0
-        return own
+        return _without_dust(np.array(self.canonical.parameters(self.parameters)))
 
     def inverse_dynamics(
         self,
@@ -147,7 +184,10 @@ class Engine:
         dtype: Any = np.float64,
     ) -> np.ndarray:
         """Joint torques; signals that are left out vanish."""
-        key = self.gravity_key(gravity), "dq" in signals, "ddq" in signals, parameters is None
+        options = self.gravity_key(gravity), "dq" in signals, "ddq" in signals
+        if parameters is None and self._is_small(signals, dtype):
+            return self._scalar("fixed_inverse_dynamics", *options)(signals)
+        key = *options, parameters is None
         own = self._own_parameters
         if parameters is not None:
             own = np.array(self.canonical.parameters(parameters))
@@ -201,3 +241,9 @@ class Engine:
         from skidyn.rigid_body._torch import evaluate
 
         return evaluate(self.program("torque_regressor", self.gravity_key()), signals)
+
+
+def _without_dust(parameters: np.ndarray) -> np.ndarray:
+    """Parameters with what is left of cancelled terms set to zero."""
+    scale = np.abs(parameters).max(initial=0.0)
+    return np.where(np.abs(parameters) < 1e-16 * scale, 0.0, parameters)

@@ -262,6 +262,7 @@ def trace_inverse_dynamics(
     with_velocity: bool = True,
     with_acceleration: bool = True,
     parameters_used: np.ndarray | None = None,
+    parameters: np.ndarray | None = None,
 ) -> Program:
     """Joint torques by the recursive Newton-Euler algorithm [1]_.
 
@@ -277,6 +278,8 @@ def trace_inverse_dynamics(
         Without one of them the robot is taken to have none, and its terms vanish.
     parameters_used : ndarray of shape (n_bodies, 10), bool, default=None
         Parameters that may differ from zero; None means all.
+    parameters : ndarray of shape (n_bodies, 10), default=None
+        Values to fold into the program; None leaves them as inputs.
     """
     tape = Tape()
     joints = _joints(tape, tree)
@@ -287,8 +290,11 @@ def trace_inverse_dynamics(
     forces: list[Vector] = []
     moments: list[Vector] = []
     for body, motion in enumerate(motions):
-        parameters = _parameters(tape, body, parameters_used)
-        mass, first_moment, inertia = parameters[0], parameters[1:4], parameters[4:]
+        if parameters is None:
+            own = _parameters(tape, body, parameters_used)
+        else:
+            own = [tape.constant(value) for value in parameters[body]]
+        mass, first_moment, inertia = own[0], own[1:4], own[4:]
         force = _add(_scale(mass, motion.acceleration), _times(motion.B, first_moment))
         moment = _cross(first_moment, motion.acceleration)
         for value, column in zip(inertia, _moment_map(motion), strict=True):

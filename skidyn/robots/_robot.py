@@ -316,9 +316,7 @@ class Robot:
             In the memory the samples come last: ``moveaxis(result, 0, -1)`` is contiguous.
         """
         signals = self._signals(q=q, dq=dq, ddq=ddq)
-        return self._engine.evaluate(
-            signals, "torque_regressor", self._engine.gravity_key(), dtype=dtype, out=out
-        )
+        return self._engine.torque_regressor(signals, dtype=dtype, out=out)
 
     def iter_torque_regressor(
         self, q: Any, dq: Any, ddq: Any, chunk: int = 4096
