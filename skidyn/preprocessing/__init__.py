@@ -1,2 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Transformers and dataset functions that prepare logs."""
+"""Transformers that keep the rows of a log, and functions on logs that change them."""
+
+from skidyn.preprocessing._current import CurrentToTorque
+from skidyn.preprocessing._logs import average_repetitions, cross_fitted_residual
+from skidyn.preprocessing._signals import ButterworthFilter, SignalScaler, TimeDerivative
+
+__all__ = [
+    "ButterworthFilter",
+    "CurrentToTorque",
+    "SignalScaler",
+    "TimeDerivative",
+    "average_repetitions",
+    "cross_fitted_residual",
+]

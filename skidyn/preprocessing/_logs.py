@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Functions on whole logs: what changes rows or targets is no step of a Pipeline."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.base import clone
+from sklearn.utils import _safe_indexing
+
+from skidyn.model_selection._split import held_out_folds
+from skidyn.preprocessing._keys import keys_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+
+
+def average_repetitions(frame: pd.DataFrame, *, period: float | None = None) -> pd.DataFrame:
+    """Average runs of the same motion, which lowers noise by the root of their number.
+
+    Parameters
+    ----------
+    frame : DataFrame
+        A log. Without `period` its trajectories are repetitions of one motion with the same
+        number of rows.
+    period : float, s, default=None
+        Cut a single trajectory into repetitions of this length; an incomplete last one is an error
+        unless it is shorter than half a period, in which case it is not used. All repetitions are
+        interpolated to the times of the first.
+
+    Returns
+    -------
+    average : DataFrame
+        One trajectory, with the number of the first and its times.
+
+    Raises
+    ------
+    ValueError
+        If repetitions differ in length.
+
+    References
+    ----------
+    .. [1] J. Swevers, W. Verdonck, J. De Schutter, "Dynamic Model Identification for Industrial
+       Robots", IEEE Control Systems Magazine 27(5), 2007.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> from skidyn.preprocessing import average_repetitions
+    >>> log = pd.DataFrame({"time": [0.0, 1, 0, 1], "trajectory": [0, 0, 1, 1],
+    ...                     "tau1": [1.0, 2, 3, 4]})
+    >>> average_repetitions(log)["tau1"].tolist()
+    [2.0, 3.0]
+    """
+    if period is not None:
+        return _average_periods(frame, period)
+    runs = [run for _, run in frame.groupby("trajectory", sort=False)]
+    lengths = [len(run) for run in runs]
+    if len(set(lengths)) > 1:
+        raise ValueError(
+            f"the repetitions have {min(lengths)} to {max(lengths)} rows; cut them to the same "
+            "motion first, or give period for one periodic recording."
+        )
+    average = runs[0].reset_index(drop=True).copy()
+    signals = [name for name in frame.columns if name not in ("time", "trajectory")]
+    average[signals] = np.mean([run[signals].to_numpy(float) for run in runs], axis=0)
+    return average
+
+
+def _average_periods(frame: pd.DataFrame, period: float) -> pd.DataFrame:
+    time = frame["time"].to_numpy(float)
+    if (np.diff(time) <= 0).any():
+        raise ValueError("time must increase; average one trajectory at a time.")
+    start, span = time[0], time[-1] - time[0]
+    n_periods = int(np.floor(span / period))
+    if n_periods < 2:
+        raise ValueError(f"the recording of {span:.4g} s holds no two periods of {period} s.")
+    if span / period - n_periods > 0.5:
+        raise ValueError(
+            f"the last {span - n_periods * period:.4g} s are no whole period; cut them."
+        )
+    average = frame[time < start + period].reset_index(drop=True).copy()
+    own = average["time"].to_numpy(float)
+    for name in frame.columns:
+        if name not in ("time", "trajectory"):
+            values = frame[name].to_numpy(float)
+            repeated = [np.interp(own + k * period, time, values) for k in range(n_periods)]
+            average[name] = np.mean(repeated, axis=0)
+    return average
+
+
+def cross_fitted_residual(physics: Any, X: Any, y: Any, *, cv: Any = 5) -> Array:
+    """What a physical model leaves over on trajectories that it has not seen.
+
+    Parameters
+    ----------
+    physics : estimator
+        A scikit-learn regressor; cloned.
+    X : DataFrame or array-like of shape (n_samples, n_features)
+        Samples; trajectories are told apart by a column named ``trajectory``.
+    y : array-like of shape (n_samples,) or (n_samples, n_joints), N m (N if prismatic)
+        Torque.
+    cv : int or cross-validator, default=5
+        Folds by trajectory, at most as many as trajectories, or a cross-validator that tests every
+        row exactly once.
+
+    Returns
+    -------
+    residual : ndarray of the shape of y, N m (N if prismatic)
+        Measured minus modelled.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from sklearn.linear_model import LinearRegression
+    >>> from skidyn.model_selection import TrajectoryKFold
+    >>> from skidyn.preprocessing import cross_fitted_residual
+    >>> X = np.c_[np.repeat([0, 1, 2], 10), np.arange(30.0)]
+    >>> folds = TrajectoryKFold(3, trajectory=0)
+    >>> residual = cross_fitted_residual(LinearRegression(), X, 2 * X[:, 1], cv=folds)
+    >>> bool(np.abs(residual).max() < 1e-9)
+    True
+    """
+    y = np.asarray(y, dtype=np.float64)
+    if hasattr(cv, "split"):
+        folds = list(cv.split(X, y))
+    else:
+        table = np.asarray(X, dtype=np.float64)
+        folds = held_out_folds(keys_of(X).trajectories(table), cv)
+    residual = np.full_like(y, np.nan)
+    for train, test in folds:
+        fitted = clone(physics).fit(_safe_indexing(X, train), y[train])
+        residual[test] = y[test] - np.reshape(
+            fitted.predict(_safe_indexing(X, test)), y[test].shape
+        )
+    if np.isnan(residual).any():
+        raise ValueError("cv must test every row exactly once, as KFold does.")
+    return residual

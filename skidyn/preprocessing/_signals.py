@@ -1,0 +1,414 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Transformers of signals: key columns pass untouched, nothing crosses the end of a segment."""
+
+from __future__ import annotations
+
+from numbers import Integral, Real
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import signal
+from sklearn.base import BaseEstimator, OneToOneFeatureMixin, TransformerMixin
+from sklearn.utils.validation import _check_feature_names_in, check_is_fitted, validate_data
+
+from skidyn._columns import ColumnSpec, _key_column
+from skidyn._compat import Interval, fit_context
+from skidyn.preprocessing._affine import scaling_of
+from skidyn.preprocessing._keys import Keys, resolve_keys
+
+Array = NDArray[np.float64]
+
+
+class _SignalTransformer(TransformerMixin, BaseEstimator):
+    """Checks and key columns that all transformers of signals share."""
+
+    trajectory: ColumnSpec
+    time: ColumnSpec
+
+    def _names(self) -> list[str] | None:
+        names = getattr(self, "feature_names_in_", None)
+        return None if names is None else [str(name) for name in names]
+
+    def _keys(self) -> Keys:
+        return resolve_keys(
+            self._names(), self.n_features_in_, trajectory=self.trajectory, time=self.time
+        )
+
+    def _checked(self, X: Any) -> Array:
+        check_is_fitted(self)
+        return validate_data(self, X, reset=False, dtype=np.float64)
+
+
+def _sampling_rate(X: Array, keys: Keys, rate: float | None) -> float:
+    """Samples per second: as given, or from the median step of the time column."""
+    if rate is not None:
+        return float(rate)
+    if keys.time is None:
+        raise ValueError("X has no time column; declare it, or give rate in Hz.")
+    steps = np.concatenate([np.diff(X[segment, keys.time]) for segment in keys.segments(X)])
+    steps = steps[steps > 0]
+    if len(steps) == 0:
+        raise ValueError("the time column never advances; n_samples = 1 is too few for a rate.")
+    return float(1.0 / np.median(steps))
+
+
+def _low_pass(values: Array, cutoff: float, order: int, rate: float) -> Array:
+    """Zero-phase Butterworth low-pass of the columns of one segment."""
+    if not cutoff < rate / 2:
+        raise ValueError(
+            f"cutoff={cutoff} Hz is not below half the sampling rate ({rate / 2:.4g} Hz)."
+        )
+    sections = signal.butter(order, cutoff, fs=rate, output="sos")
+    longest = 3 * (2 * len(sections) + 1)
+    return signal.sosfiltfilt(sections, values, axis=0, padlen=min(longest, len(values) - 1))
+
+
+class ButterworthFilter(OneToOneFeatureMixin, _SignalTransformer):
+    """Zero-phase Butterworth low-pass of all signals, within each segment.
+
+    Parameters
+    ----------
+    cutoff : float, Hz, default=10.0
+        Frequency at which one pass lets half of the power through; the filter runs forward and
+        backward, which doubles its attenuation.
+    order : int, default=4
+        Order of one pass.
+    rate : float, Hz, default=None
+        Sampling rate; from the time column if None.
+    trajectory, time : int, str or None, default="auto"
+        Key columns, handed on untouched.
+
+    Attributes
+    ----------
+    rate_ : float, Hz
+        Sampling rate of the training log.
+    n_features_in_ : int
+        Columns of X.
+    feature_names_in_ : ndarray of str
+        Their names, where X has names.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skidyn.preprocessing import ButterworthFilter
+    >>> t = np.arange(500) * 0.002
+    >>> X = np.c_[t, np.sin(t) + 0.1 * np.sin(2 * np.pi * 100 * t)]
+    >>> smooth = ButterworthFilter(10.0, time=0).fit_transform(X)
+    >>> bool(np.abs(smooth[50:-50, 1] - np.sin(t)[50:-50]).max() < 0.01)
+    True
+    """
+
+    _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
+        "cutoff": [Interval(Real, 0, None, closed="neither")],
+        "order": [Interval(Integral, 1, None, closed="left")],
+        "rate": [Interval(Real, 0, None, closed="neither"), None],
+        "trajectory": [str, Integral, None],
+        "time": [str, Integral, None],
+    }
+
+    def __init__(
+        self,
+        cutoff: float = 10.0,
+        *,
+        order: int = 4,
+        rate: float | None = None,
+        trajectory: ColumnSpec = "auto",
+        time: ColumnSpec = "auto",
+    ) -> None:
+        self.cutoff = cutoff
+        self.order = order
+        self.rate = rate
+        self.trajectory = trajectory
+        self.time = time
+
+    @fit_context(prefer_skip_nested_validation=True)
+    def fit(self, X: Any, y: Any = None) -> ButterworthFilter:
+        """Find the sampling rate.
+
+        Parameters
+        ----------
+        X : DataFrame or array-like of shape (n_samples, n_features)
+            Log.
+        y : None
+            Ignored.
+
+        Returns
+        -------
+        self : object
+            The transformer.
+        """
+        X = validate_data(self, X, dtype=np.float64)
+        self.rate_ = _sampling_rate(X, self._keys(), self.rate)
+        return self
+
+    def transform(self, X: Any) -> Array:
+        """Filter every signal.
+
+        Parameters
+        ----------
+        X : DataFrame or array-like of shape (n_samples, n_features)
+            Log.
+
+        Returns
+        -------
+        X_filtered : ndarray of shape (n_samples, n_features)
+        """
+        X = self._checked(X)
+        keys, filtered = self._keys(), X.copy()
+        features = list(keys.features)
+        for segment in keys.segments(X):
+            filtered[segment, features] = _low_pass(
+                X[segment, features], self.cutoff, self.order, self.rate_
+            )
+        return filtered
+
+
+class TimeDerivative(_SignalTransformer):
+    """Append time derivatives by central differences, within each segment.
+
+    Parameters
+    ----------
+    columns : sequence of int or str, default=None
+        What to differentiate; None means the velocities: columns whose names begin with ``dq``, or
+        without names the second half of the features (positions, then velocities).
+    cutoff : float, Hz, default=None
+        Low-pass the columns first (zero-phase Butterworth of order 4); the derivative alone sees
+        the smoothed signals. State the cut-off with every result: it moves residuals a lot.
+    rate : float, Hz, default=None
+        Sampling rate where X has no time column.
+    trajectory, time : int, str or None, default="auto"
+        Key columns, handed on untouched.
+
+    Attributes
+    ----------
+    columns_ : ndarray of int
+        Positions of the columns that are differentiated.
+    rate_ : float, Hz
+        Sampling rate of the training log.
+    n_features_in_ : int
+        Columns of X.
+    feature_names_in_ : ndarray of str
+        Their names, where X has names.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skidyn.preprocessing import TimeDerivative
+    >>> t = np.arange(200) * 0.01
+    >>> X = np.c_[t, np.sin(t), np.cos(t)]  # time, position, velocity
+    >>> table = TimeDerivative(time=0).fit_transform(X)
+    >>> bool(np.abs(table[1:-1, 3] + np.sin(t)[1:-1]).max() < 1e-4)
+    True
+    """
+
+    _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
+        "columns": ["array-like", None],
+        "cutoff": [Interval(Real, 0, None, closed="neither"), None],
+        "rate": [Interval(Real, 0, None, closed="neither"), None],
+        "trajectory": [str, Integral, None],
+        "time": [str, Integral, None],
+    }
+
+    def __init__(
+        self,
+        columns: Any = None,
+        *,
+        cutoff: float | None = None,
+        rate: float | None = None,
+        trajectory: ColumnSpec = "auto",
+        time: ColumnSpec = "auto",
+    ) -> None:
+        self.columns = columns
+        self.cutoff = cutoff
+        self.rate = rate
+        self.trajectory = trajectory
+        self.time = time
+
+    @fit_context(prefer_skip_nested_validation=True)
+    def fit(self, X: Any, y: Any = None) -> TimeDerivative:
+        """Find the columns and the sampling rate.
+
+        Parameters
+        ----------
+        X : DataFrame or array-like of shape (n_samples, n_features)
+            Log.
+        y : None
+            Ignored.
+
+        Returns
+        -------
+        self : object
+            The transformer.
+        """
+        X = validate_data(self, X, dtype=np.float64)
+        keys, names = self._keys(), self._names()
+        velocities = [i for i, name in enumerate(names or []) if name.startswith("dq")]
+        if self.columns is not None:
+            found = [_key_column("columns", c, names, X.shape[1]) for c in self.columns]
+        elif velocities:
+            found = [*velocities]
+        else:
+            found = [*keys.features[len(keys.features) // 2 :]]
+        self.columns_ = np.array(found, dtype=int)
+        self.rate_ = _sampling_rate(X, keys, self.rate)
+        return self
+
+    def transform(self, X: Any) -> Array:
+        """Append the derivatives.
+
+        Parameters
+        ----------
+        X : DataFrame or array-like of shape (n_samples, n_features)
+            Log.
+
+        Returns
+        -------
+        X_extended : ndarray of shape (n_samples, n_features + n_columns)
+            X, then the derivatives in units per second.
+        """
+        X = self._checked(X)
+        keys = self._keys()
+        derivative = np.empty((len(X), len(self.columns_)))
+        for segment in keys.segments(X):
+            values = X[segment, self.columns_]
+            if len(values) < 2:
+                raise ValueError(
+                    f"the segment at row {segment.start} has 1 sample; a derivative needs two. "
+                    "Remove it, or mend the trajectory and time columns."
+                )
+            if self.cutoff is not None:
+                values = _low_pass(values, self.cutoff, 4, self.rate_)
+            if keys.time is None:
+                times = np.arange(len(values)) / self.rate_
+            else:
+                times = X[segment, keys.time]
+                still = np.flatnonzero(np.diff(times) <= 0)
+                if len(still):
+                    raise ValueError(
+                        f"time does not advance at row {segment.start + still[0] + 1}; remove "
+                        "repeated rows first."
+                    )
+            derivative[segment] = np.gradient(
+                values, times, axis=0, edge_order=min(2, len(values) - 1)
+            )
+        return np.c_[X, derivative]
+
+    def get_feature_names_out(self, input_features: Any = None) -> NDArray[Any]:
+        """Return the names of the columns: those of X, then each derivative's with a ``d`` before.
+
+        Parameters
+        ----------
+        input_features : array-like of str, default=None
+            Names of the columns of X.
+
+        Returns
+        -------
+        names : ndarray of str
+        """
+        check_is_fitted(self)
+        names = _check_feature_names_in(self, input_features)
+        return np.array([*names, *(f"d{names[i]}" for i in self.columns_)], dtype=object)
+
+
+class SignalScaler(OneToOneFeatureMixin, _SignalTransformer):
+    """Scale signals to the range 0 to 1 or to unit variance, leaving key columns as they are.
+
+    Parameters
+    ----------
+    kind : {"minmax", "standard"}, default="minmax"
+        Range 0 to 1 (eq. 8 of [1]_), or zero mean and unit variance.
+    trajectory, time : int, str or None, default="auto"
+        Key columns, handed on untouched.
+
+    Attributes
+    ----------
+    offset_, scale_ : ndarray of shape (n_features,)
+        ``(X - offset_) / scale_``; 0 and 1 for key columns.
+    n_features_in_ : int
+        Columns of X.
+    feature_names_in_ : ndarray of str
+        Their names, where X has names.
+
+    References
+    ----------
+    .. [1] "Semiparametric Deep Learning Manipulator Inverse Dynamics Modeling Method for Smart
+       City and Industrial Applications", eq. 8.
+
+    Examples
+    --------
+    >>> from skidyn.preprocessing import SignalScaler
+    >>> SignalScaler(trajectory=0).fit_transform([[7, 1.0], [8, 3.0]])
+    array([[7., 0.],
+           [8., 1.]])
+    """
+
+    _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
+        "kind": [str],
+        "trajectory": [str, Integral, None],
+        "time": [str, Integral, None],
+    }
+
+    def __init__(
+        self,
+        kind: str = "minmax",
+        *,
+        trajectory: ColumnSpec = "auto",
+        time: ColumnSpec = "auto",
+    ) -> None:
+        self.kind = kind
+        self.trajectory = trajectory
+        self.time = time
+
+    @fit_context(prefer_skip_nested_validation=True)
+    def fit(self, X: Any, y: Any = None) -> SignalScaler:
+        """Find ranges.
+
+        Parameters
+        ----------
+        X : DataFrame or array-like of shape (n_samples, n_features)
+            Log.
+        y : None
+            Ignored.
+
+        Returns
+        -------
+        self : object
+            The transformer.
+        """
+        if self.kind not in ("minmax", "standard"):
+            raise ValueError(f"kind={self.kind!r}; use 'minmax' or 'standard'.")
+        X = validate_data(self, X, dtype=np.float64)
+        features = list(self._keys().features)
+        self.offset_, self.scale_ = np.zeros(X.shape[1]), np.ones(X.shape[1])
+        self.offset_[features], self.scale_[features] = scaling_of(X[:, features], self.kind)
+        return self
+
+    def transform(self, X: Any) -> Array:
+        """Scale.
+
+        Parameters
+        ----------
+        X : DataFrame or array-like of shape (n_samples, n_features)
+            Log.
+
+        Returns
+        -------
+        X_scaled : ndarray of shape (n_samples, n_features)
+        """
+        return (self._checked(X) - self.offset_) / self.scale_
+
+    def inverse_transform(self, X: Any) -> Array:
+        """Undo the scaling.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+            Scaled log.
+
+        Returns
+        -------
+        X_original : ndarray of shape (n_samples, n_features)
+        """
+        check_is_fitted(self)
+        return np.asarray(X, dtype=np.float64) * self.scale_ + self.offset_
