@@ -28,9 +28,9 @@ def load_panda() -> Robot:
 
     References
     ----------
-    .. [1] C. Gaz, M. Cognetti, A. Oliva, P. Robuffo Giordano, A. De Luca, "Dynamic identification of
-           the Franka Emika Panda robot with retrieval of feasible parameters using penalty-based
-           optimization", IEEE Robotics and Automation Letters 4(4), 2019.
+    .. [1] C. Gaz, M. Cognetti, A. Oliva, P. Robuffo Giordano, A. De Luca, "Dynamic identification
+           of the Franka Emika Panda robot with retrieval of feasible parameters using
+           penalty-based optimization", IEEE Robotics and Automation Letters 4(4), 2019.
 
     Examples
     --------

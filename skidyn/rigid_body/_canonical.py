@@ -3,13 +3,13 @@
 
 Torques do not depend on where a body's frame sits. Here every revolute joint turns about the z axis
 of its body, the next joint axis is reached by one turn about x (the convention of modified
-Denavit-Hartenberg parameters, [1]_) and origins lie where the offset to the next body has the fewest
-components. Nothing is rounded: a joint axis that is off by 1e-11 rad stays off by 1e-11 rad.
+Denavit-Hartenberg parameters, [1]_) and origins lie where the offset to the next body has the
+fewest components. Nothing is rounded: a joint axis that is off by 1e-11 rad stays off by 1e-11 rad.
 
-Some mass distributions may sit on either side of a joint without any torque noticing it: those that
-look the same from every joint position and resist no motion of the joint. For a revolute joint these
-are a mass on its axis and the inertia ``Ixx = Iyy`` of a thin rod on it; for a prismatic joint every
-inertia matrix. They are moved to the parent [2]_, which leaves seven parameters per revolute and
+Some mass distributions may sit on either side of a joint without any torque noticing it: those
+that look the same from every joint position and resist no motion of the joint. For a revolute joint
+these are a mass on its axis and the inertia ``Ixx = Iyy`` of a thin rod on it; for a prismatic
+joint every inertia matrix. They are moved to the parent [2]_, which leaves seven parameters per revolute and
 four per prismatic joint.
 
 References
@@ -164,8 +164,13 @@ class _Frames:
     def relative(self, body: int, base: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Pose of a new body frame in the new frame of its parent, at joint coordinate zero."""
         tree, parent = self._tree, int(self._tree.parents[body])
-        turn, shift = (base, np.zeros(3)) if parent < 0 else (
-            self.turns[parent], self.shifts[parent],
+        turn, shift = (
+            (base, np.zeros(3))
+            if parent < 0
+            else (
+                self.turns[parent],
+                self.shifts[parent],
+            )
         )
         rotation = turn.T @ tree.rotations[body] @ self.turns[body]
         offset = tree.translations[body] + tree.rotations[body] @ self.shifts[body] - shift

@@ -150,14 +150,20 @@ class Engine:
                 yield rows, bound.outputs[..., :size]
 
     def fixed_inverse_dynamics(
-        self, parameters: np.ndarray, gravity: Any = None, **options: bool
+        self,
+        parameters: np.ndarray,
+        gravity: Any = None,
+        *,
+        with_velocity: bool = True,
+        with_acceleration: bool = True,
     ) -> Program:
         """Inverse dynamics with the numbers of the inertial parameters written into it."""
         return trace_inverse_dynamics(
             self.canonical.tree,
             self.canonical.gravity(self.gravity_key(gravity)),
             parameters=_without_dust(np.array(self.canonical.parameters(parameters))),
-            **options,
+            with_velocity=with_velocity,
+            with_acceleration=with_acceleration,
         )
 
     @cached_property

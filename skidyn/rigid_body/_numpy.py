@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Run a tape with NumPy on many samples at once.
 
-A program is bound once to fixed buffers: one contiguous row of ``chunk`` samples per live value, and
-a list of ufunc calls that write into them. Rows are re-used as soon as their value is dead, so that
+A program is bound once to fixed buffers: one contiguous row of ``chunk`` samples per live value,
+and a list of ufunc calls that write into them. Rows are re-used as soon as their value is dead, so that
 a chunk stays in the cache; samples run along the last axis, so that every call is one contiguous
 loop.
 """
@@ -59,9 +59,7 @@ class BoundProgram:
                 _, name, position = self._nodes[index]
                 sizes[name] = max(sizes.get(name, 0), position + 1)
         return {
-            name: _aligned_zeros(
-                (size, 1 if name == "parameter" else self.chunk), self.dtype
-            )
+            name: _aligned_zeros((size, 1 if name == "parameter" else self.chunk), self.dtype)
             for name, size in sizes.items()
         }
 
@@ -141,7 +139,7 @@ class BoundProgram:
 
 
 def _aligned_zeros(shape: tuple[int, ...], dtype: np.dtype) -> np.ndarray:
-    """Zeros that start at a cache line: vector loads that straddle lines take nearly twice as long."""
+    """Zeros that start at a cache line: vector loads that straddle lines take nearly double."""
     line = 64
     n_bytes = math.prod(shape) * dtype.itemsize
     memory = np.zeros(n_bytes + line, np.uint8)

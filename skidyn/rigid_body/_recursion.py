@@ -10,8 +10,8 @@ are lists of three scalars in the frame of a body; two quantities carry the form
     inertial force ``m a + B (m c)`` and, through :func:`_moment_map`, the inertial moment. They are
     computed once per body.
 ``(s, v)``
-    Unit motion of a joint seen from a body further out: angular part ``s`` and velocity ``v`` of the
-    body's origin. Power of the body's inertial wrench along it is what the joint has to supply; the
+    Unit motion of a joint seen from a body further out: angular part ``s`` and velocity ``v`` of
+    the body's origin. Power of the body's inertial wrench along it is what the joint has to supply; the
     regressor carries these axes outward instead of carrying a 6 x 10 matrix of wrenches inward.
 
 Gravity enters as an acceleration ``-g`` of the base.
@@ -89,7 +89,7 @@ def _column(matrix: Matrix, k: int) -> Vector:
 
 
 class _Rotation:
-    """Rotation of a body frame in its parent: a constant matrix, then a turn about the joint axis."""
+    """Rotation of a body frame in its parent: a constant matrix, then a turn about the axis."""
 
     def __init__(
         self, tape: Tape, constant: np.ndarray, axis: np.ndarray, angle: Scalar | None
@@ -397,16 +397,14 @@ def _take_from_parent(
 
 
 def _power(motion: _Motion, moment_map: list[Vector], s: Vector, v: Vector) -> list[Scalar]:
-    """Power along the unit motion (s, v) of a body's inertial wrench, per unit of its parameters."""
+    """Power of a body's inertial wrench along a unit motion (s, v), per unit of its parameters."""
     lever = _cross(motion.acceleration, s)
     first_moments = [lever[k] + _dot(_column(motion.B, k), v) for k in range(3)]
     return [_dot(v, motion.acceleration), *first_moments, *(_dot(s, c) for c in moment_map)]
 
 
-def trace_mass_matrix(
-    tree: KinematicTree, parameters_used: np.ndarray | None = None
-) -> Program:
-    """Joint-space inertia matrix by composite rigid bodies [1]_; outputs keyed ``(row, column)``."""
+def trace_mass_matrix(tree: KinematicTree, parameters_used: np.ndarray | None = None) -> Program:
+    """Joint-space inertia matrix by composite rigid bodies [1]_; outputs keyed (row, column)."""
     tape = Tape()
     joints = _joints(tape, tree)
     composite = []
@@ -484,7 +482,7 @@ def _add_inertias(
 
 
 def _placed(tape: Tape, placement: tuple[float, ...] | None) -> tuple[Matrix, Vector]:
-    """Constant pose of a frame in its body, from a flattened 3 x 4 matrix; None is the body frame."""
+    """Constant pose of a frame in its body, from a flattened 3 x 4 matrix; None: the same."""
     pose = np.eye(3, 4) if placement is None else np.reshape(placement, (3, 4))
     rows = [[tape.constant(x) for x in row] for row in pose]
     return [row[:3] for row in rows], [row[3] for row in rows]
@@ -501,7 +499,8 @@ def trace_pose(
         position = _add(joint.position, joint.rotation.to_parent(position))
         columns = [joint.rotation.to_parent(_column(rows, k)) for k in range(3)]
         rows = [[columns[k][i] for k in range(3)] for i in range(3)]
-    outputs = {(i, k): rows[i][k] for i in range(3) for k in range(3)}
+    outputs: dict[tuple[int, ...], Scalar] = {}
+    outputs |= {(i, k): rows[i][k] for i in range(3) for k in range(3)}
     outputs |= {(i, 3): position[i] for i in range(3)}
     return Program(tape, outputs, (3, 4))
 

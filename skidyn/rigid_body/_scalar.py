@@ -25,7 +25,9 @@ class ScalarFunction:
         exec(compile(text, "<skidyn program>", "exec"), namespace)  # text is made of numbers only
         self._function = namespace["evaluate"]
         self._shape = program.shape
-        self._positions = np.ravel_multi_index(tuple(zip(*program.outputs, strict=True)), program.shape)
+        self._positions = np.ravel_multi_index(
+            tuple(zip(*program.outputs, strict=True)), program.shape
+        )
 
     def __call__(self, signals: dict[str, np.ndarray]) -> np.ndarray:
         """Outputs for the rows of the signals, shape ``(n_samples, *program.shape)``."""

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Symbolic scalars that record arithmetic on a tape and simplify it as it is written down.
 
-A rigid-body recursion is written once, in ordinary Python arithmetic, and run on these scalars. What
-is left on the tape is the recursion of one particular robot: products with 0 and 1 are gone, no
+A rigid-body recursion is written once, in ordinary Python arithmetic, and run on these scalars.
+What is left on the tape is the recursion of one particular robot: products with 0 and 1 are gone, no
 expression is computed twice, and what does not reach an output is dropped when the tape is read
 (:meth:`Tape.live`). The back ends (NumPy, torch, Python text, C text) only read tapes.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Hashable, Iterable
 
 #: One entry of a tape: the operation and its operands. Operands are indices of earlier entries,
@@ -162,8 +163,12 @@ class Scalar:
 
     def sin(self) -> Scalar:
         """Sine of an angle in rad."""
+        if self.value is not None:
+            return self.tape.constant(math.sin(self.value))
         return self.tape.record("sin", self.index)
 
     def cos(self) -> Scalar:
         """Cosine of an angle in rad."""
+        if self.value is not None:
+            return self.tape.constant(math.cos(self.value))
         return self.tape.record("cos", self.index)

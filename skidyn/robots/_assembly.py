@@ -77,10 +77,11 @@ def assemble(description: Description, selected: Sequence[str] | None) -> Assemb
     # An explicit stack: chains of ten thousand joints would exhaust Python's.
     stack: list[tuple[Joint | None, LinkPlacement]] = [(None, base)]
     while stack:
-        joint, placement = stack.pop()
+        arrival, placement = stack.pop()
         name = root
-        if joint is not None:
-            name, placement = joint.child, _attach(assembly, joint, placement, following, moving)
+        if arrival is not None:
+            name = arrival.child
+            placement = _attach(assembly, arrival, placement, following, moving)
         assembly.links[name] = placement
         if placement.body >= 0:
             assembly.parameters[placement.body] += transform_inertial(
@@ -90,8 +91,8 @@ def assemble(description: Description, selected: Sequence[str] | None) -> Assemb
     missing = [name for name in description.links if name not in assembly.links]
     if missing:
         raise RobotDescriptionError(
-            f"The links {_listed(missing)} are not connected to the root {root!r}: their joints form "
-            "a closed loop. A URDF must be a tree; cut the loop at one joint."
+            f"The links {_listed(missing)} are not connected to the root {root!r}: their joints "
+            "form a closed loop. A URDF must be a tree; cut the loop at one joint."
         )
     if not assembly.joints:
         raise RobotDescriptionError(
@@ -145,8 +146,8 @@ def _root_of(description: Description) -> str:
                 )
         if joint.child in parent_joint:
             raise RobotDescriptionError(
-                f"Link {joint.child!r} is the child of two joints, {parent_joint[joint.child]!r} and "
-                f"{joint.name!r}; a URDF must be a tree."
+                f"Link {joint.child!r} is the child of two joints, {parent_joint[joint.child]!r} "
+                f"and {joint.name!r}; a URDF must be a tree."
             )
         parent_joint[joint.child] = joint.name
     roots = [name for name in links if name not in parent_joint]

@@ -44,7 +44,7 @@ class Robot:
     joint_types : tuple of str
         ``"revolute"``, ``"continuous"`` or ``"prismatic"``.
     body_names : tuple of str
-        Moving bodies, parents first; one per joint, and one more for each joint that mimics another.
+        Moving bodies, parents first; one per joint and one more per joint that mimics another.
     position_limits : ndarray of shape (n_joints, 2)
         Lower and upper, rad or m; infinite for continuous joints.
     velocity_limits : ndarray of shape (n_joints,)
@@ -108,8 +108,8 @@ class Robot:
         source : str, bytes or path
             Path of the file, or the text itself (anything that starts with ``<``).
         joints : sequence of str, default=None
-            Joints that the logs cover; the others are locked at zero and their bodies become part of
-            what carries them. None means all. The order is always that of the URDF.
+            Joints that the logs cover; the others are locked at zero and their bodies become part
+            of what carries them. None means all. The order is always that of the URDF.
         gravity : sequence of 3 floats, default=(0, 0, -9.81)
             Gravitational acceleration in the base frame, m/s^2.
 
@@ -128,9 +128,13 @@ class Robot:
         >>> from skidyn.robots import Robot
         >>> robot = Robot.from_urdf('''
         ...   <robot name="pendulum"><link name="base"/>
-        ...     <link name="rod"><inertial><origin xyz="0 0 -0.5"/><mass value="2"/>
-        ...       <inertia ixx="0.1" iyy="0.1" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
-        ...     <joint name="swing" type="continuous"><parent link="base"/><child link="rod"/></joint>
+        ...     <link name="rod"><inertial>
+        ...       <origin xyz="0 0 -0.5"/><mass value="2"/>
+        ...       <inertia ixx="0.1" iyy="0.1" izz="0.01" ixy="0" ixz="0" iyz="0"/>
+        ...     </inertial></link>
+        ...     <joint name="swing" type="continuous">
+        ...       <parent link="base"/><child link="rod"/>
+        ...     </joint>
         ...   </robot>''')
         >>> robot.gravity_torque([[1.5707963267948966]]).round(2)
         array([[9.81]])

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Links and joints of a URDF, checked and in exact float64.
 
-The text is parsed by the URDF object model of pytorch-kinematics. Its kinematic chains are not used:
-they hold offsets that went through float32 and drop the inertials.
+The text is parsed by the URDF object model of pytorch-kinematics. Its kinematic chains are not
+used: they hold offsets that went through float32 and drop the inertials.
 """
 
 from __future__ import annotations
@@ -91,10 +91,24 @@ def parse_urdf(root: ElementTree.Element) -> Description:
     try:
         model = URDF.from_xml_string(ElementTree.tostring(root))
     except Exception as error:  # the parser raises bare Exception, AssertionError, ParseError
-        raise RobotDescriptionError(f"The URDF cannot be read: {_one_line(error)}.") from error
+        raise RobotDescriptionError(
+            f"The URDF cannot be read{_culprit(root, URDF)}: {_one_line(error)}."
+        ) from error
     links = {link.name: _link(link) for link in model.links}
     joints = {joint.name: _joint(joint) for joint in model.joints}
     return Description(model.name or "robot", links, joints)
+
+
+def _culprit(root: ElementTree.Element, parser: Any) -> str:
+    """Name of the first element that the parser refuses; its messages do not always tell."""
+    for element in root:
+        alone = ElementTree.Element("robot")
+        alone.append(element)
+        try:
+            parser.from_xml_string(ElementTree.tostring(alone))
+        except Exception:
+            return f" at {element.tag} {element.get('name')!r}"
+    return ""
 
 
 def _one_line(error: Exception) -> str:
@@ -242,7 +256,7 @@ def _limits(joint: Any, what: str) -> tuple[float, float, float, float]:
     if limit is None:
         if joint.type != "continuous":
             raise RobotDescriptionError(
-                f"The {what} has no <limit>; the URDF standard asks for one on {joint.type} joints. "
+                f"The {what} has no <limit>, which {joint.type} joints must have. "
                 'Add for example <limit lower="-3.14" upper="3.14" velocity="2" effort="100"/>.'
             )
         return -np.inf, np.inf, np.inf, np.inf

@@ -10,7 +10,7 @@ from xml.parsers import expat
 
 from skidyn._exceptions import RobotDescriptionError
 
-#: Larger descriptions are refused; the largest known URDF (whole humanoids, meshes outside) has 1 MB.
+#: Larger descriptions are refused; whole humanoids take 1 MB, their meshes are other files.
 MAX_BYTES = 64 * 2**20
 
 #: What the dynamics needs; pictures, collision shapes, drivers and simulator settings are left out.
