@@ -11,16 +11,19 @@ from skidyn.datasets._robots import (
     load_ur5,
     load_ur10e,
 )
+from skidyn.datasets._simulator import hidden_effect_kinds, make_hidden_effect_log
 
 __all__ = [
     "JointQuality",
     "LogQuality",
     "check_log",
+    "hidden_effect_kinds",
     "load_panda",
     "load_planar_arm",
     "load_scara",
     "load_srs_arm",
     "load_ur5",
     "load_ur10e",
+    "make_hidden_effect_log",
     "read_log",
 ]

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 WINDOW = 0.05
 #: Largest delay that is looked for, s, and the rows used for it.
 LARGEST_DELAY = 0.05
-DELAY_ROWS = 30_000
+DELAY_ROWS = 8_000
 
 
 def position_step(position: np.ndarray) -> float:
@@ -119,9 +119,9 @@ def torque_delay(
 ) -> np.ndarray:
     """Lag of the torque behind the motion, per joint.
 
-    The torque that robot and friction predict is shifted against the measured one; the lag is
-    where the residual of the refitted prediction is least. Torque and prediction are low-passed
-    alike at a tenth of the sampling rate.
+    The torque is shifted against the columns of the rigid-body regressor, friction and rotor
+    inertia; the lag is where the residual of their fit is least. Both are low-passed alike at a
+    tenth of the sampling rate.
 
     Parameters
     ----------
@@ -132,59 +132,58 @@ def torque_delay(
     segments : sequence of slice
         Runs of rows without a gap.
     robot : Robot
-        Predicts the rigid-body torque.
+        Its kinematics give the columns; inertial parameters are not used.
 
     Returns
     -------
     ndarray of shape (n_joints,), s
-        Positive where torque is late; NaN where prediction explains less than half of the
-        torque's variance, or where the least residual lies at the edge of +-50 ms.
+        Positive where torque is late; NaN where the fit explains less than half of the torque's
+        variance, or where the least residual lies at the edge of +-50 ms.
     """
     n = q.shape[1]
-    parts, rows = [], 0
-    for segment in sorted(segments, key=lambda s: s.start - s.stop):
-        if segment.stop - segment.start < 60 or rows > DELAY_ROWS:
-            break
-        parts.append(slice(segment.start, min(segment.stop, segment.start + DELAY_ROWS)))
-        rows += parts[-1].stop - parts[-1].start
+    parts = _delay_rows(segments)
     if not parts:
         return np.full(n, np.nan)
     step = float(np.median(np.concatenate([np.diff(time[part]) for part in parts])))
     reach = int(min(LARGEST_DELAY / step, 12))
     if reach < 1:
         return np.full(n, np.nan)
-    shifts = np.arange(-reach, reach + 1)
     low_pass = butter(2, 0.2, output="sos")
-    blocks = []
+    columns, torques = [], []
     for part in parts:
         ddq = np.gradient(sosfiltfilt(low_pass, dq[part], axis=0), time[part], axis=0)
-        rigid = robot.inverse_dynamics(q[part], dq[part], ddq)
+        rigid = robot.torque_regressor(q[part], dq[part], ddq)
         speed = 0.01 * np.abs(dq[part]).max(axis=0) + 1e-12
-        columns = [rigid, dq[part], np.tanh(dq[part] / speed)]
-        blocks.append([sosfiltfilt(low_pass, block, axis=0) for block in (*columns, tau[part])])
-    return np.array([_best_shift(blocks, k, shifts, reach) for k in range(n)]) * step
+        own = np.stack([dq[part], np.tanh(dq[part] / speed), ddq], axis=2)
+        block = sosfiltfilt(low_pass, np.concatenate([rigid, own], axis=2), axis=0)
+        columns.append(block[reach : len(block) - reach])
+        torques.append(sosfiltfilt(low_pass, tau[part], axis=0))
+    A = np.concatenate(columns)
+    return step * np.array([_best_shift(A[:, k], torques, k, reach) for k in range(n)])
 
 
-def _best_shift(
-    blocks: Sequence[Sequence[np.ndarray]], joint: int, shifts: np.ndarray, reach: int
-) -> float:
+def _delay_rows(segments: Sequence[slice]) -> list[slice]:
+    """Stretches of the longest segments, few enough rows for a quick fit."""
+    parts: list[slice] = []
+    for segment in sorted(segments, key=lambda s: s.start - s.stop):
+        room = DELAY_ROWS - sum(part.stop - part.start for part in parts)
+        if segment.stop - segment.start < 60 or room < 60:
+            break
+        parts.append(slice(segment.start, min(segment.stop, segment.start + min(room, 2000))))
+    return parts
+
+
+def _best_shift(A: np.ndarray, torques: Sequence[np.ndarray], joint: int, reach: int) -> float:
     """Shift of least residual in samples, by a parabola through the three best."""
-    A = np.concatenate(
-        [
-            np.column_stack(
-                [*(c[reach:-reach, joint] for c in block[:3]), np.ones(len(block[0]) - 2 * reach)]
-            )
-            for block in blocks
-        ]
-    )
-    basis, _ = np.linalg.qr(A)
+    used = A[:, np.abs(A).max(axis=0) > 0]
+    basis, _ = np.linalg.qr(np.column_stack([used, np.ones(len(A))]))
+    shifts = np.arange(-reach, reach + 1)
     errors = []
     for shift in shifts:
-        late = [b[3][reach + shift : len(b[3]) - reach + shift, joint] for b in blocks]
-        y = np.concatenate(late)
-        y = y - y.mean()
-        total = float(y @ y)
-        errors.append(1 - float(np.sum((basis.T @ y) ** 2)) / total if total > 0 else 1.0)
+        y = np.concatenate([t[reach + shift : len(t) - reach + shift, joint] for t in torques])
+        spread = float(np.sum((y - y.mean()) ** 2))
+        residual = float(y @ y - np.sum((basis.T @ y) ** 2))
+        errors.append(residual / spread if spread > 0 else 1.0)
     best = int(np.argmin(errors))
     if errors[best] > 0.5 or best in (0, len(shifts) - 1):
         return np.nan
