@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Frames and inertial parameters in which the inverse dynamics takes the fewest operations.
 
-Torques do not depend on where a body's frame sits. Here every revolute joint turns about the z axis
-of its body, the next joint axis is reached by one turn about x (the convention of modified
+Torques do not depend on where a body's frame sits. Here every revolute joint turns about the z
+axis of its body, the next joint axis is reached by one turn about x (the convention of modified
 Denavit-Hartenberg parameters, [1]_) and origins lie where the offset to the next body has the
-fewest components. Nothing is rounded: a joint axis that is off by 1e-11 rad stays off by 1e-11 rad.
+fewest components. Nothing is rounded: a joint axis that is off by 1e-11 rad stays off by 1e-11
+rad.
 
 Some mass distributions may sit on either side of a joint without any torque noticing it: those
-that look the same from every joint position and resist no motion of the joint. For a revolute joint
-these are a mass on its axis and the inertia ``Ixx = Iyy`` of a thin rod on it; for a prismatic
-joint every inertia matrix. They are moved to the parent [2]_, which leaves seven parameters per revolute and
-four per prismatic joint.
+that look the same from every joint position and resist no motion of the joint. For a revolute
+joint these are a mass on its axis and the inertia ``Ixx = Iyy`` of a thin rod on it; for a
+prismatic joint every inertia matrix. They are moved to the parent [2]_, which leaves seven
+parameters per revolute and four per prismatic joint.
 
 References
 ----------

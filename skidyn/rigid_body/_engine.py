@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from skidyn.rigid_body._canonical import CanonicalModel, canonicalize
+from skidyn.rigid_body._compiled import CompiledProgram
 from skidyn.rigid_body._numpy import BoundProgram, chunk_size, evaluate_rows
 from skidyn.rigid_body._recursion import (
     Program,
@@ -53,6 +54,7 @@ class Engine:
         self.gravity = gravity
         self._programs: dict[tuple, Program] = {}
         self._scalars: dict[tuple, ScalarFunction] = {}
+        self._compiled_programs: dict[tuple, CompiledProgram] = {}
         self._local = threading.local()
 
     def __getstate__(self) -> dict[str, Any]:
@@ -188,16 +190,24 @@ class Engine:
         *,
         parameters: np.ndarray | None = None,
         dtype: Any = np.float64,
+        backend: str = "numpy",
     ) -> np.ndarray:
         """Joint torques; signals that are left out vanish."""
         options = self.gravity_key(gravity), "dq" in signals, "ddq" in signals
-        if parameters is None and self._is_small(signals, dtype):
+        if backend == "numpy" and parameters is None and self._is_small(signals, dtype):
             return self._scalar("fixed_inverse_dynamics", *options)(signals)
         key = *options, parameters is None
         own = self._own_parameters
         if parameters is not None:
             own = np.array(self.canonical.parameters(parameters))
+        if backend == "compiled":
+            return self._compiled("inverse_dynamics", *key)(signals, own)
         return self.evaluate(signals, "inverse_dynamics", *key, parameters=own, dtype=dtype)
+
+    def _compiled(self, *key: Any) -> CompiledProgram:
+        if key not in self._compiled_programs:
+            self._compiled_programs[key] = CompiledProgram(self.program(*key))
+        return self._compiled_programs[key]
 
     def mass_matrix(
         self, signals: dict[str, np.ndarray], parameters: np.ndarray | None = None

@@ -11,8 +11,8 @@ are lists of three scalars in the frame of a body; two quantities carry the form
     computed once per body.
 ``(s, v)``
     Unit motion of a joint seen from a body further out: angular part ``s`` and velocity ``v`` of
-    the body's origin. Power of the body's inertial wrench along it is what the joint has to supply; the
-    regressor carries these axes outward instead of carrying a 6 x 10 matrix of wrenches inward.
+    the body's origin. Power of the body's inertial wrench along it is what the joint has to supply;
+    the regressor carries these axes outward instead of a 6 x 10 matrix of wrenches inward.
 
 Gravity enters as an acceleration ``-g`` of the base.
 

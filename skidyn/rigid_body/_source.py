@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 
 from skidyn.rigid_body._recursion import Program
 from skidyn.rigid_body._tape import operands
@@ -21,7 +22,12 @@ def subscript(name: str, position: int) -> str:
 
 
 def statements(
-    program: Program, *, input_name: InputName = subscript, prefix: str = "", suffix: str = ""
+    program: Program,
+    *,
+    input_name: InputName = subscript,
+    prefix: str = "",
+    suffix: str = "",
+    given: Mapping[int, str] = MappingProxyType({}),
 ) -> tuple[list[str], dict[tuple[int, ...], str]]:
     """Assignments that compute the outputs, and the expression of every output.
 
@@ -32,6 +38,8 @@ def statements(
         Text of the input ``(name, position)``.
     prefix, suffix : str, default=""
         Written before and after every assignment, such as ``"double "`` and ``";"``.
+    given : mapping of int to str, default={}
+        Expressions of nodes of the tape that are computed elsewhere.
 
     Returns
     -------
@@ -42,8 +50,11 @@ def statements(
     nodes = program.tape.nodes
     names: dict[int, str] = {}
     lines = []
-    for index in program.tape.live(program.outputs.values()):
+    for index in program.tape.live(program.outputs.values(), given):
         node = nodes[index]
+        if index in given:
+            names[index] = given[index]
+            continue
         if node[0] == "constant":
             # Parentheses keep "a - -1.5" readable and legal everywhere.
             names[index] = repr(node[1]) if node[1] >= 0 else f"({node[1]!r})"

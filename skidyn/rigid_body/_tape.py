@@ -2,15 +2,15 @@
 """Symbolic scalars that record arithmetic on a tape and simplify it as it is written down.
 
 A rigid-body recursion is written once, in ordinary Python arithmetic, and run on these scalars.
-What is left on the tape is the recursion of one particular robot: products with 0 and 1 are gone, no
-expression is computed twice, and what does not reach an output is dropped when the tape is read
-(:meth:`Tape.live`). The back ends (NumPy, torch, Python text, C text) only read tapes.
+What is left on the tape is the recursion of one particular robot: products with 0 and 1 are gone,
+no expression is computed twice, and what does not reach an output is dropped when the tape is
+read (:meth:`Tape.live`). The back ends (NumPy, torch, Python text, C text) only read tapes.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Iterable
+from collections.abc import Container, Hashable, Iterable
 
 #: One entry of a tape: the operation and its operands. Operands are indices of earlier entries,
 #: except for ``("input", name, index)`` and ``("constant", value)``.
@@ -52,15 +52,19 @@ class Tape:
         """Scalar with a fixed value."""
         return self.record("constant", float(value) + 0.0)  # -0.0 and 0.0 are one node
 
-    def live(self, outputs: Iterable[Scalar]) -> list[int]:
-        """Indices of all nodes that the outputs need, operands before their users."""
+    def live(self, outputs: Iterable[Scalar], given: Container[int] = ()) -> list[int]:
+        """Indices of all nodes that the outputs need, operands before their users.
+
+        Nodes that are ``given`` by other means are listed, but not what they are computed from.
+        """
         needed: set[int] = set()
         stack = [output.index for output in outputs]
         while stack:
             index = stack.pop()
             if index not in needed:
                 needed.add(index)
-                stack.extend(operands(self.nodes[index]))
+                if index not in given:
+                    stack.extend(operands(self.nodes[index]))
         return sorted(needed)
 
 

@@ -78,7 +78,7 @@ def parse_robot_element(data: bytes) -> ElementTree.Element:
 def _refuse_declarations(data: bytes) -> None:
     """Stop at the first document type, before any entity of it could be expanded."""
 
-    def refuse(*_: object) -> None:
+    def refuse(*_: object) -> int:
         raise RobotDescriptionError(
             "The description declares a document type or entities, which could expand without end "
             "or read other files; a URDF needs none. Remove the <!DOCTYPE ...> part."
