@@ -16,23 +16,27 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 
 from skidyn._columns import Columns, ColumnSpec, resolve_columns
 from skidyn._compat import HasMethods, fit_context
+from skidyn.effects._hysteresis import dahl_state
 from skidyn.preprocessing._keys import resolve_keys
 
 Array = NDArray[np.float64]
 
 
 class OwnJointRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
-    """One regressor per joint on that joint's position, velocity, acceleration and travel.
+    """One regressor per joint on that joint's own motion and pre-sliding states.
 
     What a good physical model leaves over is mostly friction inside single joints. A learner that
     sees only the joint it speaks of cannot fit accidental relations between joints, needs less
-    data and transfers better to new motions. The travel since the last reversal of motion (rad or
-    m) is added, because pre-sliding friction depends on it.
+    data and transfers better to new motions. Friction remembers the path: around rest and reversal
+    it depends on how far the joint has gone since. States of Dahl's model [1]_ of several widths
+    stand for this memory, so that a learner without one can use it.
 
     Parameters
     ----------
     estimator : estimator, default=None
         Regressor of one joint; a small, cautious gradient boosting if None.
+    presliding : sequence of float, rad (m for prismatic joints), default=(0.003, 0.01, 0.05, 0.2)
+        Ways over which the states build up. They restart at the ends of segments.
     joint_names : sequence of str, default=None
         Names of the joints for columns named ``q_<joint>``; ``q1, q2, ..`` or columns by position
         need none.
@@ -50,6 +54,10 @@ class OwnJointRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     feature_names_in_ : ndarray of str
         Their names, where X has names.
 
+    References
+    ----------
+    .. [1] P. R. Dahl, "A solid friction model", Aerospace Corporation TOR-0158, 1968.
+
     Examples
     --------
     >>> import numpy as np
@@ -62,6 +70,7 @@ class OwnJointRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
 
     _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
         "estimator": [HasMethods(["fit", "predict"]), None],
+        "presliding": ["array-like"],
         "joint_names": ["array-like", None],
         "n_jobs": [Integral, None],
         "trajectory": [str, Integral, None],
@@ -72,12 +81,14 @@ class OwnJointRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         self,
         estimator: Any = None,
         *,
+        presliding: Sequence[float] = (0.003, 0.01, 0.05, 0.2),
         joint_names: Sequence[str] | None = None,
         n_jobs: int | None = None,
         trajectory: ColumnSpec = "auto",
         time: ColumnSpec = "auto",
     ) -> None:
         self.estimator = estimator
+        self.presliding = presliding
         self.joint_names = joint_names
         self.n_jobs = n_jobs
         self.trajectory = trajectory
@@ -135,8 +146,8 @@ class OwnJointRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         segments = keys.segments(X)
         own = []
         for q, dq, ddq in zip(columns.q, columns.dq, columns.ddq, strict=True):
-            travel = _travel_since_reversal(X[:, q], X[:, dq], segments)
-            own.append(np.c_[X[:, [q, dq, ddq]], travel])
+            states = [dahl_state(X[:, q], segments, float(way)) for way in self.presliding]
+            own.append(np.column_stack([X[:, [q, dq, ddq]], *states]))
         return own
 
     def predict(self, X: Any) -> Array:
@@ -167,21 +178,9 @@ class OwnJointRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
 def _cautious_boosting() -> HistGradientBoostingRegressor:
     return HistGradientBoostingRegressor(
         max_iter=100,
-        learning_rate=0.05,
+        learning_rate=0.1,
         max_leaf_nodes=15,
-        min_samples_leaf=200,
-        l2_regularization=10.0,
+        min_samples_leaf=50,
         early_stopping=False,
         random_state=0,
     )
-
-
-def _travel_since_reversal(position: Array, velocity: Array, segments: list[slice]) -> Array:
-    """Signed distance from where the joint last changed direction within its segment."""
-    travel = np.empty_like(position)
-    for segment in segments:
-        q, direction = position[segment], np.sign(velocity[segment])
-        turned = np.r_[True, direction[1:] != direction[:-1]]
-        turn = np.maximum.accumulate(np.where(turned, np.arange(len(q)), 0))
-        travel[segment] = q - q[turn]
-    return travel

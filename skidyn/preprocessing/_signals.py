@@ -290,7 +290,7 @@ class TimeDerivative(_SignalTransformer):
                         "repeated rows first."
                     )
             derivative[segment] = np.gradient(
-                values, times, axis=0, edge_order=min(2, len(values) - 1)
+                values, times, axis=0, edge_order=2 if len(values) > 2 else 1
             )
         return np.c_[X, derivative]
 

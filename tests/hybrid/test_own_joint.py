@@ -6,8 +6,8 @@ from sklearn.ensemble import ExtraTreesRegressor
 from sklearn.linear_model import Ridge
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
+from skidyn.effects._hysteresis import dahl_state
 from skidyn.hybrid import OwnJointRegressor
-from skidyn.hybrid._own_joint import _travel_since_reversal
 
 
 class AnyColumns(OwnJointRegressor):
@@ -53,8 +53,16 @@ def test_missing_columns_are_named(data):
         OwnJointRegressor().fit(X.to_numpy()[:, :5], y)
 
 
-def test_travel_restarts_at_reversals_and_segments():
-    q = np.array([0.0, 1.0, 3.0, 2.0, 1.0, 5.0, 6.0])
-    dq = np.array([1.0, 1.0, 1.0, -1.0, -1.0, 1.0, 1.0])
-    travel = _travel_since_reversal(q, dq, [slice(0, 5), slice(5, 7)])
-    np.testing.assert_array_equal(travel, [0, 1, 3, 0, -1, 0, 1])
+def test_a_learner_without_memory_sees_hysteresis():
+    t = np.arange(0, 40, 0.01)
+    q = np.sin(t) + 0.3 * np.sin(3.1 * t)
+    X = np.stack([q, np.gradient(q, t), np.zeros_like(t)], axis=1)
+    y = dahl_state(q, [slice(0, len(t))], 0.03)
+    train, test = slice(0, 2000), slice(2000, 4000)
+    trees = ExtraTreesRegressor(10, random_state=0)
+    with_memory = OwnJointRegressor(trees).fit(X[train], y[train])
+    without = OwnJointRegressor(trees, presliding=[]).fit(X[train], y[train])
+    error = [
+        np.abs(m.predict(X[test])[100:] - y[test][100:]).mean() for m in (with_memory, without)
+    ]
+    assert error[0] < 0.3 * error[1]
