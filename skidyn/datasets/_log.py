@@ -13,6 +13,7 @@ import numpy as np
 from skidyn._checks import warn_about_log
 from skidyn._exceptions import LogError
 from skidyn._optional import import_optional
+from skidyn.datasets._log_containers import read_hdf5_channels, read_matlab_channels
 from skidyn.datasets._log_files import (
     MAX_BYTES,
     Channel,
@@ -21,6 +22,7 @@ from skidyn.datasets._log_files import (
     read_parquet_channels,
 )
 from skidyn.datasets._log_quality import check_log
+from skidyn.datasets._log_ros import read_bag_channels, read_mcap_channels
 from skidyn.datasets._log_table import ColumnMap, TableOptions, build_table
 
 if TYPE_CHECKING:
@@ -170,8 +172,18 @@ def _read_channels(path: Path, topics: Sequence[str] | None, max_bytes: int) -> 
         **dict.fromkeys((".parquet", ".feather", ".arrow"), read_parquet_channels),
         ".npz": read_npz_channels,
     }
-    if suffix in tables:
+    containers: dict[str, Callable[[Path, int, Sequence[str] | None], list[Channel]]] = {
+        **dict.fromkeys((".h5", ".hdf5"), read_hdf5_channels),
+        ".mat": read_matlab_channels,
+        ".mcap": read_mcap_channels,
+        **dict.fromkeys((".bag", ".db3"), read_bag_channels),
+    }
+    if suffix in tables and path.is_file():
         return tables[suffix](path, max_bytes)
+    if suffix in containers and path.is_file():
+        return containers[suffix](path, max_bytes, topics)
+    if (path / "metadata.yaml").exists():
+        return read_bag_channels(path, max_bytes, topics)
     raise LogError(
         f"{path}: unknown kind of log {suffix or 'without suffix'!r}. Known are .csv .tsv .txt "
         ".dat .parquet .feather .npz .h5 .hdf5 .mat .mcap .bag .db3 and folders of ROS 2 bags."

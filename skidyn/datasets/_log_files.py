@@ -15,6 +15,7 @@ import numpy as np
 
 from skidyn._exceptions import LogError
 from skidyn._optional import import_optional
+from skidyn.datasets._log_names import PER_JOINT
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -45,7 +46,7 @@ class Channel:
 def read_csv_channels(path: Path, max_bytes: int) -> list[Channel]:
     """Read a text table; the separator, a decimal comma and a missing header are recognised."""
     pd = import_optional("pandas", extra="io")
-    _check_size(path, path.stat().st_size, max_bytes)
+    check_size(path, path.stat().st_size, max_bytes)
     with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
         lines = [line for _, line in zip(range(200), file, strict=False)]
     skip = next(
@@ -70,7 +71,6 @@ def read_csv_channels(path: Path, max_bytes: int) -> list[Channel]:
         skipinitialspace=True,
         comment="#",
         encoding="utf-8-sig",
-        float_precision="round_trip",
         index_col=False,
         low_memory=False,
     )
@@ -85,7 +85,7 @@ def read_parquet_channels(path: Path, max_bytes: int) -> list[Channel]:
     if path.suffix.lower() == ".parquet":
         metadata = parquet.read_metadata(path)
         size = sum(metadata.row_group(k).total_byte_size for k in range(metadata.num_row_groups))
-        _check_size(path, size, max_bytes)
+        check_size(path, size, max_bytes)
         refuse_duplicates(parquet.read_schema(path).names, str(path))
         table = parquet.ParquetFile(path).read().to_pandas()
     else:
@@ -108,15 +108,23 @@ def read_npz_channels(path: Path, max_bytes: int) -> list[Channel]:
     attributes = {}
     if "joint_names" in arrays:
         attributes["joint_names"] = [str(name) for name in arrays.pop("joint_names")]
-    lengths = Counter(
-        len(a) for a in arrays.values() if a.ndim in (1, 2) and a.dtype.kind in "fiub"
-    )
+    return [Channel(path.name, table_from_arrays(of_one_length(arrays, str(path))), attributes)]
+
+
+def of_one_length(arrays: Mapping[str, np.ndarray], source: str) -> dict[str, np.ndarray]:
+    """Numeric arrays with one row per sample: those of the most common length.
+
+    Raises
+    ------
+    LogError
+        There is no numeric array of one or two dimensions.
+    """
+    numeric = {k: a for k, a in arrays.items() if a.ndim in (1, 2) and a.dtype.kind in "fiub"}
+    lengths = Counter(len(a) for a in numeric.values())
     if not lengths:
-        raise LogError(f"{path}: holds no numeric columns.")
+        raise LogError(f"{source}: holds no numeric columns.")
     n = max(lengths, key=lambda length: (lengths[length], length))
-    columns = {k: a for k, a in arrays.items() if a.ndim in (1, 2) and len(a) == n}
-    columns = {k: a for k, a in columns.items() if a.dtype.kind in "fiub"}
-    return [Channel(path.name, table_from_arrays(columns), attributes)]
+    return {name: a for name, a in numeric.items() if len(a) == n}
 
 
 def load_npz(path: Path, max_bytes: int = MAX_BYTES) -> dict[str, np.ndarray]:
@@ -131,7 +139,7 @@ def load_npz(path: Path, max_bytes: int = MAX_BYTES) -> dict[str, np.ndarray]:
     try:
         with zipfile.ZipFile(path) as archive:
             members = archive.infolist()
-            _check_size(path, sum(member.file_size for member in members), max_bytes)
+            check_size(path, sum(member.file_size for member in members), max_bytes)
             for member in members:
                 _check_npy_header(archive, member, path)
         with np.load(path, allow_pickle=False) as data:
@@ -167,15 +175,20 @@ def _check_npy_header(archive: zipfile.ZipFile, member: zipfile.ZipInfo, path: P
 
 
 def table_from_arrays(columns: Mapping[str, np.ndarray]) -> pd.DataFrame:
-    """Table of one-dimensional columns; a block ``q`` of shape (n, 3) becomes ``q1, q2, q3``."""
+    """Table of one-dimensional columns; a block ``q`` of shape (n, 3) becomes ``q1, q2, q3``.
+
+    A single column ``q`` is the position of the only joint and becomes ``q1``.
+    """
     pd = import_optional("pandas", extra="io")
     flat: dict[str, np.ndarray] = {}
     for name, values in columns.items():
-        if values.ndim == 2:
-            for k in range(values.shape[1]):
-                flat[f"{name}{k + 1}"] = values[:, k]
+        single = values.ndim == 1 or values.shape[1] == 1
+        if single and name not in PER_JOINT:
+            flat[name] = values.reshape(len(values))
         else:
-            flat[name] = values
+            block = values.reshape(len(values), -1)
+            for k in range(block.shape[1]):
+                flat[f"{name}{k + 1}"] = block[:, k]
     return pd.DataFrame(flat)
 
 
@@ -201,7 +214,7 @@ def refuse_duplicates(names: Sequence[str], source: str) -> None:
         )
 
 
-def _check_size(path: Path, size: int, max_bytes: int) -> None:
+def check_size(path: Path, size: int, max_bytes: int) -> None:
     if size > max_bytes:
         raise LogError(
             f"{path}: unpacks to {size / 2**20:.0f} MiB, more than max_bytes = "

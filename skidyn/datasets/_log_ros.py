@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Readers of MCAP files and of ROS 1 and ROS 2 bags; no ROS installation is needed."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from skidyn._exceptions import LogError
+from skidyn._optional import import_optional
+from skidyn.datasets._log_files import Channel, check_size, table_from_arrays
+
+#: Topic, message type, time of recording in ns, message.
+Message = tuple[str, str, int, Any]
+
+
+def read_mcap_channels(path: Path, max_bytes: int, topics: Sequence[str] | None) -> list[Channel]:
+    """Read the joint states of an MCAP file with ROS 2 messages."""
+    reader = import_optional("mcap.reader", extra="io")
+    decoder = import_optional("mcap_ros2.decoder", extra="io")
+    exceptions = import_optional("mcap.exceptions", extra="io")
+    check_size(path, path.stat().st_size, max_bytes)
+    try:
+        with path.open("rb") as file:
+            source = reader.make_reader(file, decoder_factories=[decoder.DecoderFactory()])
+            messages = (
+                (channel.topic, schema.name, message.log_time, decoded)
+                for schema, channel, message, decoded in source.iter_decoded_messages(
+                    topics=list(topics) if topics else None
+                )
+            )
+            return _channels(messages, path, topics)
+    except exceptions.McapError as error:
+        raise LogError(f"{path}: cannot be read as MCAP: {error}") from error
+
+
+def read_bag_channels(path: Path, max_bytes: int, topics: Sequence[str] | None) -> list[Channel]:
+    """Read the joint states of a ROS 1 bag (a file) or a ROS 2 bag (a folder or its .db3 file)."""
+    if path.suffix.lower() == ".db3" and not (path.parent / "metadata.yaml").exists():
+        return _channels(_bare_database(path), path, topics)
+    highlevel = import_optional("rosbags.highlevel", extra="io")
+    folder = path.parent if path.suffix.lower() == ".db3" else path
+    files = [path] if path.is_file() else [item for item in path.iterdir() if item.is_file()]
+    check_size(path, sum(item.stat().st_size for item in files), max_bytes)
+    try:
+        with highlevel.AnyReader([folder], default_typestore=_typestore()) as reader:
+            wanted = [c for c in reader.connections if topics is None or c.topic in topics]
+            if not wanted:
+                wanted = reader.connections
+            messages = (
+                (c.topic, c.msgtype, stamp, reader.deserialize(raw, c.msgtype))
+                for c, stamp, raw in reader.messages(connections=wanted)
+                if topics is not None or _is_joint_state(c.msgtype)
+            )
+            return _channels(messages, path, topics)
+    except highlevel.AnyReaderError as error:
+        raise LogError(f"{path}: cannot be read as a bag: {error}") from error
+
+
+def _bare_database(path: Path) -> Iterator[Message]:
+    """Messages of a ROS 2 database whose metadata file is missing."""
+    typestore = _typestore()
+    with sqlite3.connect(f"file:{path}?mode=ro", uri=True) as database:
+        try:
+            rows = database.execute(
+                "SELECT name, type, timestamp, data FROM messages "
+                "JOIN topics ON topics.id = messages.topic_id ORDER BY timestamp"
+            )
+            for topic, kind, stamp, data in rows:
+                if _is_joint_state(kind):
+                    yield topic, kind, stamp, typestore.deserialize_cdr(data, kind)
+        except sqlite3.DatabaseError as error:
+            raise LogError(f"{path}: not a ROS 2 bag: {error}") from error
+
+
+def _typestore() -> Any:
+    typesys = import_optional("rosbags.typesys", extra="io")
+    return typesys.get_typestore(typesys.Stores.LATEST)
+
+
+def _is_joint_state(kind: str) -> bool:
+    return kind.replace("/msg/", "/") == "sensor_msgs/JointState"
+
+
+def _channels(
+    messages: Iterator[Message], path: Path, topics: Sequence[str] | None
+) -> list[Channel]:
+    """One channel per topic and set of joints; times in s from the first message."""
+    rows: dict[tuple[str, tuple[str, ...]], list[tuple[int, dict[str, float]]]] = {}
+    seen: dict[str, str] = {}
+    for topic, kind, recorded, message in messages:
+        seen[topic] = kind
+        if topics is not None and topic not in topics:
+            continue
+        if _is_joint_state(kind):
+            values = _joint_state(message)
+        elif topics is not None:
+            values = dict(_numbers(message, ""))
+        else:
+            continue
+        key = topic, tuple(values)
+        rows.setdefault(key, []).append((_stamp(message, recorded), values))
+    if not rows:
+        kinds = ", ".join(f"{topic} ({kind})" for topic, kind in seen.items()) or "no messages"
+        raise LogError(
+            f"{path} holds no sensor_msgs/JointState{' in ' + ', '.join(topics) if topics else ''}"
+            f". It holds {kinds}. Choose others with topics=[...] and name their fields in columns."
+        )
+    start = min(stamps[0][0] for stamps in rows.values())
+    channels = []
+    for (topic, names), samples in rows.items():
+        samples.sort(key=lambda sample: sample[0])
+        columns = {name: np.array([values[name] for _, values in samples]) for name in names}
+        columns["time"] = np.array([stamp - start for stamp, _ in samples]) * 1e-9
+        channels.append(Channel(topic, table_from_arrays(columns)))
+    return channels
+
+
+def _stamp(message: Any, recorded: int) -> int:
+    """Time of the header in ns, or of the recording where the header has none."""
+    header = getattr(message, "header", None)
+    stamp = getattr(header, "stamp", None)
+    if stamp is None:
+        return recorded
+    nanoseconds = getattr(stamp, "nanosec", getattr(stamp, "nsec", getattr(stamp, "nsecs", 0)))
+    seconds = getattr(stamp, "sec", getattr(stamp, "secs", 0))
+    total = int(seconds) * 1_000_000_000 + int(nanoseconds)
+    return total or recorded
+
+
+def _joint_state(message: Any) -> dict[str, float]:
+    """``joint/position``, ``joint/velocity``, ``joint/effort`` of one message."""
+    values = {}
+    for quantity in ("position", "velocity", "effort"):
+        for name, value in zip(message.name, getattr(message, quantity), strict=False):
+            values[f"{name}/{quantity}"] = float(value)
+    return values
+
+
+def _numbers(message: Any, prefix: str) -> Iterator[tuple[str, float]]:
+    """Numeric fields of any message under names such as ``data[0]`` or ``wrench.force.x``."""
+    if isinstance(message, (bool, int, float, np.number)):
+        yield prefix, float(message)
+    elif isinstance(message, (list, tuple, np.ndarray)):
+        for k, item in enumerate(message):
+            yield from _numbers(item, f"{prefix}[{k}]")
+    elif not isinstance(message, (str, bytes)):
+        fields = getattr(message, "__dataclass_fields__", getattr(message, "__slots__", ()))
+        for name in tuple(fields):
+            if not name.startswith("_") and name not in ("header", "layout"):
+                dotted = f"{prefix}.{name}" if prefix else name
+                yield from _numbers(getattr(message, name), dotted)
