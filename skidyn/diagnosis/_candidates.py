@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from skidyn._signals import Array
-from skidyn.diagnosis._problem import Problem
 from skidyn.effects import Term, get_effect
+from skidyn.evidence._problem import Problem
 
 
 @dataclass(frozen=True, eq=False)

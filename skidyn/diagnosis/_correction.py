@@ -11,8 +11,8 @@ from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
 from skidyn._signals import Array
-from skidyn.diagnosis._problem import Problem, make_problem
-from skidyn.effects import Term, make_terms
+from skidyn.effects import make_terms
+from skidyn.evidence._problem import Problem, make_problem
 from skidyn.robots import Robot
 
 
@@ -91,9 +91,7 @@ class CorrectedRegressor(RegressorMixin, BaseEstimator):
         problem = self._problem(X, own)
         fit = problem.fit(self.effect_terms_)
         torque = problem.term_torque(
-            type(fit)(
-                fit.terms, self.coef_, fit.covariance, fit.residual, fit.sigma
-            )
+            type(fit)(fit.terms, self.coef_, fit.covariance, fit.residual, fit.sigma)
         )
         return own + torque
 
@@ -103,7 +101,12 @@ class CorrectedRegressor(RegressorMixin, BaseEstimator):
         own = np.asarray(self.regressor.predict(X), dtype=float).reshape(len(torque), -1)
         signals, torque = read_signals(X, torque, self.robot)
         problem = make_problem(
-            signals, torque - own, robot=self.robot, rigid_body=False, terms=self.effect_terms_
+            signals,
+            torque - own,
+            robot=self.robot,
+            rigid_body=False,
+            terms=self.effect_terms_,
+            subtract_urdf=False,
         )
         s = problem.signals
         load = self.robot.inverse_dynamics(s.q, s.dq, s.ddq)

@@ -29,9 +29,9 @@ from skidyn.diagnosis._floor import predictable_share
 from skidyn.diagnosis._held_out import HeldOut, held_out_residual
 from skidyn.diagnosis._intervals import parameter_intervals
 from skidyn.diagnosis._limits import Limit, find_limits
-from skidyn.diagnosis._problem import Problem, make_problem
 from skidyn.diagnosis._search import UNKNOWN, SearchResult, Settings, replace_torque, search
 from skidyn.effects import Term, list_effects, make_terms
+from skidyn.evidence._problem import Problem, make_problem
 from skidyn.robots import Robot
 
 Verdict = Literal["complete", "missing", "unknown"]
@@ -167,8 +167,9 @@ class Diagnosis:
             if finding.kind != kind:
                 continue
             terms = [
-                t for t in finding.terms if wanted is None or len(t.joints) > 1
-                or set(t.joints) <= wanted
+                t
+                for t in finding.terms
+                if wanted is None or len(t.joints) > 1 or set(t.joints) <= wanted
             ]
             known = {j for t in terms for j in t.joints}
             if terms and (wanted is None or wanted <= known):
@@ -286,13 +287,14 @@ def diagnose(
     terms: Sequence[Term] = _own_terms(model, robot, X, tau) if own else ()
     identified = own and getattr(model, "parameters", "identified") == "identified"
     problem = make_problem(
-        signals, torque, robot=robot, rigid_body=identified, terms=terms, smooth=smooth
+        signals,
+        torque if own else torque - _prediction(model, X, torque),
+        robot=robot,
+        rigid_body=identified,
+        terms=terms,
+        smooth=smooth,
+        subtract_urdf=own,
     )
-    if not own:
-        problem.torque = torque - _prediction(model, X, torque)
-    elif not identified:
-        s = problem.signals
-        problem.torque = torque - robot.inverse_dynamics(s.q, s.dq, s.ddq)
     _check_rows(problem)
     settings = settings or Settings()
     result = search(problem, kinds, settings)
@@ -442,12 +444,8 @@ def _conclude(
     findings = []
     for i, hypothesis in enumerate(result.findings):
         drop = _drop(history[i]["rmse"], history[i + 1]["rmse"], hypothesis.joints)
-        finding = make_finding(
-            problem, hypothesis, rivals[id(hypothesis)], q[i], drop, intervals
-        )
-        finding.curves.extend(
-            effect_curves(problem, finding.terms, held.torque, held.residual)
-        )
+        finding = make_finding(problem, hypothesis, rivals[id(hypothesis)], q[i], drop, intervals)
+        finding.curves.extend(effect_curves(problem, finding.terms, held.torque, held.residual))
         findings.append(finding)
     share = predictable_share(problem, result.fit.residual)
     floor = np.array(history[-1]["rmse"]) * np.sqrt(1 - share)

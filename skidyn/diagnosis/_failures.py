@@ -147,7 +147,10 @@ def regimes(comparison: Comparison) -> dict[str, NDArray[np.bool_]]:
     speed = np.abs(s.dq)
     rest = speed <= REST * s.unit
     high = np.array(
-        [np.quantile(v[~r], 0.95) if (~r).any() else 1.0 for v, r in zip(speed.T, rest.T, strict=True)]
+        [
+            np.quantile(v[~r], 0.95) if (~r).any() else 1.0
+            for v, r in zip(speed.T, rest.T, strict=True)
+        ]
     )
     reversal = ~rest & ~comparison.sliding
     moving = ~rest & ~reversal

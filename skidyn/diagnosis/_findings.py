@@ -12,9 +12,9 @@ from scipy.stats import chi2
 
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
-from skidyn.diagnosis._problem import Problem
 from skidyn.diagnosis._search import UNKNOWN, Hypothesis, Step
 from skidyn.effects import Term, get_effect
+from skidyn.evidence._problem import Problem
 
 #: Another kind with at least this share of the best one's score is a rival.
 RIVAL_SHARE = 0.8
@@ -196,9 +196,7 @@ def _parameters(
     return table
 
 
-def _code(
-    hypothesis: Hypothesis, joints: tuple[int, ...], candidates: Sequence[Candidate]
-) -> str:
+def _code(hypothesis: Hypothesis, joints: tuple[int, ...], candidates: Sequence[Candidate]) -> str:
     if hypothesis.kind == UNKNOWN or any(c.term.shape.get("trajectories") for c in candidates):
         return "model = diagnosis.model"
     return f'model = diagnosis.add("{hypothesis.kind}", joints={list(joints)})'

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from skidyn._signals import Array
-from skidyn.diagnosis._problem import Problem
+from skidyn.evidence._problem import Problem
 
 FEATURES = 200
 #: Lengths over which the learned function varies, in standard deviations of its inputs.

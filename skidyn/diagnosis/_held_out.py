@@ -8,52 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from skidyn._signals import Array
-from skidyn.diagnosis._problem import RIDGE, Problem, term_columns
 from skidyn.effects import Term, get_effect
-
-
-def left_out_coefficients(
-    problem: Problem, design: Sequence[Array], sigma: Array, target: Sequence[Array]
-) -> tuple[Array, Array]:
-    """Coefficients of the whole fit and of the fits that leave one fold out.
-
-    Parameters
-    ----------
-    problem : Problem
-        Rows and folds.
-    design : sequence of ndarray of shape (n_rows_j, n_coefficients)
-        Columns of every joint.
-    sigma : ndarray of shape (n_joints,)
-        Noise of one row.
-    target : sequence of ndarray
-        Averaged torque.
-
-    Returns
-    -------
-    whole : ndarray of shape (n_coefficients,)
-    left_out : ndarray of shape (n_folds, n_coefficients)
-    """
-    p = design[0].shape[1]
-    grams, cross = np.zeros((problem.n_folds, p, p)), np.zeros((problem.n_folds, p))
-    for j, (block, y) in enumerate(zip(design, target, strict=True)):
-        edges = np.searchsorted(problem.fold[j], np.arange(problem.n_folds + 1))
-        for f, (a, b) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
-            part = block[a:b] / sigma[j]
-            grams[f] += part.T @ part
-            cross[f] += part.T @ (y[a:b] / sigma[j])
-    total, right = grams.sum(0), cross.sum(0)
-    scale = np.sqrt(np.diag(total))
-    scale[scale == 0] = 1.0
-
-    def solve(gram: Array, r: Array) -> Array:
-        normal = gram / scale[:, None] / scale + RIDGE * np.eye(p)
-        return cho_solve(cho_factor(normal), r / scale) / scale
-
-    left = [solve(total - g, right - c) for g, c in zip(grams, cross, strict=True)]
-    return solve(total, right), np.array(left)
+from skidyn.evidence._folded import left_out_coefficients
+from skidyn.evidence._problem import Problem, term_columns
 
 
 def sample_folds(problem: Problem) -> NDArray[np.int64]:
@@ -114,10 +73,8 @@ def held_out_residual(problem: Problem, terms: Sequence[Term], sigma: Array) -> 
         s = problem.signals
         for f, coefficients in enumerate(left):
             here = fold == f
-            parameters = np.zeros(10 * problem.robot.n_bodies)
-            parameters[problem.rigid_index] = coefficients[:n_rigid]
             prediction[here] = problem.robot.inverse_dynamics(
-                s.q[here], s.dq[here], s.ddq[here], parameters=parameters.reshape(-1, 10)
+                s.q[here], s.dq[here], s.ddq[here], parameters=problem.correction(coefficients)
             )
     torque = {}
     at = n_rigid

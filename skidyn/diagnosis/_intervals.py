@@ -15,9 +15,9 @@ import numpy as np
 from scipy.stats import t as student_t
 
 from skidyn._signals import Array
-from skidyn.diagnosis._held_out import left_out_coefficients
-from skidyn.diagnosis._problem import Problem
 from skidyn.effects import Term, get_effect
+from skidyn.evidence._folded import left_out_coefficients
+from skidyn.evidence._problem import Problem
 
 CONFIDENCE = 0.95
 #: Relative step (or absolute, for linear parameters) of the derivative by a shape parameter.
@@ -78,8 +78,7 @@ def parameter_intervals(
                 )
             )
         result[term] = {
-            name: _interval(number, [r[name] for r in replicates])
-            for name, number in value.items()
+            name: _interval(number, [r[name] for r in replicates]) for name, number in value.items()
         }
     return result
 

@@ -13,8 +13,8 @@ from scipy.stats import norm
 
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
-from skidyn.diagnosis._problem import RIDGE, Problem
 from skidyn.effects import get_effect, list_effects
+from skidyn.evidence._problem import RIDGE, Problem
 
 #: Chance of finding an effect of the stated magnitude.
 POWER = 0.8

@@ -18,7 +18,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
-from skidyn.diagnosis._problem import RIDGE, Problem
+from skidyn.evidence._problem import RIDGE, Problem
 
 #: Diagonal added to a candidate's swept block: what the model already spans brings nothing.
 CANDIDATE_RIDGE = 1e-6
@@ -70,9 +70,7 @@ class Screen:
     def _folded(self, a: Array, b: Array, joint: int) -> Array:
         """Products a.T @ b of every fold, shape (n_folds, columns of a, columns of b)."""
         edges = self.edges[joint]
-        return np.stack(
-            [a[i:j].T @ b[i:j] for i, j in zip(edges[:-1], edges[1:], strict=True)]
-        )
+        return np.stack([a[i:j].T @ b[i:j] for i, j in zip(edges[:-1], edges[1:], strict=True)])
 
     def _group(self) -> list[_Group]:
         members: dict[tuple[tuple[int, ...], int], list[int]] = defaultdict(list)
@@ -239,7 +237,9 @@ def _swept_error(
     mixed = np.einsum("pck,pcl->ckl", mimic, here3, optimize=True)
     bent = (gram @ swept).reshape(-1, n, k)
     curve = (
-        own[fold] - mixed - mixed.transpose(0, 2, 1)
+        own[fold]
+        - mixed
+        - mixed.transpose(0, 2, 1)
         + np.einsum("pck,pcl->ckl", mimic, bent, optimize=True)
     )
     linear = np.einsum("ck,ck->c", gain, slope)

@@ -13,7 +13,6 @@ from scipy.stats import chi2
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate, catalogue_candidates
 from skidyn.diagnosis._clock import clock_line
-from skidyn.diagnosis._problem import Fit, Problem
 from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
 from skidyn.diagnosis._screen import Screen
 from skidyn.diagnosis._spectrum import find_lines
@@ -21,6 +20,7 @@ from skidyn.diagnosis._split import split_effects, trajectory_offsets
 from skidyn.effects import Term, get_effect
 from skidyn.effects._catalogue import nameless_kinds
 from skidyn.effects._nameless import NamelessEffect
+from skidyn.evidence._problem import Fit, Problem
 
 UNKNOWN = "unknown"
 
@@ -410,9 +410,7 @@ class _Search:
         for i, candidates in enumerate(rough):
             kind = candidates[0].kind
             if i < self.settings.refined:
-                candidates = refine(
-                    self.problem, self.blocks, candidates, self.sigma, self.target
-                )
+                candidates = refine(self.problem, self.blocks, candidates, self.sigma, self.target)
             blocks = [*self.blocks, *(c.rows for c in candidates)]
             after = profile_error(self.problem, blocks, self.sigma, self.target)
             gain = log_likelihood_gain(before, after, self.problem.rows.counts)
@@ -446,8 +444,10 @@ class _Search:
             n_rows = int(problem.rows.counts[line.joint])
             strong = line.gain.sum() > max(40.0, 2 * self.settings.relative_gate * n_rows)
             agree = (line.gain > 0).mean() >= 0.6
-            if strong and agree and (
-                line.joint not in best or line.gain.sum() > best[line.joint].gain.sum()
+            if (
+                strong
+                and agree
+                and (line.joint not in best or line.gain.sum() > best[line.joint].gain.sum())
             ):
                 best[line.joint] = line
         if not best:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from skidyn._signals import Array
-from skidyn.diagnosis._problem import Problem
+from skidyn.evidence._problem import Problem
 
 #: Angle covered by the spectrum in rad and its number of bins; sets resolution and range.
 SPAN, BINS = 4 * np.pi, 32768

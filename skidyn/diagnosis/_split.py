@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
-from skidyn.diagnosis._problem import Problem
 from skidyn.effects import Term, get_effect
+from skidyn.evidence._problem import Problem
 
 #: Coefficients of each trajectory's own estimate: mass and first moments, or the force.
 _LEADING = {"payload": 4, "external_wrench": 3}

@@ -108,7 +108,9 @@ def get_effect(kind: str) -> Effect:
     try:
         return _CATALOGUE[kind]
     except KeyError:
-        raise EffectError(f"no effect {kind!r}; the catalogue has {', '.join(_CATALOGUE)}") from None
+        raise EffectError(
+            f"no effect {kind!r}; the catalogue has {', '.join(_CATALOGUE)}"
+        ) from None
 
 
 def nameless_kinds() -> list[str]:

@@ -116,9 +116,7 @@ class Dahl(Effect):
     title = "Dahl friction (pre-sliding)"
     formula = r"F\,h,\quad \tfrac{dh}{dq} = \tfrac{1}{\delta}\,(1 - h\,\mathrm{sign}\,\dot q)"
     coefficients = (Coefficient("F", "N m", sign=1),)
-    shapes = (
-        Shape("presliding", "rad", (0.008, 0.014, 0.022, 0.035, 0.055, 0.09), 0.005, 0.5),
-    )
+    shapes = (Shape("presliding", "rad", (0.008, 0.014, 0.022, 0.035, 0.055, 0.09), 0.005, 0.5),)
     family = "hysteresis"
     simplicity = 21
     rivals = ("lugre", "maxwell_slip", "coulomb", "stribeck", "backlash", "joint_elasticity")

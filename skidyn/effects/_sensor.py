@@ -65,7 +65,9 @@ class TimeDelay(Effect):
         assert signals.model_torque is not None
         # Dry friction jumps at a reversal: its derivative is a spike that only the reversal rows
         # see. What lags visibly is the smooth part.
-        smooth = signals.smooth_torque if signals.smooth_torque is not None else signals.model_torque
+        smooth = (
+            signals.smooth_torque if signals.smooth_torque is not None else signals.model_torque
+        )
         return {j: -time_derivative(smooth[:, [j]], signals) for j in joints}
 
 

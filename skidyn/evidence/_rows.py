@@ -67,6 +67,29 @@ class Rows:
         return np.asarray(self.weights[joint] @ values)
 
 
+def every_sample(signals: Signals) -> Rows:
+    """One row per sample, for data without a clock.
+
+    Parameters
+    ----------
+    signals : Signals
+        Motion.
+
+    Returns
+    -------
+    Rows
+    """
+    n, joints = signals.n_samples, range(signals.n_joints)
+    order = np.arange(n)
+    return Rows(
+        [csc_matrix((np.ones(n), (order, order)), shape=(n, n)) for _ in joints],
+        [signals.trajectory.astype(np.int64) for _ in joints],
+        [order.astype(float) for _ in joints],
+        [order * 8 // max(1, n) % 4 for _ in joints],
+        np.ones((n, signals.n_joints), dtype=bool),
+    )
+
+
 def sliding_samples(signals: Signals, valid: NDArray[np.bool_], margin: int) -> NDArray[np.bool_]:
     """Samples at which a joint slides: neither at rest nor near a reversal.
 
@@ -130,9 +153,7 @@ def window_rows(
         ]
         trajectory.append(np.concatenate(labels))
         time.append(np.concatenate([s.middle[k] for s, k in zip(spans, keep, strict=True)]))
-        eighths = [
-            (np.arange(len(k)) * 8 // max(1, len(k)) % 4)[k] for k in keep
-        ]
+        eighths = [(np.arange(len(k)) * 8 // max(1, len(k)) % 4)[k] for k in keep]
         quarter.append(np.concatenate(eighths))
     return Rows(weights, trajectory, time, quarter, use)
 

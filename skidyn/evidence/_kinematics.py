@@ -52,6 +52,11 @@ def sampling_rate(signals: Signals) -> float:
     return 1.0 / float(np.median(steps)) if len(steps) else 1.0
 
 
+def as_given(signals: Signals) -> SmoothedMotion:
+    """Motion without a clock, taken as it is."""
+    return SmoothedMotion(signals, np.ones(signals.n_samples, dtype=bool), 0, np.inf, 1.0)
+
+
 def smooth_motion(signals: Signals, cutoff: float | None = None) -> SmoothedMotion:
     """Replace q, dq and ddq by a zero-phase local polynomial fit to the positions.
 

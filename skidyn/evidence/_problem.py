@@ -4,16 +4,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, qr
 
 from skidyn._signals import Array, Signals
-from skidyn.diagnosis._kinematics import SmoothedMotion, smooth_motion
 from skidyn.effects import Term, get_effect
-from skidyn.evidence._rows import Rows, sliding_samples, window_rows
+from skidyn.evidence._kinematics import SmoothedMotion, as_given, smooth_motion
+from skidyn.evidence._rows import Rows, every_sample, sliding_samples, window_rows
+from skidyn.rigid_body._base_parameters import base_parameter_index
 from skidyn.robots import Robot
 
 #: Columns of the rigid body weaker than this (relative, after pivoting) are dependent on others.
@@ -69,7 +70,9 @@ class Problem:
     signals : Signals
         Motion with the load and model torque of the current fit.
     torque : ndarray of shape (n_samples, n_joints)
-        Measured torque, less what a fixed model explains.
+        Measured torque less what is not fitted: the rigid body with the parameters of the URDF, or
+        the prediction of a given regressor. Identified parameters are corrections to the URDF's,
+        so that what the data leaves open stays as in the URDF.
     terms : tuple of Term
         Effects that the user's model has already.
     rows : Rows
@@ -128,6 +131,14 @@ class Problem:
             design.append(np.hstack(parts))
         return design
 
+    def with_all_rigid_columns(self) -> Problem:
+        """The same problem with every column of the torque regressor, dependent or not."""
+        if not self.rigid_body or self.robot is None:
+            return self
+        whole = replace(self, rigid_index=np.arange(10 * self.robot.n_bodies))
+        whole.rigid_rows = _regressor_rows(self)
+        return whole
+
     def fit(self, terms: Iterable[Term], sigma: Array | None = None, passes: int = 1) -> Fit:
         """Weighted least squares of the rigid body and terms.
 
@@ -155,12 +166,18 @@ class Problem:
         return fit
 
     def inertial_parameters(self, fit: Fit) -> Array | None:
-        """Rigid-body parameters of a fit, zeros for those the data regroups, (n_bodies, 10)."""
-        if self.robot is None or not self.rigid_body:
-            return None if self.robot is None else self.robot.inertial_parameters
-        parameters = np.zeros(10 * self.robot.n_bodies)
-        parameters[self.rigid_index] = fit.coefficients[: len(self.rigid_index)]
-        return parameters.reshape(-1, 10)
+        """Rigid-body parameters of a fit: the URDF's with the base parameters corrected."""
+        if self.robot is None:
+            return None
+        correction = self.correction(fit.coefficients)
+        return self.robot.inertial_parameters + correction
+
+    def correction(self, coefficients: Array) -> Array:
+        """Change of the rigid-body parameters that coefficients stand for, (n_bodies, 10)."""
+        assert self.robot is not None
+        change = np.zeros(10 * self.robot.n_bodies)
+        change[self.rigid_index] = coefficients[: len(self.rigid_index)]
+        return change.reshape(-1, 10)
 
     def rigid_torque(self, fit: Fit) -> Array:
         """Rigid-body torque of a fit at every sample, N m or N."""
@@ -185,14 +202,19 @@ class Problem:
         return torque
 
     def explained(self, fit: Fit) -> Array:
-        """Torque that a fit explains at every sample, N m or N."""
-        rigid = self.rigid_torque(fit) if self.rigid_body else 0.0
-        return rigid + self.term_torque(fit)
+        """Part of :attr:`torque` that a fit explains at every sample, N m or N."""
+        torque = self.term_torque(fit)
+        if self.rigid_body:
+            assert self.robot is not None
+            s = self.signals
+            change = self.correction(fit.coefficients)
+            torque += self.robot.inverse_dynamics(s.q, s.dq, s.ddq, parameters=change)
+        return torque
 
     def with_fit(self, fit: Fit) -> None:
         """Hand the load and the model torque of a fit to the effects that need them."""
         load = self.rigid_torque(fit)
-        torque = self.explained(fit)
+        torque = load + self.term_torque(fit)
         dry = [t for t in fit.terms if t.kind in ("coulomb", "stribeck", "offset")]
         self.signals = self.signals.with_(
             load=load,
@@ -225,6 +247,7 @@ def make_problem(
     rigid_body: bool,
     terms: Iterable[Term],
     smooth: bool = True,
+    subtract_urdf: bool = True,
 ) -> Problem:
     """Set up rows, folds and rigid-body columns.
 
@@ -242,17 +265,22 @@ def make_problem(
         Effects of the user's model.
     smooth : bool, default=True
         Derive velocity and acceleration from the positions; False takes the given ones.
+    subtract_urdf : bool, default=True
+        Take the torque of the URDF's rigid body off; False where ``torque`` is a residual already.
 
     Returns
     -------
     Problem
     """
-    motion = smooth_motion(signals)
-    if not smooth:
-        motion = SmoothedMotion(signals, motion.valid, motion.half_width, motion.cutoff, motion.rate)
-    margin = max(1, round(MARGIN * motion.half_width))
-    use = sliding_samples(motion.signals, motion.valid, margin)
-    rows = window_rows(motion.signals, use, motion.rate)
+    if signals.time is None:
+        motion, rows = as_given(signals), every_sample(signals)
+    else:
+        motion = smooth_motion(signals)
+        if not smooth:
+            motion = replace(motion, signals=signals)
+        margin = max(1, round(MARGIN * motion.half_width))
+        use = sliding_samples(motion.signals, motion.valid, margin)
+        rows = window_rows(motion.signals, use, motion.rate)
     rows, fold, n_folds, whole = _folds(rows)
     problem = Problem(
         robot,
@@ -267,23 +295,36 @@ def make_problem(
         rigid_body and robot is not None,
     )
     problem.rigid_rows = [np.zeros((n, 0)) for n in rows.counts]
+    if subtract_urdf and robot is not None:
+        s = problem.signals
+        problem.torque = torque - robot.inverse_dynamics(s.q, s.dq, s.ddq)
     if problem.rigid_body:
         _add_rigid_body(problem)
     return problem
 
 
-def _add_rigid_body(problem: Problem) -> None:
-    """Average the torque regressor chunk by chunk and keep its independent columns."""
+def _regressor_rows(problem: Problem) -> list[Array]:
+    """Averaged columns of the torque regressor, chunk by chunk."""
     robot, signals = problem.robot, problem.signals
     assert robot is not None
-    n, p = problem.n_joints, 10 * robot.n_bodies
-    rows = [np.zeros((count, p)) for count in problem.rows.counts]
+    rows = [np.zeros((count, 10 * robot.n_bodies)) for count in problem.rows.counts]
     for chunk, regressor in robot.iter_torque_regressor(signals.q, signals.dq, signals.ddq):
-        for j in range(n):
-            rows[j] += problem.rows.weights[j][:, chunk] @ regressor[j].T
+        for j, block in enumerate(rows):
+            block += problem.rows.weights[j][:, chunk] @ regressor[j].T
+    return rows
+
+
+def _add_rigid_body(problem: Problem) -> None:
+    """Average the torque regressor and keep its independent columns."""
+    assert problem.robot is not None
+    rows = _regressor_rows(problem)
     stacked = np.vstack(rows)
     size = np.linalg.norm(stacked, axis=0)
-    moved = np.flatnonzero(size > 1e-9 * size.max())
+    base = base_parameter_index(problem.robot)
+    moved = base[size[base] > 1e-9 * max(size.max(initial=0.0), 1e-300)]
+    if not len(moved):
+        problem.rigid_rows = [block[:, :0] for block in rows]
+        return
     triangle, pivots = qr(stacked[:, moved] / size[moved], mode="r", pivoting=True)
     diagonal = np.abs(np.diag(triangle))
     rank = int(np.sum(diagonal > RANK_TOLERANCE * diagonal[0]))
