@@ -137,7 +137,8 @@ class Signals:
             *("load", "model_torque", "smooth_torque"),
         )
         values = {name: getattr(self, name) for name in per_sample}
-        return replace(self, **{k: None if v is None else v[rows] for k, v in values.items()})
+        taken: dict[str, Any] = {k: None if v is None else v[rows] for k, v in values.items()}
+        return replace(self, **taken)
 
 
 def signals_from(X: Array, columns: Columns, robot: Robot | None = None) -> Signals:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The loop: compare a model with measurements, see where it fails, learn what is missing, add it."""
+"""The loop: compare a model with measurements, see where it fails, learn what to add, add it."""
 
 from __future__ import annotations
 
@@ -284,19 +284,20 @@ def diagnose(
     for note in notes:
         warnings.warn(note, LogWarning, stacklevel=2)
     own = _is_rigid_body_regressor(model)
-    terms: Sequence[Term] = _own_terms(model, robot, X, tau) if own else ()
-    identified = own and getattr(model, "parameters", "identified") == "identified"
-    problem = make_problem(
-        signals,
-        torque if own else torque - _prediction(model, X, torque),
-        robot=robot,
-        rigid_body=identified,
-        terms=terms,
-        smooth=smooth,
-        subtract_urdf=own,
-    )
-    _check_rows(problem)
     settings = settings or Settings()
+    if own:
+        problem = make_problem(
+            signals,
+            torque,
+            robot=robot,
+            rigid_body=getattr(model, "parameters", "identified") == "identified",
+            terms=_own_terms(model, robot, X, tau),
+            smooth=smooth,
+        )
+    else:
+        residual = torque - _prediction(model, X, torque)
+        problem = _residual_problem(signals, residual, robot, smooth, settings)
+    _check_rows(problem)
     result = search(problem, kinds, settings)
     return _conclude(problem, result, settings, torque, notes, model, (X, tau))
 
@@ -395,6 +396,34 @@ def _check_rows(problem: Problem) -> None:
 
 def _is_rigid_body_regressor(model: Any) -> bool:
     return hasattr(model, "with_effects") and hasattr(model, "effects")
+
+
+def _residual_problem(
+    signals: Signals, residual: Array, robot: Robot, smooth: bool, settings: Settings
+) -> Problem:
+    """Problem of a residual that some fitted model has left.
+
+    A fitted model has bent toward the effect it lacks, so its rigid body is free to move back; so
+    is its viscous and Coulomb friction, unless just that is missing.
+    """
+
+    def problem(terms: Sequence[Term]) -> Problem:
+        return make_problem(
+            signals,
+            residual,
+            robot=robot,
+            rigid_body=True,
+            terms=terms,
+            smooth=smooth,
+            subtract_urdf=False,
+        )
+
+    friction = ["viscous", "coulomb"]
+    bare = problem(())
+    _check_rows(bare)
+    if search(bare, friction, settings).findings:
+        return problem(())
+    return problem(make_terms(friction, robot.n_joints))
 
 
 def _own_terms(model: Any, robot: Robot, X: Any, tau: Any) -> list[Term]:

@@ -219,7 +219,7 @@ def find_failures(comparison: Comparison) -> list[Failure]:
                 continue
             sentence = (
                 f"Joint {j + 1} ({name}): {error:.0%} of the squared error occurs "
-                f"{_WHERE[regime]} ({time:.0%} of the time; {rmse:.3g} against {whole:.3g} overall)."
+                f"{_WHERE[regime]} ({time:.0%} of the time; {rmse:.3g} against {whole:.3g} in all)."
             )
             found.append(Failure(j + 1, regime, rmse, error, time, sentence))
     return sorted(found, key=lambda f: (-f.share_of_error, f.joint))

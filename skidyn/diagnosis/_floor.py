@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from skidyn._signals import Array
@@ -67,7 +68,7 @@ def _inputs(problem: Problem, joint: int) -> Array:
     return (x[:, keep] - x[:, keep].mean(0)) / scale[keep]
 
 
-def _held_out_share(features: Array, r: Array, fold: Array, n_folds: int) -> float:
+def _held_out_share(features: Array, r: Array, fold: NDArray[np.int64], n_folds: int) -> float:
     """Best share over ridges, errors summed over the folds left out."""
     grams = np.array([features[fold == f].T @ features[fold == f] for f in range(n_folds)])
     cross = np.array([features[fold == f].T @ r[fold == f] for f in range(n_folds)])

@@ -87,7 +87,9 @@ def find_limits(
     limits: dict[tuple[str, int], Limit] = {}
     for candidate in candidates:
         effect = get_effect(candidate.term.kind)
-        if len(candidate.joints) != 1 or effect.nameless:
+        # The coefficient of some effects is a share of their shape and no magnitude by itself.
+        share = effect.coefficients[0].name == "share"
+        if len(candidate.joints) != 1 or effect.nameless or share:
             continue
         joint = candidate.joints[0]
         own, swept = _information(candidate, design, sigma, scale, factor)

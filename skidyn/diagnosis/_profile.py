@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
@@ -74,7 +75,7 @@ def _joint_grams(
     return grams
 
 
-def log_likelihood_gain(before: Array, after: Array, counts: Array) -> Array:
+def log_likelihood_gain(before: Array, after: Array, counts: NDArray[np.int64]) -> Array:
     """Twice the gain of held-out log-likelihood per joint, noise profiled out, (n_joints,)."""
     return counts * np.log(before.sum(0) / np.maximum(after.sum(0), 1e-300))
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from skidyn._signals import Array
@@ -23,6 +24,7 @@ from skidyn.effects._nameless import NamelessEffect
 from skidyn.evidence._problem import Fit, Problem
 
 UNKNOWN = "unknown"
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -341,7 +343,7 @@ class _Search:
         return found
 
     def _greedy(
-        self, screen: Screen, wanted: Array, base: Array, first: Array
+        self, screen: Screen, wanted: Mask, base: Array, first: Array
     ) -> tuple[list[Candidate], float]:
         pool, errors, now = wanted.copy(), first, base
         chosen: list[Candidate] = []
@@ -363,7 +365,7 @@ class _Search:
                 errors = screen.step(model, pool)
         return chosen, float(base.sum() - now.sum())
 
-    def _still_open(self, added: Candidate, chosen: list[Candidate]) -> Array:
+    def _still_open(self, added: Candidate, chosen: list[Candidate]) -> Mask:
         """Which candidates may join one of the same kind."""
         if len(added.joints) == self.problem.n_joints and self.problem.n_joints > 1:
             return np.zeros(len(self.pool), dtype=bool)  # acts on the whole robot already

@@ -100,7 +100,7 @@ def _short(value: Any) -> str:
 
 
 class Effect:
-    """Base class of physical effects.
+    r"""Base class of physical effects.
 
     Subclasses state what the effect is in class attributes and give its columns. To add an
     effect, write such a class in a file of ``skidyn/effects`` and list it in the catalogue (or
@@ -146,7 +146,7 @@ class Effect:
     >>> class AirDrag(Effect):
     ...     kind = "air_drag"
     ...     title = "Air drag"
-    ...     formula = r"c\\,\\dot q\\,|\\dot q|"
+    ...     formula = r"c\,\dot q\,|\dot q|"
     ...     coefficients = (Coefficient("c", "N m s^2/rad^2", sign=1),)
     ...     def columns(self, signals, joint):
     ...         dq = signals.dq[:, joint]

@@ -131,7 +131,7 @@ class JointElasticity(_LinkSideEffect):
 
 
 class Backlash(_LinkSideEffect):
-    """Play between motor and link: the link flies from flank to flank when its load changes sign."""
+    """Play between motor and link: the link flies across when its load changes sign."""
 
     kind = "backlash"
     title = "Backlash"
@@ -155,7 +155,7 @@ class Backlash(_LinkSideEffect):
             np.zeros_like(signals.q),
             unit,
             parameters=signals.inertial_parameters,
-            gravity=np.zeros(3),
+            gravity=(0.0, 0.0, 0.0),
         )[:, joint]
         # Identified parameters need not be consistent; an inertia that vanishes would fly at once.
         inertia = np.maximum(inertia, 0.05 * np.abs(np.median(inertia)) + 1e-12)

@@ -339,8 +339,9 @@ def _folds(rows: Rows) -> tuple[Rows, list[NDArray[np.int64]], int, bool]:
     blocks = 1 if whole else max(2, -(-FEWEST_BLOCKS // max(1, len(names))))
     ends = {}
     for name in names:
-        times = [t[k == name] for t, k in zip(rows.time, rows.trajectory, strict=True)]
-        times = np.concatenate(times)
+        times = np.concatenate(
+            [t[k == name] for t, k in zip(rows.time, rows.trajectory, strict=True)]
+        )
         ends[name] = np.linspace(times.min(), times.max() + 1e-9, blocks + 1)
     n_folds = min(len(names) * blocks, MOST_FOLDS) if whole else len(names) * blocks
     fold, order = [], []

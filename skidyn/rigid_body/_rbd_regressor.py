@@ -376,7 +376,8 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
             low = np.where(signs > 0, 0.0, -np.inf)
             return nominal, lsq_linear(a, y, (low, np.inf)).x if len(signs) else start
         # The columns act on the change from the URDF's parameters.
-        factor = np.linalg.qr(np.column_stack([a, y + a[:, :n] @ nominal.ravel()]), mode="r")
+        measured = y + a[:, :n] @ nominal.ravel()
+        factor: Array = np.asarray(np.linalg.qr(np.column_stack([a, measured]), mode="r"))
         return make_consistent(nominal, factor[:, :-1], factor[:, -1], signs, start)
 
     def _in_order(self) -> list[Term]:
