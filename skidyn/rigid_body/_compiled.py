@@ -103,7 +103,7 @@ class CompiledProgram:
         self._library = compile_library(_batch_text(program))
         self._function: Callable = self._library.evaluate
         self._function.restype = None
-        self._function.argtypes = [ctypes.c_long] + 5 * [ctypes.c_void_p]
+        self._function.argtypes = (ctypes.c_long, *5 * (ctypes.c_void_p,))
 
     def __call__(self, signals: dict[str, np.ndarray], parameters: np.ndarray) -> np.ndarray:
         """Torques, shape (n_samples, n_joints)."""

@@ -14,6 +14,7 @@ import numpy as np
 
 from skidyn._exceptions import RobotDescriptionError, SkidynError
 from skidyn.rigid_body._engine import Engine
+from skidyn.rigid_body._recursion import Program
 from skidyn.rigid_body._tree import KinematicTree
 from skidyn.robots._assembly import LinkPlacement, assemble
 from skidyn.robots._urdf import parse_urdf
@@ -45,6 +46,8 @@ class Robot:
         ``"revolute"``, ``"continuous"`` or ``"prismatic"``.
     body_names : tuple of str
         Moving bodies, parents first; one per joint and one more per joint that mimics another.
+    body_joints : tuple of str
+        Name of the joint that moves each body.
     position_limits : ndarray of shape (n_joints, 2)
         Lower and upper, rad or m; infinite for continuous joints.
     velocity_limits : ndarray of shape (n_joints,)
@@ -80,6 +83,7 @@ class Robot:
     joint_names: tuple[str, ...]
     joint_types: tuple[str, ...]
     body_names: tuple[str, ...]
+    body_joints: tuple[str, ...]
     position_limits: np.ndarray
     velocity_limits: np.ndarray
     effort_limits: np.ndarray
@@ -147,6 +151,7 @@ class Robot:
             joint_names=tuple(joint.name for joint in own),
             joint_types=tuple(joint.kind for joint in own),
             body_names=tuple(assembly.body_names),
+            body_joints=tuple(joint.name for joint in assembly.moved_by),
             position_limits=_frozen([joint.position_limits for joint in own]),
             velocity_limits=_frozen([joint.velocity_limit for joint in own]),
             effort_limits=_frozen([joint.effort_limit for joint in own]),
@@ -424,6 +429,13 @@ class Robot:
     ) -> torch.Tensor:
         """Differentiable :meth:`torque_regressor`, shape (n_samples, n_joints, 10 * n_bodies)."""
         return self._engine.torque_regressor_torch({"q": q, "dq": dq, "ddq": ddq})
+
+    def fixed_program(self, parameters: Any = None) -> Program:
+        """Inverse dynamics with the numbers of the parameters written in, for exporters."""
+        values = self._parameters(parameters)
+        return self._engine.fixed_inverse_dynamics(
+            self.inertial_parameters if values is None else values
+        )
 
     def _signals(self, **signals: Any) -> dict[str, np.ndarray]:
         """Signals as float64 arrays of one shape (n_samples, n_joints)."""

@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A robot with identified parameters as an MJCF model of MuJoCo."""
+
+from __future__ import annotations
+
+import os
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from skidyn._exceptions import SkidynError
+from skidyn.export._bodies import central_inertia, joint_vector, numbers, write_files
+from skidyn.export._c import parameters_of
+from skidyn.robots import Robot
+
+#: MuJoCo refuses moving bodies with less mass (kg) or inertia (kg m^2).
+_SMALLEST = 1e-15
+
+
+def write_mjcf(
+    robot: Robot,
+    path: str | os.PathLike,
+    *,
+    parameters: Any = None,
+    viscous: Any = None,
+    coulomb: Any = None,
+    rotor_inertia: Any = None,
+    effects: Mapping[str, Any] | None = None,
+) -> tuple[str, ...]:
+    """Write an MJCF model with identified inertial parameters, friction and rotor inertia.
+
+    Friction becomes ``damping`` and ``frictionloss``, rotor inertia ``armature``; links fixed to a
+    body become sites, joints that mimic another are tied to it by an equality constraint. What MJCF
+    cannot hold goes to ``<path stem>.skidyn.json``.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    path : path
+        File to write.
+    parameters : array-like of shape (n_bodies, 10), default=None
+        Inertial parameters in place of those of the robot.
+    viscous, coulomb : array-like of shape (n_joints,), default=None
+        Friction coefficients, N m s/rad (N s/m) and N m (N); None keeps those of the URDF.
+    rotor_inertia : array-like of shape (n_joints,), default=None
+        kg m^2 (kg) on the joint side; None is none.
+    effects : mapping of str to Any, default=None
+        Further parts of a model, such as ``{"torque_ripple": {...}}``; go to the side-car file.
+
+    Returns
+    -------
+    tuple of str
+        Names of what the model does not hold; empty if it holds everything.
+
+    Raises
+    ------
+    SkidynError
+        A body has no positive mass, or an inertia that no distribution of mass has.
+
+    Examples
+    --------
+    >>> import tempfile, pathlib
+    >>> from skidyn.datasets import load_planar_arm
+    >>> from skidyn.export import write_mjcf
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_mjcf(load_planar_arm(), pathlib.Path(folder) / "arm.xml", viscous=[0.1, 0.1])
+    ()
+    """
+    values = parameters_of(robot, parameters)
+    dynamics = {
+        "damping": joint_vector(robot, viscous, "viscous", robot.joint_dynamics["damping"]),
+        "frictionloss": joint_vector(robot, coulomb, "coulomb", robot.joint_dynamics["friction"]),
+        "armature": joint_vector(robot, rotor_inertia, "rotor_inertia", None),
+    }
+    root = ElementTree.Element("mujoco", model=robot.name)
+    # Angles as they are, inertias as they are: nothing is to be derived from shapes or rounded.
+    ElementTree.SubElement(root, "compiler", angle="radian", inertiafromgeom="false")
+    ElementTree.SubElement(root, "option", gravity=numbers(robot.gravity))
+    world = ElementTree.SubElement(root, "worldbody")
+    elements: list[ElementTree.Element] = []
+    for body in range(robot.n_bodies):
+        parent = int(robot.tree.parents[body])
+        carrier = elements[parent] if parent >= 0 else world
+        elements.append(_add_body(carrier, robot, body, values[body], dynamics))
+    _add_sites(world, elements, robot)
+    _add_ties(root, robot)
+    ElementTree.indent(root)
+    text = ElementTree.tostring(root, "unicode") + "\n"
+    return write_files(path, text, robot, dict(effects or {}))
+
+
+def _add_body(
+    carrier: ElementTree.Element,
+    robot: Robot,
+    body: int,
+    parameters: np.ndarray,
+    dynamics: dict[str, np.ndarray],
+) -> ElementTree.Element:
+    tree, name = robot.tree, robot.body_names[body]
+    pose = _pose(tree.rotations[body], tree.translations[body])
+    element = ElementTree.SubElement(carrier, "body", name=name, **pose)
+    central = central_inertia(parameters, name)
+    if central is None:
+        raise SkidynError(f"Body {name!r} has no mass; MuJoCo refuses moving bodies without.")
+    moments = np.linalg.eigvalsh(central.inertia)
+    if moments[0] < _SMALLEST or moments[0] + moments[1] < moments[2] * (1 - 1e-9):
+        raise SkidynError(
+            f"Body {name!r} has the principal moments {', '.join(f'{m:.3g}' for m in moments)} kg "
+            "m^2, which break the triangle inequality or vanish; MuJoCo refuses them. Identify "
+            "physically consistent parameters, RBDRegressor(..., consistent=True)."
+        )
+    I = central.inertia
+    ElementTree.SubElement(
+        element,
+        "inertial",
+        pos=numbers(central.center),
+        mass=numbers(central.mass),
+        fullinertia=numbers([I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]]),
+    )
+    j = int(tree.coordinates[body])
+    own = robot.body_joints[body] == robot.joint_names[j]
+    joint = ElementTree.SubElement(
+        element,
+        "joint",
+        name=robot.body_joints[body],
+        type="slide" if tree.prismatic[body] else "hinge",
+        axis=numbers(tree.axes[body]),
+    )
+    limits = robot.position_limits[j]
+    if own and np.isfinite(limits).all() and limits[0] < limits[1]:
+        joint.set("limited", "true")
+        joint.set("range", numbers(limits))
+    for key, values in dynamics.items() if own else ():
+        joint.set(key, numbers(values[j]))
+    return element
+
+
+def _add_sites(
+    world: ElementTree.Element, elements: list[ElementTree.Element], robot: Robot
+) -> None:
+    """Frames of the links that are fixed to something."""
+    for name, placement in robot.links.items():
+        if name not in robot.body_names:
+            carrier = elements[placement.body] if placement.body >= 0 else world
+            pose = _pose(placement.rotation, placement.translation)
+            ElementTree.SubElement(carrier, "site", name=name, **pose)
+
+
+def _add_ties(root: ElementTree.Element, robot: Robot) -> None:
+    """Equality constraints of the joints that mimic another."""
+    tree = robot.tree
+    followers = [
+        body
+        for body in range(robot.n_bodies)
+        if robot.body_joints[body] != robot.joint_names[tree.coordinates[body]]
+    ]
+    if followers:
+        ties = ElementTree.SubElement(root, "equality")
+        for body in followers:
+            ElementTree.SubElement(
+                ties,
+                "joint",
+                joint1=robot.body_joints[body],
+                joint2=robot.joint_names[tree.coordinates[body]],
+                polycoef=numbers([tree.offsets[body], tree.multipliers[body], 0, 0, 0]),
+            )
+
+
+def _pose(rotation: np.ndarray, translation: np.ndarray) -> dict[str, str]:
+    x, y, z, w = Rotation.from_matrix(rotation).as_quat()
+    return {"pos": numbers(translation), "quat": numbers([w, x, y, z])}

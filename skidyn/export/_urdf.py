@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A robot with identified parameters as a URDF."""
+
+from __future__ import annotations
+
+import os
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from skidyn.export._bodies import central_inertia, joint_vector, numbers, write_files
+from skidyn.export._c import parameters_of
+from skidyn.robots import Robot
+
+
+def write_urdf(
+    robot: Robot,
+    path: str | os.PathLike,
+    *,
+    parameters: Any = None,
+    viscous: Any = None,
+    coulomb: Any = None,
+    rotor_inertia: Any = None,
+    effects: Mapping[str, Any] | None = None,
+) -> tuple[str, ...]:
+    """Write a URDF with identified inertial parameters and friction.
+
+    Links that are fixed to a moving body stay as frames without mass; their mass is in the body.
+    Pictures and collision shapes are not written. A URDF holds viscous and Coulomb friction
+    (``<dynamics damping friction>``); what it cannot hold goes to ``<path stem>.skidyn.json``.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    path : path
+        File to write.
+    parameters : array-like of shape (n_bodies, 10), default=None
+        Inertial parameters in place of those of the robot.
+    viscous, coulomb : array-like of shape (n_joints,), default=None
+        Friction coefficients, N m s/rad (N s/m) and N m (N); None keeps those of the URDF.
+    rotor_inertia : array-like of shape (n_joints,), default=None
+        kg m^2 (kg) on the joint side; goes to the side-car file.
+    effects : mapping of str to Any, default=None
+        Further parts of a model, such as ``{"torque_ripple": {...}}``; go to the side-car file.
+
+    Returns
+    -------
+    tuple of str
+        Names of what the URDF does not hold; empty if it holds everything.
+
+    Raises
+    ------
+    SkidynError
+        A body has no positive mass or no positive definite inertia.
+
+    Examples
+    --------
+    >>> import tempfile, pathlib
+    >>> from skidyn.datasets import load_planar_arm
+    >>> from skidyn.export import write_urdf
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder) / "arm.urdf"
+    ...     write_urdf(load_planar_arm(), path, rotor_inertia=[0.1, 0.05])
+    ('rotor_inertia',)
+    """
+    values = parameters_of(robot, parameters)
+    damping = joint_vector(robot, viscous, "viscous", robot.joint_dynamics["damping"])
+    friction = joint_vector(robot, coulomb, "coulomb", robot.joint_dynamics["friction"])
+    root = ElementTree.Element("robot", name=robot.name)
+    for name, placement in robot.links.items():
+        link = ElementTree.SubElement(root, "link", name=name)
+        if placement.body >= 0 and robot.body_names[placement.body] == name:
+            _add_inertial(link, values[placement.body], name)
+    for body in range(robot.n_bodies):
+        _add_joint(root, robot, body, damping, friction)
+    _add_fixed_links(root, robot)
+    ElementTree.indent(root)
+    text = '<?xml version="1.0" encoding="utf-8"?>\n' + ElementTree.tostring(root, "unicode") + "\n"
+    not_held = dict(effects or {})
+    if rotor_inertia is not None:
+        not_held["rotor_inertia"] = joint_vector(robot, rotor_inertia, "rotor_inertia", None)
+    return write_files(path, text, robot, not_held)
+
+
+def _add_inertial(link: ElementTree.Element, parameters: np.ndarray, name: str) -> None:
+    central = central_inertia(parameters, name)
+    if central is None:
+        return
+    inertial = ElementTree.SubElement(link, "inertial")
+    ElementTree.SubElement(inertial, "origin", xyz=numbers(central.center), rpy="0 0 0")
+    ElementTree.SubElement(inertial, "mass", value=numbers(central.mass))
+    names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    entries = central.inertia[np.triu_indices(3)]
+    moments = {key: numbers(x) for key, x in zip(names, entries, strict=True)}
+    ElementTree.SubElement(inertial, "inertia", moments)
+
+
+def _root_link(robot: Robot) -> str:
+    return next(iter(robot.links))
+
+
+def _add_joint(
+    root: ElementTree.Element, robot: Robot, body: int, damping: np.ndarray, friction: np.ndarray
+) -> None:
+    tree = robot.tree
+    j, name = int(tree.coordinates[body]), robot.body_joints[body]
+    follows = name != robot.joint_names[j]
+    kind = robot.joint_types[j]
+    if follows:  # limits of a joint that follows are those of its leader
+        kind = "prismatic" if tree.prismatic[body] else "continuous"
+    joint = ElementTree.SubElement(root, "joint", name=name, type=kind)
+    parent = int(tree.parents[body])
+    _add_ends(
+        joint,
+        robot.body_names[parent] if parent >= 0 else _root_link(robot),
+        robot.body_names[body],
+        tree.rotations[body],
+        tree.translations[body],
+    )
+    ElementTree.SubElement(joint, "axis", xyz=numbers(tree.axes[body]))
+    if follows:
+        ElementTree.SubElement(
+            joint,
+            "mimic",
+            joint=robot.joint_names[j],
+            multiplier=numbers(tree.multipliers[body]),
+            offset=numbers(tree.offsets[body]),
+        )
+    lower, upper = robot.position_limits[j]
+    limits = {"velocity": robot.velocity_limits[j], "effort": robot.effort_limits[j]}
+    if kind == "prismatic" or (kind == "revolute" and not follows):
+        low, high = sorted(tree.multipliers[body] * x + tree.offsets[body] for x in (lower, upper))
+        limits |= {"lower": low, "upper": high} if np.isfinite([low, high]).all() else {}
+    if np.isfinite(list(limits.values())).all():
+        ElementTree.SubElement(joint, "limit", {k: numbers(x) for k, x in limits.items()})
+    if not follows:
+        dynamics = {"damping": numbers(damping[j]), "friction": numbers(friction[j])}
+        ElementTree.SubElement(joint, "dynamics", dynamics)
+
+
+def _add_fixed_links(root: ElementTree.Element, robot: Robot) -> None:
+    for name, placement in robot.links.items():
+        carrier = _root_link(robot) if placement.body < 0 else robot.body_names[placement.body]
+        if name != carrier:
+            joint = ElementTree.SubElement(root, "joint", name=f"{name}_fixed", type="fixed")
+            _add_ends(joint, carrier, name, placement.rotation, placement.translation)
+
+
+def _add_ends(
+    joint: ElementTree.Element,
+    parent: str,
+    child: str,
+    rotation: np.ndarray,
+    translation: np.ndarray,
+) -> None:
+    ElementTree.SubElement(joint, "parent", link=parent)
+    ElementTree.SubElement(joint, "child", link=child)
+    ElementTree.SubElement(
+        joint, "origin", xyz=numbers(translation), rpy=numbers(_rpy_from_rotation(rotation))
+    )
+
+
+def _rpy_from_rotation(rotation: np.ndarray) -> tuple[float, float, float]:
+    """Fixed-axis roll, pitch and yaw in rad."""
+    pitch = np.arctan2(-rotation[2, 0], np.hypot(rotation[0, 0], rotation[1, 0]))
+    if np.hypot(rotation[0, 0], rotation[1, 0]) < 1e-12:
+        # Pitch is +-90 degrees: only the difference or sum of the other two counts.
+        return float(np.arctan2(-rotation[1, 2], rotation[1, 1])), float(pitch), 0.0
+    roll = np.arctan2(rotation[2, 1], rotation[2, 2])
+    yaw = np.arctan2(rotation[1, 0], rotation[0, 0])
+    return float(roll), float(pitch), float(yaw)
