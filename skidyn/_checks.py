@@ -41,8 +41,9 @@ def count_joints(frame: pd.DataFrame, source: str = "the log") -> int:
     Raises
     ------
     LogError
-        No positions, or a joint without one.
+        No positions, a joint without one, or a column that occurs twice.
     """
+    refuse_duplicates([str(name) for name in frame.columns], source)
     numbers = sorted(
         int(hit[1]) for name in frame.columns if (hit := re.fullmatch(r"q(\d+)", str(name)))
     )
@@ -82,12 +83,9 @@ def require_columns(
     Raises
     ------
     LogError
-        Columns are missing, occur twice, or belong to a joint that the robot does not have.
+        Columns are missing, or belong to a joint without position.
     """
     names = [str(name) for name in frame.columns]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise LogError(f"{source} has the column(s) {', '.join(twice)} more than once; keep one.")
     present = {hit[1] for name in names if (hit := SIGNAL_COLUMN.fullmatch(name))}
     for quantity in dict.fromkeys([*quantities, *sorted(present)]):
         found = {
@@ -102,10 +100,20 @@ def require_columns(
             )
         if surplus:
             raise LogError(
-                f"{source} has {', '.join(f'{quantity}{k}' for k in surplus)}, but there are "
-                f"{n_joints} joints. Load the robot that the log is of, or take the columns to "
-                "use with columns={...}."
+                f"{source} has {', '.join(f'{quantity}{k}' for k in surplus)}, but positions of "
+                f"{n_joints} joint(s) only. Name the positions that are missing, or take the "
+                "columns to use with columns={...}."
             )
+
+
+def refuse_duplicates(names: Sequence[str], source: str) -> None:
+    """Raise if a column name occurs twice."""
+    twice = sorted({name for name in names if names.count(name) > 1 and name})
+    if twice:
+        raise LogError(
+            f"{source}: the column(s) {', '.join(twice)} occur more than once. Rename or remove "
+            "the surplus ones; which of them is meant cannot be known."
+        )
 
 
 def as_numbers(frame: pd.DataFrame, names: Sequence[str], source: str = "the log") -> pd.DataFrame:

@@ -23,7 +23,11 @@ def read_hdf5_channels(path: Path, max_bytes: int, topics: Sequence[str] | None)
     h5py = import_optional("h5py", extra="io")
     groups: dict[str, dict[str, np.ndarray]] = {}
     names: list[str] = []
-    with h5py.File(path, "r") as file:
+    try:
+        file = h5py.File(path, "r")
+    except OSError as error:
+        raise LogError(f"{path}: cannot be read as HDF5: {error}") from error
+    with file:
         datasets: list[Any] = []
         file.visititems(lambda _, item: datasets.append(item) if hasattr(item, "shape") else None)
         check_size(path, sum(item.nbytes for item in datasets), max_bytes)

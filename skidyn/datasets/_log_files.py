@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from skidyn._checks import refuse_duplicates
 from skidyn._exceptions import LogError
 from skidyn._optional import import_optional
 from skidyn.datasets._log_names import PER_JOINT
@@ -82,16 +83,23 @@ def read_parquet_channels(path: Path, max_bytes: int) -> list[Channel]:
     """Read a Parquet or Feather table; list columns become one column per joint."""
     parquet = import_optional("pyarrow.parquet", extra="io")
     import_optional("pandas", extra="io")
-    if path.suffix.lower() == ".parquet":
-        metadata = parquet.read_metadata(path)
-        size = sum(metadata.row_group(k).total_byte_size for k in range(metadata.num_row_groups))
-        check_size(path, size, max_bytes)
-        refuse_duplicates(parquet.read_schema(path).names, str(path))
-        table = parquet.ParquetFile(path).read().to_pandas()
-    else:
-        feather = import_optional("pyarrow.feather", extra="io")
-        table = feather.read_table(path).to_pandas()
-        refuse_duplicates([str(name) for name in table.columns], str(path))
+    arrow = import_optional("pyarrow", extra="io")
+    try:
+        if path.suffix.lower() == ".parquet":
+            with parquet.ParquetFile(path) as file:
+                groups = range(file.metadata.num_row_groups)
+                size = sum(file.metadata.row_group(k).total_byte_size for k in groups)
+                check_size(path, size, max_bytes)
+                refuse_duplicates(file.schema_arrow.names, str(path))
+                table = file.read().to_pandas()
+        else:
+            check_size(path, path.stat().st_size, max_bytes)
+            feather = import_optional("pyarrow.feather", extra="io")
+            table = feather.read_table(path)
+            refuse_duplicates(table.column_names, str(path))
+            table = table.to_pandas()
+    except arrow.ArrowException as error:
+        raise LogError(f"{path}: cannot be read as a table: {error}") from error
     columns: dict[str, Any] = {}
     for name in table.columns:
         values = table[name]
@@ -202,16 +210,6 @@ def stack_rows(rows: Sequence[Any], name: str, source: str) -> np.ndarray:
             f"{source}: {name} has {len(rows[row])} values in row {row}, {common} in most others."
         )
     return np.array([np.asarray(row, dtype=float) for row in rows])
-
-
-def refuse_duplicates(names: Sequence[str], source: str) -> None:
-    """Raise if a column name occurs twice."""
-    twice = [name for name, count in Counter(names).items() if count > 1 and name]
-    if twice:
-        raise LogError(
-            f"{source}: the column(s) {', '.join(twice)} occur more than once. Rename or remove "
-            "the surplus ones; which of them is meant cannot be known."
-        )
 
 
 def check_size(path: Path, size: int, max_bytes: int) -> None:
