@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Downloads, from a local server in place of the network."""
+
+import functools
+import hashlib
+import http.server
+import sqlite3
+import threading
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from skidyn._exceptions import LogError
+from skidyn.datasets import fetch_emps, fetch_panda_exciting
+
+pytest.importorskip("pooch")
+
+
+@pytest.fixture
+def site(tmp_path):
+    """Folder that is served on this machine, and its address."""
+
+    class Quiet(http.server.SimpleHTTPRequestHandler):
+        def log_message(self, *args):
+            pass
+
+    folder = tmp_path / "site"
+    folder.mkdir()
+    handler = functools.partial(Quiet, directory=folder)
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        thread = threading.Thread(target=server.serve_forever, daemon=True)
+        thread.start()
+        yield folder, f"http://127.0.0.1:{server.server_port}"
+        server.shutdown()
+        thread.join()
+
+
+def emps_like(path):
+    t = np.arange(200)[:, None] / 1000
+    data = {"t": t, "qm": 0.1 * np.sin(9 * t), "vir": np.cos(9 * t), "gtau": 35.15}
+    savemat(path, data)
+
+
+def test_emps_is_read_and_kept(site, tmp_path):
+    folder, address = site
+    emps_like(folder / "DATA_EMPS.mat")
+    options = {"data_home": tmp_path / "home", "url": f"{address}/DATA_EMPS.mat"}
+    with pytest.warns(UserWarning, match="derived by central differences"):
+        emps = fetch_emps(**options)
+    assert emps.licence == "Apache-2.0"
+    assert emps.frame["tau1"].iloc[0] == pytest.approx(35.15065, abs=1e-4)
+    (folder / "DATA_EMPS.mat").unlink()  # the second call must not need the source
+    with pytest.warns(UserWarning):
+        assert fetch_emps(**options).frame.equals(emps.frame)
+
+
+def test_checksum_is_held(site, tmp_path):
+    folder, address = site
+    emps_like(folder / "DATA_EMPS.mat")
+    options = {"data_home": tmp_path / "home", "url": f"{address}/DATA_EMPS.mat"}
+    with pytest.raises(LogError, match="SHA-256 checksum .* not abc"):
+        fetch_emps(**options, sha256="abc")
+    right = hashlib.sha256((folder / "DATA_EMPS.mat").read_bytes()).hexdigest()
+    with pytest.warns(UserWarning):
+        emps = fetch_emps(**options, sha256=right)
+    with open(emps.path, "ab") as file:
+        file.write(b"spoiled")
+    with pytest.raises(LogError, match="SHA-256 checksum"):
+        fetch_emps(**options)
+
+
+def test_panda_bag_is_read(site, tmp_path):
+    pytest.importorskip("rosbags")
+    from rosbags.typesys import Stores, get_typestore
+
+    folder, address = site
+    store = get_typestore(Stores.LATEST)
+    state = store.types["sensor_msgs/msg/JointState"]
+    header, time = store.types["std_msgs/msg/Header"], store.types["builtin_interfaces/msg/Time"]
+    names = [f"fer_joint{k}" for k in range(1, 8)]
+    with sqlite3.connect(folder / "panda.db3") as bag:
+        bag.execute("CREATE TABLE topics (id INTEGER, name TEXT, type TEXT)")
+        bag.execute("CREATE TABLE messages (topic_id INTEGER, timestamp INTEGER, data BLOB)")
+        bag.execute("INSERT INTO topics VALUES (1, '/joint_states', 'sensor_msgs/msg/JointState')")
+        for k in range(30):
+            blocks = (np.full(7, value, dtype=float) for value in (0.1 * k, 3.0, 5.0))
+            message = state(header(time(1, k * 33_000_000), ""), names, *blocks)
+            raw = bytes(store.serialize_cdr(message, "sensor_msgs/msg/JointState"))
+            bag.execute("INSERT INTO messages VALUES (1, ?, ?)", (k, raw))
+    bag.close()
+    panda = fetch_panda_exciting(data_home=tmp_path / "home", url=f"{address}/panda.db3")
+    assert panda.licence == "BSD-3-Clause"
+    assert panda.frame.shape == (30, 23) and panda.frame.attrs["joint_names"] == names
