@@ -1,0 +1,536 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The command line: ``skidyn COMMAND --help`` teaches each command."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from skidyn._exceptions import SkidynError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from skidyn.diagnosis import Comparison, Diagnosis
+    from skidyn.rigid_body import RBDRegressor
+    from skidyn.robots import Robot
+
+#: Exit codes: done; the input is at fault; stopped by the user.
+DONE, BAD_INPUT, STOPPED = 0, 2, 130
+
+_DIAGNOSE = """\
+Compare a model with a log and learn which physical effect it lacks.
+
+  skidyn diagnose run1.csv run2.csv --urdf robot.urdf --out report.json --html report.html
+
+LOG is a table with the columns time, trajectory, q1.., dq1.., tau1.. (optional ddq1.., temp1..);
+other names through --columns '{"q": ["pos_a", "pos_b"]}'. --model says what the model has already:
+rigid_body and kinds of the catalogue (skidyn effects lists them).
+"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Words after ``skidyn``; those of the process by default.
+
+    Returns
+    -------
+    int
+        Exit code: 0 done, 2 the input is at fault, 130 stopped by Ctrl-C.
+
+    Examples
+    --------
+    >>> main(["effects", "--json"])  # doctest: +ELLIPSIS
+    {...
+    0
+    """
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    if not hasattr(options, "run"):
+        parser.print_help()
+        return BAD_INPUT
+    try:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            options.run(options)
+        for text in dict.fromkeys(str(w.message) for w in caught if _is_ours(w)):
+            print(f"warning: {text}", file=sys.stderr)
+    except (SkidynError, OSError, ImportError) as error:
+        print(f"skidyn {options.command}: {error}", file=sys.stderr)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        print("stopped; nothing was written", file=sys.stderr)
+        return STOPPED
+    return DONE
+
+
+def _is_ours(caught: warnings.WarningMessage) -> bool:
+    from skidyn._exceptions import LogWarning
+
+    return issubclass(caught.category, LogWarning)
+
+
+# ---------------------------------------------------------------------------- words
+def _parser() -> argparse.ArgumentParser:
+    from skidyn import __version__
+
+    parser = argparse.ArgumentParser(
+        prog="skidyn",
+        description="Robot inverse dynamics: compare a model with measurements, see where it "
+        "fails, learn what is missing, add it and watch the error fall.",
+    )
+    parser.add_argument("--version", action="version", version=f"skidyn {__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND")
+    _add_diagnose(commands)
+    _add_compare(commands)
+    _add_identify(commands)
+    _add_add(commands)
+    _add_report(commands)
+    _add_simulate(commands)
+    _add_demo(commands)
+    _add_effects(commands)
+    return parser
+
+
+def _command(commands: Any, name: str, run: Any, text: str, description: str = "") -> Any:
+    parser = commands.add_parser(
+        name,
+        help=text,
+        description=description or text,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.set_defaults(run=run)
+    parser.add_argument("--json", action="store_true", help="print the result as JSON")
+    return parser
+
+
+def _with_log(parser: Any) -> None:
+    parser.add_argument("logs", nargs="+", metavar="LOG", help="recordings, one or more files")
+    parser.add_argument("--urdf", required=True, help="description of the robot")
+    parser.add_argument(
+        "--model",
+        default="rigid_body,viscous,coulomb",
+        help="what the model has, separated by commas (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--nominal",
+        action="store_true",
+        help="keep the inertial parameters of the URDF instead of identifying them",
+    )
+    parser.add_argument("--columns", help="JSON object: which columns hold which signals")
+    parser.add_argument("--units", help='JSON object: units that are not SI, {"q": "deg"}')
+    parser.add_argument("--joints", help="joints the log covers, separated by commas")
+    parser.add_argument("--rate", type=float, help="sampling rate in Hz of a log without time")
+
+
+def _add_diagnose(commands: Any) -> None:
+    parser = _command(commands, "diagnose", _diagnose, "learn which effect is missing", _DIAGNOSE)
+    _with_log(parser)
+    parser.add_argument("--out", metavar="JSON", help="write the report as JSON")
+    parser.add_argument("--html", metavar="HTML", help="write the report as a page")
+    parser.add_argument("--effects", help="kinds to try, separated by commas (default: all)")
+
+
+def _add_compare(commands: Any) -> None:
+    parser = _command(
+        commands, "compare", _compare, "print the held-out error by joint, trajectory and regime"
+    )
+    _with_log(parser)
+
+
+def _add_identify(commands: Any) -> None:
+    parser = _command(commands, "identify", _identify, "identify parameters and print them")
+    _with_log(parser)
+    parser.add_argument("--out", metavar="JSON", help="write the parameters as JSON")
+    parser.add_argument("--consistent", action="store_true", help="only bodies that can exist")
+
+
+def _add_add(commands: Any) -> None:
+    parser = _command(
+        commands,
+        "add",
+        _add,
+        "add an effect to a diagnosed model and print the error before, after",
+    )
+    parser.add_argument("--from", dest="report", required=True, help="report.json of diagnose")
+    parser.add_argument("--effect", required=True, help="kind of the catalogue")
+    parser.add_argument("--on", help="joints counted from 1, separated by commas (default: all)")
+    parser.add_argument("--out", metavar="JSON", help="write the parameters of the better model")
+
+
+def _add_report(commands: Any) -> None:
+    parser = _command(commands, "report", _report, "turn the log of a report.json into a page")
+    parser.add_argument("--from", dest="report", required=True, help="report.json of diagnose")
+    parser.add_argument("--html", required=True, help="page to write")
+
+
+def _add_simulate(commands: Any) -> None:
+    parser = _command(commands, "simulate", _simulate, "write a log that hides an effect")
+    parser.add_argument("--robot", default="panda", help="embedded robot (default: %(default)s)")
+    parser.add_argument("--effect", default="dahl", help="kind, or none (default: %(default)s)")
+    parser.add_argument("--on", help="joints counted from 1, separated by commas")
+    parser.add_argument("--noise", default="low", choices=("low", "high"))
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--out", required=True, metavar="LOG", help="file.csv or file.parquet")
+
+
+def _add_demo(commands: Any) -> None:
+    parser = _command(commands, "demo", _demo, "the whole loop on a simulated log")
+    parser.add_argument("--html", default="skidyn-demo.html", help="page to write")
+
+
+def _add_effects(commands: Any) -> None:
+    _command(commands, "effects", _effects, "list the catalogue of effects")
+
+
+# ---------------------------------------------------------------------------- commands
+def _diagnose(options: argparse.Namespace) -> None:
+    model, frame, tau = _load(options)
+    diagnosis = _run_diagnosis(model, frame, tau, options)
+    _write_reports(diagnosis, options.out, options.html, _provenance(options))
+    if options.json:
+        _print_json(diagnosis.to_dict())
+    else:
+        _print_diagnosis(diagnosis)
+        for path in filter(None, (options.out, options.html)):
+            print(f"written: {Path(path).resolve()}")
+
+
+def _compare(options: argparse.Namespace) -> None:
+    model, frame, tau = _load(options)
+    diagnosis = _run_diagnosis(model, frame, tau, options, kinds=())
+    comparison = diagnosis.comparison
+    if options.json:
+        _print_json(
+            {"table": comparison.table(), "failures": [vars(f) for f in diagnosis.failures]}
+        )
+        return
+    _print_comparison(comparison)
+    _print_regimes(diagnosis)
+
+
+def _identify(options: argparse.Namespace) -> None:
+    model, frame, tau = _load(options)
+    model.set_params(consistent=options.consistent)
+    model.fit(frame, tau)
+    content = _parameters(model)
+    if options.out:
+        _write_json(options.out, content)
+    if options.json:
+        _print_json(content)
+        return
+    for row in model.parameter_table():
+        print(f"{row['value']:12.5g} ± {row['std']:9.2g}   {row['name']}")
+
+
+def _add(options: argparse.Namespace) -> None:
+    from skidyn.effects import make_terms
+
+    report = json.loads(Path(options.report).read_text(encoding="utf-8"))
+    options = _recorded(report, options)
+    model, frame, tau = _load(options)
+    joints = _numbers(options.on)
+    spec = options.effect if joints is None else (options.effect, joints)
+    terms = make_terms([spec], model.robot.n_joints)
+    before = _run_diagnosis(model, frame, tau, options, kinds=()).rmse_before
+    fitted = model.with_effects(terms).fit(frame, tau)
+    better = model.with_effects(fitted.effect_terms_[-len(terms) :])
+    after = _run_diagnosis(better, frame, tau, options, kinds=()).rmse_before
+    if options.out:
+        _write_json(options.out, _parameters(fitted))
+    if options.json:
+        _print_json({"before": before.tolist(), "after": after.tolist()})
+        return
+    print(f"held-out error with {options.effect} added (N m, N for sliders; sliding samples)")
+    for j, name in enumerate(model.robot.joint_names):
+        change = after[j] / before[j] - 1 if before[j] > 0 else 0.0
+        print(f"  {name:24s} {before[j]:9.4g} -> {after[j]:9.4g}  ({change:+.0%})")
+
+
+def _report(options: argparse.Namespace) -> None:
+    report = json.loads(Path(options.report).read_text(encoding="utf-8"))
+    options = _recorded(report, options)
+    model, frame, tau = _load(options)
+    diagnosis = _run_diagnosis(model, frame, tau, options)
+    _write_reports(diagnosis, None, options.html, _provenance(options))
+    print(f"written: {Path(options.html).resolve()}")
+
+
+def _simulate(options: argparse.Namespace) -> None:
+    from skidyn.datasets import make_hidden_effect_log
+
+    robot = _embedded(options.robot)
+    effect = None if options.effect == "none" else options.effect
+    log = make_hidden_effect_log(
+        robot,
+        effect,
+        joints=_numbers(options.on),
+        noise=options.noise,
+        random_state=options.seed,
+    )
+    _write_table(log.frame, options.out)
+    truth = {"effect": log.effect, "joints": list(log.joints), "parameters": log.parameters}
+    if options.json:
+        _print_json(truth)
+    else:
+        print(f"{len(log.frame)} samples written: {Path(options.out).resolve()}")
+        print(f"hidden: {truth}")
+
+
+def _demo(options: argparse.Namespace) -> None:
+    from skidyn.datasets import load_demo_log
+    from skidyn.diagnosis import diagnose
+    from skidyn.rigid_body import RBDRegressor
+
+    print("1. A Panda arm is simulated with two effects that no model below knows of. Two of its")
+    print("   trajectories are put aside: nothing is fitted to them.")
+    log = load_demo_log()
+    aside = log.X["trajectory"] >= log.X["trajectory"].max() - 1
+    X, y, X_new, y_new = log.X[~aside], log.y[~aside], log.X[aside], log.y[aside]
+    model = RBDRegressor(log.robot)
+    print("2. The model: rigid body, viscous and Coulomb friction. Where does it fail?")
+    diagnosis = diagnose(model, X, y)
+    for failure in diagnosis.failures[:3]:
+        print(f"   {failure.sentence}")
+    print("3. What is missing?")
+    for finding in diagnosis.findings:
+        print(f"   {finding.sentence}")
+    print("4. Added and fitted again; error on the trajectories put aside (N m, whole motion):")
+    before = _errors(model.fit(X, y), X_new, y_new)
+    after = _errors(diagnosis.model, X_new, y_new)
+    for name, a, b in zip(log.robot.joint_names, before, after, strict=True):
+        print(f"   {name:22s} {a:8.4f} -> {b:8.4f}  ({b / a - 1:+.0%})")
+    _write_reports(diagnosis, None, options.html, {"log": "simulated by skidyn demo"})
+    print(f"5. The report: {Path(options.html).resolve()}")
+
+
+def _effects(options: argparse.Namespace) -> None:
+    from skidyn.effects import get_effect, list_effects
+
+    catalogue = {kind: get_effect(kind).describe() for kind in list_effects()}
+    if options.json:
+        _print_json(catalogue)
+        return
+    for kind, entry in catalogue.items():
+        print(f"{kind:28s} {entry['title']}")
+
+
+# ---------------------------------------------------------------------------- input
+def _load(options: argparse.Namespace) -> tuple[RBDRegressor, pd.DataFrame, Any]:
+    from skidyn.datasets import read_log
+    from skidyn.rigid_body import RBDRegressor
+
+    robot = _robot(options)
+    frame = read_log(
+        list(options.logs),
+        robot=robot,
+        columns=_json_option("columns", options.columns),
+        units=_json_option("units", options.units),
+        rate=options.rate,
+    )
+    tau = frame[[f"tau{j + 1}" for j in range(robot.n_joints)]].to_numpy()
+    kinds = [kind.strip() for kind in options.model.split(",") if kind.strip()]
+    if "rigid_body" not in kinds:
+        raise SkidynError("--model must contain rigid_body; it may add kinds of the catalogue")
+    effects = tuple(kind for kind in kinds if kind != "rigid_body")
+    model = RBDRegressor(robot, effects, "nominal" if options.nominal else "identified")
+    return model, frame, tau
+
+
+def _robot(options: argparse.Namespace) -> Robot:
+    from skidyn.robots import Robot
+
+    path = Path(options.urdf)
+    if not path.is_file():
+        raise SkidynError(f"no file {options.urdf}; --urdf wants the description of the robot")
+    joints = options.joints.split(",") if options.joints else None
+    return Robot.from_urdf(path, joints=joints)
+
+
+def _embedded(name: str) -> Robot:
+    from skidyn import datasets
+
+    loader = getattr(datasets, f"load_{name}", None)
+    if loader is None or name in ("recording", "demo_log"):
+        known = sorted(
+            n.removeprefix("load_")
+            for n in datasets.__all__
+            if n.startswith("load_") and n not in ("load_recording", "load_demo_log")
+        )
+        raise SkidynError(f"no embedded robot {name!r}; there are {', '.join(known)}")
+    return loader()
+
+
+def _json_option(name: str, text: str | None) -> Any:
+    if text is None:
+        return None
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError as error:
+        raise SkidynError(f"--{name} is not JSON: {error}") from None
+
+
+def _numbers(text: str | None) -> list[int] | None:
+    if text is None:
+        return None
+    try:
+        return [int(part) for part in text.split(",")]
+    except ValueError:
+        raise SkidynError(f"{text!r}: joints are numbers from 1, such as 1,4") from None
+
+
+def _recorded(report: dict[str, Any], options: argparse.Namespace) -> argparse.Namespace:
+    """Options of the diagnosis that a report records, with those of this command."""
+    recorded = report.get("provenance", {}).get("options")
+    if not isinstance(recorded, dict) or "logs" not in recorded:
+        raise SkidynError(f"{options.report} records no log; it must come from skidyn diagnose")
+    return argparse.Namespace(**{**recorded, **vars(options)})
+
+
+# ---------------------------------------------------------------------------- output
+def _run_diagnosis(
+    model: Any, frame: Any, tau: Any, options: argparse.Namespace, kinds: Any = None
+) -> Diagnosis:
+    from skidyn.diagnosis import Settings, diagnose
+
+    wanted = getattr(options, "effects", None)
+    if kinds is None and wanted:
+        kinds = [kind.strip() for kind in wanted.split(",")]
+    # Without kinds nothing is searched: the model is only compared.
+    settings = Settings(max_findings=0) if kinds == () else Settings()
+    rate = getattr(options, "rate", None)
+    return diagnose(model, frame, tau, effects=kinds, rate=rate, settings=settings)
+
+
+def _write_reports(
+    diagnosis: Diagnosis, out: str | None, html: str | None, provenance: dict[str, Any]
+) -> None:
+    if out:
+        _write_json(out, {**diagnosis.to_dict(), "provenance": provenance})
+    if html:
+        from skidyn.report import summarize, write_html
+
+        write_html(html, summarize(diagnosis, provenance=provenance))
+
+
+def _write_json(path: str, content: dict[str, Any]) -> None:
+    from skidyn.report import write_json
+
+    write_json(path, content)
+
+
+def _write_table(frame: pd.DataFrame, path: str) -> None:
+    if path.endswith(".parquet"):
+        frame.to_parquet(path, index=False)
+    elif path.endswith(".csv"):
+        frame.to_csv(path, index=False)
+    else:
+        raise SkidynError(f"{path}: write .csv or .parquet")
+
+
+def _provenance(options: argparse.Namespace) -> dict[str, Any]:
+    import hashlib
+
+    from skidyn._version import versions
+
+    files = [*options.logs, options.urdf]
+    hashes = {}
+    for name in files:
+        path = Path(name)
+        if path.is_file():
+            hashes[name] = hashlib.sha256(path.read_bytes()).hexdigest()
+    keep = ("logs", "urdf", "model", "nominal", "columns", "units", "joints", "rate", "effects")
+    recorded = {k: getattr(options, k, None) for k in keep}
+    return {"versions": versions(), "sha256": hashes, "options": recorded}
+
+
+def _parameters(model: RBDRegressor) -> dict[str, Any]:
+    return {
+        "schema": "skidyn.parameters/1",
+        "joints": list(model.robot_.joint_names),
+        "coefficients": model.parameter_table(),
+        "base_parameters": model.base_parameters_,
+        "inertial_parameters": model.inertial_parameters_.tolist(),
+        "effects": [
+            {
+                "kind": term.kind,
+                "joints": [j + 1 for j in term.joints],
+                "shape": dict(term.shape),
+                "coefficients": model.effect_coefficients_[term].tolist(),
+            }
+            for term in model.effect_terms_
+        ],
+        "noise_std": model.noise_std_.tolist(),
+    }
+
+
+def _errors(model: Any, X: Any, y: Any) -> Any:
+    import numpy as np
+
+    return np.sqrt(np.mean((np.asarray(model.predict(X)) - np.asarray(y)) ** 2, axis=0))
+
+
+def _print_json(content: Any) -> None:
+    from skidyn.report._plain import plain
+
+    print(json.dumps(plain(content), indent=2))
+
+
+def _print_diagnosis(diagnosis: Diagnosis) -> None:
+    verdicts = {
+        "complete": "Nothing significant is missing.",
+        "missing": "Something is missing, and it has a name.",
+        "unknown": "Something is missing that no named effect explains.",
+    }
+    print(verdicts[diagnosis.verdict])
+    for note in diagnosis.warnings:
+        print(f"  note: {note}")
+    for finding in diagnosis.findings:
+        print(f"  {finding.sentence}")
+        print(f"      {finding.code}")
+    print("held-out error on sliding samples (N m, N for sliders): before, after, noise floor")
+    rows = zip(
+        diagnosis.joint_names,
+        diagnosis.rmse_before,
+        diagnosis.rmse_after,
+        diagnosis.noise_floor,
+        strict=True,
+    )
+    for name, before, after, floor in rows:
+        print(f"  {name:24s} {before:9.4g} {after:9.4g} {floor:9.4g}")
+    for failure in diagnosis.failures[:3]:
+        print(f"  {failure.sentence}")
+
+
+def _print_comparison(comparison: Comparison) -> None:
+    print("held-out error by joint and trajectory: rmse (N m, N for sliders), share of the torque")
+    for row in comparison.table():
+        print(
+            f"  {row['name']:24s} trajectory {row['trajectory']:4d} "
+            f"{row['rmse']:9.4g}  {row['relative']:6.1%}"
+        )
+
+
+def _print_regimes(diagnosis: Diagnosis) -> None:
+    import numpy as np
+
+    print("by joint and regime (N m, N for sliders)")
+    print(" " * 26 + "".join(f"{name:>10s}" for name in diagnosis.regimes))
+    for name, errors in zip(diagnosis.joint_names, diagnosis.error_map(), strict=True):
+        cells = "".join("         -" if np.isnan(e) else f"{e:10.4g}" for e in errors)
+        print(f"  {name:24s}{cells}")
+    for failure in diagnosis.failures:
+        print(f"  {failure.sentence}")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
