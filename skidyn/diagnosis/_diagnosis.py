@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 from sklearn.base import clone
+from threadpoolctl import threadpool_limits
 
 from skidyn._columns import ColumnSpec, column_names, resolve_columns
 from skidyn._exceptions import ColumnError, LogError, LogWarning
@@ -266,6 +267,24 @@ def diagnose(
     >>> [(finding.kind, finding.joints) for finding in diagnosis.findings]
     [('stribeck', (2,))]
     """
+    with threadpool_limits(1):  # many small matrices: more threads only wait for each other
+        return _diagnose(
+            model, X, tau, robot, effects, trajectory, time, rate, smooth, settings or Settings()
+        )
+
+
+def _diagnose(
+    model: Any,
+    X: Any,
+    tau: Any,
+    robot: Robot | None,
+    effects: Iterable[str] | None,
+    trajectory: ColumnSpec,
+    time: ColumnSpec,
+    rate: float | None,
+    smooth: bool,
+    settings: Settings,
+) -> Diagnosis:
     robot = robot if robot is not None else getattr(model, "robot", None)
     if robot is None:
         raise ColumnError("this regressor has no robot; pass robot=Robot.from_urdf(...)")
@@ -282,9 +301,8 @@ def diagnose(
     kinds = list_effects() if effects is None else list(effects)
     notes = suspicions(signals, torque, robot)
     for note in notes:
-        warnings.warn(note, LogWarning, stacklevel=2)
+        warnings.warn(note, LogWarning, stacklevel=4)
     own = _is_rigid_body_regressor(model)
-    settings = settings or Settings()
     if own:
         problem = make_problem(
             signals,
