@@ -57,12 +57,16 @@ def seconds(table: pd.DataFrame, rate: float | None, source: str) -> np.ndarray:
     except (TypeError, ValueError):
         pass
     try:
-        stamps = pd.to_datetime(column, utc=True)
+        stamps = pd.to_datetime(column, utc=True, format=None if _is_date(column) else "ISO8601")
     except (TypeError, ValueError) as error:
         raise LogError(
             f"{source}: the time column holds neither numbers nor dates: {error}"
         ) from None
     return (stamps - stamps.iloc[0]).dt.total_seconds().to_numpy(dtype=np.float64)
+
+
+def _is_date(column: pd.Series) -> bool:
+    return column.dtype.kind == "M"
 
 
 def align_channels(
@@ -147,8 +151,8 @@ def _interpolate(table: pd.DataFrame, clock: np.ndarray) -> pd.DataFrame:
     if len(steps):
         moving = steps[steps > 0]
         longest = GAP_STEPS * float(np.median(moving)) if len(moving) else np.inf
-        exact = np.isin(clock, time)
-        hole = (steps[right - 1] > longest) & ~exact
+        near = np.minimum(np.abs(clock - time[right]), np.abs(clock - time[right - 1]))
+        hole = (steps[right - 1] > longest) & (near > 1e-6 * longest)
     columns = {}
     for name in table.columns:
         if name == "time":

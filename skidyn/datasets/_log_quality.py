@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 class JointQuality:
     """Quality of the signals of one joint.
 
-    Attributes
+    Parameters
     ----------
     name : str
         Joint.
@@ -80,7 +80,7 @@ class JointQuality:
 class LogQuality:
     """What :func:`check_log` found.
 
-    Attributes
+    Parameters
     ----------
     n_samples, n_trajectories : int
         Size of the log.
@@ -121,6 +121,7 @@ class LogQuality:
         Returns
         -------
         dict
+            The fields of this report, ``joints`` as a list of dicts.
         """
         plain = _plain(asdict(self))
         assert isinstance(plain, dict)
