@@ -103,12 +103,15 @@ def _parts(summary: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def _heat(table: list[list[float | None]]) -> list[list[dict[str, Any]]]:
-    """Cells of the error map; depth of colour within the joint, whose unit and size are its own."""
+    """Cells of the error map; the colour is the squared error relative to the joint's largest."""
     rows = []
     for row in table:
         largest = max((v for v in row if v is not None), default=0.0) or 1.0
         rows.append(
-            [{"value": v, "depth": None if v is None else round(v / largest, 2)} for v in row]
+            [
+                {"value": v, "depth": None if v is None else round((v / largest) ** 2, 2)}
+                for v in row
+            ]
         )
     return rows
 

@@ -104,8 +104,9 @@ def verdict_sentence(diagnosis: Diagnosis) -> str:
     ratio = after[before > 0] / before[before > 0]
     if len(ratio):
         # joints have different units and scales, so the mean is one of ratios
+        what = "it" if len(diagnosis.findings) == 1 else "them"
         change = f"{abs(1 - math.exp(np.log(np.maximum(ratio, 1e-12)).mean())):.0%}"
-        text += f" Adding it lowers the held-out error by {change} in the mean over joints."
+        text += f" Adding {what} lowers the held-out error by {change} in the mean over joints."
     return text.strip()
 
 

@@ -58,7 +58,7 @@
     const y = (v) => box.bottom - (v - range[0]) / (range[1] - range[0]) * (box.bottom - box.top);
     context.font = "11.5px system-ui, sans-serif";
     context.textBaseline = "middle"; context.textAlign = "right"; context.lineWidth = 1;
-    for (const v of ticks(range[0], range[1], Math.max(2, (box.bottom - box.top) / 34))) {
+    for (const v of ticks(range[0], range[1], Math.max(2, (box.bottom - box.top) / 24))) {
       context.strokeStyle = colour(Math.abs(v) < 1e-12 ? "--soft" : "--grid");
       context.beginPath(); context.moveTo(box.left, y(v)); context.lineTo(box.left + box.width, y(v)); context.stroke();
       context.fillStyle = colour("--soft"); context.fillText(digits(v), box.left - 6, y(v));

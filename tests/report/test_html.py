@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import re
+
+import pytest
+
+from skidyn.report import render_html, summarize
+
+
+def test_markup_in_names_is_escaped(fakes):
+    names = (fakes.HOSTILE, "</script><script>alert(2)</script>", 'it\'s "quoted"')
+    diagnosis = fakes.make_diagnosis("unknown", names)
+    diagnosis.warnings = [fakes.HOSTILE]
+    page = render_html(summarize(diagnosis, title=fakes.HOSTILE, provenance={"x": fakes.HOSTILE}))
+    assert "<img" not in page
+    assert "<script>alert" not in page
+    assert page.count("</script>") == 2
+
+
+def test_page_loads_nothing(fakes):
+    page = render_html(summarize(fakes.make_diagnosis()))
+    assert not re.search(r"""(?:src|href)=["']?(?:https?:)?//""", page)
+    assert "url(" not in page and "@import" not in page
+    assert "default-src 'none'" in page
+
+
+def test_story_is_told_in_order(fakes):
+    page = render_html(summarize(fakes.make_diagnosis()))
+    order = [
+        "The model lacks a known effect", "Where it fails", "What is missing",
+        "What adding it does", "What is unexplained", "Limits: what", "Warnings", "Provenance",
+    ]  # fmt: skip
+    places = [page.index(f"<h2>{title}") for title in order]
+    assert places == sorted(places)
+    assert "diagnosis.add(&#34;dahl&#34;, joints=[1, 2])" in page
+
+
+def test_a_complete_model_has_no_findings_to_show(fakes):
+    page = render_html(summarize(fakes.make_diagnosis("complete")))
+    assert "The model is complete" in page
+    assert "What is missing" not in page and "What adding it does" not in page
+
+
+def test_parameters_of_several_joints_get_a_row_each(fakes):
+    page = render_html(summarize(fakes.make_diagnosis()))
+    assert page.count('<th scope="row">Fc</th>') == 3
+
+
+def test_numbers_of_the_page_are_those_of_the_report(fakes):
+    summary = summarize(fakes.make_diagnosis())
+    page = render_html(summary)
+    before = [float(x) for x in re.findall(r'data-before="([^"]+)"', page)]
+    after = [float(x) for x in re.findall(r'data-after="([^"]+)"', page)]
+    assert before == pytest.approx(summary["report"]["rmse_before"])
+    assert after == pytest.approx(summary["report"]["rmse_after"])
+
+
+def test_non_finite_numbers_do_not_break_the_page(fakes):
+    diagnosis = fakes.make_diagnosis()
+    diagnosis.noise_floor[0] = float("nan")
+    diagnosis.findings[0].curves[0]["measured"][:3] = float("nan")
+    page = render_html(summarize(diagnosis))
+    assert "nan" not in page.partition("<script")[0].lower().replace("provenance", "")

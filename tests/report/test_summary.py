@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import json
+from importlib import resources
+
+import numpy as np
+import pytest
+
+from skidyn.report import summarize, write_json
+
+
+@pytest.mark.parametrize("verdict", ["complete", "missing", "unknown"])
+def test_report_follows_the_schema(fakes, verdict, tmp_path):
+    jsonschema = pytest.importorskip("jsonschema")
+    schema = json.loads(
+        resources.files("skidyn.report").joinpath("diagnosis.schema.json").read_text()
+    )
+    summary = summarize(fakes.make_diagnosis(verdict), provenance={"files": {"a.csv": "12"}})
+    jsonschema.Draft202012Validator.check_schema(schema)
+    path = write_json(tmp_path / "report.json", summary["report"])
+    report = json.loads(path.read_text())
+    jsonschema.validate(report, schema)
+    assert report["verdict"] == verdict
+    assert report["provenance"]["files"] == {"a.csv": "12"}
+    assert "numpy" in report["provenance"]["versions"]
+
+
+def test_summary_is_pure_json(fakes):
+    summary = summarize(fakes.make_diagnosis())
+    assert json.loads(json.dumps(summary, allow_nan=False)) == summary
+
+
+def test_missing_regimes_become_null(fakes):
+    diagnosis = fakes.make_diagnosis()
+    table = diagnosis.error_map()
+    table[0, 0] = np.nan
+    diagnosis.error_map = lambda after=False: table
+    assert summarize(diagnosis)["error_map"][0][0] is None
+
+
+def test_verdict_is_said_in_words(fakes):
+    assert "Nothing significant" in summarize(fakes.make_diagnosis("complete"))["verdict_sentence"]
+    missing = summarize(fakes.make_diagnosis("missing"))["verdict_sentence"]
+    assert missing.startswith("Dahl friction (joints 1 and 2) and Spring (joint 3) are missing.")
+    unknown = summarize(fakes.make_diagnosis("unknown"))["verdict_sentence"]
+    assert "Something that depends on q1 and q3 is also missing on joint 2" in unknown
+
+
+def test_trajectories_are_laid_end_to_end(fakes):
+    trace = summarize(fakes.make_diagnosis())["traces"][0]
+    assert [start["trajectory"] for start in trace["starts"]] == [0, 1, 2]
+    assert [start["time"] for start in trace["starts"]] == pytest.approx([0, 10, 20])
+    assert (np.diff(trace["time"]) > 0).all()
+    assert len(trace["breaks"]) == 2
+
+
+def test_units_follow_the_joint_type(fakes):
+    assert summarize(fakes.make_diagnosis())["units"] == ["N m", "N m", "N"]
+
+
+def test_long_logs_are_thinned_without_losing_the_largest_residual(fakes):
+    diagnosis = fakes.make_diagnosis(n_samples=300_000)
+    trace = summarize(diagnosis)["traces"][0]
+    assert len(trace["time"]) < 25_000
+    residual = np.subtract(trace["measured"], trace["before"])
+    whole = diagnosis.comparison.residual[:, 0]
+    assert residual.max() == pytest.approx(whole.max())
+    assert residual.min() == pytest.approx(whole.min())
