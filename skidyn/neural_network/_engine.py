@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from skorch import NeuralNet
-from skorch.callbacks import Callback, EarlyStopping, GradientNormClipping
+from skorch.callbacks import Callback, EarlyStopping, GradientNormClipping, LRScheduler
 from skorch.helper import predefined_split
 from torch import nn
 
@@ -143,7 +143,11 @@ def train(
 
     callbacks: list[Any] = [GradientNormClipping(1.0), _Progress(progress)]
     split = None
-    if validation is not None:
+    if validation is None:
+        # steps that shrink to nothing average the noise of small batches away
+        cosine = torch.optim.lr_scheduler.CosineAnnealingLR
+        callbacks.append(LRScheduler(cosine, T_max=plan.max_epochs))
+    else:
         callbacks.insert(1, EarlyStopping(patience=plan.patience, load_best=True, sink=_silent))
         split = predefined_split(window_set(np.where(validation, weight, 0.0)))
         weight = np.where(validation, 0.0, weight)
