@@ -48,7 +48,7 @@ def render_html(summary: dict[str, Any]) -> str:
     environment = jinja2.Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
-    environment.filters |= {"number": _number, "percent": _percent, "words": _words}
+    environment.filters.update(number=_number, percent=_percent, words=_words)
     markup = environment.from_string(_resource("page.html.jinja"))
     report = summary["report"]
     causes = _causes(summary["budget"])
