@@ -36,7 +36,7 @@ def c_source(robot: Robot, *, parameters: Any = None, name: str = "skidyn_invers
     robot : Robot
         The robot.
     parameters : array-like of shape (n_bodies, 10), default=None
-        Identified inertial parameters in place of those of the URDF; they are written into the text.
+        Identified inertial parameters in place of those of the URDF; written into the text.
     name : str, default="skidyn_inverse_dynamics"
         Name of the function ``void name(const double *q, const double *dq, const double *ddq,
         double *tau)``.

@@ -102,7 +102,7 @@ def _add_body(
 ) -> ElementTree.Element:
     tree, name = robot.tree, robot.body_names[body]
     pose = _pose(tree.rotations[body], tree.translations[body])
-    element = ElementTree.SubElement(carrier, "body", name=name, **pose)
+    element = ElementTree.SubElement(carrier, "body", {"name": name, **pose})
     central = central_inertia(parameters, name)
     if central is None:
         raise SkidynError(f"Body {name!r} has no mass; MuJoCo refuses moving bodies without.")
@@ -147,7 +147,7 @@ def _add_sites(
         if name not in robot.body_names:
             carrier = elements[placement.body] if placement.body >= 0 else world
             pose = _pose(placement.rotation, placement.translation)
-            ElementTree.SubElement(carrier, "site", name=name, **pose)
+            ElementTree.SubElement(carrier, "site", {"name": name, **pose})
 
 
 def _add_ties(root: ElementTree.Element, robot: Robot) -> None:

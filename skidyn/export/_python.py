@@ -40,7 +40,7 @@ def python_source(robot: Robot, *, parameters: Any = None, name: str = "inverse_
     robot : Robot
         The robot.
     parameters : array-like of shape (n_bodies, 10), default=None
-        Identified inertial parameters in place of those of the URDF; they are written into the text.
+        Identified inertial parameters in place of those of the URDF; written into the text.
     name : str, default="inverse_dynamics"
         Name of the function; it takes ``q, dq, ddq`` of shape (n_samples, n_joints).
 
@@ -61,7 +61,7 @@ def python_source(robot: Robot, *, parameters: Any = None, name: str = "inverse_
     >>> namespace = {}
     >>> exec(python_source(load_planar_arm()), namespace)
     >>> namespace["inverse_dynamics"]([[0.5, 0.0]], [[0.0, 0.0]], [[0.0, 0.0]]).round(3)
-    array([[5.738, 0.22 ]])
+    array([[5.737, 0.22 ]])
     """
     if not name.isidentifier() or keyword.iskeyword(name):
         raise SkidynError(f"name is {name!r}; expected a Python identifier such as 'torque'.")

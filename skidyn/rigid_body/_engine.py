@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 #: Samples per chunk. Below about a thousand the cost of a ufunc call shows; far above, the rows of
 #: a chunk no longer fit into the second-level cache.
-CHUNK = 5120
+CHUNK = 6144
 
 #: Up to this many samples are run one by one.
 FEW = 8
@@ -145,7 +145,7 @@ class Engine:
     ) -> Iterator[tuple[slice, np.ndarray]]:
         """Yield ``(rows, outputs)``; the outputs are a view of a buffer that is used again."""
         n_samples = len(signals["q"])
-        with self._borrowed(min(chunk, chunk_size(n_samples, chunk)), dtype, *key) as bound:
+        with self._borrowed(chunk_size(n_samples, chunk), dtype, *key) as bound:
             for start in range(0, n_samples, bound.chunk):
                 rows = slice(start, min(start + bound.chunk, n_samples))
                 size = bound.run(signals, rows)

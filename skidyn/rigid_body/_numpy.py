@@ -50,6 +50,8 @@ class BoundProgram:
         self._values: dict[int, np.ndarray] = {}
         self._uniform_calls: list[tuple[Callable, tuple]] = []
         self._calls: list[tuple[Callable, tuple]] = []
+        self._final: list[tuple[int, tuple[int, ...]]] = []  # calls that write an output for good
+        self._reread: list[tuple[int, ...]] = []  # outputs that other calls read
         self._bind(program)
 
     def _input_buffers(self) -> dict[str, np.ndarray]:
@@ -66,15 +68,14 @@ class BoundProgram:
     def _bind(self, program: Program) -> None:
         """Give every live value a row and list the calls that fill the rows."""
         uniform = self._uniform()
-        targets: dict[int, np.ndarray] = {}
-        copies: list[tuple[np.ndarray, int]] = []
+        targets: dict[int, tuple[int, ...]] = {}
+        copies: list[tuple[tuple[int, ...], int]] = []
         for key, scalar in program.outputs.items():
-            row = self.outputs[key]
             computed = self._nodes[scalar.index][0] not in ("input", "constant")
             if computed and scalar.index not in uniform and scalar.index not in targets:
-                targets[scalar.index] = row
+                targets[scalar.index] = key
             else:
-                copies.append((row, scalar.index))
+                copies.append((key, scalar.index))
         last_use = {i: index for index in self._live for i in operands(self._nodes[index])}
         free: list[np.ndarray] = []
         for index in self._live:
@@ -87,13 +88,19 @@ class BoundProgram:
                 if last_use[i] == index and i not in uniform and i not in targets:
                     if self._nodes[i][0] != "input":
                         free.append(self._values[i])
-            row = targets.get(index)
-            if row is None:
+            if index in targets:
+                row = self.outputs[targets[index]]
+                if index in last_use:
+                    self._reread.append(targets[index])
+                else:
+                    self._final.append((len(self._calls), targets[index]))
+            else:
                 row = free.pop() if free else _aligned_zeros((self.chunk,), self.dtype)
             self._values[index] = row
             self._calls.append(_call(node[0], arguments, row))
-        for row, index in copies:
-            self._calls.append((np.copyto, (row, self._values[index])))
+        for key, index in copies:
+            self._calls.append((np.copyto, (self.outputs[key], self._values[index])))
+            self._reread.append(key)
 
     def _uniform(self) -> set[int]:
         """Values that are the same for every sample: constants and functions of parameters."""
@@ -124,8 +131,37 @@ class BoundProgram:
             for function, arguments in self._uniform_calls:
                 function(*arguments)
 
+    @property
+    def vanishing(self) -> np.ndarray:
+        """Entries of the outputs that are zero for every motion, bool."""
+        vanishing = np.ones(self.outputs.shape[:-1], dtype=bool)
+        for key in (*self._reread, *(key for _, key in self._final)):
+            vanishing[key] = False
+        return vanishing
+
     def run(self, signals: dict[str, np.ndarray], rows: slice) -> int:
         """Evaluate the outputs at some rows of the signals; the number of rows is returned."""
+        size = self._fill(signals, rows)
+        for function, arguments in self._calls:
+            function(*arguments)
+        return size
+
+    def run_into(self, out: np.ndarray, signals: dict[str, np.ndarray], rows: slice) -> None:
+        """Write the outputs of a full chunk to memory of their shape, without a copy.
+
+        Entries that vanish for every motion are not written.
+        """
+        self._fill(signals, rows)
+        calls = self._calls.copy()
+        for position, key in self._final:
+            function, arguments = calls[position]
+            calls[position] = function, (*arguments[:-1], out[key])
+        for function, arguments in calls:
+            function(*arguments)
+        for key in self._reread:
+            out[key] = self.outputs[key]
+
+    def _fill(self, signals: dict[str, np.ndarray], rows: slice) -> int:
         size = 0
         for name, values in signals.items():
             buffer = self.inputs.get(name)
@@ -133,8 +169,6 @@ class BoundProgram:
             size = len(part)
             if buffer is not None:
                 buffer[:, :size] = part.T[: len(buffer)]
-        for function, arguments in self._calls:
-            function(*arguments)
         return size
 
 
@@ -161,13 +195,13 @@ def _call(
 
 
 def chunk_size(n_samples: int, limit: int) -> int:
-    """Size of equal chunks, at most about ``limit``, a multiple of 64.
+    """Size of equal chunks, at most ``limit``, if possible a multiple of 64.
 
     Equal, because a chunk that is half empty costs as much as a full one; small calls get small
     buffers.
     """
-    n_chunks = max(1, round(n_samples / limit))
-    return max(64, 64 * math.ceil(n_samples / n_chunks / 64))
+    n_chunks = max(1, math.ceil(n_samples / limit))
+    return min(limit, max(64, 64 * math.ceil(n_samples / n_chunks / 64)))
 
 
 def evaluate_rows(
@@ -185,9 +219,18 @@ def evaluate_rows(
         raise SkidynError(
             f"out has shape {out.shape} and type {out.dtype}; expected {shape} of {bound.dtype}."
         )
-    result = np.empty(shape, bound.dtype) if out is None else out
+    if out is None:
+        result = np.zeros(shape, bound.dtype)  # untouched zeros cost no memory traffic
+    else:
+        result = out
+        for key in np.argwhere(bound.vanishing):
+            result[tuple(key)] = 0.0
     for start in range(0, n_samples, bound.chunk):
         rows = slice(start, min(start + bound.chunk, n_samples))
-        size = bound.run(signals, rows)
-        result[..., rows] = bound.outputs[..., :size]
+        size = rows.stop - rows.start
+        if size == bound.chunk:
+            bound.run_into(result[..., rows], signals, rows)
+        else:
+            bound.run(signals, rows)
+            result[..., rows] = bound.outputs[..., :size]
     return np.moveaxis(result, -1, 0)

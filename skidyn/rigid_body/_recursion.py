@@ -289,6 +289,8 @@ def trace_inverse_dynamics(
     motions = _motions(joints, dq, ddq, [tape.constant(g) for g in gravity])
     forces: list[Vector] = []
     moments: list[Vector] = []
+    torques = list(zeros)
+    waiting = np.bincount(tree.parents[tree.parents >= 0], minlength=tree.n_bodies).tolist()
     for body, motion in enumerate(motions):
         if parameters is None:
             own = _parameters(tape, body, parameters_used)
@@ -301,16 +303,19 @@ def trace_inverse_dynamics(
             moment = _add(moment, _scale(value, column))
         forces.append(force)
         moments.append(moment)
-    torques = list(zeros)
-    for body in range(tree.n_bodies - 1, -1, -1):
-        joint, force, moment = joints[body], forces[body], moments[body]
-        along = _dot(joint.axis, force if joint.prismatic else moment)
-        torques[joint.coordinate] = torques[joint.coordinate] + joint.multiplier * along
-        if joint.parent >= 0:
-            force, moment = joint.rotation.to_parent(force), joint.rotation.to_parent(moment)
-            moment = _add(moment, _cross(joint.position, force))
-            forces[joint.parent] = _add(forces[joint.parent], force)
-            moments[joint.parent] = _add(moments[joint.parent], moment)
+        # A body is done with as soon as all behind it are: its values leave the cache early.
+        done = body
+        while done >= 0 and waiting[done] == 0:
+            joint, force, moment = joints[done], forces[done], moments[done]
+            along = _dot(joint.axis, force if joint.prismatic else moment)
+            torques[joint.coordinate] = torques[joint.coordinate] + joint.multiplier * along
+            done = joint.parent
+            if done >= 0:
+                force, moment = joint.rotation.to_parent(force), joint.rotation.to_parent(moment)
+                moment = _add(moment, _cross(joint.position, force))
+                forces[done] = _add(forces[done], force)
+                moments[done] = _add(moments[done], moment)
+                waiting[done] -= 1
     return Program(tape, {(i,): t for i, t in enumerate(torques)}, (tree.n_joints,))
 
 

@@ -258,7 +258,7 @@ class Robot:
         --------
         >>> from skidyn.datasets import load_scara
         >>> load_scara().inverse_dynamics([[0, 0, 0, 0]], [[0, 0, 0, 0]], [[0, 0, 1, 0]]).round(2)
-        array([[ 0.  ,  0.  , 16.21,  0.  ]])
+        array([[ 0.  ,  0.  , 16.22,  0.  ]])
         """
         if backend not in ("numpy", "compiled"):
             raise SkidynError(f"backend is {backend!r}; expected 'numpy' or 'compiled'.")

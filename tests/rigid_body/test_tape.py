@@ -69,10 +69,13 @@ def test_program_text_is_plain_python():
     np.testing.assert_allclose(torque, load_scara().inverse_dynamics(q, dq, ddq)[0], atol=1e-12)
 
 
-def test_chunks_are_even():
-    assert chunk_size(0, 4096) == 64
-    assert chunk_size(50_000, 4096) * round(50_000 / 4096) - 50_000 < 64 * 12
-    assert chunk_size(100, 4096) == 128
+@pytest.mark.parametrize(("n_samples", "limit"), [(0, 64), (100, 128), (50_000, 4096), (7, 3)])
+def test_chunks_are_even_and_within_the_limit(n_samples, limit):
+    size = chunk_size(n_samples, limit)
+    assert size <= limit
+    assert (
+        size * max(1, -(-n_samples // size)) - n_samples < 64 * max(1, -(-n_samples // limit)) + 64
+    )
 
 
 def test_right_angles_are_not_snapped():
