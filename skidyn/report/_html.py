@@ -48,7 +48,7 @@ def render_html(summary: dict[str, Any]) -> str:
     environment = jinja2.Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
-    environment.filters.update(number=_number, percent=_percent, words=_words)
+    environment.filters.update(number=_number, percent=_percent, change=_change, words=_words)
     markup = environment.from_string(_resource("page.html.jinja"))
     report = summary["report"]
     causes = _causes(summary["budget"])
@@ -85,6 +85,12 @@ def _number(value: Any) -> str:
 
 def _percent(value: float | None) -> str:
     return "–" if value is None else f"{100 * value:.0f} %"
+
+
+def _change(ratio: float) -> str:
+    """Relative change in per cent, with a sign only where something changed."""
+    rounded = round(100 * ratio)
+    return f"{rounded:+d} %".replace("-", "−") if rounded else "0 %"
 
 
 def _words(kind: str) -> str:
@@ -161,9 +167,11 @@ def _plots(summary: dict[str, Any]) -> dict[str, Any]:
             }
         )
     starts = summary["traces"][0]["starts"] if joints else []
-    failing = list(dict.fromkeys(failure["joint"] - 1 for failure in summary["failures"]))
-    added = bool(summary["findings"])
-    return {"joints": joints, "starts": starts, "shown": failing[:2] or [0], "added": added}
+    found = [joint - 1 for finding in summary["findings"] for joint in finding["joints"]]
+    failing = [failure["joint"] - 1 for failure in summary["failures"]]
+    # the first joints a reader wants to see
+    shown = list(dict.fromkeys(found + failing))[:2] or [0]
+    return {"joints": joints, "starts": starts, "shown": shown, "added": bool(found)}
 
 
 def _packed(values: list[float | None]) -> str:

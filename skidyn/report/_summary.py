@@ -88,7 +88,7 @@ def verdict_sentence(diagnosis: Diagnosis) -> str:
             "data."
         )
     named = [f for f in diagnosis.findings if f.kind != "unknown"]
-    parts = [f"{f.title} ({_joints(f.joints)})" for f in named]
+    parts = [f"{f.title} ({_joints(f.joints)}{_rivals(f.rivals)})" for f in named]
     text = ""
     if parts:
         text = f"{_and(parts)} {'is' if len(parts) == 1 else 'are'} missing."
@@ -113,6 +113,11 @@ def verdict_sentence(diagnosis: Diagnosis) -> str:
 def _joints(joints: Any) -> str:
     numbers = [str(j) for j in joints]
     return f"joint {numbers[0]}" if len(numbers) == 1 else f"joints {_and(numbers)}"
+
+
+def _rivals(kinds: Any) -> str:
+    """A name that the data do not settle is not said without its rivals."""
+    return f"; or {', '.join(kind.replace('_', ' ') for kind in kinds)}" if kinds else ""
 
 
 def _and(parts: list[str]) -> str:

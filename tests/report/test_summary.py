@@ -40,7 +40,7 @@ def test_missing_regimes_become_null(fakes):
 def test_verdict_is_said_in_words(fakes):
     assert "Nothing significant" in summarize(fakes.make_diagnosis("complete"))["verdict_sentence"]
     missing = summarize(fakes.make_diagnosis("missing"))["verdict_sentence"]
-    assert missing.startswith("Dahl friction (joints 1 and 2) and Spring (joint 3) are missing.")
+    assert missing.startswith("Dahl friction (joints 1 and 2; or lugre, stribeck) and ")
     unknown = summarize(fakes.make_diagnosis("unknown"))["verdict_sentence"]
     assert "Something that depends on q1 and q3 is also missing on joint 2" in unknown
 
