@@ -36,7 +36,7 @@ class Robot:
     it. All methods take joint positions ``q`` (rad, m), velocities ``dq`` and accelerations ``ddq``
     of shape (n_samples, n_joints) and are batched over the samples.
 
-    Attributes
+    Parameters
     ----------
     name : str
         Name in the URDF.
@@ -62,6 +62,10 @@ class Robot:
     inertial_parameters : ndarray of shape (n_bodies, 10)
         ``(m, m cx, m cy, m cz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz)`` in the frame of the body and about
         its origin; kg, kg m, kg m^2.
+    tree : KinematicTree
+        Placement and axis of every body, for the recursions.
+    links : dict of str to LinkPlacement
+        All links of the URDF: the body that carries them (-1: the base) and their pose in its frame.
 
     References
     ----------
@@ -276,19 +280,60 @@ class Robot:
     def gravity_torque(
         self, q: Any, *, parameters: Any = None, gravity: Sequence[float] | None = None
     ) -> np.ndarray:
-        """Joint torques that hold the robot at rest, shape (n_samples, n_joints), N m or N."""
+        """Joint torques that hold the robot at rest.
+
+        Parameters
+        ----------
+        q : array-like of shape (n_samples, n_joints)
+            Positions, rad or m.
+        parameters : array-like of shape (n_bodies, 10), default=None
+            Inertial parameters in place of those of the URDF.
+        gravity : sequence of 3 floats, default=None
+            Gravitational acceleration in the base frame in place of the robot's, m/s^2.
+
+        Returns
+        -------
+        ndarray of shape (n_samples, n_joints)
+            N m; N for prismatic joints.
+        """
         return self._engine.inverse_dynamics(
             self._signals(q=q), gravity, parameters=self._parameters(parameters)
         )
 
     def coriolis_torque(self, q: Any, dq: Any, *, parameters: Any = None) -> np.ndarray:
-        """Centrifugal and Coriolis torques, shape (n_samples, n_joints), N m or N."""
+        """Centrifugal and Coriolis torques.
+
+        Parameters
+        ----------
+        q, dq : array-like of shape (n_samples, n_joints)
+            Positions (rad, m) and velocities.
+        parameters : array-like of shape (n_bodies, 10), default=None
+            Inertial parameters in place of those of the URDF.
+
+        Returns
+        -------
+        ndarray of shape (n_samples, n_joints)
+            N m; N for prismatic joints.
+        """
         return self._engine.inverse_dynamics(
             self._signals(q=q, dq=dq), (0.0, 0.0, 0.0), parameters=self._parameters(parameters)
         )
 
     def mass_matrix(self, q: Any, *, parameters: Any = None) -> np.ndarray:
-        """Joint-space inertia matrix, shape (n_samples, n_joints, n_joints), kg m^2 (kg m, kg)."""
+        """Joint-space inertia matrix.
+
+        Parameters
+        ----------
+        q : array-like of shape (n_samples, n_joints)
+            Positions, rad or m.
+        parameters : array-like of shape (n_bodies, 10), default=None
+            Inertial parameters in place of those of the URDF.
+
+        Returns
+        -------
+        ndarray of shape (n_samples, n_joints, n_joints)
+            Symmetric; kg m^2, with kg m and kg where prismatic joints take part.
+        """
         return self._engine.mass_matrix(self._signals(q=q), self._parameters(parameters))
 
     def forward_dynamics(self, q: Any, dq: Any, tau: Any, *, parameters: Any = None) -> np.ndarray:
@@ -417,9 +462,19 @@ class Robot:
     def inverse_dynamics_torch(
         self, q: torch.Tensor, dq: torch.Tensor, ddq: torch.Tensor, parameters: Any = None
     ) -> torch.Tensor:
-        """Differentiable :meth:`inverse_dynamics` for tensors of shape (n_samples, n_joints).
+        """Differentiable :meth:`inverse_dynamics`, in the precision and on the device of ``q``.
 
-        Works in the precision and on the device of ``q``; ``parameters`` may require gradients.
+        Parameters
+        ----------
+        q, dq, ddq : Tensor of shape (n_samples, n_joints)
+            Positions (rad, m), velocities and accelerations.
+        parameters : Tensor of shape (n_bodies, 10), default=None
+            Inertial parameters in place of those of the URDF; may require gradients.
+
+        Returns
+        -------
+        Tensor of shape (n_samples, n_joints)
+            N m; N for prismatic joints.
         """
         signals = {"q": q, "dq": dq, "ddq": ddq}
         return self._engine.inverse_dynamics_torch(signals, parameters)
@@ -427,11 +482,33 @@ class Robot:
     def torque_regressor_torch(
         self, q: torch.Tensor, dq: torch.Tensor, ddq: torch.Tensor
     ) -> torch.Tensor:
-        """Differentiable :meth:`torque_regressor`, shape (n_samples, n_joints, 10 * n_bodies)."""
+        """Differentiable :meth:`torque_regressor`, in the precision and on the device of ``q``.
+
+        Parameters
+        ----------
+        q, dq, ddq : Tensor of shape (n_samples, n_joints)
+            Positions (rad, m), velocities and accelerations.
+
+        Returns
+        -------
+        Tensor of shape (n_samples, n_joints, 10 * n_bodies)
+            Joint torque per unit of every inertial parameter.
+        """
         return self._engine.torque_regressor_torch({"q": q, "dq": dq, "ddq": ddq})
 
     def fixed_program(self, parameters: Any = None) -> Program:
-        """Inverse dynamics with the numbers of the parameters written in, for exporters."""
+        """Inverse dynamics as a list of operations with the parameters written in, for exporters.
+
+        Parameters
+        ----------
+        parameters : array-like of shape (n_bodies, 10), default=None
+            Inertial parameters in place of those of the URDF.
+
+        Returns
+        -------
+        Program
+            Operations, the inputs ``q``, ``dq``, ``ddq`` and the outputs ``(joint,)``.
+        """
         values = self._parameters(parameters)
         return self._engine.fixed_inverse_dynamics(
             self.inertial_parameters if values is None else values

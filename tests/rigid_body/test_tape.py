@@ -73,9 +73,8 @@ def test_program_text_is_plain_python():
 def test_chunks_are_even_and_within_the_limit(n_samples, limit):
     size = chunk_size(n_samples, limit)
     assert size <= limit
-    assert (
-        size * max(1, -(-n_samples // size)) - n_samples < 64 * max(1, -(-n_samples // limit)) + 64
-    )
+    n_chunks = max(1, -(-n_samples // limit))
+    assert size * n_chunks < n_samples + 64 * (n_chunks + 1)
 
 
 def test_right_angles_are_not_snapped():
