@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Ask whether a learner beats the physics that a diagnosis completed.
+
+    SKIDYN_DATA=... python benchmarks/papers/learners_on_physics.py
+
+Held-out recordings (parts of the path for the Panda, blocks for EMPS) of four logs; RMSE of every
+combination relative to the plain physics, and the learner against its own physics with a 95 %
+interval over recordings. The UR10e is in ``paper_001.py``. The practice logs are simulated; they
+are found beside the recordings (``../practice``).
+"""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import json
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from _common import (
+    BASE,
+    COMPLETE,
+    DAHL,
+    PANDA_PERIOD,
+    LinearPhysics,
+    data_dir,
+    load_emps,
+    load_panda,
+    make_log,
+)
+from sklearn.base import clone
+
+from skidyn.committee import ELMCommittee
+from skidyn.hybrid import HybridRegressor
+from skidyn.metrics import paired_comparison, trajectory_errors
+from skidyn.model_selection import PhaseKFold, TrajectoryKFold
+from skidyn.neural_network import LSTMRegressor
+from skidyn.robots import Robot
+
+
+def load_practice(case: str) -> tuple[Robot, pd.DataFrame, np.ndarray, tuple]:
+    """Robot, X, torque and base effects of a simulated log."""
+    folder = data_dir().parent / "practice" / "cases" / case
+    frame = pd.read_parquet(folder / "log.parquet")
+    meta = json.loads((folder / "meta.json").read_text())
+    runs = []
+    for _, run in frame.groupby("trajectory"):
+        signals = [run.filter(regex=rf"^{s}\d+$").to_numpy() for s in ("q", "dq", "tau")]
+        runs.append((run["time"].to_numpy(), *signals))
+    rate = float(meta["nominal_rate_hz"])
+    X, y = make_log(runs, rate=rate, cutoff=10.0, torque_cutoff=10.0, keep_every=2)
+    effects = tuple((kind, ()) for kind in meta["base_model"] if kind != "rigid_body")
+    return Robot.from_urdf(folder / "robot.urdf"), X, y, effects
+
+
+def compare(
+    title: str, robot: Robot, X: Any, y: Any, base: tuple, completed: tuple, cv: Any, inner: Any
+) -> None:
+    print(f"\n**{title}** ({len(X)} rows, {y.shape[1]} joints)\n")
+    folds = list(cv.split(X, y))
+    unit = X["trajectory"].to_numpy()
+    if len(np.unique(unit)) == 1:
+        unit = np.zeros(len(X), dtype=int)
+        for k, (_, test) in enumerate(folds):
+            unit[test] = k
+    network = LSTMRegressor(max_epochs=15, batch_size=8, random_state=0)
+    learners = {
+        "own joints": None,
+        "ELM": ELMCommittee(p=0.9, random_state=0),
+        "LSTM": network,
+    }
+    first = None
+    for physics_name, effects in (("BASE", base), ("completed", completed)):
+        physics = LinearPhysics(robot, effects)
+        own = None
+        for learner_name, learner in {"": "none", **learners}.items():
+            model: Any = physics
+            if learner_name:
+                model = HybridRegressor(physics, learner, cv=inner)
+            prediction = np.zeros_like(y)
+            kept = []
+            for train, test in folds:
+                fitted = clone(model).fit(X.iloc[train], y[train])
+                prediction[test] = fitted.predict(X.iloc[test])
+                kept.append((getattr(fitted, "learned_weight_", np.zeros(1)) > 0).sum())
+            rmse = np.sqrt(((y - prediction) ** 2).mean(axis=0))
+            errors = trajectory_errors(y, prediction, unit)[1]
+            first = rmse if first is None else first
+            own = errors if own is None else own
+            name, against = physics_name, ""
+            if learner_name:
+                name += f" + {learner_name}"
+                against = f"   on its physics {paired_comparison(own, errors)}"
+                against += f"   joints kept {np.mean(kept):.1f}"
+            print(
+                f"{name:24s} mean RMSE {rmse.mean():.4f}   to BASE {(rmse / first).mean():.3f}"
+                f"{against}",
+                flush=True,
+            )
+
+
+def main() -> None:
+    robot, X, y = load_panda()
+    dahl = tuple(("dahl", (("presliding", width),)) for width in (0.01, 0.05, 0.2))
+    cv, inner = (PhaseKFold(n, period=PANDA_PERIOD) for n in (4, 5))
+    compare("Panda, parts of the path held out", robot, X, y, BASE, (*BASE, *dahl), cv, inner)
+
+    robot, X, y = load_emps()
+    short = tuple(("dahl", (("presliding", way),)) for way in (0.0003, 0.001, 0.005))
+    base = BASE[:3]
+    completed = (*base, ("asymmetric_friction", ()), *short)
+    compare("EMPS, 8 blocks", robot, X, y, base, completed, TrajectoryKFold(8), 7)
+
+    robot, X, y, base = load_practice("practice_33")
+    completed = (*base, *DAHL)
+    compare("Practice, Dahl friction", robot, X, y, base, completed, TrajectoryKFold(5), 5)
+
+    robot, X, y, base = load_practice("practice_20")
+    completed = (*base, *COMPLETE[4:])
+    title = "Practice, an effect of no known kind (completed: friction added in vain)"
+    compare(title, robot, X, y, base, completed, TrajectoryKFold(5), 5)
+
+
+if __name__ == "__main__":
+    main()
