@@ -5,13 +5,16 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
+import tempfile
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from skidyn._exceptions import SkidynError
+from skidyn._exceptions import LogWarning, SkidynError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -61,21 +64,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            options.run(options)
-        for text in dict.fromkeys(str(w.message) for w in caught if _is_ours(w)):
-            print(f"warning: {text}", file=sys.stderr)
+            try:
+                options.run(options)
+            finally:  # what is odd about a log often explains why it was refused
+                for text in dict.fromkeys(str(w.message) for w in caught if _is_ours(w)):
+                    print(f"warning: {text}", file=sys.stderr)
     except (SkidynError, OSError, ImportError) as error:
         print(f"skidyn {options.command}: {error}", file=sys.stderr)
         return BAD_INPUT
     except KeyboardInterrupt:
-        print("stopped; nothing was written", file=sys.stderr)
+        print("stopped; no file was left half written", file=sys.stderr)
         return STOPPED
     return DONE
 
 
 def _is_ours(caught: warnings.WarningMessage) -> bool:
-    from skidyn._exceptions import LogWarning
-
     return issubclass(caught.category, LogWarning)
 
 
@@ -140,6 +143,13 @@ def _add_diagnose(commands: Any) -> None:
     parser.add_argument("--effects", help="kinds to try, separated by commas (default: all)")
 
 
+def _with_joints(parser: Any, text: str) -> None:
+    # not `joints`: that is the option of the log, which a report records
+    parser.add_argument(
+        "--joints", "--on", dest="on", metavar="1,4", help=f"{text}, counted from 1"
+    )
+
+
 def _add_compare(commands: Any) -> None:
     parser = _command(
         commands, "compare", _compare, "print the held-out error by joint, trajectory and regime"
@@ -163,7 +173,7 @@ def _add_add(commands: Any) -> None:
     )
     parser.add_argument("--from", dest="report", required=True, help="report.json of diagnose")
     parser.add_argument("--effect", required=True, help="kind of the catalogue")
-    parser.add_argument("--on", help="joints counted from 1, separated by commas (default: all)")
+    _with_joints(parser, "joints that get the effect (default: all)")
     parser.add_argument("--out", metavar="JSON", help="write the parameters of the better model")
 
 
@@ -177,7 +187,7 @@ def _add_simulate(commands: Any) -> None:
     parser = _command(commands, "simulate", _simulate, "write a log that hides an effect")
     parser.add_argument("--robot", default="panda", help="embedded robot (default: %(default)s)")
     parser.add_argument("--effect", default="dahl", help="kind, or none (default: %(default)s)")
-    parser.add_argument("--on", help="joints counted from 1, separated by commas")
+    _with_joints(parser, "joints that have the effect (default: a suitable choice)")
     parser.add_argument("--noise", default="low", choices=("low", "high"))
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", required=True, metavar="LOG", help="file.csv or file.parquet")
@@ -221,7 +231,8 @@ def _compare(options: argparse.Namespace) -> None:
 def _identify(options: argparse.Namespace) -> None:
     model, frame, tau = _load(options)
     model.set_params(consistent=options.consistent)
-    model.fit(frame, tau)
+    with _working("Identifying", options):
+        model.fit(frame, tau)
     content = _parameters(model)
     if options.out:
         _write_json(options.out, content)
@@ -235,12 +246,12 @@ def _identify(options: argparse.Namespace) -> None:
 def _add(options: argparse.Namespace) -> None:
     from skidyn.effects import make_terms
 
-    report = json.loads(Path(options.report).read_text(encoding="utf-8"))
-    options = _recorded(report, options)
+    options = _recorded(options)
     model, frame, tau = _load(options)
+    robot = _robot(options)
     joints = _numbers(options.on)
     spec = options.effect if joints is None else (options.effect, joints)
-    terms = make_terms([spec], model.robot.n_joints)
+    terms = make_terms([spec], robot.n_joints)
     before = _run_diagnosis(model, frame, tau, options, kinds=()).rmse_before
     fitted = model.with_effects(terms).fit(frame, tau)
     better = model.with_effects(fitted.effect_terms_[-len(terms) :])
@@ -251,32 +262,38 @@ def _add(options: argparse.Namespace) -> None:
         _print_json({"before": before.tolist(), "after": after.tolist()})
         return
     print(f"held-out error with {options.effect} added (N m, N for sliders; sliding samples)")
-    for j, name in enumerate(model.robot.joint_names):
+    for j, name in enumerate(robot.joint_names):
         change = after[j] / before[j] - 1 if before[j] > 0 else 0.0
         print(f"  {name:24s} {before[j]:9.4g} -> {after[j]:9.4g}  ({change:+.0%})")
 
 
 def _report(options: argparse.Namespace) -> None:
-    report = json.loads(Path(options.report).read_text(encoding="utf-8"))
-    options = _recorded(report, options)
+    options = _recorded(options)
     model, frame, tau = _load(options)
     diagnosis = _run_diagnosis(model, frame, tau, options)
     _write_reports(diagnosis, None, options.html, _provenance(options))
-    print(f"written: {Path(options.html).resolve()}")
+    page = str(Path(options.html).resolve())
+    if options.json:
+        _print_json({"html": page})
+    else:
+        print(f"written: {page}")
 
 
 def _simulate(options: argparse.Namespace) -> None:
     from skidyn.datasets import make_hidden_effect_log
 
+    if Path(options.out).suffix not in (".csv", ".parquet"):
+        raise SkidynError(f"{options.out}: the log to write must end in .csv or .parquet")
     robot = _embedded(options.robot)
     effect = None if options.effect == "none" else options.effect
-    log = make_hidden_effect_log(
-        robot,
-        effect,
-        joints=_numbers(options.on),
-        noise=options.noise,
-        random_state=options.seed,
-    )
+    with _working("Simulating", options):
+        log = make_hidden_effect_log(
+            robot,
+            effect,
+            joints=_numbers(options.on),
+            noise=options.noise,
+            random_state=options.seed,
+        )
     _write_table(log.frame, options.out)
     truth = {"effect": log.effect, "joints": list(log.joints), "parameters": log.parameters}
     if options.json:
@@ -291,26 +308,32 @@ def _demo(options: argparse.Namespace) -> None:
     from skidyn.diagnosis import diagnose
     from skidyn.rigid_body import RBDRegressor
 
-    print("1. A Panda arm is simulated with two effects that no model below knows of. Two of its")
-    print("   trajectories are put aside: nothing is fitted to them.")
+    say = (lambda *words: None) if options.json else print
+    say("1. A Panda arm is simulated with two effects that no model below knows of. Two of its")
+    say("   trajectories are put aside: nothing is fitted to them.")
     log = load_demo_log()
     aside = log.X["trajectory"] >= log.X["trajectory"].max() - 1
     X, y, X_new, y_new = log.X[~aside], log.y[~aside], log.X[aside], log.y[aside]
     model = RBDRegressor(log.robot)
-    print("2. The model: rigid body, viscous and Coulomb friction. Where does it fail?")
-    diagnosis = diagnose(model, X, y)
+    say("2. The model: rigid body, viscous and Coulomb friction. Where does it fail?")
+    with _working("Searching for what is missing", options):
+        diagnosis = diagnose(model, X, y)
     for failure in diagnosis.failures[:3]:
-        print(f"   {failure.sentence}")
-    print("3. What is missing?")
+        say(f"   {failure.sentence}")
+    say("3. What is missing?")
     for finding in diagnosis.findings:
-        print(f"   {finding.sentence}")
-    print("4. Added and fitted again; error on the trajectories put aside (N m, whole motion):")
+        say(f"   {finding.sentence}")
+    say("4. Added and fitted again; error on the trajectories put aside (N m, whole motion):")
     before = _errors(model.fit(X, y), X_new, y_new)
     after = _errors(diagnosis.model, X_new, y_new)
     for name, a, b in zip(log.robot.joint_names, before, after, strict=True):
-        print(f"   {name:22s} {a:8.4f} -> {b:8.4f}  ({b / a - 1:+.0%})")
+        say(f"   {name:22s} {a:8.4f} -> {b:8.4f}  ({b / a - 1:+.0%})")
     _write_reports(diagnosis, None, options.html, {"log": "simulated by skidyn demo"})
-    print(f"5. The report: {Path(options.html).resolve()}")
+    page = str(Path(options.html).resolve())
+    if options.json:
+        kinds = [finding.kind for finding in diagnosis.findings]
+        _print_json({"found": kinds, "before": before, "after": after, "html": page})
+    say(f"5. The report: {page}")
 
 
 def _effects(options: argparse.Namespace) -> None:
@@ -388,11 +411,22 @@ def _numbers(text: str | None) -> list[int] | None:
         raise SkidynError(f"{text!r}: joints are numbers from 1, such as 1,4") from None
 
 
-def _recorded(report: dict[str, Any], options: argparse.Namespace) -> argparse.Namespace:
+def _recorded(options: argparse.Namespace) -> argparse.Namespace:
     """Options of the diagnosis that a report records, with those of this command."""
-    recorded = report.get("provenance", {}).get("options")
+    try:
+        report = json.loads(Path(options.report).read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise SkidynError(f"{options.report} is not a report of skidyn diagnose: {error}") from None
+    provenance = report.get("provenance") if isinstance(report, dict) else None
+    provenance = provenance if isinstance(provenance, dict) else {}
+    recorded = provenance.get("options")
     if not isinstance(recorded, dict) or "logs" not in recorded:
         raise SkidynError(f"{options.report} records no log; it must come from skidyn diagnose")
+    for name, digest in _hashes([*recorded["logs"], recorded["urdf"]]).items():
+        if digest != provenance.get("sha256", {}).get(name):
+            warnings.warn(
+                f"{name} has changed since {options.report} was written", LogWarning, stacklevel=2
+            )
     return argparse.Namespace(**{**recorded, **vars(options)})
 
 
@@ -408,7 +442,8 @@ def _run_diagnosis(
     # Without kinds nothing is searched: the model is only compared.
     settings = Settings(max_findings=0) if kinds == () else Settings()
     rate = getattr(options, "rate", None)
-    return diagnose(model, frame, tau, effects=kinds, rate=rate, settings=settings)
+    with _working("Comparing" if kinds == () else "Searching for what is missing", options):
+        return diagnose(model, frame, tau, effects=kinds, rate=rate, settings=settings)
 
 
 def _write_reports(
@@ -429,28 +464,53 @@ def _write_json(path: str, content: dict[str, Any]) -> None:
 
 
 def _write_table(frame: pd.DataFrame, path: str) -> None:
-    if path.endswith(".parquet"):
-        frame.to_parquet(path, index=False)
-    elif path.endswith(".csv"):
-        frame.to_csv(path, index=False)
-    else:
-        raise SkidynError(f"{path}: write .csv or .parquet")
+    """Write a log in one step: an interrupted run leaves the previous file whole."""
+    target = Path(path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    write = frame.to_parquet if target.suffix == ".parquet" else frame.to_csv
+    with tempfile.TemporaryDirectory(dir=target.parent, prefix=".skidyn-") as folder:
+        part = Path(folder, target.name)
+        write(part, index=False)
+        os.replace(part, target)
+
+
+@contextmanager
+def _working(text: str, options: argparse.Namespace) -> Iterator[None]:
+    """Show that long work goes on, where a person looks and rich is installed."""
+    if getattr(options, "json", False) or not sys.stderr.isatty():
+        yield
+        return
+    try:
+        from rich.console import Console
+    except ImportError:
+        print(f"{text} ...", file=sys.stderr)
+        yield
+        return
+    with Console(stderr=True).status(text):
+        yield
 
 
 def _provenance(options: argparse.Namespace) -> dict[str, Any]:
-    import hashlib
-
     from skidyn._version import versions
 
-    files = [*options.logs, options.urdf]
-    hashes = {}
-    for name in files:
-        path = Path(name)
-        if path.is_file():
-            hashes[name] = hashlib.sha256(path.read_bytes()).hexdigest()
+    # the path of the interpreter says nothing about the numbers, but much about its user
+    used = {name: version for name, version in versions().items() if name != "executable"}
     keep = ("logs", "urdf", "model", "nominal", "columns", "units", "joints", "rate", "effects")
     recorded = {k: getattr(options, k, None) for k in keep}
-    return {"versions": versions(), "sha256": hashes, "options": recorded}
+    hashes = _hashes([*options.logs, options.urdf])
+    return {"versions": used, "sha256": hashes, "options": recorded}
+
+
+def _hashes(files: Sequence[str]) -> dict[str, str]:
+    """SHA-256 of every file that is there."""
+    import hashlib
+
+    hashes = {}
+    for name in files:
+        if Path(name).is_file():
+            with open(name, "rb") as file:
+                hashes[name] = hashlib.file_digest(file, "sha256").hexdigest()
+    return hashes
 
 
 def _parameters(model: RBDRegressor) -> dict[str, Any]:
