@@ -34,6 +34,9 @@ if TYPE_CHECKING:
 #: a chunk no longer fit into the second-level cache.
 CHUNK = 6144
 
+#: Numbers that the outputs of a chunk may hold (64 MiB): matters from some twenty joints on.
+LARGEST = 2**23
+
 #: Up to this many samples are run one by one.
 FEW = 8
 
@@ -92,6 +95,11 @@ class Engine:
             return trace_mass_matrix(self.canonical.tree, self._structure)
         return {"pose": trace_pose, "jacobian": trace_jacobian}[kind](self.tree, *options)
 
+    def _chunk(self, n_samples: int, limit: int, *key: Any) -> int:
+        """Size of chunks whose outputs stay within a bound on memory."""
+        fitting = max(512, LARGEST // max(1, len(self.program(*key).outputs)))
+        return chunk_size(n_samples, min(limit, fitting))
+
     @contextmanager
     def _borrowed(self, chunk: int, dtype: Any, *key: Any) -> Iterator[BoundProgram]:
         """Program with buffers that nobody else uses meanwhile, kept for the next call."""
@@ -135,7 +143,7 @@ class Engine:
     ) -> np.ndarray:
         """Outputs of a program for all samples, samples first (a view of memory samples last)."""
         n_samples = len(signals["q"])
-        with self._borrowed(chunk_size(n_samples, CHUNK), dtype, *key) as bound:
+        with self._borrowed(self._chunk(n_samples, CHUNK, *key), dtype, *key) as bound:
             if parameters is not None:
                 bound.set_parameters(parameters)
             return evaluate_rows(bound, signals, n_samples, out)
@@ -145,7 +153,7 @@ class Engine:
     ) -> Iterator[tuple[slice, np.ndarray]]:
         """Yield ``(rows, outputs)``; the outputs are a view of a buffer that is used again."""
         n_samples = len(signals["q"])
-        with self._borrowed(chunk_size(n_samples, chunk), dtype, *key) as bound:
+        with self._borrowed(self._chunk(n_samples, chunk, *key), dtype, *key) as bound:
             for start in range(0, n_samples, bound.chunk):
                 rows = slice(start, min(start + bound.chunk, n_samples))
                 size = bound.run(signals, rows)

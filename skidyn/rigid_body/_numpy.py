@@ -77,6 +77,7 @@ class BoundProgram:
             else:
                 copies.append((key, scalar.index))
         last_use = {i: index for index in self._live for i in operands(self._nodes[index])}
+        copied = {index for _, index in copies}
         free: list[np.ndarray] = []
         for index in self._live:
             node = self._nodes[index]
@@ -90,7 +91,7 @@ class BoundProgram:
                         free.append(self._values[i])
             if index in targets:
                 row = self.outputs[targets[index]]
-                if index in last_use:
+                if index in last_use or index in copied:
                     self._reread.append(targets[index])
                 else:
                     self._final.append((len(self._calls), targets[index]))

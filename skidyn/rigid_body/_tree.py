@@ -42,6 +42,10 @@ class KinematicTree:
     multipliers: np.ndarray
     offsets: np.ndarray
 
+    def __post_init__(self) -> None:
+        for array in vars(self).values():
+            array.flags.writeable = False
+
     @property
     def n_bodies(self) -> int:
         """Number of moving bodies."""

@@ -65,7 +65,7 @@ class Robot:
     tree : KinematicTree
         Placement and axis of every body, for the recursions.
     links : dict of str to LinkPlacement
-        All links of the URDF: the body that carries them (-1: the base) and their pose in its frame.
+        All links of the URDF: the body that carries them (-1: the base) and their pose in it.
 
     References
     ----------

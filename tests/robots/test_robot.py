@@ -62,6 +62,20 @@ def test_regressor_chunks_equal_the_whole(n_samples):
     assert covered == n_samples
 
 
+def test_two_iterations_at_once_do_not_disturb_each_other():
+    robot = load_scara()
+    one, other = states(robot, 300, seed=1), states(robot, 300, seed=2)
+    pairs = zip(
+        robot.iter_torque_regressor(*one, chunk=100),
+        robot.iter_torque_regressor(*other, chunk=100),
+        strict=True,
+    )
+    expected_one, expected_other = robot.torque_regressor(*one), robot.torque_regressor(*other)
+    for (rows, a), (_, b) in pairs:
+        np.testing.assert_allclose(np.moveaxis(a, -1, 0), expected_one[rows], atol=1e-12)
+        np.testing.assert_allclose(np.moveaxis(b, -1, 0), expected_other[rows], atol=1e-12)
+
+
 def test_regressor_into_given_memory():
     robot = load_scara()
     q, dq, ddq = states(robot)
@@ -79,6 +93,15 @@ def test_float32_error_is_as_stated():
     exact, single = (robot.inverse_dynamics(q, dq, ddq, dtype=t) for t in (float, np.float32))
     assert single.dtype == np.float32
     assert np.abs(single - exact).max() < 2e-6 * np.abs(exact).max()
+
+
+@pytest.mark.parametrize("n_samples", [1, 100, 7000])
+def test_given_memory_of_full_chunks_and_a_remainder(n_samples):
+    robot = load_panda()
+    q, dq, ddq = states(robot, n_samples)
+    Y = robot.torque_regressor(q, dq, ddq, out=np.full((7, 70, n_samples), np.nan))
+    tau = robot.inverse_dynamics(q, dq, ddq)
+    np.testing.assert_allclose(Y @ robot.inertial_parameters.ravel(), tau, atol=1e-10)
 
 
 def test_other_gravity_is_felt_linearly():
@@ -126,6 +149,8 @@ def test_robot_is_immutable():
             immutable.name = "other"
         with pytest.raises(ValueError, match="read-only"):
             immutable.inertial_parameters[0, 0] = 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        robot.tree.axes[0] = 1.0
 
 
 def test_representations():
@@ -171,6 +196,22 @@ def test_wrong_arguments_are_named(call, message):
     robot = load_planar_arm()
     with pytest.raises(ValueError, match=message):
         call(robot, states(robot)[0])
+
+
+def test_long_chain():
+    """A chain of 200 equal pendulums, each hanging on the one before."""
+    parts = ['<robot name="chain"><link name="l0"/>']
+    for i in range(200):
+        parts.append(
+            f'<link name="l{i + 1}"><inertial><mass value="1"/></inertial></link>'
+            f'<joint name="j{i}" type="continuous"><parent link="l{i}"/><child link="l{i + 1}"/>'
+            '<origin xyz="0 0.1 0"/></joint>'
+        )
+    robot = Robot.from_urdf("".join([*parts, "</robot>"]))
+    torque = robot.gravity_torque(np.zeros((2, 200)))[0]
+    # Bodies k, k+1, .. 199 hang 0, 0.1, .. m out from joint k; turning about x lifts them.
+    expected = [9.81 * 0.1 * sum(range(200 - k)) for k in range(200)]
+    np.testing.assert_allclose(torque, expected, rtol=1e-12)
 
 
 def test_massless_joint_has_no_forward_dynamics():
