@@ -138,6 +138,57 @@ def budget_bars(budget: Sequence[dict[str, Number]], causes: Sequence[str]) -> l
     return rows
 
 
+def map_chart(table: dict[str, Any], width: int = 460, height: int = 320) -> dict[str, Any]:
+    """Tiles coloured by a value: blue where negative, orange where positive.
+
+    Parameters
+    ----------
+    table : dict
+        ``x`` and ``y`` (edges) and ``table``, as from the maps of a finding.
+    width, height : int
+        Size in pixels.
+
+    Returns
+    -------
+    dict
+        Tiles with their colours, ticks, colour scale and the largest absolute value.
+    """
+    left, right, top, bottom = 56, width - 74, 10, height - 42
+    x = Scale(table["x"][0], table["x"][-1], left, right)
+    y = Scale(table["y"][0], table["y"][-1], bottom, top)
+    values = [v for row in table["table"] for v in row if v is not None]
+    largest = max((abs(v) for v in values), default=0.0) or 1.0
+    tiles = []
+    for i, row in enumerate(table["table"]):
+        for k, value in enumerate(row):
+            if value is None:
+                continue
+            x0, x1, y0, y1 = (x(table["x"][k]), x(table["x"][k + 1]),
+                              y(table["y"][i]), y(table["y"][i + 1]))  # fmt: skip
+            # a hair wider than the tile, so that no seams show
+            size = {"width": round(x1 - x0 + 0.4, 1), "height": round(y0 - y1 + 0.4, 1)}
+            fill = _diverging(value / largest)
+            tiles.append({"x": x0, "y": y1, **size, "fill": fill, "title": f"{value:.4g}"})
+    step = (bottom - top) / 21
+    scale = [
+        {"y": round(top + k * step, 1), "height": round(step + 0.4, 1),
+         "fill": _diverging(1 - k / 10)}
+        for k in range(21)
+    ]  # fmt: skip
+    return {
+        "left": left, "right": right, "top": top, "bottom": bottom, "width": width,
+        "height": height, "tiles": tiles, "scale": scale, "largest": largest,
+        "x_ticks": x.ticks(6), "y_ticks": y.ticks(5),
+    }  # fmt: skip
+
+
+def _diverging(share: float) -> str:
+    """Colour between blue (-1), pale grey (0) and orange (1), safe for colour-blind readers."""
+    end = (230, 126, 0) if share > 0 else (0, 96, 160)
+    mixed = [round(238 + (e - 238) * min(abs(share), 1.0)) for e in end]
+    return "#{:02x}{:02x}{:02x}".format(*mixed)
+
+
 def _line(xs: Sequence[Number], ys: Sequence[Number], x: Scale, y: Scale) -> str:
     """Path through the points, interrupted where a value is missing."""
     path, pen = [], "M"

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from skidyn._optional import import_optional
-from skidyn.report._charts import budget_bars, curve_chart, fall_chart
+from skidyn.report._charts import budget_bars, curve_chart, fall_chart, map_chart
 
 _VERDICTS = {
     "complete": ("✓", "The model is complete"),
@@ -48,7 +48,9 @@ def render_html(summary: dict[str, Any]) -> str:
     environment = jinja2.Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
-    environment.filters.update(number=_number, percent=_percent, change=_change, words=_words)
+    environment.filters.update(
+        number=_number, percent=_percent, change=_change, chance=_chance, words=_words
+    )
     markup = environment.from_string(_resource("page.html.jinja"))
     report = summary["report"]
     causes = _causes(summary["budget"])
@@ -94,7 +96,12 @@ def _change(ratio: float) -> str:
 
 
 def _words(kind: str) -> str:
-    return kind.replace("_", " ")
+    return "effect without a name" if kind == "unknown" else kind.replace("_", " ")
+
+
+def _chance(q_value: float | None) -> str:
+    """A q-value; digits far below what any model of the noise can promise are not shown."""
+    return "below 1e-15" if q_value is not None and q_value < 1e-15 else _number(q_value)
 
 
 def _parts(summary: dict[str, Any]) -> list[tuple[str, str]]:
@@ -136,7 +143,8 @@ def _finding(finding: dict[str, Any]) -> dict[str, Any]:
                  "unit": p["unit"]}
             )  # fmt: skip
     charts = [{**curve, **curve_chart(curve)} for curve in finding["curves"]]
-    return {**finding, "rows": rows, "charts": charts}
+    maps = [{**table, **map_chart(table)} for table in finding["maps"]]
+    return {**finding, "rows": rows, "charts": charts, "maps": maps}
 
 
 def _falls(report: dict[str, Any]) -> list[dict[str, Any]]:
@@ -149,7 +157,7 @@ def _falls(report: dict[str, Any]) -> list[dict[str, Any]]:
 
 def _causes(budget: list[dict[str, float]]) -> list[str]:
     """Causes in the order they were added; the unexplained and the noise last."""
-    seen = list(dict.fromkeys(cause for shares in budget for cause in shares))
+    seen = list(dict.fromkeys(c for shares in budget for c in shares if (shares[c] or 0) >= 0.005))
     last = [cause for cause in ("unexplained", "noise") if cause in seen]
     return [cause for cause in seen if cause not in last] + last
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from skidyn._version import versions
 from skidyn.report._decimate import rows_with_peaks
+from skidyn.report._maps import residual_maps
 from skidyn.report._plain import plain
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ BUCKETS = 3000
 def summarize(
     diagnosis: Diagnosis,
     *,
-    title: str = "Robot inverse dynamics",
+    title: str | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Everything that the report page shows, as a dictionary of JSON values.
@@ -32,8 +33,8 @@ def summarize(
     ----------
     diagnosis : Diagnosis
         From :func:`skidyn.diagnosis.diagnose`.
-    title : str, default="Robot inverse dynamics"
-        Heading of the page, for example the name of the robot.
+    title : str, optional
+        Heading of the page; the name of the robot by default.
     provenance : mapping, optional
         Where the numbers come from: files with their hashes, options. Versions are added.
 
@@ -59,7 +60,7 @@ def summarize(
     return plain(
         {
             "report": report,
-            "title": title,
+            "title": title or getattr(signals.robot, "name", "") or "Robot inverse dynamics",
             "verdict_sentence": verdict_sentence(diagnosis),
             "units": units,
             "n_samples": signals.n_samples,
@@ -70,7 +71,7 @@ def summarize(
             "error_map": diagnosis.error_map(),
             "findings": [
                 {**finding.to_dict(), "title": finding.title, "code": finding.code,
-                 "curves": finding.curves}
+                 "curves": finding.curves, "maps": residual_maps(diagnosis, finding)}
                 for finding in diagnosis.findings
             ],
             "budget": diagnosis.budget,

@@ -248,10 +248,7 @@
   dark.addEventListener("change", redraw);
   window.addEventListener("resize", redraw);
   // Paper is white: styles switch by themselves, canvases must be drawn again, and at once.
-  window.addEventListener("beforeprint", () => {
-    for (const part of document.querySelectorAll("details")) part.open = true;
-    drawAll();
-  });
+  window.addEventListener("beforeprint", drawAll);
   window.matchMedia("print").addEventListener("change", drawAll);
   window.addEventListener("afterprint", redraw);
   arrange();
