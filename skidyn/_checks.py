@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 import warnings
 from collections.abc import Sequence
@@ -20,8 +21,11 @@ SIGNAL_COLUMN = re.compile(r"(q|dq|ddq|tau|temp)(\d+)")
 
 
 def warn_about_log(message: str) -> None:
-    """Issue a LogWarning that points at the caller of the public function."""
-    warnings.warn(message, LogWarning, stacklevel=3)
+    """Issue a LogWarning that points at the line outside skidyn that led to it."""
+    level, frame = 1, inspect.currentframe()
+    while frame is not None and frame.f_globals.get("__name__", "").startswith("skidyn."):
+        level, frame = level + 1, frame.f_back
+    warnings.warn(message, LogWarning, stacklevel=level)
 
 
 def count_joints(frame: pd.DataFrame, source: str = "the log") -> int:

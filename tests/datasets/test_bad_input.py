@@ -284,6 +284,7 @@ def test_broken_containers(tmp_path):
             read_log(tmp_path / name)
 
 
-def test_warnings_point_at_what_check_log_found(saved):
-    with pytest.warns(LogWarning, match="single trajectory"):
+def test_suspicions_are_issued_as_warnings(saved):
+    with pytest.warns(LogWarning, match="single trajectory") as caught:
         read_log(saved(LOG[LOG["trajectory"] == 0]), robot=ROBOT)
+    assert caught[0].filename == __file__  # at the caller's line, not inside skidyn
