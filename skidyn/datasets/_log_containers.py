@@ -59,7 +59,9 @@ def read_hdf5_channels(path: Path, max_bytes: int, topics: Sequence[str] | None)
 def read_matlab_channels(path: Path, max_bytes: int, topics: Sequence[str] | None) -> list[Channel]:
     """Read a MATLAB file: variables of one length, also inside one level of structs."""
     check_size(path, path.stat().st_size, max_bytes)
-    if path.read_bytes()[:4] == b"\x89HDF" or b"MATLAB 7.3" in path.read_bytes()[:128]:
+    with path.open("rb") as file:
+        head = file.read(128)
+    if head.startswith(b"\x89HDF") or b"MATLAB 7.3" in head:
         return read_hdf5_channels(path, max_bytes, topics)
     from scipy.io import loadmat
     from scipy.io.matlab import MatReadError

@@ -57,7 +57,7 @@ class JointQuality:
         Velocity against differentiated position; both are 1 in a consistent log.
     torque_delay : float, s
         Time by which torque lags motion (positive: torque is late); NaN where it cannot be told.
-        Pre-sliding friction looks like a lag of its joint; a delay of the recording is alike in all.
+        Pre-sliding friction looks like a lag of its joint; a delay is alike in all joints.
     excited : bool
         Whether the joint moves enough for its own parameters to be identified.
     """

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,11 +27,15 @@ def read_mcap_channels(path: Path, max_bytes: int, topics: Sequence[str] | None)
     try:
         with path.open("rb") as file:
             source = reader.make_reader(file, decoder_factories=[decoder.DecoderFactory()])
+            summary = source.get_summary()
+            held = {}
+            if summary is not None:  # an unfinished file has none; then every message is decoded
+                schemas = {k: schema.name for k, schema in summary.schemas.items()}
+                held = {c.topic: schemas.get(c.schema_id, "") for c in summary.channels.values()}
+            wanted = _wanted(held, topics, path) if held else topics
             messages = (
                 (channel.topic, schema.name, message.log_time, decoded)
-                for schema, channel, message, decoded in source.iter_decoded_messages(
-                    topics=list(topics) if topics else None
-                )
+                for schema, channel, message, decoded in source.iter_decoded_messages(topics=wanted)
             )
             return _channels(messages, path, topics)
     except exceptions.McapError as error:
@@ -48,13 +52,12 @@ def read_bag_channels(path: Path, max_bytes: int, topics: Sequence[str] | None) 
     check_size(path, sum(item.stat().st_size for item in files), max_bytes)
     try:
         with highlevel.AnyReader([folder], default_typestore=_typestore()) as reader:
-            wanted = [c for c in reader.connections if topics is None or c.topic in topics]
-            if not wanted:
-                wanted = reader.connections
+            held = {c.topic: c.msgtype for c in reader.connections}
+            wanted = _wanted(held, topics, path)
+            chosen = [c for c in reader.connections if c.topic in wanted]
             messages = (
                 (c.topic, c.msgtype, stamp, reader.deserialize(raw, c.msgtype))
-                for c, stamp, raw in reader.messages(connections=wanted)
-                if topics is not None or _is_joint_state(c.msgtype)
+                for c, stamp, raw in reader.messages(connections=chosen)
             )
             return _channels(messages, path, topics)
     except highlevel.AnyReaderError as error:
@@ -77,6 +80,23 @@ def _bare_database(path: Path) -> Iterator[Message]:
             raise LogError(f"{path}: not a ROS 2 bag: {error}") from error
 
 
+def _wanted(held: Mapping[str, str], topics: Sequence[str] | None, path: Path) -> list[str]:
+    """Topics to read: those asked for, or all with joint states."""
+    wanted = [
+        topic
+        for topic, kind in held.items()
+        if (topic in topics if topics is not None else _is_joint_state(kind))
+    ]
+    if not wanted:
+        asked = "sensor_msgs/JointState" if topics is None else f"topic {', '.join(topics)}"
+        kinds = ", ".join(f"{topic} ({kind})" for topic, kind in held.items()) or "nothing"
+        raise LogError(
+            f"{path} holds no {asked}. It holds {kinds}. Choose with topics=[...] and name the "
+            "fields of other messages in columns."
+        )
+    return wanted
+
+
 def _typestore() -> Any:
     typesys = import_optional("rosbags.typesys", extra="io")
     return typesys.get_typestore(typesys.Stores.LATEST)
@@ -91,9 +111,7 @@ def _channels(
 ) -> list[Channel]:
     """One channel per topic and set of joints; times in s from the first message."""
     rows: dict[tuple[str, tuple[str, ...]], list[tuple[int, dict[str, float]]]] = {}
-    seen: dict[str, str] = {}
     for topic, kind, recorded, message in messages:
-        seen[topic] = kind
         if topics is not None and topic not in topics:
             continue
         if _is_joint_state(kind):
@@ -105,11 +123,7 @@ def _channels(
         key = topic, tuple(values)
         rows.setdefault(key, []).append((_stamp(message, recorded), values))
     if not rows:
-        kinds = ", ".join(f"{topic} ({kind})" for topic, kind in seen.items()) or "no messages"
-        raise LogError(
-            f"{path} holds no sensor_msgs/JointState{' in ' + ', '.join(topics) if topics else ''}"
-            f". It holds {kinds}. Choose others with topics=[...] and name their fields in columns."
-        )
+        raise LogError(f"{path} holds no messages to read.")
     start = min(stamps[0][0] for stamps in rows.values())
     channels = []
     for (topic, names), samples in rows.items():

@@ -291,3 +291,30 @@ def test_dates_become_seconds(tmp_path):
     dated = source.assign(time=pd.to_datetime(source["time"] + 1.6e9, unit="s"))
     dated.to_csv(tmp_path / "log.csv", index=False)
     np.testing.assert_allclose(quiet_read(tmp_path / "log.csv")["time"], source["time"], atol=1e-6)
+
+
+def test_other_messages_by_topic_and_mapping(tmp_path):
+    pytest.importorskip("rosbags")
+    from rosbags.rosbag2 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.LATEST)
+    array, layout = (
+        store.types[f"std_msgs/msg/{n}"] for n in ("Float64MultiArray", "MultiArrayLayout")
+    )
+    source = table(60)
+    with Writer(tmp_path / "bag", version=9) as bag:
+        connection = bag.add_connection("/drive", array.__msgtype__, typestore=store)
+        for row in source.itertuples(index=False):
+            message = array(layout([], 0), np.array(row[1:]))
+            raw = store.serialize_cdr(message, array.__msgtype__)
+            bag.write(connection, round(row.time * 1e9), raw)
+    with pytest.raises(LogError, match=r"no sensor_msgs/JointState. It holds /drive \(std_msgs"):
+        read_log(tmp_path / "bag")
+    columns = {
+        "q": ["data[0]", "data[3]"],
+        "dq": ["data[1]", "data[4]"],
+        "tau": ["data[2]", "data[5]"],
+    }
+    frame = quiet_read(tmp_path / "bag", topics=["/drive"], columns=columns)
+    assert_same(frame, source)
