@@ -174,12 +174,13 @@ def _plots(summary: dict[str, Any]) -> dict[str, Any]:
                 **{key: _packed(trace[key]) for key in ("time", "measured", "before", "after")},
             }
         )
-    starts = summary["traces"][0]["starts"] if joints else []
+    starts = summary["traces"][0]["starts"]
+    end = max(trace["time"][-1] for trace in summary["traces"])
     found = [joint - 1 for finding in summary["findings"] for joint in finding["joints"]]
     failing = [failure["joint"] - 1 for failure in summary["failures"]]
     # the first joints a reader wants to see
     shown = list(dict.fromkeys(found + failing))[:2] or [0]
-    return {"joints": joints, "starts": starts, "shown": shown, "added": bool(found)}
+    return {"joints": joints, "starts": starts, "end": end, "shown": shown, "added": bool(found)}
 
 
 def _packed(values: list[float | None]) -> str:

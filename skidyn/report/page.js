@@ -6,15 +6,12 @@
   const plots = JSON.parse(document.getElementById("numbers").textContent);
   const panels = document.getElementById("panels");
   const unpack = (text) => {
-    const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+    const raw = atob(text), bytes = new Uint8Array(raw.length);
+    for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
     return new Float32Array(bytes.buffer);
   };
-  const joints = plots.joints.map((joint) => ({
-    name: joint.name, unit: joint.unit, breaks: new Set(joint.breaks),
-    time: unpack(joint.time), measured: unpack(joint.measured),
-    before: unpack(joint.before), after: unpack(joint.after), panel: null,
-  }));
-  const end = Math.max(...joints.map((joint) => joint.time[joint.time.length - 1]), 1e-9);
+  const joints = plots.joints;
+  const end = Math.max(plots.end, 1e-9);
   let view = [0, end];
   const shown = new Set(plots.shown);
   const LEFT = 58, RIGHT = 10, TOP = 8, GAP = 26, BOTTOM = 36;
@@ -52,6 +49,13 @@
     return [low - pad, high + pad];
   }
 
+  // All points on one column of pixels are one stroke from the lowest to the highest.
+  function flush(context, column) {
+    if (!column) return;
+    context.lineTo(column.px, column.low);
+    if (column.high !== column.low) { context.lineTo(column.px, column.high); context.lineTo(column.px, column.last); }
+  }
+
   // One set of axes with lines; the upper holds torque, the lower the residual.
   function axes(context, box, range, joint, lines, from, to, label) {
     const x = (t) => box.left + (t - view[0]) / (view[1] - view[0]) * box.width;
@@ -77,10 +81,21 @@
     for (const line of lines) {
       context.strokeStyle = colour(line.colour); context.lineWidth = line.width; context.setLineDash(line.dash);
       context.beginPath();
+      let column = null;
       for (let i = from; i < to; i++) {
-        const px = x(joint.time[i]), py = y(line.values(i));
-        if (i === from || joint.breaks.has(i)) context.moveTo(px, py); else context.lineTo(px, py);
+        const px = x(joint.time[i]), py = y(line.values(i)), here = Math.floor(px);
+        if (i === from || joint.breaks.has(i)) {
+          flush(context, column);
+          context.moveTo(px, py);
+          column = { at: here, px, low: py, high: py, last: py };
+        } else if (here === column.at) {
+          column.low = Math.min(column.low, py); column.high = Math.max(column.high, py); column.last = py;
+        } else {
+          flush(context, column);
+          column = { at: here, px, low: py, high: py, last: py };
+        }
       }
+      flush(context, column);
       context.stroke(); context.setLineDash([]);
     }
     context.restore();
@@ -100,7 +115,6 @@
     const from = Math.max(0, search(joint.time, view[0]) - 1);
     const to = Math.min(joint.time.length, search(joint.time, view[1]) + 1);
     const torque = extent([joint.measured, joint.before], from, to);
-    if (!joint.errors) joint.errors = ["before", "after"].map((k) => joint.measured.map((m, i) => m - joint[k][i]));
     const residual = extent(plots.added ? joint.errors : [joint.errors[0]], from, to);
     const line = (values, name, w, dash = []) => ({ values: (i) => values[i], colour: name, width: w, dash });
     const models = [line(joint.before, "--before", 1.4, [6, 3])];
@@ -181,6 +195,9 @@
     canvas.tabIndex = 0; canvas.setAttribute("role", "img");
     canvas.setAttribute("aria-label", `Measured and modelled torque of joint ${index + 1} over time, with the residual`);
     box.append(title, canvas, tip);
+    for (const key of ["time", "measured", "before", "after"]) joint[key] = unpack(joint[key]);
+    joint.breaks = new Set(joint.breaks);
+    joint.errors = ["before", "after"].map((key) => joint.measured.map((m, i) => m - joint[key][i]));
     joint.panel = { box, canvas, tip, drag: null, cursor: null };
     const position = (event) => event.clientX - canvas.getBoundingClientRect().left;
     const timeAt = (px) => view[0] + (px - LEFT) / (canvas.clientWidth - LEFT - RIGHT) * (view[1] - view[0]);
