@@ -117,7 +117,8 @@ def find_leaks(X: NDArray[Any], keys: Keys, folds: list[Any]) -> Bunch:
     shared: set[Any] = set()
     repeated = []
     for train, test in folds:
-        if keys.trajectory is not None:
+        # a single recording can only be shared; what counts is whether its motion is
+        if len(np.unique(trajectory)) > 1:
             shared |= set(np.intersect1d(trajectory[train], trajectory[test]).tolist())
         looked_at = test[:: max(1, len(test) // LOOKED_AT)]
         distance, _ = cKDTree(features[train]).query(features[looked_at], p=np.inf)
