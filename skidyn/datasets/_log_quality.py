@@ -60,6 +60,14 @@ class JointQuality:
         Pre-sliding friction looks like a lag of its joint; a delay is alike in all joints.
     excited : bool
         Whether the joint moves enough for its own parameters to be identified.
+
+    Examples
+    --------
+    >>> from skidyn.datasets import check_log, load_planar_arm, make_hidden_effect_log
+    >>> log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=2, duration=2.0)
+    >>> joint = check_log(log.frame).joints[0]
+    >>> joint.name, joint.excited, round(joint.velocity_slope, 2)
+    ('joint1', True, 1.0)
     """
 
     name: str
@@ -103,6 +111,13 @@ class LogQuality:
         One per joint.
     warnings : tuple of str
         What looks wrong, each with its evidence.
+
+    Examples
+    --------
+    >>> from skidyn.datasets import check_log, load_planar_arm, make_hidden_effect_log
+    >>> log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=1, duration=2.0)
+    >>> print(check_log(log.frame).warnings[0].partition(":")[0])
+    there is a single trajectory
     """
 
     n_samples: int
