@@ -69,6 +69,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             finally:  # what is odd about a log often explains why it was refused
                 for text in dict.fromkeys(str(w.message) for w in caught if _is_ours(w)):
                     print(f"warning: {text}", file=sys.stderr)
+    except BrokenPipeError:  # the reader, such as head, has seen enough
+        # what is still buffered must not raise again when Python shuts down
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except (SkidynError, OSError, ImportError) as error:
         print(f"skidyn {options.command}: {error}", file=sys.stderr)
         return BAD_INPUT

@@ -177,3 +177,11 @@ def test_runs_as_a_module():
         [sys.executable, "-m", "skidyn", "--version"], capture_output=True, text=True, check=True
     )
     assert done.stdout.startswith("skidyn ")
+
+
+def test_a_reader_that_stops_early_is_no_error():
+    words = [sys.executable, "-m", "skidyn", "effects", "--json"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        process.stdout.close()
+        errors = process.stderr.read()
+    assert (process.returncode, errors) == (cli.DONE, b"")
