@@ -55,6 +55,18 @@ def central_inertia(parameters: np.ndarray, body: str) -> CentralInertia | None:
     return CentralInertia(mass, center, (central + central.T) / 2)
 
 
+def parameters_of(robot: Robot, parameters: Any) -> np.ndarray:
+    """Given parameters, shape (n_bodies, 10), or those of the URDF."""
+    if parameters is None:
+        return robot.inertial_parameters
+    array = np.asarray(parameters, dtype=np.float64)
+    if array.size != 10 * robot.n_bodies or not np.all(np.isfinite(array)):
+        raise SkidynError(
+            f"parameters has shape {array.shape}; expected ({robot.n_bodies}, 10), all finite."
+        )
+    return array.reshape(robot.n_bodies, 10)
+
+
 def joint_vector(robot: Robot, values: Any, what: str, default: np.ndarray | None) -> np.ndarray:
     """One number per joint; zeros or the default where none is given."""
     if values is None:

@@ -6,14 +6,21 @@ from __future__ import annotations
 import re
 from typing import Any
 
-import numpy as np
-
 from skidyn._exceptions import SkidynError
+from skidyn.export._bodies import joint_vector
 from skidyn.rigid_body._source import renumber, statements
 from skidyn.robots import Robot
 
+#: What the coefficient of each term is multiplied by.
+_FACTORS = {
+    "viscous": "dq[{j}]",
+    "coulomb": "((dq[{j}] > 0.0) - (dq[{j}] < 0.0))",
+    "rotor_inertia": "ddq[{j}]",
+    "offset": "1.0",
+}
+
 _TEMPLATE = """\
-/* Joint torques of the rigid-body model of {robot}, without friction. Written by skidyn.
+/* Joint torques of a model of {robot}: {terms}. Written by skidyn.
  *
  * Joints: {joints}.
  * q in rad or m, dq in rad/s or m/s, ddq in rad/s^2 or m/s^2; tau in N m, in N for sliding joints.
@@ -28,7 +35,16 @@ void {name}(const double q[{n}], const double dq[{n}], const double ddq[{n}], do
 """
 
 
-def c_source(robot: Robot, *, parameters: Any = None, name: str = "skidyn_inverse_dynamics") -> str:
+def c_source(
+    robot: Robot,
+    *,
+    parameters: Any = None,
+    viscous: Any = None,
+    coulomb: Any = None,
+    rotor_inertia: Any = None,
+    offset: Any = None,
+    name: str = "skidyn_inverse_dynamics",
+) -> str:
     """Text of a C function that computes the torques of one sample.
 
     Parameters
@@ -37,6 +53,13 @@ def c_source(robot: Robot, *, parameters: Any = None, name: str = "skidyn_invers
         The robot.
     parameters : array-like of shape (n_bodies, 10), default=None
         Identified inertial parameters in place of those of the URDF; written into the text.
+    viscous, coulomb : array-like of shape (n_joints,), default=None
+        Friction ``viscous * dq + coulomb * sign(dq)``, N m s/rad (N s/m) and N m (N); ``sign(0)``
+        is 0. None is no friction.
+    rotor_inertia : array-like of shape (n_joints,), default=None
+        ``rotor_inertia * ddq``, kg m^2 (kg) on the joint side; None is none.
+    offset : array-like of shape (n_joints,), default=None
+        Constant torque, N m (N); None is none.
     name : str, default="skidyn_inverse_dynamics"
         Name of the function ``void name(const double *q, const double *dq, const double *ddq,
         double *tau)``.
@@ -62,11 +85,20 @@ def c_source(robot: Robot, *, parameters: Any = None, name: str = "skidyn_invers
         raise SkidynError(f"name is {name!r}; expected a C identifier such as 'robot_torque'.")
     program = robot.fixed_program(parameters)
     lines, outputs = statements(program, prefix="const double ", suffix=";")
-    lines += [f"tau[{key[0]}] = {value};" for key, value in outputs.items()]
+    added = joint_terms(
+        robot, viscous=viscous, coulomb=coulomb, rotor_inertia=rotor_inertia, offset=offset
+    )
+    for (j,), value in outputs.items():
+        text = [
+            value,
+            *(f"{values[j]!r} * {_FACTORS[k].format(j=j)}" for k, values in added.items()),
+        ]
+        lines.append(f"tau[{j}] = {' + '.join(text)};")
     unused = [x for x in ("q", "dq", "ddq") if not re.search(rf"\b{x}\[", "\n".join(lines))]
     lines[:0] = [f"(void){x};" for x in unused]
     return _TEMPLATE.format(
         robot=printable(robot.name),
+        terms=", ".join(["rigid bodies", *(name.replace("_", " ") for name in added)]),
         joints=printable(", ".join(robot.joint_names)),
         name=name,
         n=robot.n_joints,
@@ -74,18 +106,15 @@ def c_source(robot: Robot, *, parameters: Any = None, name: str = "skidyn_invers
     )
 
 
+def joint_terms(robot: Robot, **terms: Any) -> dict[str, list[float]]:
+    """Coefficients per joint of the terms that are given."""
+    return {
+        name: joint_vector(robot, values, name, None).tolist()
+        for name, values in terms.items()
+        if values is not None
+    }
+
+
 def printable(text: str) -> str:
     """Text that cannot end a comment, whatever a URDF calls its joints."""
     return re.sub(r"[^\w ,.\-]", "_", text)
-
-
-def parameters_of(robot: Robot, parameters: Any) -> np.ndarray:
-    """Given parameters, shape (n_bodies, 10), or those of the URDF."""
-    if parameters is None:
-        return robot.inertial_parameters
-    array = np.asarray(parameters, dtype=np.float64)
-    if array.size != 10 * robot.n_bodies or not np.all(np.isfinite(array)):
-        raise SkidynError(
-            f"parameters has shape {array.shape}; expected ({robot.n_bodies}, 10), all finite."
-        )
-    return array.reshape(robot.n_bodies, 10)

@@ -12,8 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from skidyn._exceptions import SkidynError
-from skidyn.export._bodies import central_inertia, joint_vector, numbers, write_files
-from skidyn.export._c import parameters_of
+from skidyn.export._bodies import central_inertia, joint_vector, numbers, parameters_of, write_files
 from skidyn.robots import Robot
 
 #: MuJoCo refuses moving bodies with less mass (kg) or inertia (kg m^2).

@@ -7,18 +7,25 @@ import keyword
 from typing import Any
 
 from skidyn._exceptions import SkidynError
-from skidyn.export._c import printable
+from skidyn.export._c import joint_terms, printable
 from skidyn.rigid_body._scalar import python_function
 from skidyn.robots import Robot
 
+_SUMMANDS = {
+    "viscous": "VISCOUS * dq",
+    "coulomb": "COULOMB * np.sign(dq)",
+    "rotor_inertia": "ROTOR_INERTIA * ddq",
+    "offset": "OFFSET",
+}
+
 _TEMPLATE = '''\
-"""Joint torques of the rigid-body model of {robot}, without friction. Written by skidyn."""
+"""Joint torques of a model of {robot}: {terms}. Written by skidyn."""
 
 import numpy as np
 from numpy import cos, sin
 
 JOINTS = {joints!r}
-
+{constants}
 
 {columns}
 
@@ -27,12 +34,23 @@ def {name}(q, dq, ddq):
 
     q, dq, ddq have shape (n_samples, {n}), in rad, rad/s and rad/s^2 (m for sliding joints).
     """
-    q, dq, ddq = (np.asarray(x, dtype=float).T for x in (q, dq, ddq))
-    return np.stack([np.broadcast_to(tau, q[0].shape) for tau in _columns(q, dq, ddq)], axis=-1)
+    q, dq, ddq = (np.asarray(x, dtype=float) for x in (q, dq, ddq))
+    columns = _columns(q.T, dq.T, ddq.T)
+    tau = np.stack([np.broadcast_to(column, q.shape[:1]) for column in columns], axis=-1)
+    return {total}
 '''
 
 
-def python_source(robot: Robot, *, parameters: Any = None, name: str = "inverse_dynamics") -> str:
+def python_source(
+    robot: Robot,
+    *,
+    parameters: Any = None,
+    viscous: Any = None,
+    coulomb: Any = None,
+    rotor_inertia: Any = None,
+    offset: Any = None,
+    name: str = "inverse_dynamics",
+) -> str:
     """Text of a Python module with one function, for feedforward without skidyn.
 
     Parameters
@@ -41,6 +59,13 @@ def python_source(robot: Robot, *, parameters: Any = None, name: str = "inverse_
         The robot.
     parameters : array-like of shape (n_bodies, 10), default=None
         Identified inertial parameters in place of those of the URDF; written into the text.
+    viscous, coulomb : array-like of shape (n_joints,), default=None
+        Friction ``viscous * dq + coulomb * sign(dq)``, N m s/rad (N s/m) and N m (N); ``sign(0)``
+        is 0. None is no friction.
+    rotor_inertia : array-like of shape (n_joints,), default=None
+        ``rotor_inertia * ddq``, kg m^2 (kg) on the joint side; None is none.
+    offset : array-like of shape (n_joints,), default=None
+        Constant torque, N m (N); None is none.
     name : str, default="inverse_dynamics"
         Name of the function; it takes ``q, dq, ddq`` of shape (n_samples, n_joints).
 
@@ -65,8 +90,14 @@ def python_source(robot: Robot, *, parameters: Any = None, name: str = "inverse_
     """
     if not name.isidentifier() or keyword.iskeyword(name):
         raise SkidynError(f"name is {name!r}; expected a Python identifier such as 'torque'.")
+    added = joint_terms(
+        robot, viscous=viscous, coulomb=coulomb, rotor_inertia=rotor_inertia, offset=offset
+    )
     return _TEMPLATE.format(
         robot=printable(robot.name),
+        terms=", ".join(["rigid bodies", *(name.replace("_", " ") for name in added)]),
+        constants="".join(f"{key.upper()} = np.array({values})\n" for key, values in added.items()),
+        total=" + ".join(["tau", *(_SUMMANDS[key] for key in added)]),
         joints=robot.joint_names,
         name=name,
         n=robot.n_joints,

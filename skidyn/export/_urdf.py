@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from skidyn.export._bodies import central_inertia, joint_vector, numbers, write_files
-from skidyn.export._c import parameters_of
+from skidyn.export._bodies import central_inertia, joint_vector, numbers, parameters_of, write_files
 from skidyn.robots import Robot
 
 

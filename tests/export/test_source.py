@@ -53,6 +53,34 @@ def test_python_function_needs_numpy_only(load, tmp_path):
     np.testing.assert_allclose(np.load(tmp_path / "tau.npy"), expected, atol=1e-11)
 
 
+@pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
+def test_friction_rotor_inertia_and_offset():
+    robot, parameters, (q, dq, ddq), expected = case(load_scara)
+    dq[:5] = 0.0  # at rest there is no Coulomb friction
+    expected = robot.inverse_dynamics(q, dq, ddq, parameters=parameters)
+    terms = dict(
+        zip(
+            ("viscous", "coulomb", "rotor_inertia", "offset"),
+            np.random.default_rng(2).normal(size=(4, 4)),
+            strict=True,
+        )
+    )
+    expected = expected + terms["viscous"] * dq + terms["coulomb"] * np.sign(dq)
+    expected = expected + terms["rotor_inertia"] * ddq + terms["offset"]
+    namespace = {}
+    exec(python_source(robot, parameters=parameters, **terms), namespace)
+    np.testing.assert_allclose(namespace["inverse_dynamics"](q, dq, ddq), expected, atol=1e-11)
+    text = c_source(robot, parameters=parameters, **terms)
+    function = compile_library(text, ("-shared", "-fPIC")).skidyn_inverse_dynamics
+    for k in range(len(q)):
+        arrays = [np.ascontiguousarray(signal[k]) for signal in (q, dq, ddq)]
+        out = np.empty(4)
+        function(*(ctypes.c_void_p(a.ctypes.data) for a in (*arrays, out)))
+        np.testing.assert_allclose(out, expected[k], atol=1e-11)
+    with pytest.raises(ValueError, match="coulomb has shape"):
+        c_source(robot, coulomb=[1.0])
+
+
 @pytest.mark.parametrize("export", [c_source, python_source])
 def test_names_are_checked(export):
     for name in ("", "1st", "a b", "a;b"):
