@@ -224,7 +224,8 @@ class TorqueDisplay:
         above.set_ylabel(f"torque ({self.unit})" if self.unit == "N m" else f"force ({self.unit})")
         below.set_ylabel(f"residual ({self.unit})")
         below.set_xlabel("time (s)")
-        above.legend(loc="upper right", ncols=2, frameon=False)
+        # beside the title, where it hides no curve
+        above.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, frameon=False)
         for axes in self.ax_:
             tidy(axes)
         return self

@@ -47,6 +47,7 @@ def write_json(path: PathLike, content: dict[str, Any]) -> Path:
     Returns
     -------
     path : Path
+        The file.
 
     Examples
     --------
@@ -75,6 +76,7 @@ def write_html(path: PathLike, summary: dict[str, Any]) -> Path:
     Returns
     -------
     path : Path
+        The file.
 
     Examples
     --------
