@@ -109,7 +109,7 @@ def forecasting(epochs: int, members: int) -> None:
         results[name] = joint_error_table(table.y[test], prediction)
         rows[name] = list(results[name]["RMSE"].values())
         print(f"{name}: {time.perf_counter() - start:.1f} s")
-    title = f"Table IV, one-step-ahead forecasting (1 kHz, 50 Hz low-pass): RMSE, N m"
+    title = "Table IV, one-step-ahead forecasting (1 kHz, 50 Hz low-pass): RMSE, N m"
     print_table(title, rows, [*JOINTS, "mean"])
     for metric in ("MSE", "MAE", "R2", "max", "min"):
         rows = {k: list(v[metric].values()) for k, v in results.items()}

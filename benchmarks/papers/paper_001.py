@@ -43,6 +43,7 @@ PAPER = {
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--epochs", type=int, default=15)
+    parser.add_argument("--models", nargs="*", help="only models whose names hold one of these")
     options = parser.parse_args()
     robot, X, y, fold = load_ur10e()
     folds = [(np.flatnonzero(fold != k), np.flatnonzero(fold == k)) for k in np.unique(fold)]
@@ -66,6 +67,13 @@ def main() -> None:
         "completed + hybrid(ELM)": HybridRegressor(complete, ELMCommittee(random_state=0)),
         "completed + hybrid(boosting)": HybridRegressor(complete, boosting),
     }
+    if options.models:
+        wanted = ("BASE", "completed physics", *options.models)
+        models = {
+            name: model
+            for name, model in models.items()
+            if name in wanted or any(part in name for part in options.models)
+        }
     rmse, per_recording = {}, {}
     recording = X["trajectory"].to_numpy(int)
     for name, model in models.items():
@@ -94,6 +102,8 @@ def main() -> None:
 
     print("\n**R2 against the number of training recordings** (5 folds by recording)\n")
     for name in ("BASE", "completed physics", "ELM alone"):
+        if name not in models:
+            continue
         curve = trajectory_learning_curve(models[name], X, y, random_state=0)
         scores = ", ".join(
             f"{n}: {s:.4f}"
@@ -103,6 +113,8 @@ def main() -> None:
 
     print("\n**What random rows would have claimed** (R2)\n")
     for name in ("completed physics", "ELM alone"):
+        if name not in models:
+            continue
         report = leakage_report(
             models[name], X, y,
             cv=KFold(5, shuffle=True, random_state=0), honest_cv=TrajectoryKFold(5),

@@ -156,6 +156,7 @@ class PersistenceRegressor(_Forecaster):
         Returns
         -------
         y : ndarray of shape (n_samples,) or (n_samples, n_outputs)
+            Forecast samples.
         """
         check_is_fitted(self)
         X = validate_data(self, X, reset=False, dtype=np.float64)
@@ -261,6 +262,7 @@ class AutoregressiveRegressor(_Forecaster):
         Returns
         -------
         y : ndarray of shape (n_samples,) or (n_samples, n_outputs)
+            Forecast samples.
         """
         check_is_fitted(self)
         X = validate_data(self, X, reset=False, dtype=np.float64)

@@ -104,6 +104,7 @@ def max_absolute_error(
     Returns
     -------
     error : float or ndarray of shape (n_joints,), N m
+        The error, or one per joint.
 
     Examples
     --------
@@ -129,6 +130,7 @@ def min_absolute_error(
     Returns
     -------
     error : float or ndarray of shape (n_joints,), N m
+        The error, or one per joint.
 
     Examples
     --------

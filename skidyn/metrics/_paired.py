@@ -51,7 +51,7 @@ def trajectory_errors(
 class PairedComparison:
     """Ratio of two models' errors over the same recordings.
 
-    Attributes
+    Parameters
     ----------
     ratio : float
         RMSE of the second model over that of the first, geometric mean over recordings and joints;

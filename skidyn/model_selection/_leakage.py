@@ -80,7 +80,8 @@ class LeakageGuard(BaseCrossValidator):
 
         Returns
         -------
-        int
+        n_splits : int
+            Number of folds.
         """
         return int(check_cv(self.cv).get_n_splits(X, y, groups))
 

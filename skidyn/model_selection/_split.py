@@ -72,7 +72,8 @@ class TrajectoryKFold(BaseCrossValidator):
 
         Returns
         -------
-        int
+        n_splits : int
+            Number of folds.
         """
         return self.n_splits
 
@@ -153,7 +154,8 @@ class PhaseKFold(BaseCrossValidator):
 
         Returns
         -------
-        int
+        n_splits : int
+            Number of folds.
         """
         return self.n_splits
 

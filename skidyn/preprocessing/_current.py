@@ -86,6 +86,7 @@ class CurrentToTorque(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         Returns
         -------
         torque : ndarray of shape (n_samples, n_joints), N m (N if prismatic)
+            Joint torques.
         """
         check_is_fitted(self)
         return validate_data(self, X, reset=False, dtype=np.float64) * self.gain_
@@ -101,6 +102,7 @@ class CurrentToTorque(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         Returns
         -------
         current : ndarray of shape (n_samples, n_joints), A
+            Motor currents.
         """
         check_is_fitted(self)
         return np.asarray(X, dtype=np.float64) / self.gain_

@@ -153,6 +153,7 @@ class ButterworthFilter(OneToOneFeatureMixin, _SignalTransformer):
         Returns
         -------
         X_filtered : ndarray of shape (n_samples, n_features)
+            Smoothed signals, key columns as they were.
         """
         X = self._checked(X)
         keys, filtered = self._keys(), X.copy()
@@ -305,6 +306,7 @@ class TimeDerivative(_SignalTransformer):
         Returns
         -------
         names : ndarray of str
+            One per column.
         """
         check_is_fitted(self)
         names = _check_feature_names_in(self, input_features)
@@ -395,6 +397,7 @@ class SignalScaler(OneToOneFeatureMixin, _SignalTransformer):
         Returns
         -------
         X_scaled : ndarray of shape (n_samples, n_features)
+            Scaled signals, key columns as they were.
         """
         return (self._checked(X) - self.offset_) / self.scale_
 
@@ -409,6 +412,7 @@ class SignalScaler(OneToOneFeatureMixin, _SignalTransformer):
         Returns
         -------
         X_original : ndarray of shape (n_samples, n_features)
+            Signals in their units.
         """
         check_is_fitted(self)
         return np.asarray(X, dtype=np.float64) * self.scale_ + self.offset_
