@@ -43,6 +43,7 @@ def c_source(
     coulomb: Any = None,
     rotor_inertia: Any = None,
     offset: Any = None,
+    blur: Any = None,
     name: str = "skidyn_inverse_dynamics",
 ) -> str:
     """Text of a C function that computes the torques of one sample.
@@ -60,6 +61,9 @@ def c_source(
         ``rotor_inertia * ddq``, kg m^2 (kg) on the joint side; None is none.
     offset : array-like of shape (n_joints,), default=None
         Constant torque, N m (N); None is none.
+    blur : array-like of shape (n_joints,), default=None
+        Speed in rad/s (m/s) below which Coulomb friction fades: ``tanh(dq / blur)`` in place of
+        ``sign(dq)``. None is the sign itself.
     name : str, default="skidyn_inverse_dynamics"
         Name of the function ``void name(const double *q, const double *dq, const double *ddq,
         double *tau)``.
@@ -88,12 +92,17 @@ def c_source(
     added = joint_terms(
         robot, viscous=viscous, coulomb=coulomb, rotor_inertia=rotor_inertia, offset=offset
     )
+    factors = dict(_FACTORS)
+    widths = None if blur is None else joint_vector(robot, blur, "blur", None).tolist()
+    if widths is not None:
+        factors["coulomb"] = "tanh(dq[{j}] / {width})"
     for (j,), value in outputs.items():
-        text = [
-            value,
-            *(f"{values[j]!r} * {_FACTORS[k].format(j=j)}" for k, values in added.items()),
+        width = None if widths is None else widths[j]
+        summands = [
+            f"{values[j]!r} * {factors[term].format(j=j, width=width)}"
+            for term, values in added.items()
         ]
-        lines.append(f"tau[{j}] = {' + '.join(text)};")
+        lines.append(f"tau[{j}] = {' + '.join([value, *summands])};")
     unused = [x for x in ("q", "dq", "ddq") if not re.search(rf"\b{x}\[", "\n".join(lines))]
     lines[:0] = [f"(void){x};" for x in unused]
     return _TEMPLATE.format(

@@ -7,6 +7,7 @@ import keyword
 from typing import Any
 
 from skidyn._exceptions import SkidynError
+from skidyn.export._bodies import joint_vector
 from skidyn.export._c import joint_terms, printable
 from skidyn.rigid_body._scalar import python_function
 from skidyn.robots import Robot
@@ -49,6 +50,7 @@ def python_source(
     coulomb: Any = None,
     rotor_inertia: Any = None,
     offset: Any = None,
+    blur: Any = None,
     name: str = "inverse_dynamics",
 ) -> str:
     """Text of a Python module with one function, for feedforward without skidyn.
@@ -66,6 +68,9 @@ def python_source(
         ``rotor_inertia * ddq``, kg m^2 (kg) on the joint side; None is none.
     offset : array-like of shape (n_joints,), default=None
         Constant torque, N m (N); None is none.
+    blur : array-like of shape (n_joints,), default=None
+        Speed in rad/s (m/s) below which Coulomb friction fades: ``tanh(dq / blur)`` in place of
+        ``sign(dq)``. None is the sign itself.
     name : str, default="inverse_dynamics"
         Name of the function; it takes ``q, dq, ddq`` of shape (n_samples, n_joints).
 
@@ -93,11 +98,17 @@ def python_source(
     added = joint_terms(
         robot, viscous=viscous, coulomb=coulomb, rotor_inertia=rotor_inertia, offset=offset
     )
+    constants, summands = dict(added), dict(_SUMMANDS)
+    if blur is not None:
+        constants["blur"] = joint_vector(robot, blur, "blur", None).tolist()
+        summands["coulomb"] = "COULOMB * np.tanh(dq / BLUR)"
     return _TEMPLATE.format(
         robot=printable(robot.name),
         terms=", ".join(["rigid bodies", *(name.replace("_", " ") for name in added)]),
-        constants="".join(f"{key.upper()} = np.array({values})\n" for key, values in added.items()),
-        total=" + ".join(["tau", *(_SUMMANDS[key] for key in added)]),
+        constants="".join(
+            f"{key.upper()} = np.array({values})\n" for key, values in constants.items()
+        ),
+        total=" + ".join(["tau", *(summands[key] for key in added)]),
         joints=robot.joint_names,
         name=name,
         n=robot.n_joints,
