@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 #: Buckets over the whole log; up to six rows of each bucket are drawn.
 BUCKETS = 3000
+#: Share of what is left of a joint's squared error that is worth a word if it is predictable.
+WORTH_A_WORD = 0.1
 
 
 def summarize(
@@ -75,14 +77,34 @@ def summarize(
                 for finding in diagnosis.findings
             ],
             "budget": diagnosis.budget,
+            "left": predictable_left(diagnosis),
             "warnings": list(diagnosis.warnings),
             "traces": _traces(diagnosis),
         }
     )  # fmt: skip
 
 
+def predictable_left(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """Joints on which the motion still predicts part of the error, the largest share first."""
+    after, floor = np.asarray(diagnosis.rmse_after), np.asarray(diagnosis.noise_floor)
+    shares = 1 - (floor / np.maximum(after, 1e-300)) ** 2
+    rows = [
+        {"joint": j + 1, "share": float(share)}
+        for j, share in enumerate(shares)
+        if share >= WORTH_A_WORD  # false for NaN
+    ]
+    return sorted(rows, key=lambda row: -row["share"])
+
+
 def verdict_sentence(diagnosis: Diagnosis) -> str:
     """The outcome in one or two sentences."""
+    left = predictable_left(diagnosis)
+    if not diagnosis.findings and left:
+        return (
+            "No effect stands out enough to be called missing, but the error is not all noise: on "
+            f"{_joints(sorted(row['joint'] for row in left))} part of it can be predicted from "
+            "the motion."
+        )
     if not diagnosis.findings:
         return (
             "Nothing significant is missing: what is left of the error looks like noise in this "
@@ -106,8 +128,13 @@ def verdict_sentence(diagnosis: Diagnosis) -> str:
     if len(ratio):
         # joints have different units and scales, so the mean is one of ratios
         what = "it" if len(diagnosis.findings) == 1 else "them"
-        change = f"{abs(1 - math.exp(np.log(np.maximum(ratio, 1e-12)).mean())):.0%}"
-        text += f" Adding {what} lowers the held-out error by {change} in the mean over joints."
+        drop = 1 - math.exp(np.log(np.maximum(ratio, 1e-12)).mean())
+        if drop < 0.005:
+            text += f" Adding {what} hardly changes the held-out error in the mean over joints."
+        else:
+            text += (
+                f" Adding {what} lowers the held-out error by {drop:.0%} in the mean over joints."
+            )
     return text.strip()
 
 

@@ -5,7 +5,7 @@ from importlib import resources
 import numpy as np
 import pytest
 
-from skidyn.report import summarize, write_json
+from skidyn.report import render_html, summarize, write_json
 
 
 @pytest.mark.parametrize("verdict", ["complete", "missing", "unknown"])
@@ -43,6 +43,21 @@ def test_verdict_is_said_in_words(fakes):
     assert missing.startswith("Dahl friction (joints 1 and 2; or lugre, stribeck) and ")
     unknown = summarize(fakes.make_diagnosis("unknown"))["verdict_sentence"]
     assert "Something that depends on q1 and q3 is also missing on joint 2" in unknown
+
+
+def test_predictable_error_is_never_called_noise(fakes):
+    diagnosis = fakes.make_diagnosis("complete")
+    diagnosis.noise_floor = 0.5 * diagnosis.rmse_after
+    summary = summarize(diagnosis)
+    assert summary["left"][0]["share"] == pytest.approx(0.75)
+    assert "not all noise: on joints 1, 2 and 3" in summary["verdict_sentence"]
+    assert "Nothing predictable is left" not in render_html(summary)
+
+
+def test_an_effect_that_changes_nothing_is_not_praised(fakes):
+    diagnosis = fakes.make_diagnosis()
+    diagnosis.rmse_after = diagnosis.rmse_before
+    assert "hardly changes the held-out error" in summarize(diagnosis)["verdict_sentence"]
 
 
 def test_trajectories_are_laid_end_to_end(fakes):
