@@ -27,7 +27,7 @@ class LSTMRegressor(SequenceRegressor):
     max_epochs : int, default=100
         Passes over the log.
     learning_rate : float, default=0.01
-        Step size of Adam.
+        First step size of Adam; it falls to zero along a cosine unless `early_stopping` is on.
     batch_size : int, default=16
         Windows per step.
     scaling : {"standard", "minmax"}, default="standard"
@@ -156,7 +156,7 @@ class NDLRegressor(SequenceRegressor):
     max_epochs : int, default=100
         Passes over the log.
     learning_rate : float, default=0.01
-        Step size of Adam.
+        First step size of Adam; it falls to zero along a cosine unless `early_stopping` is on.
     batch_size : int, default=16
         Windows per step.
     scaling : {"minmax", "standard"}, default="minmax"

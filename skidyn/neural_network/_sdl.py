@@ -88,7 +88,8 @@ class SDLRegressor(SequenceRegressor):
     max_epochs : int, default=100
         Passes over the log.
     learning_rate : float, default=0.01
-        Step size of Adam; a tenth of it for the inertial parameters.
+        First step size of Adam, which falls to zero along a cosine unless `early_stopping` is on; a
+        tenth of it for the inertial parameters.
     batch_size : int, default=16
         Windows per step.
     scaling : {"minmax", "standard"}, default="minmax"
