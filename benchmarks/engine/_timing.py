@@ -89,13 +89,16 @@ def models(text: str) -> tuple[Robot, pin.Model, np.ndarray]:
 
 
 def interleaved(functions: dict[str, Callable[[], object]], n_samples: int, rounds: int) -> dict:
-    """Best time per sample in microseconds; the functions take turns."""
+    """Best CPU time per sample in microseconds; the functions take turns.
+
+    CPU time, because on a busy machine the clock on the wall also measures the neighbours.
+    """
     best = dict.fromkeys(functions, np.inf)
     for function in functions.values():
         function()
     for _ in range(rounds):
         for name, function in functions.items():
-            start = time.perf_counter()
+            start = time.process_time()
             function()
-            best[name] = min(best[name], (time.perf_counter() - start) / n_samples * 1e6)
+            best[name] = min(best[name], (time.process_time() - start) / n_samples * 1e6)
     return best
