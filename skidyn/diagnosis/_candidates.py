@@ -77,6 +77,11 @@ def catalogue_candidates(problem: Problem, kinds: Iterable[str]) -> list[Candida
     candidates = []
     for kind in kinds:
         effect = get_effect(kind)
+        if effect.search == "trajectories" and not problem.rigid_body and problem.robot is not None:
+            # With the URDF's own bodies even a load carried all the time shows.
+            term = Term(kind, tuple(range(problem.n_joints)))
+            candidates.append(Candidate(kind, term, problem.term_rows(term)))
+            continue
         if effect.search != "grid" or ("robot" in effect.needs and problem.robot is None):
             continue
         if "load" in effect.needs and problem.robot is None:

@@ -482,7 +482,8 @@ def _conclude(
     held = base
     for hypothesis in result.findings:
         terms += [c.term for c in hypothesis.candidates if c.term not in terms]
-        held = _held_out(problem, terms, result)
+        last = hypothesis is result.findings[-1]
+        held = _held_out(problem, terms, result, keep=terms[len(problem.terms) :] if last else ())
         comparisons.append(_comparison(problem, torque, held))
         history.append(_entry(comparisons[-1], hypothesis.kind, hypothesis.joints))
     intervals = parameter_intervals(problem, terms, result.fit.noise)
@@ -519,14 +520,16 @@ def _conclude(
     )
 
 
-def _held_out(problem: Problem, terms: Sequence[Term], result: SearchResult) -> HeldOut:
+def _held_out(
+    problem: Problem, terms: Sequence[Term], result: SearchResult, keep: Sequence[Term]
+) -> HeldOut:
     """Held-out residual; a ripple's coefficients come from the residual at the full rate."""
     waves = [t for t in terms if t.kind == "torque_ripple"]
     rest = [t for t in terms if t.kind != "torque_ripple"]
     if not waves:
-        return held_out_residual(problem, rest, result.fit.sigma)
+        return held_out_residual(problem, rest, result.fit.sigma, keep)
     torque = problem.torque - result.ripple
-    held = held_out_residual(replace_torque(problem, torque), rest, result.fit.sigma)
+    held = held_out_residual(replace_torque(problem, torque), rest, result.fit.sigma, keep)
     for t in waves:
         own = np.zeros_like(torque)
         own[:, t.joints[0]] = result.ripple[:, t.joints[0]]

@@ -147,6 +147,10 @@ def make_finding(
     title = _unknown_title(hypothesis) if unknown else effect.title
     code = _code(hypothesis, joints, candidates)
     sentence = _sentence(title, joints, parameters, error_drop, rivals, effect.separating_motion)
+    if effect.caveat:
+        sentence += f" Note that {effect.caveat}."
+    if parameters.get("mass", {}).get("value", 0.0) < 0:
+        sentence += " The mass is negative: the description has a load that the robot lacks."
     return Finding(
         hypothesis.kind,
         title,

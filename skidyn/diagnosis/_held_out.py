@@ -41,14 +41,16 @@ class HeldOut:
     residual : ndarray of shape (n_samples, n_joints)
         Torque less the prediction of a model fitted without the sample's fold, N m or N.
     torque : dict of Term to ndarray of shape (n_samples, n_joints)
-        Contribution of every term of the model, fitted to all data, N m or N.
+        Contribution of the terms asked for, fitted to all data, N m or N.
     """
 
     residual: Array
     torque: dict[Term, Array]
 
 
-def held_out_residual(problem: Problem, terms: Sequence[Term], sigma: Array) -> HeldOut:
+def held_out_residual(
+    problem: Problem, terms: Sequence[Term], sigma: Array, keep: Sequence[Term] = ()
+) -> HeldOut:
     """Residual of every sample under the model fitted without its fold.
 
     Parameters
@@ -59,6 +61,8 @@ def held_out_residual(problem: Problem, terms: Sequence[Term], sigma: Array) -> 
         Every effect of the model.
     sigma : ndarray of shape (n_joints,)
         Noise of one row.
+    keep : sequence of Term, default=()
+        Terms whose own contribution is wanted.
 
     Returns
     -------
@@ -77,16 +81,19 @@ def held_out_residual(problem: Problem, terms: Sequence[Term], sigma: Array) -> 
                 s.q[here], s.dq[here], s.ddq[here], parameters=problem.correction(coefficients)
             )
     torque = {}
+    wanted = set(keep)
     at = n_rigid
     for term in terms:
         k = len(get_effect(term.kind).coefficients)
-        own = np.zeros_like(problem.torque)
+        own = np.zeros_like(problem.torque) if term in wanted else None
         for j, block in term_columns(problem.signals, term).items():
             # What one recording alone can tell is not held out with it.
             own_only = "trajectory" in term.shape
             coefficients = whole[None, at : at + k] if own_only else left[fold, at : at + k]
             prediction[:, j] += (block * coefficients).sum(1)
-            own[:, j] += block @ whole[at : at + k]
-        torque[term] = own
+            if own is not None:
+                own[:, j] += block @ whole[at : at + k]
+        if own is not None:
+            torque[term] = own
         at += k
     return HeldOut(problem.torque - prediction, torque)

@@ -69,7 +69,7 @@ def split_effects(
     list of Split
     """
     names = np.unique(np.concatenate(problem.rows.trajectory))
-    if problem.robot is None or len(names) < 3:
+    if problem.robot is None or len(names) < 2:
         return []
     design = [a / s for a, s in zip(problem.design(blocks), sigma, strict=True)]
     y = [t / s for t, s in zip(target, sigma, strict=True)]

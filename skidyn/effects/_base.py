@@ -138,6 +138,8 @@ class Effect:
         Kinds it is easily confused with.
     separating_motion : str
         Motion that tells it from its rivals.
+    caveat : str
+        What a finding of this kind must always say.
     reference : str
         Paper or book.
 
@@ -169,6 +171,7 @@ class Effect:
     simplicity: ClassVar[int] = 50
     rivals: ClassVar[tuple[str, ...]] = ()
     separating_motion: ClassVar[str] = ""
+    caveat: ClassVar[str] = ""
     reference: ClassVar[str] = ""
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:

@@ -27,8 +27,8 @@ class _ToolEffect(Effect):
     search = "trajectories"
 
     def not_shown(self, signals: Signals, joint: int) -> str | None:
-        if len(np.unique(signals.trajectory)) < 3:
-            return "fewer than three trajectories to compare"
+        if len(np.unique(signals.trajectory)) < 2:
+            return "only one trajectory: nothing to compare it with"
         return None
 
 
@@ -47,6 +47,10 @@ class Payload(_ToolEffect):
         *(Coefficient(name, "kg m^2") for name in ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")),
     )
     simplicity = 28
+    caveat = (
+        "mass and drive gain cannot be told apart by this data: the mass scales with the "
+        "calibration of the torque"
+    )
     rivals = ("external_wrench", "torque_gain")
     separating_motion = "the same motion with and without the payload, in poses that turn it over"
     reference = "Khalil, Gautier, Lemoine (2007), ICRA, 1943-1948."
@@ -56,9 +60,12 @@ class Payload(_ToolEffect):
     ) -> dict[int, Array]:
         robot = signals.robot
         assert robot is not None
-        regressor = robot.torque_regressor(signals.q, signals.dq, signals.ddq)[:, :, -10:]
-        inside = _inside(signals, shape)
-        return {j: regressor[:, j] * inside for j in joints}
+        columns = np.empty((signals.n_joints, signals.n_samples, 10))
+        # Chunk by chunk: the whole regressor of a long log does not fit into memory.
+        for rows, chunk in robot.iter_torque_regressor(signals.q, signals.dq, signals.ddq):
+            columns[:, rows] = chunk[:, -10:].transpose(0, 2, 1)
+        columns *= _inside(signals, shape)
+        return {j: columns[j] for j in joints}
 
     def parameters(
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
