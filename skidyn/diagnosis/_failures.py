@@ -16,8 +16,9 @@ from skidyn.evidence._rows import REST
 REGIMES = ("rest", "reversal", "slow", "medium", "fast", "loaded", "warm")
 #: Slow and fast as shares of the speed that a joint exceeds in 5 % of its motion.
 SLOW, FAST = 0.25, 0.7
-#: A regime fails if its error is this much larger than the joint's, and this share of it.
-LARGER, SHARE = 1.25, 0.15
+#: A regime fails if it holds this share of a joint's squared error, and the odds of an error to lie
+#: in it are this many times the odds of a sample (a ratio that also serves regimes of most samples).
+SHARE, ODDS = 0.15, 2.0
 
 _WHERE = {
     "rest": "while it stands still",
@@ -215,7 +216,7 @@ def find_failures(comparison: Comparison) -> list[Failure]:
                 continue
             error, time = float(square[here, j].sum() / total[j]), float(here.mean())
             rmse = float(np.sqrt(square[here, j].mean()))
-            if rmse < LARGER * whole or error < SHARE:
+            if error < SHARE or error * (1 - time) < ODDS * time * (1 - error):
                 continue
             sentence = (
                 f"Joint {j + 1} ({name}): {error:.0%} of the squared error occurs "
