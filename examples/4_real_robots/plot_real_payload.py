@@ -27,9 +27,10 @@ if not (DATA / "ur10e").is_dir():
     sys.exit(0)
 
 # %%
-# **UR10e.** Currents become torques by drive gains. The published set reads payloads about 10 % too
-# heavy; times 0.91 it is calibrated (a known load carried by the same robot on other days). Mass and
-# gain scale alike: without that calibration only their product is known, and the finding says so.
+# **UR10e.** Currents become torques by drive gains. The published set reads payloads about 10 %
+# too heavy; times 0.91 it is calibrated (a known load carried by the same robot on other days).
+# Mass and gain scale alike: without that calibration only their product is known, and the finding
+# says so.
 gains = 0.91 * np.array([14.87, 13.26, 11.13, 10.62, 11.03, 11.47])
 log = load_recording(
     DATA / "ur10e" / "ur10e_excitation.npz",

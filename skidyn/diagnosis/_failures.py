@@ -16,8 +16,8 @@ from skidyn.evidence._rows import REST
 REGIMES = ("rest", "reversal", "slow", "medium", "fast", "loaded", "warm")
 #: Slow and fast as shares of the speed that a joint exceeds in 5 % of its motion.
 SLOW, FAST = 0.25, 0.7
-#: A regime fails if it holds this share of a joint's squared error, and the odds of an error to lie
-#: in it are this many times the odds of a sample (a ratio that also serves regimes of most samples).
+#: A regime fails if it holds this share of a joint's squared error, and the odds of error to lie
+#: in it are this many times those of a sample (a ratio that serves regimes of most samples too).
 SHARE, ODDS = 0.15, 2.0
 
 _WHERE = {
