@@ -16,6 +16,7 @@ from skidyn._columns import Columns, ColumnSpec, resolve_columns
 from skidyn._exceptions import ColumnError
 from skidyn._signals import Array, Signals, signals_from
 from skidyn.effects import Term, get_effect, make_terms
+from skidyn.evidence._evidence import Evidence
 from skidyn.evidence._folded import left_out_coefficients
 from skidyn.evidence._kinematics import smooth_motion
 from skidyn.evidence._problem import Fit, Problem, make_problem, term_columns
@@ -67,6 +68,9 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
         Effects with their shape parameters.
     effect_coefficients_ : dict of Term to ndarray
         Coefficients of every term.
+    evidence_ : Evidence
+        Triangular factors of [columns | torque] of every trajectory and joint; the torque is that
+        beyond the URDF's rigid body.
     noise_std_ : ndarray of shape (n_joints,)
         Standard deviation of one averaged residual row, N m or N.
     robot_ : Robot
@@ -357,6 +361,7 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
         self.coef_ = np.r_[values[where], coefficients[n_rigid:]]
         self.coef_std_ = _jackknife(problem, fit)
         self.noise_std_ = fit.noise
+        self.evidence_ = Evidence.from_problem(problem, fit.terms)
 
     def _consistent(self, problem: Problem, fit: Fit) -> tuple[Array, Array]:
         """Bodies that can exist and coefficients of the right sign, closest to the data."""

@@ -1,0 +1,293 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Evidence: all that a linear model needs from a log, in a small triangle per trajectory and joint.
+
+For the columns A and the torque y of a trajectory, the triangular factor R of [A | y] holds the
+same least-squares problem as all its rows. Factors of two recordings are merged by factorising
+them stacked, exactly and in any order; a trajectory is left out by not using its factor.
+
+References
+----------
+G. H. Golub, C. F. Van Loan (2013), Matrix Computations, 4th ed., section 5.3 and 6.5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import lstsq
+
+from skidyn._exceptions import SkidynError
+from skidyn._signals import Array
+from skidyn.effects import Term, get_effect
+from skidyn.evidence._problem import Problem
+
+#: Trajectory and joint (from 0) that a factor belongs to.
+Key = tuple[int, int]
+#: Columns weaker than this, relative to the strongest direction, are left at zero.
+RANK_TOLERANCE = 1e-10
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Triangular factors of [columns | torque] of every trajectory and joint.
+
+    Attributes
+    ----------
+    columns : tuple of str
+        Names of the columns.
+    factors : mapping of (int, int) to ndarray of shape (n_columns + 1, n_columns + 1)
+        Upper triangular factor of each trajectory and joint (from 0).
+    counts : mapping of (int, int) to int
+        Rows behind each factor.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> rows = np.random.default_rng(0).normal(size=(50, 3))
+    >>> first = Evidence.from_rows(("a", "b"), {(0, 0): rows[:20]})
+    >>> second = Evidence.from_rows(("a", "b"), {(0, 0): rows[20:]})
+    >>> whole = Evidence.from_rows(("a", "b"), {(0, 0): rows})
+    >>> bool(np.allclose((first + second).solve(), whole.solve()))
+    True
+    """
+
+    columns: tuple[str, ...]
+    factors: Mapping[Key, Array]
+    counts: Mapping[Key, int]
+
+    @classmethod
+    def from_rows(cls, columns: Sequence[str], rows: Mapping[Key, Array]) -> Evidence:
+        """Factorise rows.
+
+        Parameters
+        ----------
+        columns : sequence of str
+            Names of the columns.
+        rows : mapping of (int, int) to ndarray of shape (n_rows, n_columns + 1)
+            [columns | torque] of every trajectory and joint.
+
+        Returns
+        -------
+        Evidence
+
+        Raises
+        ------
+        SkidynError
+            Rows of the wrong width.
+        """
+        for key, block in rows.items():
+            if block.shape[1] != len(columns) + 1:
+                raise SkidynError(
+                    f"rows of trajectory {key[0]}, joint {key[1] + 1} have {block.shape[1]} "
+                    f"columns; {len(columns)} and the torque are expected"
+                )
+        return cls(
+            tuple(columns),
+            {key: _triangle(block) for key, block in rows.items()},
+            {key: len(block) for key, block in rows.items()},
+        )
+
+    @classmethod
+    def from_problem(cls, problem: Problem, terms: Iterable[Term]) -> Evidence:
+        """Factorise the averaged rows of a problem.
+
+        Parameters
+        ----------
+        problem : Problem
+            Rows.
+        terms : iterable of Term
+            Effects beside the rigid body.
+
+        Returns
+        -------
+        Evidence
+        """
+        terms = list(terms)
+        names = []
+        if problem.robot is not None:
+            names = [problem.robot.parameter_names[i] for i in problem.rigid_index]
+        for term in terms:
+            joints = ",".join(str(j + 1) for j in term.joints)
+            names += [f"{term.kind}.{c.name}[{joints}]" for c in get_effect(term.kind).coefficients]
+        design = problem.design([problem.term_rows(t) for t in terms])
+        rows = {}
+        for j, (block, y) in enumerate(zip(design, problem.target, strict=True)):
+            for name in np.unique(problem.rows.trajectory[j]):
+                here = problem.rows.trajectory[j] == name
+                rows[int(name), j] = np.column_stack([block[here], y[here]])
+        return cls.from_rows(names, rows)
+
+    @property
+    def trajectories(self) -> list[int]:
+        """Trajectories with evidence."""
+        return sorted({trajectory for trajectory, _ in self.factors})
+
+    @property
+    def joints(self) -> list[int]:
+        """Joints with evidence, from 0."""
+        return sorted({joint for _, joint in self.factors})
+
+    def __add__(self, other: Evidence) -> Evidence:
+        if self.columns != other.columns:
+            raise SkidynError("evidence of different columns cannot be merged")
+        factors, counts = dict(self.factors), dict(self.counts)
+        for key, factor in other.factors.items():
+            if key in factors:
+                factors[key] = _triangle(np.vstack([factors[key], factor]))
+                counts[key] += other.counts[key]
+            else:
+                factors[key], counts[key] = factor, other.counts[key]
+        return Evidence(self.columns, factors, counts)
+
+    def only(self, trajectories: Iterable[int]) -> Evidence:
+        """Evidence of some trajectories.
+
+        Parameters
+        ----------
+        trajectories : iterable of int
+            Trajectories to keep.
+
+        Returns
+        -------
+        Evidence
+        """
+        kept = set(trajectories)
+        return Evidence(
+            self.columns,
+            {key: factor for key, factor in self.factors.items() if key[0] in kept},
+            {key: count for key, count in self.counts.items() if key[0] in kept},
+        )
+
+    def without(self, trajectory: int) -> Evidence:
+        """Evidence of all trajectories but one.
+
+        Parameters
+        ----------
+        trajectory : int
+            Trajectory to leave out.
+
+        Returns
+        -------
+        Evidence
+        """
+        return self.only(t for t in self.trajectories if t != trajectory)
+
+    def solve(
+        self, columns: Sequence[str] | None = None, noise: Mapping[int, float] | None = None
+    ) -> Array:
+        """Least-squares coefficients.
+
+        Parameters
+        ----------
+        columns : sequence of str, optional
+            Columns of the model; all by default, the others are zero.
+        noise : mapping of int to float, optional
+            Noise of a row of every joint (from 0), by which joints are weighted; equal by default.
+
+        Returns
+        -------
+        ndarray of shape (n_columns,)
+
+        Raises
+        ------
+        SkidynError
+            A column that is not there, or no evidence at all.
+        """
+        if not self.factors:
+            raise SkidynError("no evidence: every trajectory was left out")
+        index = self._index(columns)
+        stacked = np.vstack(
+            [
+                factor / (1.0 if noise is None else noise[key[1]])
+                for key, factor in self.factors.items()
+            ]
+        )
+        a, y = stacked[:, index], stacked[:, -1]
+        size = np.linalg.norm(a, axis=0)
+        size[size == 0] = 1.0
+        coefficients = np.zeros(len(self.columns))
+        coefficients[index] = lstsq(a / size, y, cond=RANK_TOLERANCE)[0] / size
+        return coefficients
+
+    def squared_error(self, coefficients: Array) -> dict[Key, float]:
+        """Sum of squared residuals of every trajectory and joint.
+
+        Parameters
+        ----------
+        coefficients : ndarray of shape (n_columns,)
+            Of all columns.
+
+        Returns
+        -------
+        dict of (int, int) to float
+            (N m)^2 or N^2.
+        """
+        step = np.append(-np.asarray(coefficients, dtype=float), 1.0)
+        return {key: float(np.sum((factor @ step) ** 2)) for key, factor in self.factors.items()}
+
+    def noise(self, coefficients: Array) -> dict[int, float]:
+        """Root mean square residual of a row of every joint, N m or N.
+
+        Parameters
+        ----------
+        coefficients : ndarray of shape (n_columns,)
+            Of all columns.
+
+        Returns
+        -------
+        dict of int to float
+        """
+        errors = self.squared_error(coefficients)
+        return {
+            joint: float(
+                np.sqrt(
+                    sum(e for key, e in errors.items() if key[1] == joint)
+                    / max(1, sum(n for key, n in self.counts.items() if key[1] == joint))
+                )
+            )
+            for joint in self.joints
+        }
+
+    def held_out_error(
+        self, columns: Sequence[str] | None = None, noise: Mapping[int, float] | None = None
+    ) -> dict[Key, float]:
+        """Root mean square error of every trajectory under the model fitted without it.
+
+        Parameters
+        ----------
+        columns : sequence of str, optional
+            Columns of the model; all by default.
+        noise : mapping of int to float, optional
+            Noise of a row of every joint, by which joints are weighted.
+
+        Returns
+        -------
+        dict of (int, int) to float
+            Per trajectory and joint, of averaged rows, N m or N.
+        """
+        result = {}
+        for trajectory in self.trajectories:
+            coefficients = self.without(trajectory).solve(columns, noise)
+            left_out = self.only([trajectory])
+            for key, error in left_out.squared_error(coefficients).items():
+                result[key] = float(np.sqrt(error / max(1, self.counts[key])))
+        return result
+
+    def _index(self, columns: Sequence[str] | None) -> list[int]:
+        if columns is None:
+            return list(range(len(self.columns)))
+        unknown = [name for name in columns if name not in self.columns]
+        if unknown:
+            raise SkidynError(f"no column {unknown[0]!r}; there are {', '.join(self.columns)}")
+        return [self.columns.index(name) for name in columns]
+
+
+def _triangle(rows: Array) -> Array:
+    """Square upper triangular factor, padded with zero rows where there are few rows."""
+    width = rows.shape[1]
+    factor: Array = np.asarray(np.linalg.qr(rows, mode="r"))
+    if len(factor) < width:
+        factor = np.vstack([factor, np.zeros((width - len(factor), width))])
+    return factor

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Factors of evidence: merging, leaving out and solving equal the same on all rows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.evidence import Evidence
+from skidyn.rigid_body import RBDRegressor
+
+NAMES = ("a", "b", "c")
+
+
+@pytest.fixture
+def rows():
+    rng = np.random.default_rng(0)
+    blocks = {}
+    for trajectory in range(4):
+        for joint in range(2):
+            a = rng.normal(size=(30 + 5 * trajectory, 3))
+            noise = (0.1, 1.0)[joint] * rng.normal(size=len(a))
+            blocks[trajectory, joint] = np.column_stack([a, a @ [1.0, -2.0, 0.5] + noise])
+    return blocks
+
+
+def stacked(rows, keys=None):
+    return np.vstack([block for key, block in rows.items() if keys is None or key in keys])
+
+
+def test_solving_equals_least_squares_on_all_rows(rows):
+    whole = stacked(rows)
+    expected = np.linalg.lstsq(whole[:, :-1], whole[:, -1])[0]
+    np.testing.assert_allclose(Evidence.from_rows(NAMES, rows).solve(), expected, rtol=1e-10)
+
+
+def test_merging_is_exact_and_in_any_order(rows):
+    first = Evidence.from_rows(NAMES, {k: b[:10] for k, b in rows.items()})
+    second = Evidence.from_rows(NAMES, {k: b[10:] for k, b in rows.items()})
+    whole = Evidence.from_rows(NAMES, rows)
+
+    for merged in (first + second, second + first):
+        assert merged.counts == whole.counts
+        np.testing.assert_allclose(merged.solve(), whole.solve(), rtol=1e-10)
+
+
+def test_leaving_out_equals_never_having_seen(rows):
+    evidence = Evidence.from_rows(NAMES, rows)
+    rest = {key: block for key, block in rows.items() if key[0] != 2}
+
+    np.testing.assert_allclose(
+        evidence.without(2).solve(), Evidence.from_rows(NAMES, rest).solve(), rtol=1e-12
+    )
+    b = evidence.without(2).solve()
+    block = rows[2, 1]
+    expected = np.sqrt(np.mean((block[:, -1] - block[:, :-1] @ b) ** 2))
+    assert evidence.held_out_error()[2, 1] == pytest.approx(expected, rel=1e-10)
+
+
+def test_noise_weights_the_joints_and_columns_can_be_left_out(rows):
+    evidence = Evidence.from_rows(NAMES, rows)
+    noise = evidence.noise(evidence.solve())
+    assert noise[0] == pytest.approx(0.1, rel=0.2)
+    assert noise[1] == pytest.approx(1.0, rel=0.2)
+    truth = np.array([1.0, -2.0, 0.5])
+    plain, weighted = evidence.solve(), evidence.solve(noise=noise)
+    assert np.abs(weighted - truth).max() < np.abs(plain - truth).max()
+    assert evidence.solve(["a", "b"])[2] == 0.0
+
+
+def test_errors_say_what_is_wrong(rows):
+    evidence = Evidence.from_rows(NAMES, rows)
+    with pytest.raises(ValueError, match="no column 'd'"):
+        evidence.solve(["d"])
+    with pytest.raises(ValueError, match="different columns"):
+        evidence + Evidence.from_rows(("x", "y", "z"), rows)
+    with pytest.raises(ValueError, match="trajectory 0, joint 1"):
+        Evidence.from_rows(("a",), rows)
+    with pytest.raises(ValueError, match="every trajectory was left out"):
+        evidence.only([]).solve()
+
+
+def test_the_model_of_a_regressor_follows_from_its_evidence():
+    log = make_hidden_effect_log(load_planar_arm(), None, random_state=1)
+    model = RBDRegressor(log.robot).fit(log.X, log.y)
+
+    noise = dict(enumerate(model.noise_std_))
+    coefficients = model.evidence_.solve(noise=noise)
+
+    friction = dict(zip(model.evidence_.columns, coefficients, strict=True))
+    assert friction["viscous.Fv[1]"] == pytest.approx(
+        model.effect_coefficients_[model.effect_terms_[0]][0], rel=1e-4
+    )
