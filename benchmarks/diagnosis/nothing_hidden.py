@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""False alarms: simulated logs that hide nothing must be called complete.
+
+    python benchmarks/diagnosis/nothing_hidden.py [--logs 200] [--jobs 2]
+
+Robots, noise, motion and true parameters change from log to log.
+"""
+
+from __future__ import annotations
+
+import argparse
+import warnings
+
+from joblib import Parallel, delayed
+
+from skidyn.datasets import (
+    load_panda,
+    load_planar_arm,
+    load_scara,
+    load_srs_arm,
+    load_ur5,
+    make_hidden_effect_log,
+)
+from skidyn.diagnosis import diagnose
+from skidyn.rigid_body import RBDRegressor
+
+ROBOTS = (load_planar_arm, load_ur5, load_scara, load_srs_arm, load_panda)
+
+
+def alarm(seed: int) -> list[str]:
+    """Sentences of what was found where nothing is."""
+    warnings.simplefilter("ignore")
+    robot = ROBOTS[seed % len(ROBOTS)]()
+    noise = ("low", "high")[seed // len(ROBOTS) % 2]
+    log = make_hidden_effect_log(robot, None, noise=noise, random_state=1000 + seed)
+    found = diagnose(RBDRegressor(robot), log.X, log.y).findings
+    return [f"{robot.name}, {noise} noise, seed {seed}: {f.sentence}" for f in found]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--logs", type=int, default=200)
+    parser.add_argument("--jobs", type=int, default=2)
+    options = parser.parse_args()
+    results = Parallel(n_jobs=options.jobs)(delayed(alarm)(k) for k in range(options.logs))
+    for sentence in (s for found in results for s in found):
+        print(sentence)
+    complete = sum(not found for found in results)
+    print(f"complete: {complete} of {options.logs} ({complete / options.logs:.1%})")
+
+
+if __name__ == "__main__":
+    main()
