@@ -22,7 +22,7 @@ from skidyn.datasets import load_recording
 from skidyn.diagnosis._diagnosis import read_signals
 from skidyn.diagnosis._search import variance_inflation
 from skidyn.effects import Term, get_effect, make_terms
-from skidyn.evidence import make_problem
+from skidyn.evidence._problem import make_problem
 from skidyn.robots import Robot
 
 GAINS = (14.87, 13.26, 11.13, 10.62, 11.03, 11.47)

@@ -44,7 +44,7 @@ class Diagnosis:
 
     Made by :func:`diagnose`.
 
-    Attributes
+    Parameters
     ----------
     verdict : {"complete", "missing", "unknown"}
         Nothing significant is missing; a named effect is missing; something is missing that no
@@ -57,8 +57,6 @@ class Diagnosis:
         Measured against predicted torque of the model as given, held out.
     comparison_after : Comparison
         The same with the findings added.
-    failures : list of Failure
-        Where the given model fails.
     history : list of dict
         ``{"added", "joints", "rmse"}`` of every step; errors per joint, held out, N m or N.
     noise_floor : ndarray of shape (n_joints,)
@@ -69,6 +67,24 @@ class Diagnosis:
         Largest magnitude of every effect that was not found.
     warnings : list of str
         What about the data or the folds the reader should know.
+    base_model : regressor
+        The model as given.
+    data : tuple
+        X and the torque it was diagnosed on.
+    problem : Problem
+        Averaged rows and folds behind the diagnosis.
+    result : SearchResult
+        Every step of the search with its ranking.
+    predictable : ndarray of shape (n_joints,)
+        Share of the remaining squared error that a flexible learner predicts.
+
+    Examples
+    --------
+    >>> from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+    >>> from skidyn.rigid_body import RBDRegressor
+    >>> log = make_hidden_effect_log(load_planar_arm(), None)
+    >>> diagnose(RBDRegressor(log.robot), log.X, log.y).verdict
+    'complete'
     """
 
     verdict: Verdict
@@ -118,6 +134,7 @@ class Diagnosis:
         Returns
         -------
         ndarray of shape (n_joints, n_regimes), N m or N
+            NaN where a regime does not occur.
         """
         return error_map(self.comparison_after if after else self.comparison)
 
@@ -250,6 +267,7 @@ def diagnose(
     Returns
     -------
     Diagnosis
+        Findings, failures, limits and the better model.
 
     Raises
     ------

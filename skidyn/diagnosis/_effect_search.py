@@ -79,6 +79,7 @@ class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         Returns
         -------
         EffectSearchCV
+            The search itself.
         """
         model = clone(self.estimator)
         self.diagnosis_: Diagnosis = diagnose(
@@ -107,6 +108,7 @@ class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         Returns
         -------
         ndarray of shape (n_samples, n_joints), N m or N
+            Predicted torque.
         """
         check_is_fitted(self)
         return np.asarray(self.best_estimator_.predict(X))

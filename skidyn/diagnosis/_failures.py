@@ -35,7 +35,7 @@ _WHERE = {
 class Failure:
     """A regime in which a joint's error stands out.
 
-    Attributes
+    Parameters
     ----------
     joint : int
         Joint, counted from 1.
@@ -50,6 +50,12 @@ class Failure:
         Share of the samples.
     sentence : str
         The same in words.
+
+    Examples
+    --------
+    >>> failure = Failure(5, "rest", 1.9, 0.93, 0.39, "Joint 5 fails at rest.")
+    >>> failure.share_of_error
+    0.93
     """
 
     joint: int
@@ -64,7 +70,7 @@ class Failure:
 class Comparison:
     """Measured against predicted torque; the prediction never saw the sample's trajectory.
 
-    Attributes
+    Parameters
     ----------
     signals : Signals
         Smoothed motion.
@@ -74,6 +80,12 @@ class Comparison:
         Samples away from rest and reversals, on which effects are judged.
     joint_names : tuple of str
         Names of the joints.
+
+    Examples
+    --------
+    >>> comparison = diagnosis.comparison  # doctest: +SKIP
+    >>> comparison.rmse()  # doctest: +SKIP
+    array([0.43, 2.37])
     """
 
     signals: Signals
@@ -98,6 +110,7 @@ class Comparison:
         Returns
         -------
         ndarray of shape (n_joints,), N m or N
+            Errors of the joints.
         """
         use = self.sliding if sliding else np.ones_like(self.sliding)
         square = np.where(use, self.residual**2, 0.0).sum(0)

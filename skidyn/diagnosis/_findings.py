@@ -26,7 +26,7 @@ BINS = 40
 class Finding:
     """An effect that the model lacks.
 
-    Attributes
+    Parameters
     ----------
     kind : str
         Kind of the vocabulary, ``"unknown"`` for something no name describes.
@@ -54,6 +54,12 @@ class Finding:
         Terms to add to a model.
     curves : list of dict
         Effect and partial residual against its main signal, for each joint.
+
+    Examples
+    --------
+    >>> finding = diagnosis.findings[0]  # doctest: +SKIP
+    >>> finding.kind, finding.joints, finding.parameters["vs"]["value"]  # doctest: +SKIP
+    ('stribeck', (2,), 0.071)
     """
 
     kind: str
@@ -71,7 +77,13 @@ class Finding:
     curves: list[dict[str, Any]] = field(default_factory=list, repr=False)
 
     def to_dict(self) -> dict[str, Any]:
-        """As in the report file."""
+        """As in the report file.
+
+        Returns
+        -------
+        dict
+            One entry of ``effects``.
+        """
         return {
             "kind": self.kind,
             "joints": list(self.joints),

@@ -26,7 +26,7 @@ NEW_SHARE = 1e-4
 class Limit:
     """Largest magnitude of an effect that this data could hide.
 
-    Attributes
+    Parameters
     ----------
     kind : str
         Kind of the effect.
@@ -38,6 +38,11 @@ class Limit:
         Its unit.
     sentence : str
         The same in words.
+
+    Examples
+    --------
+    >>> Limit("dahl", 1, 0.4, "N m", "Dahl friction of joint 1: below 0.4 N m.").largest_hidden
+    0.4
     """
 
     kind: str
@@ -47,7 +52,13 @@ class Limit:
     sentence: str
 
     def to_dict(self) -> dict[str, Any]:
-        """As a dictionary for JSON."""
+        """As a dictionary for JSON.
+
+        Returns
+        -------
+        dict
+            One entry of ``limits``.
+        """
         return asdict(self)
 
 

@@ -31,7 +31,7 @@ Mask = NDArray[np.bool_]
 class Settings:
     """Thresholds of the search; the defaults are what is shipped, for every robot and effect.
 
-    Attributes
+    Parameters
     ----------
     significance : float
         Chance of a false candidate over the whole catalogue (Bonferroni).
@@ -51,7 +51,14 @@ class Settings:
     max_findings : int
         Kinds added at most.
     finalists : int
-        Kinds compared with noise re-estimated; the first ``refined`` of them with shape refined.
+        Kinds compared with noise re-estimated.
+    refined : int
+        So many of them with their shape parameters refined.
+
+    Examples
+    --------
+    >>> Settings(max_findings=1).max_findings
+    1
     """
 
     significance: float = 1e-4

@@ -23,7 +23,7 @@ Scope = Literal["joint", "pair", "robot"]
 class Coefficient:
     """A linear coefficient of an effect.
 
-    Attributes
+    Parameters
     ----------
     name : str
         Symbol, such as ``"Fc"``.
@@ -31,6 +31,11 @@ class Coefficient:
         Unit for a revolute joint; for a slider ``N m`` becomes ``N`` and ``rad`` becomes ``m``.
     sign : {0, 1}
         1 where physics allows no negative value.
+
+    Examples
+    --------
+    >>> Coefficient("Fc", "N m", sign=1).name
+    'Fc'
     """
 
     name: str
@@ -42,7 +47,7 @@ class Coefficient:
 class Shape:
     """A parameter that enters an effect nonlinearly and is searched on a grid, then refined.
 
-    Attributes
+    Parameters
     ----------
     name : str
         Symbol, such as ``"stribeck_velocity"``.
@@ -57,6 +62,11 @@ class Shape:
         How refinement steps: by factors or by differences.
     scales : bool
         Whether the value is an angle or angular velocity, so that it scales for sliders.
+
+    Examples
+    --------
+    >>> Shape("vs", "rad/s", (0.05, 0.1), 0.01, 1.0).spacing
+    'log'
     """
 
     name: str
@@ -72,7 +82,7 @@ class Shape:
 class Term:
     """An effect on certain joints with certain shape parameters: one block of regressor columns.
 
-    Attributes
+    Parameters
     ----------
     kind : str
         Kind of the effect, a name of the catalogue.
@@ -80,6 +90,11 @@ class Term:
         Joints, counted from 0; all joints for an effect of the whole robot.
     shape : mapping of str to object
         Values of the shape parameters; empty where the effect has none.
+
+    Examples
+    --------
+    >>> print(Term("dahl", (0,), {"presliding": 0.02}))
+    dahl(joint 1, presliding=0.02)
     """
 
     kind: str
@@ -189,6 +204,7 @@ class Effect:
         Returns
         -------
         ndarray of shape (n_samples, n_coefficients)
+            One column for each coefficient.
         """
         raise NotImplementedError
 
@@ -209,6 +225,7 @@ class Effect:
         Returns
         -------
         dict of int to ndarray of shape (n_samples, n_coefficients)
+            By joint, from 0.
         """
         (joint,) = joints
         return {joint: self.columns(signals, joint, **shape)}
@@ -226,6 +243,7 @@ class Effect:
         Returns
         -------
         str or None
+            A reason in words.
         """
         if "temperature" in self.needs and signals.temperature is None:
             return "no temperature is logged"
@@ -246,6 +264,7 @@ class Effect:
         Returns
         -------
         list of tuple of int
+            Joints from 0.
         """
         n = signals.n_joints
         if self.scope == "robot":
@@ -268,6 +287,7 @@ class Effect:
         Returns
         -------
         list of dict
+            Combinations of shape parameters.
         """
         axes = []
         for shape in self.shapes:
@@ -293,6 +313,7 @@ class Effect:
         Returns
         -------
         dict of str to float
+            Physical parameters by name.
         """
         values: dict[str, Any] = {
             c.name: float(v) for c, v in zip(self.coefficients, coefficients, strict=True)
@@ -310,6 +331,7 @@ class Effect:
         Returns
         -------
         dict of str to str
+            By name of the parameter.
         """
         units = {c.name: c.unit for c in self.coefficients}
         units |= {s.name: s.unit for s in self.shapes}
@@ -323,6 +345,7 @@ class Effect:
         Returns
         -------
         dict
+            Attributes of the class by name.
         """
         return {
             "kind": self.kind,

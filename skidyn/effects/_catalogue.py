@@ -74,6 +74,7 @@ def list_effects() -> list[str]:
     Returns
     -------
     list of str
+        In the order of the catalogue.
 
     Examples
     --------
@@ -94,6 +95,7 @@ def get_effect(kind: str) -> Effect:
     Returns
     -------
     Effect
+        The instance of the catalogue.
 
     Raises
     ------
@@ -130,10 +132,32 @@ def register_effect(effect: Effect | type[Effect]) -> None:
     ------
     EffectError
         The declaration is incomplete.
+
+    Examples
+    --------
+    >>> from skidyn.effects import Coefficient, Effect, list_effects, register_effect
+    >>> class AirDrag(Effect):
+    ...     kind = "air_drag"
+    ...     title = "Air drag"
+    ...     formula = "c dq abs(dq)"
+    ...     coefficients = (Coefficient("c", "N m s^2/rad^2", sign=1),)
+    ...
+    ...     def columns(self, signals, joint, **shape):
+    ...         dq = signals.dq[:, joint]
+    ...         return (dq * abs(dq))[:, None]
+    >>> register_effect(AirDrag)
+    >>> "air_drag" in list_effects()
+    True
+    >>> unregister_effect("air_drag")
     """
     instance = effect() if isinstance(effect, type) else effect
     instance.check()
     _CATALOGUE[instance.kind] = instance
+
+
+def unregister_effect(kind: str) -> None:
+    """Take an effect out of the catalogue again."""
+    _CATALOGUE.pop(kind, None)
 
 
 def make_terms(specs: Iterable[TermSpec], n_joints: int) -> list[Term]:

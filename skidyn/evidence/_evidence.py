@@ -33,7 +33,7 @@ RANK_TOLERANCE = 1e-10
 class Evidence:
     """Triangular factors of [columns | torque] of every trajectory and joint.
 
-    Attributes
+    Parameters
     ----------
     columns : tuple of str
         Names of the columns.
@@ -71,6 +71,7 @@ class Evidence:
         Returns
         -------
         Evidence
+            Factors of the rows.
 
         Raises
         ------
@@ -103,6 +104,7 @@ class Evidence:
         Returns
         -------
         Evidence
+            Factors by trajectory and joint.
         """
         terms = list(terms)
         names = []
@@ -152,6 +154,7 @@ class Evidence:
         Returns
         -------
         Evidence
+            The same columns, fewer trajectories.
         """
         kept = set(trajectories)
         return Evidence(
@@ -171,6 +174,7 @@ class Evidence:
         Returns
         -------
         Evidence
+            The same columns, one trajectory less.
         """
         return self.only(t for t in self.trajectories if t != trajectory)
 
@@ -189,6 +193,7 @@ class Evidence:
         Returns
         -------
         ndarray of shape (n_columns,)
+            One for every column, zero for those that are left out.
 
         Raises
         ------
@@ -238,6 +243,7 @@ class Evidence:
         Returns
         -------
         dict of int to float
+            By joint, from 0.
         """
         errors = self.squared_error(coefficients)
         return {

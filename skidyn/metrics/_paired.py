@@ -62,6 +62,13 @@ class PairedComparison:
         One-sided: probability of a ratio this low if the second model were no better.
     n_recordings : int
         Number of recordings.
+
+    Examples
+    --------
+    >>> from skidyn.metrics import paired_comparison
+    >>> result = paired_comparison([1.0, 1.1, 0.9], [0.5, 0.6, 0.5])
+    >>> result.ratio < 1
+    True
     """
 
     ratio: float

@@ -29,7 +29,14 @@ LOOKED_AT = 2000
 
 
 class LeakageWarning(UserWarning):
-    """Training and test rows of a fold are not independent; the score promises too much."""
+    """Training and test rows of a fold are not independent; the score promises too much.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> warnings.simplefilter("error", LeakageWarning)  # make leaking folds an error
+    >>> warnings.simplefilter("default", LeakageWarning)
+    """
 
 
 class LeakageGuard(BaseCrossValidator):

@@ -29,7 +29,7 @@ NEGLIGIBLE = 1e-7
 class BaseParameters:
     """Independent columns of the torque regressor and how the others join them.
 
-    Attributes
+    Parameters
     ----------
     index : ndarray of shape (n_base,)
         Columns of the torque regressor that are kept.
@@ -37,6 +37,12 @@ class BaseParameters:
         Base parameters as combinations of all inertial parameters.
     expressions : tuple of str
         The combinations in words, such as ``"Izz_link1 + 0.04*m_link2"``.
+
+    Examples
+    --------
+    >>> from skidyn.datasets import load_planar_arm
+    >>> find_base_parameters(load_planar_arm()).expressions[0]
+    'mcx_link1'
     """
 
     index: NDArray[np.int64]
@@ -54,6 +60,7 @@ class BaseParameters:
         Returns
         -------
         ndarray of shape (n_base,)
+            In the order of ``index``.
         """
         return self.regrouping @ np.ravel(inertial_parameters)
 
@@ -69,6 +76,7 @@ def find_base_parameters(robot: Robot) -> BaseParameters:
     Returns
     -------
     BaseParameters
+        Columns, combinations and their names.
 
     Examples
     --------

@@ -93,6 +93,7 @@ def is_consistent(parameters: Array) -> bool:
     Returns
     -------
     bool
+        Whether all pseudo-inertias are positive definite.
 
     Examples
     --------
@@ -133,7 +134,20 @@ def make_consistent(
     Returns
     -------
     parameters : ndarray of shape (n_bodies, 10)
+        Of bodies that can exist.
     coefficients : ndarray of shape (n_coefficients,)
+        Of the right sign.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skidyn.datasets import load_planar_arm
+    >>> nominal = load_planar_arm().inertial_parameters
+    >>> wrong = nominal.ravel().copy()
+    >>> wrong[0] = -1.0  # a negative mass cannot be fitted
+    >>> parameters, _ = make_consistent(nominal, np.eye(20), wrong, np.zeros(0), np.zeros(0))
+    >>> is_consistent(parameters)
+    True
     """
     n = 10 * len(nominal)
     x0 = _log_cholesky(_repaired(nominal))

@@ -143,6 +143,7 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
         Returns
         -------
         RBDRegressor
+            The model itself.
 
         Raises
         ------
@@ -183,6 +184,7 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
         Returns
         -------
         ndarray of shape (n_samples, n_joints) or (n_samples,), N m or N
+            Predicted torque.
         """
         check_is_fitted(self)
         X = validate_data(self, X, reset=False, dtype=np.float64)
@@ -221,6 +223,7 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
         Returns
         -------
         ndarray of shape (n_samples, n_joints), N m or N
+            Torque without the effects.
         """
         check_is_fitted(self)
         return self.robot_.inverse_dynamics(q, dq, ddq, parameters=self.inertial_parameters_)
@@ -236,6 +239,7 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
         Returns
         -------
         RBDRegressor
+            Not fitted.
         """
         more = [e for e in effects if e not in list(self.effects)]
         parameters = self.get_params(deep=False) | {"effects": [*self.effects, *more]}
