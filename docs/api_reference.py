@@ -25,4 +25,270 @@ class Page(NamedTuple):
 
 PAGES: tuple[Page, ...] = (
     Page("skidyn", "What the package itself offers.", (Section("Versions", ("show_versions",)),)),
+    Page(
+        "skidyn.robots",
+        "Robots from URDF files: joints, limits, inertial parameters and dynamics.",
+        (Section("Classes", ("Robot",)),),
+    ),
+    Page(
+        "skidyn.rigid_body",
+        "Identification of rigid bodies together with effects; base parameters; consistency.",
+        (
+            Section(
+                "Classes",
+                (
+                    "BaseParameters",
+                    "RBDRegressor",
+                ),
+            ),
+            Section(
+                "Functions",
+                (
+                    "find_base_parameters",
+                    "is_consistent",
+                    "make_consistent",
+                ),
+            ),
+        ),
+    ),
+    Page(
+        "skidyn.effects",
+        "The catalogue of physical effects and how to add one.",
+        (
+            Section(
+                "Classes",
+                (
+                    "Coefficient",
+                    "Effect",
+                    "Shape",
+                    "Term",
+                ),
+            ),
+            Section(
+                "Functions",
+                (
+                    "dahl_state",
+                    "get_effect",
+                    "list_effects",
+                    "make_terms",
+                    "register_effect",
+                    "stop_state",
+                ),
+            ),
+        ),
+    ),
+    Page(
+        "skidyn.evidence",
+        "Least-squares evidence of trajectories: merged, left out, solved.",
+        (Section("Classes", ("Evidence",)),),
+    ),
+    Page(
+        "skidyn.diagnosis",
+        "The loop: compare, see where it fails, learn what is missing, add it.",
+        (
+            Section(
+                "Classes",
+                (
+                    "Comparison",
+                    "Diagnosis",
+                    "EffectSearchCV",
+                    "Failure",
+                    "Finding",
+                    "Limit",
+                    "Settings",
+                ),
+            ),
+            Section("Functions", ("diagnose",)),
+        ),
+    ),
+    Page(
+        "skidyn.inspection",
+        "Pictures of torque, residuals, error budgets and error maps.",
+        (
+            Section(
+                "Classes",
+                (
+                    "ErrorBudgetDisplay",
+                    "ErrorMapDisplay",
+                    "ResidualDisplay",
+                    "TorqueDisplay",
+                ),
+            ),
+        ),
+    ),
+    Page(
+        "skidyn.report",
+        "A diagnosis as JSON and as one HTML page.",
+        (
+            Section(
+                "Functions",
+                (
+                    "render_html",
+                    "summarize",
+                    "write_html",
+                    "write_json",
+                ),
+            ),
+        ),
+    ),
+    Page(
+        "skidyn.datasets",
+        "Logs from files, simulated logs with a hidden effect, embedded robots.",
+        (
+            Section(
+                "Classes",
+                (
+                    "JointQuality",
+                    "LogQuality",
+                ),
+            ),
+            Section(
+                "Functions",
+                (
+                    "check_log",
+                    "fetch_emps",
+                    "fetch_panda_exciting",
+                    "hidden_effect_kinds",
+                    "load_demo_log",
+                    "load_panda",
+                    "load_planar_arm",
+                    "load_recording",
+                    "load_scara",
+                    "load_srs_arm",
+                    "load_ur10e",
+                    "load_ur5",
+                    "make_hidden_effect_log",
+                    "read_log",
+                ),
+            ),
+        ),
+    ),
+    Page(
+        "skidyn.preprocessing",
+        "Currents to torques, filters, derivatives, scaling, repeated trajectories.",
+        (
+            Section(
+                "Classes",
+                (
+                    "ButterworthFilter",
+                    "CurrentToTorque",
+                    "SignalScaler",
+                    "TimeDerivative",
+                ),
+            ),
+            Section(
+                "Functions",
+                (
+                    "average_repetitions",
+                    "cross_fitted_residual",
+                ),
+            ),
+        ),
+    ),
+    Page(
+        "skidyn.model_selection",
+        "Splits by trajectory and phase, a leakage guard, learning curves.",
+        (
+            Section(
+                "Classes",
+                (
+                    "LeakageGuard",
+                    "LeakageWarning",
+                    "PhaseKFold",
+                    "TrajectoryKFold",
+                ),
+            ),
+            Section(
+                "Functions",
+                (
+                    "leakage_report",
+                    "trajectory_learning_curve",
+                ),
+            ),
+        ),
+    ),
+    Page(
+        "skidyn.metrics",
+        "Errors per joint, scorers, paired comparison of two models.",
+        (
+            Section("Classes", ("PairedComparison",)),
+            Section(
+                "Functions",
+                (
+                    "SCORERS",
+                    "joint_error_table",
+                    "max_absolute_error",
+                    "min_absolute_error",
+                    "paired_comparison",
+                    "percent_improvement",
+                    "rmse_over_range",
+                    "trajectory_errors",
+                ),
+            ),
+        ),
+    ),
+    Page(
+        "skidyn.neural_network",
+        "LSTM regressors without and with the rigid body.",
+        (
+            Section(
+                "Classes",
+                (
+                    "BLLRegressor",
+                    "LSTMRegressor",
+                    "NDLRegressor",
+                    "SDLRegressor",
+                    "TorqueStream",
+                ),
+            ),
+        ),
+    ),
+    Page(
+        "skidyn.committee",
+        "Committees of extreme learning machines.",
+        (Section("Classes", ("ELMCommittee",)),),
+    ),
+    Page(
+        "skidyn.hybrid",
+        "Physics plus a learner of its residual that knows when to add nothing.",
+        (
+            Section(
+                "Classes",
+                (
+                    "HybridRegressor",
+                    "OwnJointRegressor",
+                ),
+            ),
+        ),
+    ),
+    Page(
+        "skidyn.forecasting",
+        "Forecasts from past torque, which every forecast must beat.",
+        (
+            Section(
+                "Classes",
+                (
+                    "AutoregressiveRegressor",
+                    "PersistenceRegressor",
+                ),
+            ),
+            Section("Functions", ("forecast_table",)),
+        ),
+    ),
+    Page(
+        "skidyn.export",
+        "C, Python, URDF and MJCF of an identified model.",
+        (
+            Section(
+                "Functions",
+                (
+                    "c_source",
+                    "model_terms",
+                    "python_source",
+                    "write_mjcf",
+                    "write_urdf",
+                ),
+            ),
+        ),
+    ),
 )
