@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Time and peak memory of ``skidyn diagnose`` on a long log: five minutes of 7 joints at 1 kHz.
 
-    python benchmarks/diagnosis/long_log.py
+python benchmarks/diagnosis/long_log.py
 """
 
 from __future__ import annotations

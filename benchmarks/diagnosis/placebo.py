@@ -42,9 +42,7 @@ def prepare(name: str, robot: Robot, folder: Path):
     """Problem of one recording with its base model fitted."""
     frame = load_recording(folder / "ur10e_excitation.npz", run=name, drive_gains=GAINS).frame
     signals, torque = read_signals(frame, frame[[f"tau{j + 1}" for j in range(6)]], robot)
-    problem = make_problem(
-        signals, torque, robot=robot, rigid_body=True, terms=make_terms(BASE, 6)
-    )
+    problem = make_problem(signals, torque, robot=robot, rigid_body=True, terms=make_terms(BASE, 6))
     fit = problem.fit(problem.terms, passes=3)
     problem.with_fit(fit)
     return problem, fit

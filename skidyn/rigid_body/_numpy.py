@@ -2,7 +2,7 @@
 """Run a tape with NumPy on many samples at once.
 
 A program is bound once to fixed buffers: one contiguous row of ``chunk`` samples per live value,
-and a list of ufunc calls that write into them. Rows are re-used as soon as their value is dead,
+and a list of ufunc calls that write into them. Rows are reused as soon as their value is dead,
 so that a chunk stays in the cache; samples run along the last axis, so that every call is one
 contiguous loop.
 """
