@@ -157,6 +157,9 @@ def make_finding(
     joints = _joints(problem, hypothesis, candidates)
     parameters = {} if unknown else _parameters(problem, candidates, intervals)
     title = _unknown_title(hypothesis) if unknown else effect.title
+    relatives = [k for k in rivals if k != UNKNOWN and get_effect(k).family == effect.family]
+    if effect.family and relatives:
+        title = f"{effect.family.capitalize()}, best described by {title}"
     code = _code(hypothesis, joints, candidates)
     sentence = _sentence(title, joints, parameters, error_drop, rivals, effect.separating_motion)
     if effect.caveat:

@@ -48,6 +48,9 @@ class Settings:
         Share by which a nameless function must beat a named effect.
     simpler_share : float
         A simpler kind is named if it falls behind by less than this share.
+    family_share : float
+        Within a family of effects (hysteresis), the simplest one with this share of the best
+        one's score is named.
     max_findings : int
         Kinds added at most.
     finalists : int
@@ -69,6 +72,7 @@ class Settings:
     second_any: float = 0.015
     unknown_handicap: float = 0.03
     simpler_share: float = 0.05
+    family_share: float = 0.9
     max_findings: int = 4
     finalists: int = 8
     refined: int = 4
@@ -282,6 +286,11 @@ class _Search:
             if not reach & set(old.joints):
                 continue
             without = [c for c in self.chosen if c not in old.candidates]
+            if _family(old) and _family(old) == _family(newest) and old.joints == newest.joints:
+                # A richer member of the family takes the place of the simpler one.
+                self.chosen = without
+                self.findings.remove(old)
+                continue
             errors = [
                 profile_error(
                     self.problem,
@@ -322,7 +331,21 @@ class _Search:
             cap = self.settings.simpler_share * best.score
             if behind.sum() < min(max(error, 6.0), cap):
                 best = rival
-        return best
+        return self._simplest_of_family(best, ranking)
+
+    def _simplest_of_family(self, best: Hypothesis, ranking: list[Hypothesis]) -> Hypothesis:
+        """Members of a family differ only in motion made for it: the simplest near one is named."""
+        family = _family(best)
+        if not family:
+            return best
+        near = [
+            h
+            for h in ranking
+            if _family(h) == family
+            and h.joints == best.joints
+            and h.score >= self.settings.family_share * best.score
+        ]
+        return min([best, *near], key=_simplicity)
 
     def _limit(self, n_columns: int, joints: Sequence[int], n_rows: int) -> float:
         """Least drop of squared error (in noise units) that is not chance."""
@@ -492,6 +515,10 @@ class _Search:
 def replace_torque(problem: Problem, torque: Array) -> Problem:
     """The same problem with another torque to explain."""
     return replace(problem, torque=torque)
+
+
+def _family(hypothesis: Hypothesis) -> str:
+    return "" if hypothesis.kind == UNKNOWN else get_effect(hypothesis.kind).family
 
 
 def _simplicity(hypothesis: Hypothesis) -> int:
