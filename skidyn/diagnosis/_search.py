@@ -72,7 +72,7 @@ class Settings:
     second_any: float = 0.015
     unknown_handicap: float = 0.03
     simpler_share: float = 0.05
-    family_share: float = 0.9
+    family_share: float = 0.95
     max_findings: int = 4
     finalists: int = 8
     refined: int = 4
