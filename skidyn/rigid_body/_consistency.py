@@ -24,6 +24,8 @@ _LOWER = [(0, 0), (1, 1), (2, 2), (3, 3), (1, 0), (2, 0), (3, 0), (2, 1), (3, 1)
 #: Pull toward the given parameters, relative to the data, where the data says nothing.
 PRIOR = 1e-4
 MOST_EVALUATIONS = 60
+#: Least eigenvalue of a pseudo-inertia, as a share of its largest; far below what torque shows.
+LEAST_EIGENVALUE = 1e-10
 
 
 def pseudo_inertia(parameters: Array) -> Array:
@@ -182,7 +184,7 @@ def make_consistent(
         ftol=1e-8,
         xtol=1e-8,
     )
-    parameters = from_pseudo_inertia(_matrices(solution.x[:n]))
+    parameters = from_pseudo_inertia(_lifted(_matrices(solution.x[:n])))
     return parameters, solution.x[n:] / scale
 
 
@@ -200,6 +202,12 @@ def _repaired(nominal: Array) -> Array:
             repaired[i, :3, 3] = repaired[i, 3, :3] = mass * centre
             repaired[i, :3, :3] = mass * (np.outer(centre, centre) + 0.03**2 * np.eye(3))
     return repaired
+
+
+def _lifted(matrices: Array) -> Array:
+    """The same matrices, with eigenvalues that rounding may have lost raised above zero."""
+    largest = np.linalg.eigvalsh(matrices)[:, -1]
+    return matrices + (LEAST_EIGENVALUE * largest)[:, None, None] * np.eye(4)
 
 
 def _log_cholesky(matrices: Array) -> Array:
