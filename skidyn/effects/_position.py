@@ -40,6 +40,10 @@ class PositionDependentFriction(Effect):
         a, b = coefficients
         return {"A": float(np.hypot(a, b)), "phase": float(np.arctan2(b, a)), **shape}
 
+    def units(self, prismatic: bool = False) -> dict[str, str]:
+        torque, wave = ("N", "1/m") if prismatic else ("N m", "1/rad")
+        return {"A": torque, "phase": "rad", "n": wave}
+
 
 class TorqueRipple(Effect):
     """Torque periodic in the joint angle: cogging, gear teeth, the wave of a harmonic drive."""
@@ -71,3 +75,6 @@ class TorqueRipple(Effect):
     ) -> dict[str, Any]:
         a, b = coefficients
         return {"A": float(np.hypot(a, b)), "phase": float(np.arctan2(-b, a)), **shape}
+
+    def units(self, prismatic: bool = False) -> dict[str, str]:
+        return {"A": "N m", "phase": "rad", "N": "1/rad"}

@@ -53,6 +53,9 @@ class Spring(Effect):
         k, tau0 = map(float, coefficients)
         return {"k": k, "q0": -tau0 / k if k else 0.0}
 
+    def units(self, prismatic: bool = False) -> dict[str, str]:
+        return {"k": "N/m", "q0": "m"} if prismatic else {"k": "N m/rad", "q0": "rad"}
+
 
 class NonlinearSpring(Effect):
     """Spring that stiffens or softens: a cubic in position."""
