@@ -60,6 +60,7 @@ PAGES: tuple[Page, ...] = (
                 (
                     "Coefficient",
                     "Effect",
+                    "FrictionTransformer",
                     "Shape",
                     "Term",
                 ),

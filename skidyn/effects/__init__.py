@@ -4,10 +4,12 @@
 from skidyn.effects._base import Coefficient, Effect, Shape, Term
 from skidyn.effects._catalogue import get_effect, list_effects, make_terms, register_effect
 from skidyn.effects._hysteresis import dahl_state, stop_state
+from skidyn.effects._transformer import FrictionTransformer
 
 __all__ = [
     "Coefficient",
     "Effect",
+    "FrictionTransformer",
     "Shape",
     "Term",
     "dahl_state",

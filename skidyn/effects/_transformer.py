@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Friction as features for any scikit-learn regressor."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.base import BaseEstimator, TransformerMixin
+from sklearn.utils.validation import _check_feature_names_in, check_is_fitted, validate_data
+
+from skidyn._columns import Columns, ColumnSpec, _key_column, resolve_columns
+from skidyn._exceptions import ColumnError, EffectError
+from skidyn._signals import Array, signals_from
+from skidyn.effects._base import Effect, Term
+from skidyn.effects._catalogue import get_effect, make_terms
+
+
+class FrictionTransformer(TransformerMixin, BaseEstimator):
+    """Append the columns of friction and other joint effects to X.
+
+    Parameters
+    ----------
+    effects : sequence of str, (str, joints) or Term, default=("viscous", "coulomb")
+        Effects that act on single joints and follow from the motion alone. Those with shape
+        parameters are given as :class:`~skidyn.effects.Term`.
+    n_joints : int, default=None
+        Number of joints; from the columns if None. All joints are taken to be revolute.
+    trajectory, time : int, str or None, default="auto"
+        Key columns, handed on untouched.
+
+    Attributes
+    ----------
+    terms_ : list of Term
+        Effects per joint, in the order of the appended columns.
+    columns_ : Columns
+        Which column of X means what.
+    n_features_in_ : int
+        Columns of X.
+    feature_names_in_ : ndarray of str
+        Their names, where X has names.
+
+    See Also
+    --------
+    skidyn.rigid_body.RBDRegressor : Rigid body and effects identified together.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> X = np.array([[0.1, 2.0, 0.0], [0.2, -2.0, 0.0]])
+    >>> FrictionTransformer().fit_transform(X)[:, 3:].tolist()
+    [[2.0, 1.0], [-2.0, -1.0]]
+    """
+
+    def __init__(
+        self,
+        effects: Iterable[Any] = ("viscous", "coulomb"),
+        n_joints: int | None = None,
+        *,
+        trajectory: ColumnSpec = "auto",
+        time: ColumnSpec = "auto",
+    ) -> None:
+        self.effects = effects
+        self.n_joints = n_joints
+        self.trajectory = trajectory
+        self.time = time
+
+    def fit(self, X: Any, y: Any = None) -> FrictionTransformer:
+        """Find the columns of X and check the effects.
+
+        Parameters
+        ----------
+        X : DataFrame or array of shape (n_samples, n_features)
+            Motion, following the X contract.
+        y : None
+            Ignored.
+
+        Returns
+        -------
+        FrictionTransformer
+            The transformer itself.
+
+        Raises
+        ------
+        ColumnError
+            X does not follow the contract.
+        EffectError
+            An effect needs more than the motion of its joint, or its shape parameters.
+        """
+        X = validate_data(self, X, dtype=np.float64)
+        self.columns_ = self._resolve(X.shape[1])
+        self.terms_ = make_terms(self.effects, self.columns_.n_joints)
+        for term in self.terms_:
+            _refuse(term, self.columns_)
+        return self
+
+    def transform(self, X: Any) -> Array:
+        """Append the effects' columns.
+
+        Parameters
+        ----------
+        X : DataFrame or array of shape (n_samples, n_features)
+            Motion. States of hysteresis start anew with each trajectory.
+
+        Returns
+        -------
+        ndarray of shape (n_samples, n_features + n_coefficients)
+            X, then one column per coefficient of each term.
+        """
+        check_is_fitted(self)
+        X = validate_data(self, X, reset=False, dtype=np.float64)
+        signals = signals_from(X, self.columns_)
+        blocks = [get_effect(t.kind).columns(signals, t.joints[0], **t.shape) for t in self.terms_]
+        return np.hstack([X, *blocks])
+
+    def get_feature_names_out(self, input_features: Any = None) -> NDArray[Any]:
+        """Names of the columns of X, then ``<kind>_<coefficient>_<joint>``, joints from 1.
+
+        Parameters
+        ----------
+        input_features : array-like of str, default=None
+            Names of the columns of X; those seen in ``fit`` if None.
+
+        Returns
+        -------
+        ndarray of str
+            Names of the output's columns.
+        """
+        check_is_fitted(self)
+        names = list(_check_feature_names_in(self, input_features))
+        for i, term in enumerate(self.terms_):
+            own = [f"{term.kind}_{c.name}_{term.joints[0] + 1}" for c in _coefficients(term)]
+            # The same kind twice on a joint differs in its shape parameters alone.
+            names += [f"{name}_{i}" if name in names else name for name in own]
+        return np.asarray(names, dtype=object)
+
+    def _resolve(self, n_features: int) -> Columns:
+        given = getattr(self, "feature_names_in_", None)
+        names = None if given is None else [str(name) for name in given]
+        joints = self._joints(names, n_features)
+        return resolve_columns(
+            names, n_features, joints, trajectory=self.trajectory, time=self.time
+        )
+
+    def _joints(self, names: list[str] | None, n_features: int) -> list[str]:
+        """Names of the joints: those of columns ``dq_<joint>``, numbers otherwise."""
+        named = [name[3:] for name in names or () if name.startswith("dq_")]
+        numbered = [name for name in names or () if name[:2] == "dq" and name[2:].isdigit()]
+        if named:
+            found = named
+        else:
+            keys = {
+                _key_column(what, spec, names, n_features)
+                for what, spec in (("trajectory", self.trajectory), ("time", self.time))
+            } - {None}
+            count = len(numbered) or max(1, (n_features - len(keys)) // 3)
+            found = [str(k + 1) for k in range(count)]
+        if self.n_joints is not None and self.n_joints != len(found):
+            raise ColumnError(
+                f"n_joints={self.n_joints}, but X has the columns of {len(found)} joint(s)"
+            )
+        return found
+
+
+def _coefficients(term: Term) -> Any:
+    return get_effect(term.kind).coefficients
+
+
+def _refuse(term: Term, columns: Columns) -> None:
+    """Refuse an effect that the motion of one joint does not determine."""
+    effect = get_effect(term.kind)
+    beyond = [need for need in effect.needs if need not in ("temperature", "time")]
+    if effect.scope != "joint" or beyond:
+        what = ", ".join(beyond) or f"scope {effect.scope!r}"
+        raise EffectError(
+            f"{term.kind} does not follow from the motion of one joint alone ({what}); "
+            "use RBDRegressor, which knows the robot and its torque"
+        )
+    if not term.shape and (effect.shapes or type(effect).grid is not Effect.grid):
+        example = ", ".join(f"{s.name!r}: .." for s in effect.shapes) or ".."
+        raise EffectError(
+            f"{term.kind} needs shape parameters; pass Term({term.kind!r}, ({term.joints[0]},), "
+            f"{{{example}}}) or use RBDRegressor, which finds them"
+        )
+    for need in effect.needs:
+        if getattr(columns, need) is None:
+            raise ColumnError(f"{term.kind} needs the column(s) of {need}, which X lacks")
