@@ -134,6 +134,7 @@ def _with_log(parser: Any) -> None:
     )
     parser.add_argument("--columns", help="JSON object: which columns hold which signals")
     parser.add_argument("--units", help='JSON object: units that are not SI, {"q": "deg"}')
+    parser.add_argument("--drive-gains", help="JSON list: torque per ampere, for logs of currents")
     parser.add_argument("--joints", help="joints the log covers, separated by commas")
     parser.add_argument("--rate", type=float, help="sampling rate in Hz of a log without time")
 
@@ -361,6 +362,7 @@ def _load(options: argparse.Namespace) -> tuple[RBDRegressor, pd.DataFrame, Any]
         robot=robot,
         columns=_json_option("columns", options.columns),
         units=_json_option("units", options.units),
+        drive_gains=_json_option("drive-gains", getattr(options, "drive_gains", None)),
         rate=options.rate,
     )
     tau = frame[[f"tau{j + 1}" for j in range(robot.n_joints)]].to_numpy()
@@ -498,7 +500,8 @@ def _provenance(options: argparse.Namespace) -> dict[str, Any]:
 
     # the path of the interpreter says nothing about the numbers, but much about its user
     used = {name: version for name, version in versions().items() if name != "executable"}
-    keep = ("logs", "urdf", "model", "nominal", "columns", "units", "joints", "rate", "effects")
+    keep = ("logs", "urdf", "model", "nominal", "columns", "units", "drive_gains", "joints")
+    keep += ("rate", "effects")
     recorded = {k: getattr(options, k, None) for k in keep}
     hashes = _hashes([*options.logs, options.urdf])
     return {"versions": used, "sha256": hashes, "options": recorded}

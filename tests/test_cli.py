@@ -185,3 +185,13 @@ def test_a_reader_that_stops_early_is_no_error():
         process.stdout.close()
         errors = process.stderr.read()
     assert (process.returncode, errors) == (cli.DONE, b"")
+
+
+def test_currents_become_torques_by_drive_gains(work, tmp_path, capsys):
+    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=3, duration=4.0)
+    frame = log.frame.rename(columns={"tau1": "i1", "tau2": "i2"})
+    frame[["i1", "i2"]] = frame[["i1", "i2"]] / [10.0, 5.0]
+    frame.to_csv(tmp_path / "currents.csv", index=False)
+    words = ["compare", str(tmp_path / "currents.csv"), "--urdf", str(work / "arm.urdf")]
+    result = run_json(capsys, *words, "--drive-gains", "[10, 5]")
+    assert max(row["relative"] for row in result["table"]) < 0.5
