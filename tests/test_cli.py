@@ -193,5 +193,6 @@ def test_currents_become_torques_by_drive_gains(work, tmp_path, capsys):
     frame[["i1", "i2"]] = frame[["i1", "i2"]] / [10.0, 5.0]
     frame.to_csv(tmp_path / "currents.csv", index=False)
     words = ["compare", str(tmp_path / "currents.csv"), "--urdf", str(work / "arm.urdf")]
-    result = run_json(capsys, *words, "--drive-gains", "[10, 5]")
+    code, result = run_json(capsys, *words, "--drive-gains", "[10, 5]")
+    assert code == cli.DONE
     assert max(row["relative"] for row in result["table"]) < 0.5
