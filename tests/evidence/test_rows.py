@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import numpy as np
+import pytest
+
+from skidyn._signals import Signals
+from skidyn.evidence._rows import every_sample, sliding_samples, window_rows
+
+
+@pytest.fixture
+def signals():
+    t = np.tile(np.arange(400) * 0.01, 2)
+    q = np.sin(2 * t)[:, None]
+    return Signals(q, 2 * np.cos(2 * t)[:, None], -4 * q, np.repeat([3, 7], 400), time=t)
+
+
+def test_averaging_keeps_a_linear_model_exact(signals):
+    rng = np.random.default_rng(0)
+    columns, truth = rng.normal(size=(800, 3)), np.array([1.0, -2.0, 0.5])
+    rows = window_rows(signals, rng.random((800, 1)) > 0.3, 100.0)
+    np.testing.assert_allclose(
+        rows.average(columns, 0) @ truth, rows.average(columns @ truth, 0), atol=1e-12
+    )
+
+
+def test_windows_have_unit_noise_gain_and_stay_in_their_trajectory(signals):
+    use = np.ones((800, 1), dtype=bool)
+    use[100:150] = False
+    rows = window_rows(signals, use, 100.0)
+    weights = rows.weights[0].toarray()
+    np.testing.assert_allclose((weights**2).sum(1), 1.0)
+    assert not weights[:, 100:150].any()
+    for weight, trajectory in zip(weights, rows.trajectory[0], strict=True):
+        assert set(signals.trajectory[weight != 0]) == {trajectory}
+    assert set(rows.quarter[0]) == {0, 1, 2, 3}
+
+
+def test_rest_and_reversals_do_not_slide(signals):
+    sliding = sliding_samples(signals, np.ones(800, dtype=bool), margin=3)
+    turn = int(np.pi / 4 / 0.01)
+    assert not sliding[turn - 3 : turn + 4].any()
+    assert sliding[turn + 20 : turn + 60].all()
+
+
+def test_without_a_clock_every_sample_is_a_row(signals):
+    rows = every_sample(signals)
+    np.testing.assert_array_equal(rows.average(signals.q, 0), signals.q)
+    assert rows.counts.tolist() == [800]

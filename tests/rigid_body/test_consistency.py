@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import numpy as np
+
+from skidyn.datasets import load_panda, load_planar_arm
+from skidyn.rigid_body._consistency import (
+    from_pseudo_inertia,
+    is_consistent,
+    make_consistent,
+    pseudo_inertia,
+)
+
+
+def test_pseudo_inertia_of_points():
+    rng = np.random.default_rng(0)
+    points, masses = rng.normal(size=(6, 3)), rng.uniform(0.1, 1, 6)
+    second = np.einsum("k,ki,kj->ij", masses, points, points)
+    inertia = np.trace(second) * np.eye(3) - second
+    own = np.r_[masses.sum(), masses @ points, inertia[np.triu_indices(3)]][None]
+    matrix = pseudo_inertia(own)[0]
+    np.testing.assert_allclose(matrix[:3, :3], second)
+    np.testing.assert_allclose(from_pseudo_inertia(matrix[None]), own)
+
+
+def test_mass_and_triangle_inequality():
+    body = np.array([[1.0, 0, 0, 0, 0.1, 0, 0, 0.1, 0, 0.1]])
+    assert is_consistent(body)
+    assert not is_consistent(body * np.r_[-1.0, np.ones(9)])
+    assert not is_consistent(body * np.r_[np.ones(9), 2.5])
+
+
+def test_consistent_solution_is_kept():
+    for robot in (load_planar_arm(), load_panda()):
+        truth = robot.inertial_parameters * 1.1
+        n = truth.size
+        found, coefficients = make_consistent(
+            robot.inertial_parameters,
+            np.eye(n + 1),
+            np.r_[truth.ravel(), 0.5],
+            np.ones(1),
+            np.ones(1),
+        )
+        np.testing.assert_allclose(found, truth, atol=2e-2)
+        np.testing.assert_allclose(coefficients, 0.5, atol=1e-3)
+
+
+def test_negative_friction_ends_at_zero():
+    nominal = load_planar_arm().inertial_parameters
+    target = np.r_[nominal.ravel(), -1.0]
+    _, coefficients = make_consistent(
+        nominal, np.eye(21), target, np.array([1.0]), np.array([-1.0])
+    )
+    assert 0 <= coefficients[0] < 1e-3
