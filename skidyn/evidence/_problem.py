@@ -13,7 +13,7 @@ from scipy.linalg import cho_factor, cho_solve, qr
 from skidyn._signals import Array, Signals
 from skidyn.effects import Term, get_effect
 from skidyn.evidence._kinematics import SmoothedMotion, as_given, smooth_motion
-from skidyn.evidence._rows import Rows, every_sample, sliding_samples, window_rows
+from skidyn.evidence._rows import FEWEST_SAMPLES, Rows, every_sample, sliding_samples, window_rows
 from skidyn.rigid_body._base_parameters import base_parameter_index
 from skidyn.robots import Robot
 
@@ -281,7 +281,9 @@ def make_problem(
         margin = max(1, round(MARGIN * motion.half_width))
         use = sliding_samples(motion.signals, motion.valid, margin)
         rows = window_rows(motion.signals, use, motion.rate)
-    rows, fold, n_folds, whole = _folds(rows)
+    # A slow log has wider windows, which reach further over a border.
+    guard = WINDOW_GUARD if signals.time is None else max(WINDOW_GUARD, _half_window(motion.rate))
+    rows, fold, n_folds, whole = _folds(rows, guard)
     problem = Problem(
         robot,
         motion,
@@ -332,7 +334,11 @@ def _add_rigid_body(problem: Problem) -> None:
     problem.rigid_rows = [block[:, problem.rigid_index] for block in rows]
 
 
-def _folds(rows: Rows) -> tuple[Rows, list[NDArray[np.int64]], int, bool]:
+def _half_window(rate: float) -> float:
+    return FEWEST_SAMPLES / rate / 2
+
+
+def _folds(rows: Rows, guard: float) -> tuple[Rows, list[NDArray[np.int64]], int, bool]:
     """Assign rows to folds and sort them; blocks of few trajectories lose the rows at borders."""
     names = np.unique(np.concatenate(rows.trajectory))
     whole = len(names) > FEW_TRAJECTORIES
@@ -353,7 +359,7 @@ def _folds(rows: Rows) -> tuple[Rows, list[NDArray[np.int64]], int, bool]:
             edges = ends[name][1:-1]
             label[inside] += np.searchsorted(edges, time[inside], side="right")
             for edge in edges:
-                near = np.abs(time[inside] - edge) < WINDOW_GUARD
+                near = np.abs(time[inside] - edge) < guard
                 keep[inside[near]] = False
         label = label * n_folds // (len(names) * blocks)
         index = np.flatnonzero(keep)
@@ -370,7 +376,8 @@ def _folds(rows: Rows) -> tuple[Rows, list[NDArray[np.int64]], int, bool]:
     return sorted_rows, fold, n_folds, whole
 
 
-#: Rows whose middle is nearer than this to the border between two blocks are dropped, in s.
+#: Rows whose middle is nearer than this, or half a window, to the border between two blocks are
+#: dropped, in s.
 WINDOW_GUARD = 1 / 16
 
 

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import numpy as np
+import pytest
+
+from skidyn._signals import Signals
+from skidyn.datasets import load_planar_arm
+from skidyn.effects import make_terms
+from skidyn.evidence._problem import make_problem
+
+
+def problem(n_trajectories, rate=100.0):
+    robot = load_planar_arm()
+    t = np.arange(0, 12, 1 / rate)
+    parts = []
+    for k in range(n_trajectories):
+        phase = t[:, None] * [1.1 + 0.1 * k, 1.7]
+        w = np.array([1.1 + 0.1 * k, 1.7])
+        parts.append((np.sin(phase), w * np.cos(phase), -(w**2) * np.sin(phase)))
+    q, dq, ddq = (np.vstack(x) for x in zip(*parts, strict=True))
+    label = np.repeat(np.arange(n_trajectories), len(t))
+    signals = Signals(q, dq, ddq, label, time=np.tile(t, n_trajectories), robot=robot)
+    torque = robot.inverse_dynamics(q, dq, ddq, parameters=1.1 * robot.inertial_parameters)
+    terms = make_terms(["viscous"], 2)
+    return make_problem(
+        signals, torque + 0.4 * dq, robot=robot, rigid_body=True, terms=terms, smooth=False
+    )
+
+
+def test_averaging_keeps_the_model_exact():
+    made = problem(6)
+    fit = made.fit(made.terms)
+    np.testing.assert_allclose(fit.coefficients[len(made.rigid_index) :], 0.4, atol=1e-6)
+
+
+def test_folds_are_whole_trajectories():
+    made = problem(8)
+    assert made.whole_trajectories
+    for fold, trajectory in zip(made.fold, made.rows.trajectory, strict=True):
+        for name in np.unique(trajectory):
+            assert len(set(fold[trajectory == name])) == 1
+
+
+@pytest.mark.parametrize("rate", [100.0, 20.0])
+def test_blocks_of_one_trajectory_share_no_sample(rate):
+    made = problem(1, rate)
+    assert not made.whole_trajectories
+    for weights, fold in zip(made.rows.weights, made.fold, strict=True):
+        used = [set(np.flatnonzero(abs(weights[fold == f]).sum(0) > 1e-12)) for f in set(fold)]
+        assert sum(map(len, used)) == len(set().union(*used))
