@@ -500,8 +500,10 @@ def _provenance(options: argparse.Namespace) -> dict[str, Any]:
 
     # the path of the interpreter says nothing about the numbers, but much about its user
     used = {name: version for name, version in versions().items() if name != "executable"}
-    keep = ("logs", "urdf", "model", "nominal", "columns", "units", "drive_gains", "joints")
-    keep += ("rate", "effects")
+    keep = (
+        *("logs", "urdf", "model", "nominal", "columns", "units", "drive_gains", "joints"),
+        *("rate", "effects"),
+    )
     recorded = {k: getattr(options, k, None) for k in keep}
     hashes = _hashes([*options.logs, options.urdf])
     return {"versions": used, "sha256": hashes, "options": recorded}
