@@ -66,25 +66,27 @@ better = base.with_effects(terms).fit(train, train[TAU])
 
 
 def errors(fitted, frame):
-    """RMSE per joint below 5 Hz: while the joint moves, and at rest."""
+    """RMSE per joint below 5 Hz: from first to last motion, moving, and standing still."""
     b, a = butter(4, 5, fs=1 / np.median(np.diff(frame["time"])))
     residual = filtfilt(b, a, frame[TAU].to_numpy() - fitted.predict(frame), axis=0)
     moves = np.abs(frame[[f"dq{j + 1}" for j in range(6)]].to_numpy()) > 0.02
+    first, *_, last = np.flatnonzero(moves.any(1))
+    run = np.zeros_like(moves)
+    run[first : last + 1] = True
     return [
         np.sqrt(np.where(m, residual**2, 0).sum(0) / np.maximum(m.sum(0), 1))
-        for m in (moves, ~moves)
+        for m in (run, moves, ~moves)
     ]
 
 
 RATIOS = {}
 for name, frame in judge.items():
-    (before, rest_before), (after, rest_after) = errors(base, frame), errors(better, frame)
-    RATIOS[name] = float(np.mean(after / before))
-    print(f"{name}: RMSE in N m, joints 1 to 6")
-    print("   moving, model    ", np.round(before, 2))
-    print("   moving, completed", np.round(after, 2), f"mean change {RATIOS[name] - 1:+.0%}")
-    print("   at rest, model   ", np.round(rest_before, 2))
-    print("   at rest, completed", np.round(rest_after, 2))
+    print(f"{name}: RMSE in N m, joints 1 to 6, model and completed model")
+    parts = ("from first to last motion", "while the joint moves", "while it stands still")
+    for part, before, after in zip(parts, errors(base, frame), errors(better, frame), strict=True):
+        RATIOS[name, part] = float(np.mean(after / before))
+        change = f"{RATIOS[name, part] - 1:+.0%} in the mean over joints"
+        print(f"   {part:26s}", np.round(before, 2), np.round(after, 2), change)
 
 # %%
 # Where the point-to-point run fails: joints 5 and 6 stand still most of the time, and friction at

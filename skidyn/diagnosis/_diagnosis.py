@@ -10,6 +10,7 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from sklearn.base import clone
 from threadpoolctl import threadpool_limits
 
@@ -30,6 +31,7 @@ from skidyn.diagnosis._floor import predictable_share
 from skidyn.diagnosis._held_out import HeldOut, held_out_residual
 from skidyn.diagnosis._intervals import parameter_intervals
 from skidyn.diagnosis._limits import Limit, find_limits
+from skidyn.diagnosis._reversals import look_at_reversals
 from skidyn.diagnosis._search import UNKNOWN, SearchResult, Settings, replace_torque, search
 from skidyn.effects import Term, list_effects, make_terms
 from skidyn.evidence._problem import Problem, make_problem
@@ -105,12 +107,12 @@ class Diagnosis:
 
     @property
     def rmse_before(self) -> Array:
-        """Held-out error of the model as given on sliding samples, (n_joints,), N m or N."""
+        """Held-out error of the model as given on the samples judged, (n_joints,), N m or N."""
         return np.array(self.history[0]["rmse"])
 
     @property
     def rmse_after(self) -> Array:
-        """Held-out error with all findings added on sliding samples, (n_joints,), N m or N."""
+        """Held-out error with all findings added on the samples judged, (n_joints,), N m or N."""
         return np.array(self.history[-1]["rmse"])
 
     @cached_property
@@ -335,7 +337,26 @@ def _diagnose(
         problem = _residual_problem(signals, residual, robot, smooth, settings)
     _check_rows(problem)
     result = search(problem, kinds, settings)
-    return _conclude(problem, result, settings, torque, notes, model, (X, tau))
+    wider, completed = look_at_reversals(problem, result, kinds, settings)
+    limits = _limits(problem, result, completed, settings)
+    sliding = problem.rows.sliding
+    return _conclude(wider, completed, limits, sliding, torque, notes, model, (X, tau))
+
+
+def _limits(
+    problem: Problem, result: SearchResult, completed: SearchResult, settings: Settings
+) -> list[Limit]:
+    """What could still hide beside everything that was found, among the sliding samples."""
+    found = [c.term for h in completed.findings for c in h.candidates]
+    blocks = [problem.term_rows(t) for t in (*problem.terms, *found)]
+    return find_limits(
+        problem,
+        result.candidates,
+        blocks,
+        result.fit.noise,
+        result.inflation,
+        settings.least_gain,
+    )
 
 
 def read_signals(
@@ -485,7 +506,8 @@ def _prediction(model: Any, X: Any, torque: Array) -> Array:
 def _conclude(
     problem: Problem,
     result: SearchResult,
-    settings: Settings,
+    limits: list[Limit],
+    sliding: NDArray[np.bool_],
     torque: Array,
     notes: list[str],
     model: Any,
@@ -494,7 +516,7 @@ def _conclude(
     robot = problem.robot
     assert robot is not None
     base = held_out_residual(problem, problem.terms, result.fit.sigma)
-    comparisons = [_comparison(problem, torque, base)]
+    comparisons = [_comparison(problem, torque, base, sliding)]
     history = [_entry(comparisons[0], None, ())]
     terms = list(problem.terms)
     held = base
@@ -502,7 +524,7 @@ def _conclude(
         terms += [c.term for c in hypothesis.candidates if c.term not in terms]
         last = hypothesis is result.findings[-1]
         held = _held_out(problem, terms, result, keep=terms[len(problem.terms) :] if last else ())
-        comparisons.append(_comparison(problem, torque, held))
+        comparisons.append(_comparison(problem, torque, held, sliding))
         history.append(_entry(comparisons[-1], hypothesis.kind, hypothesis.joints))
     intervals = parameter_intervals(problem, terms, result.fit.noise)
     q = q_values(result.findings, result.inflation, max(1, len(result.candidates)))
@@ -515,10 +537,6 @@ def _conclude(
         findings.append(finding)
     share = predictable_share(problem, result.fit.residual)
     floor = np.array(history[-1]["rmse"]) * np.sqrt(1 - share)
-    blocks = [problem.term_rows(t) for t in terms]
-    limits = find_limits(
-        problem, result.candidates, blocks, result.fit.noise, result.inflation, settings.least_gain
-    )
     return Diagnosis(
         _verdict(findings),
         robot.joint_names,
@@ -555,19 +573,22 @@ def _held_out(
     return held
 
 
-def _comparison(problem: Problem, torque: Array, held: HeldOut) -> Comparison:
+def _comparison(
+    problem: Problem, torque: Array, held: HeldOut, sliding: NDArray[np.bool_]
+) -> Comparison:
     assert problem.robot is not None
     return Comparison(
         problem.signals,
         torque,
         torque - held.residual,
-        problem.rows.sliding,
+        sliding,
         problem.robot.joint_names,
+        problem.rows.sliding,
     )
 
 
 def _entry(comparison: Comparison, added: str | None, joints: Sequence[int]) -> dict[str, Any]:
-    rmse = [float(x) for x in comparison.rmse(sliding=True)]
+    rmse = [float(x) for x in comparison.rmse(judged=True)]
     return {"added": added, "joints": [j + 1 for j in joints], "rmse": rmse}
 
 

@@ -77,9 +77,12 @@ class Comparison:
     measured, predicted : ndarray of shape (n_samples, n_joints)
         Torque, N m or N.
     sliding : ndarray of shape (n_samples, n_joints) of bool
-        Samples away from rest and reversals, on which effects are judged.
+        Samples away from rest and reversals.
     joint_names : tuple of str
         Names of the joints.
+    judged : ndarray of shape (n_samples, n_joints) of bool, optional
+        Samples on which effects are judged: the sliding ones by default, and those at reversals
+        where hysteresis was found.
 
     Examples
     --------
@@ -93,26 +96,28 @@ class Comparison:
     predicted: Array
     sliding: NDArray[np.bool_]
     joint_names: tuple[str, ...]
+    judged: NDArray[np.bool_] | None = None
 
     @property
     def residual(self) -> Array:
         """Measured less predicted torque, N m or N."""
         return self.measured - self.predicted
 
-    def rmse(self, sliding: bool = False) -> Array:
+    def rmse(self, judged: bool = False) -> Array:
         """Root mean square error of every joint.
 
         Parameters
         ----------
-        sliding : bool, default=False
-            Only samples away from rest and reversals.
+        judged : bool, default=False
+            Only the samples on which effects are judged.
 
         Returns
         -------
         ndarray of shape (n_joints,), N m or N
             Errors of the joints.
         """
-        use = self.sliding if sliding else np.ones_like(self.sliding)
+        chosen = self.sliding if self.judged is None else self.judged
+        use = chosen if judged else np.ones_like(chosen)
         square = np.where(use, self.residual**2, 0.0).sum(0)
         return np.sqrt(square / np.maximum(use.sum(0), 1))
 

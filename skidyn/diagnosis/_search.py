@@ -186,7 +186,14 @@ def variance_inflation(problem: Problem, residual: Sequence[Array], lags: int = 
     return inflation
 
 
-def search(problem: Problem, kinds: Sequence[str], settings: Settings) -> SearchResult:
+def search(
+    problem: Problem,
+    kinds: Sequence[str],
+    settings: Settings,
+    *,
+    nameless: bool = True,
+    joints: Sequence[int] | None = None,
+) -> SearchResult:
     """Find the missing effects.
 
     Parameters
@@ -197,16 +204,25 @@ def search(problem: Problem, kinds: Sequence[str], settings: Settings) -> Search
         Kinds of the catalogue to try.
     settings : Settings
         Thresholds.
+    nameless : bool, default=True
+        Whether nameless functions of the signals compete.
+    joints : sequence of int, optional
+        Joints, from 0, on which effects are tried; all by default.
 
     Returns
     -------
     SearchResult
     """
-    return _Search(problem, kinds, settings).run()
+    searcher = _Search(problem, kinds, settings, nameless)
+    if joints is not None:
+        searcher.pool = [c for c in searcher.pool if set(c.joints) <= set(joints)]
+    return searcher.run()
 
 
 class _Search:
-    def __init__(self, problem: Problem, kinds: Sequence[str], settings: Settings) -> None:
+    def __init__(
+        self, problem: Problem, kinds: Sequence[str], settings: Settings, nameless: bool
+    ) -> None:
         self.problem = problem
         self.settings = settings
         self.kinds = list(kinds)
@@ -217,7 +233,8 @@ class _Search:
         problem.with_fit(base)
         self.fit = base
         self.pool = catalogue_candidates(problem, self.kinds)
-        self.pool += _nameless_candidates(problem, problem.torque - problem.explained(base))
+        if nameless:
+            self.pool += _nameless_candidates(problem, problem.torque - problem.explained(base))
         self.n_tests = len(self.pool)
 
     # ---------------------------------------------------------------- state of the model so far

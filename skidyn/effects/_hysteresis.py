@@ -116,7 +116,9 @@ class Dahl(Effect):
     title = "Dahl friction (pre-sliding)"
     formula = r"F\,h,\quad \tfrac{dh}{dq} = \tfrac{1}{\delta}\,(1 - h\,\mathrm{sign}\,\dot q)"
     coefficients = (Coefficient("F", "N m", sign=1),)
-    shapes = (Shape("presliding", "rad", (0.008, 0.014, 0.022, 0.035, 0.055, 0.09), 0.005, 0.5),)
+    shapes = (
+        Shape("presliding", "rad", (0.003, 0.008, 0.014, 0.022, 0.035, 0.055, 0.09), 0.0005, 0.5),
+    )
     family = "hysteresis"
     simplicity = 21
     rivals = ("lugre", "maxwell_slip", "coulomb", "stribeck", "backlash", "joint_elasticity")
@@ -136,7 +138,7 @@ class LuGre(Effect):
     formula = r"\left(F_c + \Delta F\,e^{-(\dot q/v_s)^2}\right) h,\quad h\ \text{as in Dahl}"
     coefficients = (Coefficient("F", "N m", sign=1), Coefficient("dF", "N m"))
     shapes = (
-        Shape("presliding", "rad", (0.008, 0.014, 0.022), 0.005, 0.5),
+        Shape("presliding", "rad", (0.003, 0.008, 0.014, 0.022), 0.0005, 0.5),
         Shape("vs", "rad/s", (0.05, 0.1, 0.16), 0.01, 1.0),
     )
     family = "hysteresis"
@@ -163,7 +165,7 @@ class MaxwellSlip(Effect):
         Coefficient("F2", "N m"),
         Coefficient("F3", "N m"),
     )
-    shapes = (Shape("presliding", "rad", (0.016, 0.025, 0.04, 0.06, 0.1), 0.005, 0.5),)
+    shapes = (Shape("presliding", "rad", (0.005, 0.016, 0.025, 0.04, 0.06, 0.1), 0.001, 0.5),)
     family = "hysteresis"
     simplicity = 24
     rivals = ("dahl", "lugre", "coulomb")

@@ -13,7 +13,13 @@ from scipy.linalg import cho_factor, cho_solve, qr
 from skidyn._signals import Array, Signals
 from skidyn.effects import Term, get_effect
 from skidyn.evidence._kinematics import SmoothedMotion, as_given, smooth_motion
-from skidyn.evidence._rows import FEWEST_SAMPLES, Rows, every_sample, sliding_samples, window_rows
+from skidyn.evidence._rows import (
+    FEWEST_SAMPLES,
+    Rows,
+    every_sample,
+    sliding_samples,
+    window_rows,
+)
 from skidyn.rigid_body._base_parameters import base_parameter_index
 from skidyn.robots import Robot
 
@@ -23,8 +29,9 @@ RANK_TOLERANCE = 2e-6
 RIDGE = 1e-9
 #: Folds: whole trajectories where there are more than this many, else blocks of them.
 FEW_TRAJECTORIES, FEWEST_BLOCKS, MOST_FOLDS = 6, 8, 20
-#: Share of the smoother's half width that is left out around rest and reversals.
-MARGIN = 0.75
+#: Share of the smoother's half width that is left out around rest and reversals, and the samples
+#: left out where a model of hysteresis says what happens between the two.
+MARGIN, SHORT_MARGIN = 0.75, 1
 
 
 @dataclass(frozen=True)
@@ -229,6 +236,12 @@ class Problem:
         }
 
 
+def hysteresis_joints(terms: Iterable[Term]) -> list[int]:
+    """Joints, from 0, whose friction at reversals some of the terms describe."""
+    joints = {j for t in terms if get_effect(t.kind).family == "hysteresis" for j in t.joints}
+    return sorted(joints)
+
+
 def term_columns(signals: Signals, term: Term) -> dict[int, Array]:
     """Columns of a term at every sample, per joint it reaches."""
     return get_effect(term.kind).torque_columns(signals, term.joints, **term.shape)
@@ -248,6 +261,7 @@ def make_problem(
     terms: Iterable[Term],
     smooth: bool = True,
     subtract_urdf: bool = True,
+    reversals: Sequence[int] = (),
 ) -> Problem:
     """Set up rows, folds and rigid-body columns.
 
@@ -267,23 +281,21 @@ def make_problem(
         Derive velocity and acceleration from the positions; False takes the given ones.
     subtract_urdf : bool, default=True
         Take the torque of the URDF's rigid body off; False where ``torque`` is a residual already.
+    reversals : sequence of int, default=()
+        Joints, from 0, of which the rows reach up to the reversals. Only a model that says what
+        friction does there, one of the family ``"hysteresis"``, can be held to them.
 
     Returns
     -------
     Problem
     """
     if signals.time is None:
-        motion, rows = as_given(signals), every_sample(signals)
+        motion = as_given(signals)
     else:
         motion = smooth_motion(signals)
         if not smooth:
             motion = replace(motion, signals=signals)
-        margin = max(1, round(MARGIN * motion.half_width))
-        use = sliding_samples(motion.signals, motion.valid, margin)
-        rows = window_rows(motion.signals, use, motion.rate)
-    # A slow log has wider windows, which reach further over a border.
-    guard = WINDOW_GUARD if signals.time is None else max(WINDOW_GUARD, _half_window(motion.rate))
-    rows, fold, n_folds, whole = _folds(rows, guard)
+    rows, fold, n_folds, whole = _rows_and_folds(motion, reversals)
     problem = Problem(
         robot,
         motion,
@@ -303,6 +315,54 @@ def make_problem(
     if problem.rigid_body:
         _add_rigid_body(problem)
     return problem
+
+
+def with_reversals(problem: Problem, terms: Iterable[Term], joints: Sequence[int]) -> Problem:
+    """The same problem with rows up to the reversals, for a model with other terms.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows without reversals.
+    terms : iterable of Term
+        Effects of the model.
+    joints : sequence of int
+        Joints, from 0, whose rows reach up to the reversals.
+
+    Returns
+    -------
+    Problem
+    """
+    rows, fold, n_folds, whole = _rows_and_folds(problem.motion, joints)
+    wider = replace(
+        problem,
+        terms=tuple(terms),
+        rows=rows,
+        fold=fold,
+        n_folds=n_folds,
+        whole_trajectories=whole,
+        rigid_rows=[np.zeros((n, 0)) for n in rows.counts],
+        rigid_index=np.zeros(0, dtype=np.int64),
+        _cache={},
+    )
+    if wider.rigid_body:
+        _add_rigid_body(wider)
+    return wider
+
+
+def _rows_and_folds(
+    motion: SmoothedMotion, reversals: Sequence[int]
+) -> tuple[Rows, list[NDArray[np.int64]], int, bool]:
+    """Averaging windows and the folds they fall into."""
+    signals = motion.signals
+    if signals.time is None:
+        return _folds(every_sample(signals), WINDOW_GUARD)
+    margin = np.full(signals.n_joints, max(1, round(MARGIN * motion.half_width)))
+    margin[list(reversals)] = SHORT_MARGIN
+    use = sliding_samples(signals, motion.valid, margin.tolist())
+    # A slow log has wider windows, which reach further over a border.
+    guard = max(WINDOW_GUARD, _half_window(motion.rate))
+    return _folds(window_rows(signals, use, motion.rate), guard)
 
 
 def _regressor_rows(problem: Problem) -> list[Array]:

@@ -10,6 +10,7 @@ half overlapping the rows are nearly independent, and there are few of them.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -90,7 +91,9 @@ def every_sample(signals: Signals) -> Rows:
     )
 
 
-def sliding_samples(signals: Signals, valid: NDArray[np.bool_], margin: int) -> NDArray[np.bool_]:
+def sliding_samples(
+    signals: Signals, valid: NDArray[np.bool_], margin: int | Sequence[int]
+) -> NDArray[np.bool_]:
     """Samples at which a joint slides: neither at rest nor near a reversal.
 
     Parameters
@@ -99,13 +102,14 @@ def sliding_samples(signals: Signals, valid: NDArray[np.bool_], margin: int) -> 
         Smoothed motion.
     valid : ndarray of shape (n_samples,) of bool
         Samples where the motion can be trusted.
-    margin : int
-        Samples left out on each side, the reach of the smoother.
+    margin : int or sequence of int
+        Samples left out on each side, such as the reach of the smoother; by joint if several.
 
     Returns
     -------
     ndarray of shape (n_samples, n_joints) of bool
     """
+    margins = np.broadcast_to(margin, signals.n_joints)
     sliding = np.zeros(signals.q.shape, dtype=bool)
     for rows in signals.segments:
         for joint in range(signals.n_joints):
@@ -114,8 +118,8 @@ def sliding_samples(signals: Signals, valid: NDArray[np.bool_], margin: int) -> 
             turns = np.flatnonzero(np.diff(np.sign(velocity)))
             still[turns] = True
             still[np.minimum(turns + 1, len(still) - 1)] = True
-            if margin > 0:
-                still = binary_dilation(still, iterations=margin)
+            if margins[joint] > 0:
+                still = binary_dilation(still, iterations=int(margins[joint]))
             sliding[rows, joint] = ~still & valid[rows]
     return sliding
 

@@ -19,7 +19,7 @@ from skidyn.effects import Term, get_effect, make_terms
 from skidyn.evidence._evidence import Evidence
 from skidyn.evidence._folded import left_out_coefficients
 from skidyn.evidence._kinematics import smooth_motion
-from skidyn.evidence._problem import Fit, Problem, make_problem, term_columns
+from skidyn.evidence._problem import Fit, Problem, hysteresis_joints, make_problem, term_columns
 from skidyn.evidence._shapes import Gain, best_on_grid, refine_term
 from skidyn.rigid_body._base_parameters import find_base_parameters
 from skidyn.rigid_body._consistency import make_consistent
@@ -161,13 +161,15 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
         self.columns_ = self._resolve(X.shape[1])
         self._check_targets(torque)
         signals = self._read(X)
+        terms = make_terms(self.effects, self.robot_.n_joints)
         problem = make_problem(
             signals,
             torque,
             robot=self.robot_,
             rigid_body=self.parameters == "identified",
-            terms=make_terms(self.effects, self.robot_.n_joints),
+            terms=terms,
             smooth=self._smooths(),
+            reversals=hysteresis_joints(terms),
         )
         fit = self._identify(problem)
         self._store(problem, fit)

@@ -32,8 +32,10 @@ def test_ur10e_effects_found_on_some_recordings_cut_the_error_of_others(run):
     kinds = {finding.kind for finding in result["diagnosis"].findings}
     assert "load_dependent_friction" in kinds
     assert "rotor_inertia" not in kinds
-    assert result["RATIOS"]["50 s Fourier"] < 0.75
-    assert result["RATIOS"]["point to point"] < 0.85
+    assert {"dahl", "maxwell_slip", "lugre"} & kinds  # the reversals, which sliding rows leave out
+    for part in ("from first to last motion", "while the joint moves"):
+        assert result["RATIOS"]["50 s Fourier", part] < 0.70
+        assert result["RATIOS"]["point to point", part] < 0.85
     at_rest = {f.joint for f in result["REST"] if f.regime == "rest" and f.share_of_error > 0.9}
     assert at_rest == {5, 6}
 

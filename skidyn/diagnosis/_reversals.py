@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A second look at the reversals, which the search among sliding samples leaves out.
+
+Sliding friction does not say what happens while a joint turns back, so a search that judges it
+must not look there. But a joint whose friction builds up over a thousandth of a radian shows it
+nowhere else. Where the completed model fails close to reversals, the members of the hysteresis
+family are compared once more with rows that reach up to them. Only the standstill itself stays
+out: a joint that sticks while it turns back holds any torque.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from skidyn.diagnosis._search import SearchResult, Settings, search
+from skidyn.effects import get_effect
+from skidyn.evidence._problem import SHORT_MARGIN, Problem, hysteresis_joints, with_reversals
+from skidyn.evidence._rows import sliding_samples, window_rows
+
+FAMILY = "hysteresis"
+#: Friction whose direction changes at a reversal.
+DRY = ("coulomb", "stribeck")
+#: A joint is looked at if its error close to reversals is more than this share of its dry
+#: friction, what the uncertain velocity there may leave,
+SHARE_OF_FRICTION = 0.12
+#: and if its mean squared error there exceeds that of sliding by this factor.
+STANDS_OUT = 2.0
+#: Rows at reversals that a joint must have for its error there to be judged, and the share of a
+#: row's weight that lies away from them.
+FEWEST_ROWS, AWAY = 20, 0.6
+#: Gates of the second look: half the least share of a joint's squared error removed, and the share
+#: of folds in which it must be.
+RELATIVE_GATE, AGREEING_FOLDS = 0.03, 0.6
+
+
+def look_at_reversals(
+    problem: Problem, result: SearchResult, kinds: list[str], settings: Settings
+) -> tuple[Problem, SearchResult]:
+    """Search for hysteresis with the reversals among the rows.
+
+    Parameters
+    ----------
+    problem : Problem
+        Problem of the sliding samples.
+    result : SearchResult
+        What was found there.
+    kinds : list of str
+        Kinds of the catalogue that may be named.
+    settings : Settings
+        Thresholds of the search.
+
+    Returns
+    -------
+    problem : Problem
+        With rows at reversals if hysteresis was found there, else as given.
+    result : SearchResult
+        With the findings of both looks.
+    """
+    family = [k for k in kinds if _is_hysteresis(k)]
+    others = [h for h in result.findings if not _is_hysteresis(h.kind)]
+    room = settings.max_findings - len(others)
+    if not family or room < 1 or problem.signals.time is None:
+        return problem, result
+    own = set(hysteresis_joints(problem.terms))
+    before = {j for h in result.findings if _is_hysteresis(h.kind) for j in h.joints}
+    new = set(failing_joints(problem, result)) - own - before
+    if not new:
+        return problem, result
+    # What was found among the sliding samples has to be found again, by the same name.
+    joints = sorted(new | before)
+    known = [c.term for h in others if h.torque is None for c in h.candidates]
+    wider = with_reversals(problem, (*problem.terms, *known), joints)
+    wider.torque = problem.torque - result.ripple
+    gates = replace(
+        settings, relative_gate=RELATIVE_GATE, agreeing_folds=AGREEING_FOLDS, max_findings=room
+    )
+    second = search(wider, family, gates, nameless=False, joints=joints)
+    if not new & {j for h in second.findings for j in h.joints}:
+        return problem, result
+    wider = replace(wider, terms=problem.terms, torque=problem.torque)
+    steps = [s for s in result.steps if s.added in others] + second.steps
+    return wider, replace(
+        second,
+        findings=others + second.findings,
+        steps=steps,
+        ripple=result.ripple,
+        candidates=result.candidates,
+    )
+
+
+def failing_joints(problem: Problem, result: SearchResult) -> list[int]:
+    """Joints whose error close to reversals stands out.
+
+    Parameters
+    ----------
+    problem : Problem
+        Problem of the sliding samples.
+    result : SearchResult
+        Its fit.
+
+    Returns
+    -------
+    list of int
+        Joints, from 0.
+    """
+    motion, n = problem.motion, problem.signals.n_samples
+    close = sliding_samples(motion.signals, motion.valid, SHORT_MARGIN)
+    rows = window_rows(motion.signals, close, motion.rate)
+    residual = problem.torque - result.ripple - problem.explained(result.fit)
+    dry = [t for t in result.fit.terms if t.kind in DRY or _is_hysteresis(t.kind)]
+    friction = problem.term_torque(result.fit, dry)
+    failing = []
+    for j in range(problem.n_joints):
+        weight = rows.average(np.ones(n), j)
+        away = rows.average(problem.rows.sliding[:, j].astype(float), j) / weight
+        square = (rows.average(residual[:, j], j) / weight) ** 2
+        turning = away < AWAY
+        if min(turning.sum(), (~turning).sum()) < FEWEST_ROWS:
+            continue
+        error, sliding = square[turning].mean(), square[~turning].mean()
+        level = np.mean(friction[close[:, j], j] ** 2)
+        if error > STANDS_OUT * sliding and error > SHARE_OF_FRICTION**2 * level > 0:
+            failing.append(j)
+    return failing
+
+
+def _is_hysteresis(kind: str) -> bool:
+    return kind != "unknown" and get_effect(kind).family == FAMILY

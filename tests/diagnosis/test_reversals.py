@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Friction that builds up over a thousandth of a radian shows only close to reversals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from skidyn._signals import find_segments
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.diagnosis import Settings, diagnose
+from skidyn.diagnosis._reversals import look_at_reversals
+from skidyn.diagnosis._search import search
+from skidyn.effects import dahl_state
+from skidyn.rigid_body import RBDRegressor
+
+
+@pytest.fixture(scope="module")
+def log():
+    return make_hidden_effect_log(load_planar_arm(), None, random_state=3)
+
+
+@pytest.fixture(scope="module")
+def diagnosis(log):
+    rows = find_segments(log.X["trajectory"].to_numpy(), log.X["time"].to_numpy())
+    state = dahl_state(log.X["q1"].to_numpy(), rows, presliding=0.004)
+    torque = np.array(log.y)
+    torque[:, 0] += 2.0 * state
+    return diagnose(RBDRegressor(log.robot), log.X, torque)
+
+
+def test_hysteresis_of_a_short_way_is_found_on_its_joint(diagnosis):
+    assert [f.joints for f in diagnosis.findings] == [(1,)]
+    assert diagnosis.findings[0].kind in {"dahl", "lugre", "maxwell_slip"}
+
+
+def test_its_way_is_measured_by_a_model_that_reaches_up_to_the_reversals(diagnosis):
+    model = diagnosis.base_model.with_effects([("dahl", [1])]).fit(*diagnosis.data)
+
+    (term,) = [t for t in model.effect_terms_ if t.kind == "dahl"]
+    assert term.shape["presliding"] == pytest.approx(0.004, rel=0.5)
+
+
+def test_what_the_sliding_samples_did_not_show_is_found_close_to_the_reversals(diagnosis):
+    problem = diagnosis.problem
+    nothing = search(problem, [], Settings(), nameless=False)
+    assert not nothing.findings
+
+    wider, result = look_at_reversals(problem, nothing, ["dahl", "coulomb"], Settings())
+
+    assert [(h.kind, h.joints) for h in result.findings] == [("dahl", (0,))]
+    assert wider.rows.sliding[:, 0].sum() > problem.rows.sliding[:, 0].sum()
+    np.testing.assert_array_equal(wider.rows.sliding[:, 1], problem.rows.sliding[:, 1])
+
+
+def test_a_joint_that_sticks_at_reversals_is_no_hysteresis(log):
+    assert diagnose(RBDRegressor(log.robot), log.X, log.y).verdict == "complete"
