@@ -3,6 +3,7 @@
 
 from skidyn.effects._base import Coefficient, Effect, Shape, Term
 from skidyn.effects._catalogue import get_effect, list_effects, make_terms, register_effect
+from skidyn.effects._formula import formula
 from skidyn.effects._hysteresis import dahl_state, stop_state
 from skidyn.effects._transformer import FrictionTransformer
 
@@ -13,6 +14,7 @@ __all__ = [
     "Shape",
     "Term",
     "dahl_state",
+    "formula",
     "get_effect",
     "list_effects",
     "make_terms",

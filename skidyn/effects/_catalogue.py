@@ -9,6 +9,7 @@ from typing import Any
 from skidyn._exceptions import EffectError
 from skidyn.effects._base import Effect, Term
 from skidyn.effects._coupling import CoupledFriction, CoupledInertia, CouplingSpring
+from skidyn.effects._formula import Formula
 from skidyn.effects._friction import (
     AsymmetricFriction,
     Coulomb,
@@ -62,7 +63,7 @@ _CLASSES: tuple[type[Effect], ...] = (
     ExternalWrench,
     EnvironmentContact,
 )
-_CATALOGUE: dict[str, Effect] = {cls.kind: cls() for cls in (*_CLASSES, *NAMELESS)}
+_CATALOGUE: dict[str, Effect] = {cls.kind: cls() for cls in (*_CLASSES, *NAMELESS, Formula)}
 
 #: What users may write for a term: a kind, a kind with joints counted from 1, or a Term.
 TermSpec = str | tuple[str, Sequence[int]] | Term
@@ -117,7 +118,7 @@ def get_effect(kind: str) -> Effect:
 
 def nameless_kinds() -> list[str]:
     """Nameless functions that the diagnosis tries when no name fits."""
-    return [kind for kind, effect in _CATALOGUE.items() if effect.nameless]
+    return [kind for kind, e in _CATALOGUE.items() if e.nameless and e.search != "given"]
 
 
 def register_effect(effect: Effect | type[Effect]) -> None:

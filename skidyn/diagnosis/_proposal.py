@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A short formula for a nameless torque: sparse regression over a small, safe grammar.
+
+Products of a few functions of the positions and of the velocities that the torque depends on are
+tried one by one, and the best is kept; then a second and a third (orthogonal matching pursuit,
+Pati, Rezaiifar, Krishnaprasad 1993), judged by the error of the held-out folds.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from skidyn._signals import Array
+from skidyn.effects import Term, formula
+from skidyn.evidence._problem import Problem
+
+#: Terms of a formula at most, and the share of what the nameless function explains that it needs.
+LONGEST, LEAST_SHARE = 3, 0.9
+#: A further term must bring this share of it.
+WORTH = 0.03
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A formula that explains what a nameless function does.
+
+    Parameters
+    ----------
+    joint : int
+        Joint on which the torque acts, counted from 1.
+    text : str
+        The formula with its coefficients, SI units.
+    expressions : tuple of str
+        Its terms without coefficients.
+    coefficients : tuple of float
+        Their coefficients, N m or N.
+    share : float
+        Squared error it removes on held-out folds over what the nameless function removes.
+    terms : tuple of Term
+        To be added to a model.
+
+    Examples
+    --------
+    >>> Proposal(2, "0.8 sin(q1 - q2)", ("sin(q1 - q2)",), (0.8,), 1.0, ()).text
+    '0.8 sin(q1 - q2)'
+    """
+
+    joint: int
+    text: str
+    expressions: tuple[str, ...]
+    coefficients: tuple[float, ...]
+    share: float
+    terms: tuple[Term, ...]
+
+
+def grammar(variables: Sequence[str], joint: int) -> list[str]:
+    """Expressions that are tried for a torque that depends on some signals.
+
+    Parameters
+    ----------
+    variables : sequence of str
+        Signals such as ``"q1"`` and ``"dq3"``.
+    joint : int
+        Joint on which the torque acts, from 0.
+
+    Returns
+    -------
+    list of str
+    """
+    positions = [v for v in variables if v.startswith("q")]
+    velocities = [v for v in variables if v.startswith("dq")]
+    others = [v for v in variables if v.startswith("ddq")]
+    places = [f(q) for q in positions for f in _PLACES]
+    for a, b in itertools.combinations(positions, 2):
+        places += [f"{w}({a} {o} {b})" for w in ("sin", "cos") for o in "-+"] + [f"{a} * {b}"]
+    speeds = [f(v) for v in velocities for f in _SPEEDS]
+    own = f"dq{joint + 1}"
+    for a, b in itertools.permutations(velocities, 2):
+        speeds += [f"{a} * {b}", f"{a} * abs({b})", f"sign({a}) * abs({b})", f"sign({a}) * {b}"]
+    frictions = [own, f"sign({own})"] if own in velocities else speeds
+    mixed = [f"{p} * {v}" for p in places for v in frictions if positions]
+    return list(dict.fromkeys([*places, *speeds, *mixed, *others]))
+
+
+_PLACES = (
+    "{}".format,
+    "{}**2".format,
+    "{}**3".format,
+    "sin({})".format,
+    "cos({})".format,
+    "sin(2 * {})".format,
+    "cos(2 * {})".format,
+    "sin(3 * {})".format,
+    "cos(3 * {})".format,
+)
+_SPEEDS = (
+    "{}".format,
+    "sign({})".format,
+    "abs({})".format,
+    "{0} * abs({0})".format,
+    "{}**3".format,
+    "tanh(10 * {})".format,
+)
+
+
+def propose(
+    problem: Problem,
+    joint: int,
+    residual: Array,
+    explained: Array,
+    variables: Sequence[str],
+    waves: Sequence[str] = (),
+) -> Proposal | None:
+    """The shortest formula that explains what a nameless function does.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows and folds.
+    joint : int
+        Joint, from 0.
+    residual : ndarray of shape (n_rows,)
+        Residual rows of the joint with the nameless torque in them.
+    explained : ndarray of shape (n_rows,)
+        Rows of the nameless torque.
+    variables : sequence of str
+        Signals on which it depends.
+    waves : sequence of str, default=()
+        Expressions in time that are tried too.
+
+    Returns
+    -------
+    Proposal or None
+        None where no short formula fits.
+    """
+    expressions = [*grammar(variables, joint), *waves]
+    if not expressions:
+        return None
+    terms = [formula(e, joint + 1) for e in expressions]
+    columns = np.hstack([problem.term_rows(t)[joint] for t in terms])
+    fold = problem.fold[joint]
+    nothing = float(residual @ residual)
+    goal = max(nothing - float(np.sum((residual - explained) ** 2)), 1e-300)
+    chosen: list[int] = []
+    reached = nothing
+    while len(chosen) < LONGEST:
+        errors = _with_each(columns, chosen, residual, fold, problem.n_folds)
+        best = int(np.argmin(errors))
+        if reached - errors[best] < WORTH * goal:
+            break
+        chosen.append(best)
+        reached = float(errors[best])
+    share = (nothing - reached) / goal
+    if not chosen or share < LEAST_SHARE:
+        return None
+    coefficients = np.linalg.lstsq(columns[:, chosen], residual, rcond=None)[0]
+    words = tuple(expressions[i] for i in chosen)
+    parts = [f"{c:+.3g} {w}" for c, w in zip(coefficients, words, strict=True)]
+    text = " ".join(parts).removeprefix("+")
+    found = tuple(terms[i] for i in chosen)
+    return Proposal(joint + 1, text, words, tuple(map(float, coefficients)), float(share), found)
+
+
+def _with_each(
+    columns: Array, chosen: Sequence[int], residual: Array, fold: Array, n_folds: int
+) -> Array:
+    """Held-out squared error with each column added to the chosen ones, (n_columns,)."""
+    errors = np.zeros(columns.shape[1])
+    for f in range(n_folds):
+        train, test = fold != f, fold == f
+        a, b = columns[train], columns[test]
+        fixed, held = a[:, chosen], b[:, chosen]
+        # Sweep the chosen columns out of the others and of the residual.
+        sweep = np.linalg.pinv(fixed) if chosen else np.zeros((0, len(a)))
+        mimic, base = sweep @ a, sweep @ residual[train]
+        rest_a, rest_y = a - fixed @ mimic, residual[train] - fixed @ base
+        size = np.einsum("ij,ij->j", rest_a, rest_a)
+        new = size > 1e-9 * np.maximum(np.einsum("ij,ij->j", a, a), 1e-300)
+        gain = np.where(new, rest_a.T @ rest_y / np.where(new, size, 1.0), 0.0)
+        left = (residual[test] - held @ base)[:, None] - (b - held @ mimic) * gain
+        errors += np.einsum("ij,ij->j", left, left)
+    return errors

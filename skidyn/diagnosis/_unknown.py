@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What is known about something no name fits: its variables, its shape, a formula."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from skidyn._signals import Array
+from skidyn.diagnosis._proposal import Proposal, propose
+from skidyn.diagnosis._variables import VariableTest, depends_on
+from skidyn.effects import Term, get_effect
+from skidyn.effects._nameless import NamelessEffect
+from skidyn.evidence._folded import left_out_coefficients
+from skidyn.evidence._problem import Problem, term_columns
+
+#: Bins of a curve, and of each side of a map; a bin with fewer samples stays empty.
+CURVE, MAP, FEWEST = 40, 16, 5
+
+
+@dataclass(frozen=True)
+class UnknownTorque:
+    """A nameless torque on one joint.
+
+    Parameters
+    ----------
+    joint : int
+        Joint, counted from 1.
+    variables : tuple of str
+        Signals that it depends on, as tested.
+    tests : tuple of VariableTest
+        The test of every signal.
+    shape : dict
+        ``variables`` (one or two), ``edges`` of the bins of each (SI units), and ``value``,
+        ``low``, ``high``: torque in every bin with its 95 % band, N m or N; NaN where no sample is.
+    proposal : Proposal or None
+        A short formula that does the same.
+
+    Examples
+    --------
+    >>> diagnosis.unknowns[0].variables  # doctest: +SKIP
+    ('q1', 'q3')
+    """
+
+    joint: int
+    variables: tuple[str, ...]
+    tests: tuple[VariableTest, ...]
+    shape: dict[str, Any] = field(repr=False)
+    proposal: Proposal | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """As in the report file.
+
+        Returns
+        -------
+        dict
+            JSON types only.
+        """
+        shape = {
+            key: _nested(value) if key != "variables" else list(value)
+            for key, value in self.shape.items()
+        }
+        formula = None
+        if self.proposal is not None:
+            formula = {k: v for k, v in asdict(self.proposal).items() if k not in ("terms",)}
+        return {
+            "joint": self.joint,
+            "variables": list(self.variables),
+            "tests": [asdict(t) for t in self.tests],
+            "shape": shape,
+            "formula": formula,
+        }
+
+
+def _nested(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_nested(v) for v in value]
+    return [[None if np.isnan(x) else float(x) for x in row] for row in np.atleast_2d(value)]
+
+
+def describe_unknowns(
+    problem: Problem, terms: Sequence[Term], unknown: Sequence[Term], sigma: Array
+) -> list[UnknownTorque]:
+    """Variables, shape and formula of every nameless term.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows, folds and torque, ripple taken off.
+    terms : sequence of Term
+        Every effect of the final model.
+    unknown : sequence of Term
+        The nameless ones among them.
+    sigma : ndarray of shape (n_joints,)
+        Noise of one row.
+
+    Returns
+    -------
+    list of UnknownTorque
+    """
+    terms = list(terms)
+    design = problem.design([problem.term_rows(t) for t in terms])
+    target = problem.target
+    whole, left = left_out_coefficients(problem, design, sigma, target)
+    starts = len(problem.rigid_index) + np.cumsum(
+        [0, *(len(get_effect(t.kind).coefficients) for t in terms)]
+    )
+    found = []
+    for term in unknown:
+        (joint,) = term.joints
+        i = terms.index(term)
+        span = slice(starts[i], starts[i + 1])
+        explained = problem.term_rows(term)[joint] @ whole[span]
+        residual = target[joint] - design[joint] @ whole + explained
+        effect = get_effect(term.kind)
+        assert isinstance(effect, NamelessEffect)
+        guessed = effect.variables(joint, dict(term.shape))
+        rows = problem.term_rows(term)[joint]
+        tests = depends_on(problem, joint, residual, guessed, rows)
+        needed = {t.variable for t in tests if t.needed} or set(guessed)
+        variables = tuple(sorted(needed, key=lambda v: (v not in guessed, v)))
+        shape = _shape(problem, term, joint, whole[span], left[:, span], variables)
+        proposal = propose(problem, joint, residual, explained, variables, _waves(term))
+        found.append(UnknownTorque(joint + 1, variables, tuple(tests), shape, proposal))
+    return found
+
+
+def _waves(term: Term) -> list[str]:
+    """Expressions of a torque that is periodic in time."""
+    if "frequency" not in term.shape:
+        return []
+    omega = 2 * np.pi * float(term.shape["frequency"])
+    return [f"{wave}({omega:.9g} * t)" for wave in ("sin", "cos")]
+
+
+def _shape(
+    problem: Problem,
+    term: Term,
+    joint: int,
+    coefficients: Array,
+    left: Array,
+    variables: Sequence[str],
+) -> dict[str, Any]:
+    """Torque in bins of one or two signals, with a band from leaving folds out (jackknife)."""
+    use = problem.rows.sliding[:, joint]
+    columns = term_columns(problem.signals, term)[joint][use]
+    drawn = [v for v in variables if v != "time"][:2] or ["time"]
+    n_bins = CURVE if len(drawn) == 1 else MAP
+    index, edges = np.zeros(len(columns), dtype=np.int64), []
+    for name in drawn:
+        x = _signal(problem, name)[use]
+        cuts = np.linspace(*np.quantile(x, [0.005, 0.995]), n_bins + 1)
+        edges.append(cuts)
+        index = index * n_bins + np.clip(np.searchsorted(cuts, x) - 1, 0, n_bins - 1)
+    size = n_bins ** len(drawn)
+    count = np.bincount(index, minlength=size)
+    mean = np.column_stack([np.bincount(index, c, minlength=size) for c in columns.T])
+    mean = mean / np.maximum(count, 1)[:, None]
+    value = mean @ coefficients
+    ways = mean @ left.T
+    n = left.shape[0]
+    spread = np.sqrt((n - 1) / n * np.sum((ways - ways.mean(1, keepdims=True)) ** 2, axis=1))
+    empty = count < FEWEST
+
+    def grid(x: Array) -> Array:
+        return np.where(empty, np.nan, x).reshape((n_bins,) * len(drawn))
+
+    return {
+        "variables": tuple(drawn),
+        "edges": edges,
+        "value": grid(value),
+        "low": grid(value - 1.96 * spread),
+        "high": grid(value + 1.96 * spread),
+    }
+
+
+def _signal(problem: Problem, name: str) -> Array:
+    s = problem.signals
+    if name == "time":
+        return s.clock
+    kind = name.rstrip("0123456789")
+    table = s.temperature if kind == "temp" else getattr(s, kind)
+    return np.asarray(table[:, int(name[len(kind) :]) - 1])

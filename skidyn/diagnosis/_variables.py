@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""On which signals a nameless torque depends: a test for each, on folds never trained on.
+
+A flexible learner (random Fourier features, ridge regression; Rahimi, Recht 2007) predicts the
+joint's residual, with the nameless torque put back, from a set of signals. A signal is needed if leaving it
+out makes the error of the held-out folds larger, fold against fold (one-sided paired t-test of the
+logarithm of their ratio); one outside the set is missing if adding it makes them smaller. Folds are
+whole trajectories where there are enough, so autocorrelation within one does not count twice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import eigh
+from scipy.stats import ttest_1samp
+
+from skidyn._signals import Array
+from skidyn.evidence._problem import Problem
+
+FEATURES = 120
+#: Lengths over which the learned function varies, in standard deviations of its inputs.
+LENGTHS = (1.0, 3.0)
+RIDGES = 10.0 ** np.arange(-3.0, 4.0)
+#: Chance at which a signal of the set is kept, and at which one outside it is taken in (divided by
+#: the number tried); what it brings must also be at least this share of what is predictable.
+KEPT, TAKEN_IN, LEAST_SHARE = 0.05, 0.01, 0.05
+
+
+@dataclass(frozen=True)
+class VariableTest:
+    """Whether a nameless torque depends on a signal.
+
+    Parameters
+    ----------
+    variable : str
+        Signal, joints counted from 1: ``"q1"``, ``"dq3"``, ``"ddq2"``, ``"temp1"``.
+    share : float
+        Share of the predictable squared error that is lost without it, or won with it.
+    p_value : float
+        Chance of that if the torque did not depend on it.
+    needed : bool
+        Whether the torque depends on it.
+
+    Examples
+    --------
+    >>> VariableTest("q2", 0.6, 1e-5, True).needed
+    True
+    """
+
+    variable: str
+    share: float
+    p_value: float
+    needed: bool
+
+
+def row_signals(problem: Problem, joint: int) -> dict[str, Array]:
+    """Signals averaged at the rows of a joint, by name.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows and signals.
+    joint : int
+        Joint, from 0.
+
+    Returns
+    -------
+    dict of str to ndarray of shape (n_rows, k)
+        One column each, two for the joint's own velocity: with its direction.
+    """
+    s = problem.signals
+    columns: dict[str, Array] = {}
+    for k in range(problem.n_joints):
+        columns[f"q{k + 1}"] = s.q[:, [k]]
+        columns[f"dq{k + 1}"] = np.column_stack([s.dq[:, k], s.sign[:, k]])
+        columns[f"ddq{k + 1}"] = s.ddq[:, [k]]
+    if s.temperature is not None:
+        columns[f"temp{joint + 1}"] = s.temperature[:, [joint]]
+    weight = problem.rows.average(np.ones(s.n_samples), joint)[:, None]
+    rows = {name: problem.rows.average(x, joint) / weight for name, x in columns.items()}
+    scaled = {}
+    for name, x in rows.items():
+        spread = x.std(0)
+        moves = spread > 1e-9
+        if moves.any():
+            scaled[name] = (x[:, moves] - x[:, moves].mean(0)) / spread[moves]
+    return scaled
+
+
+def depends_on(
+    problem: Problem, joint: int, residual: Array, hypothesis: Sequence[str], columns: Array
+) -> list[VariableTest]:
+    """Test on which signals the residual of a joint depends.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows and folds.
+    joint : int
+        Joint, from 0.
+    residual : ndarray of shape (n_rows,)
+        Residual rows of the joint with the nameless torque in them.
+    hypothesis : sequence of str
+        Signals of the function that was found.
+    columns : ndarray of shape (n_rows, k)
+        Rows of that function, which stand for ``"time"`` where it is periodic in time.
+
+    Returns
+    -------
+    list of VariableTest
+        The signals found needed first, then the others by their share.
+    """
+    signals = row_signals(problem, joint)
+    fold, n_folds = problem.fold[joint], problem.n_folds
+    if "time" in hypothesis:
+        signals["time"] = columns / np.maximum(columns.std(0), 1e-300)
+
+    def errors(names: Sequence[str]) -> Array:
+        inputs = [signals[name] for name in names]
+        return _held_out_errors(inputs, residual, fold, n_folds)
+
+    chosen = [v for v in hypothesis if v in signals]
+    if not chosen:
+        return []
+    outside = [v for v in signals if v not in chosen]
+    reached = errors(chosen)
+    nothing = errors([])
+    whole = max(float((nothing - reached).sum()), 1e-300)
+    tests = {}
+    for name in outside:
+        better = errors([*chosen, name])
+        share, p = float((reached - better).sum()) / whole, _p_value(reached, better)
+        needed = p < TAKEN_IN / max(1, len(outside)) and share > LEAST_SHARE
+        tests[name] = VariableTest(name, share, p, needed)
+    # The strongest one tells: another may only stand in for it.
+    best = max((t for t in tests.values() if t.needed), key=lambda t: t.share, default=None)
+    if best is not None:
+        chosen.append(best.variable)
+        reached = errors(chosen)
+        tests = {
+            n: t if t is best else VariableTest(n, t.share, t.p_value, False)
+            for n, t in tests.items()
+        }
+    for name in chosen:
+        worse = errors([v for v in chosen if v != name])
+        share, p = float((worse - reached).sum()) / whole, _p_value(worse, reached)
+        tests[name] = VariableTest(name, share, p, p < KEPT and share > LEAST_SHARE)
+    return sorted(tests.values(), key=lambda t: (not t.needed, -t.share))
+
+
+def _p_value(worse: Array, better: Array) -> float:
+    """Chance of such errors, fold by fold, if the second were no better than the first."""
+    ratio = np.log(np.maximum(worse, 1e-300) / np.maximum(better, 1e-300))
+    if np.ptp(ratio) == 0:
+        return 1.0
+    return float(ttest_1samp(ratio, 0.0, alternative="greater").pvalue)
+
+
+def _held_out_errors(
+    inputs: Sequence[Array], residual: Array, fold: Array, n_folds: int
+) -> Array:
+    """Squared error of every fold when it is left out, (n_folds,), best length and ridge."""
+    if not inputs:
+        return np.bincount(fold, residual**2, minlength=n_folds)
+    x = np.column_stack(inputs)
+    tried = [_ridge_errors(_features(x, length), residual, fold, n_folds) for length in LENGTHS]
+    table = np.concatenate(tried)
+    return np.asarray(table[np.argmin(table.sum(1))])
+
+
+def _features(x: Array, length: float) -> Array:
+    rng = np.random.default_rng(0)
+    phase = x @ (rng.normal(size=(x.shape[1], FEATURES // 2)) / length)
+    return np.column_stack([np.ones(len(x)), x, np.cos(phase), np.sin(phase)])
+
+
+def _ridge_errors(features: Array, residual: Array, fold: Array, n_folds: int) -> Array:
+    """Held-out squared errors, shape (n_ridges, n_folds)."""
+    parts = [(features[fold == f], residual[fold == f]) for f in range(n_folds)]
+    grams = np.array([a.T @ a for a, _ in parts])
+    cross = np.array([a.T @ y for a, y in parts])
+    total, right = grams.sum(0), cross.sum(0)
+    errors = np.zeros((len(RIDGES), n_folds))
+    for f, (a, y) in enumerate(parts):
+        values, vectors = eigh(total - grams[f])
+        rotated = vectors.T @ (right - cross[f])
+        for k, ridge in enumerate(RIDGES):
+            weight = vectors @ (rotated / (np.maximum(values, 0) + ridge * len(residual) / n_folds))
+            errors[k, f] = np.sum((y - a @ weight) ** 2)
+    return errors
