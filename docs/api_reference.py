@@ -69,6 +69,7 @@ PAGES: tuple[Page, ...] = (
                 "Functions",
                 (
                     "dahl_state",
+                    "formula",
                     "get_effect",
                     "list_effects",
                     "make_terms",
@@ -96,7 +97,10 @@ PAGES: tuple[Page, ...] = (
                     "Failure",
                     "Finding",
                     "Limit",
+                    "Proposal",
                     "Settings",
+                    "UnknownTorque",
+                    "VariableTest",
                 ),
             ),
             Section("Functions", ("diagnose",)),

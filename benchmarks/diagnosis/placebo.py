@@ -19,7 +19,7 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from skidyn.datasets import load_recording
-from skidyn.diagnosis._diagnosis import read_signals
+from skidyn.diagnosis._reading import read_signals
 from skidyn.diagnosis._search import variance_inflation
 from skidyn.effects import Term, get_effect, make_terms
 from skidyn.evidence._problem import make_problem

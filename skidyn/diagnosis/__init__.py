@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Diagnosis: where a model fails, which physical effect it lacks, and what adding it does."""
 
-from skidyn.diagnosis._diagnosis import Diagnosis, diagnose
+from skidyn.diagnosis._diagnosis import diagnose
 from skidyn.diagnosis._effect_search import EffectSearchCV
 from skidyn.diagnosis._failures import Comparison, Failure
 from skidyn.diagnosis._findings import Finding
 from skidyn.diagnosis._limits import Limit
+from skidyn.diagnosis._proposal import Proposal
+from skidyn.diagnosis._result import Diagnosis
 from skidyn.diagnosis._search import Settings
+from skidyn.diagnosis._unknown import UnknownTorque
+from skidyn.diagnosis._variables import VariableTest
 
 __all__ = [
     "Comparison",
@@ -15,6 +19,9 @@ __all__ = [
     "Failure",
     "Finding",
     "Limit",
+    "Proposal",
     "Settings",
+    "UnknownTorque",
+    "VariableTest",
     "diagnose",
 ]

@@ -96,7 +96,7 @@ class CorrectedRegressor(RegressorMixin, BaseEstimator):
         return own + torque
 
     def _problem(self, X: Any, torque: Array) -> Problem:
-        from skidyn.diagnosis._diagnosis import read_signals
+        from skidyn.diagnosis._reading import read_signals
 
         own = np.asarray(self.regressor.predict(X), dtype=float).reshape(len(torque), -1)
         signals, torque = read_signals(X, torque, self.robot)

@@ -11,7 +11,8 @@ from sklearn.base import BaseEstimator, MetaEstimatorMixin, RegressorMixin, clon
 from sklearn.utils.validation import check_is_fitted
 
 from skidyn._signals import Array
-from skidyn.diagnosis._diagnosis import Diagnosis, diagnose
+from skidyn.diagnosis._diagnosis import diagnose
+from skidyn.diagnosis._result import Diagnosis
 from skidyn.diagnosis._search import Settings
 
 

@@ -13,6 +13,7 @@ from scipy.stats import chi2
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._search import UNKNOWN, Hypothesis, Step
+from skidyn.diagnosis._unknown import UnknownTorque
 from skidyn.effects import Term, get_effect
 from skidyn.evidence._problem import Problem
 
@@ -149,19 +150,46 @@ def make_finding(
     q_value: float,
     error_drop: float,
     intervals: dict[Term, dict[str, Any]],
+    unknowns: Sequence[UnknownTorque] = (),
 ) -> Finding:
-    """Put a hypothesis into words and numbers."""
+    """Put a hypothesis into words and numbers.
+
+    Parameters
+    ----------
+    problem : Problem
+        Signals of the log.
+    hypothesis : Hypothesis
+        What was added.
+    rivals : tuple of str
+        Kinds that explain nearly as much.
+    q_value, error_drop : float
+        Significance and share of the squared error removed.
+    intervals : dict
+        Parameters of every term with their intervals.
+    unknowns : sequence of UnknownTorque, default=()
+        What is known about nameless terms.
+
+    Returns
+    -------
+    Finding
+    """
     candidates = sorted(hypothesis.candidates, key=lambda c: c.joints)
     unknown = hypothesis.kind == UNKNOWN
     effect = get_effect(candidates[0].term.kind)
     joints = _joints(problem, hypothesis, candidates)
     parameters = {} if unknown else _parameters(problem, candidates, intervals)
-    title = _unknown_title(hypothesis) if unknown else effect.title
+    tested = tuple(sorted({v for u in unknowns for v in u.variables}))
+    variables = tested or hypothesis.variables
+    title = f"Something that depends on {' and '.join(variables)}" if unknown else effect.title
     relatives = [k for k in rivals if k != UNKNOWN and get_effect(k).family == effect.family]
     if effect.family and relatives:
         title = f"{effect.family.capitalize()}, best described by {title}"
-    code = _code(hypothesis, joints, candidates)
+    formulas = [u for u in unknowns if u.proposal is not None]
+    code = _code(hypothesis, joints, candidates, adopt=bool(formulas))
     sentence = _sentence(title, joints, parameters, error_drop, rivals, effect.separating_motion)
+    for u in formulas:
+        assert u.proposal is not None
+        sentence += f" A formula that does the same on joint {u.joint}: {u.proposal.text}."
     if effect.caveat:
         sentence += f" Note that {effect.caveat}."
     if parameters.get("mass", {}).get("value", 0.0) < 0:
@@ -171,7 +199,7 @@ def make_finding(
         title,
         joints,
         parameters,
-        hypothesis.variables,
+        variables,
         error_drop,
         q_value,
         rivals,
@@ -188,11 +216,6 @@ def _joints(
     if hypothesis.kind == "payload":
         return (problem.n_joints,)
     return tuple(sorted({j + 1 for c in candidates for j in c.joints}))
-
-
-def _unknown_title(hypothesis: Hypothesis) -> str:
-    names = " and ".join(hypothesis.variables)
-    return f"Something that depends on {names}"
 
 
 def _parameters(
@@ -215,7 +238,14 @@ def _parameters(
     return table
 
 
-def _code(hypothesis: Hypothesis, joints: tuple[int, ...], candidates: Sequence[Candidate]) -> str:
+def _code(
+    hypothesis: Hypothesis,
+    joints: tuple[int, ...],
+    candidates: Sequence[Candidate],
+    adopt: bool,
+) -> str:
+    if adopt:
+        return 'model = diagnosis.add("formula")'
     if hypothesis.kind == UNKNOWN or any(c.term.shape.get("trajectories") for c in candidates):
         return "model = diagnosis.model"
     return f'model = diagnosis.add("{hypothesis.kind}", joints={list(joints)})'

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.effects import Term, formula
@@ -166,7 +167,7 @@ def propose(
 
 
 def _with_each(
-    columns: Array, chosen: Sequence[int], residual: Array, fold: Array, n_folds: int
+    columns: Array, chosen: Sequence[int], residual: Array, fold: NDArray[np.int64], n_folds: int
 ) -> Array:
     """Held-out squared error with each column added to the chosen ones, (n_columns,)."""
     errors = np.zeros(columns.shape[1])

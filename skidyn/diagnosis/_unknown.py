@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.diagnosis._proposal import Proposal, propose
@@ -60,12 +61,18 @@ class UnknownTorque:
             JSON types only.
         """
         shape = {
-            key: _nested(value) if key != "variables" else list(value)
+            key: _plain(value) if key != "variables" else list(value)
             for key, value in self.shape.items()
         }
         formula = None
         if self.proposal is not None:
-            formula = {k: v for k, v in asdict(self.proposal).items() if k not in ("terms",)}
+            p = self.proposal
+            formula = {
+                "text": p.text,
+                "expressions": list(p.expressions),
+                "coefficients": list(p.coefficients),
+                "share": p.share,
+            }
         return {
             "joint": self.joint,
             "variables": list(self.variables),
@@ -75,10 +82,11 @@ class UnknownTorque:
         }
 
 
-def _nested(value: Any) -> Any:
-    if isinstance(value, list):
-        return [_nested(v) for v in value]
-    return [[None if np.isnan(x) else float(x) for x in row] for row in np.atleast_2d(value)]
+def _plain(value: Any) -> Any:
+    """Lists and numbers; None for NaN."""
+    if isinstance(value, list | np.ndarray):
+        return [_plain(v) for v in value]
+    return None if np.isnan(value) else float(value)
 
 
 def describe_unknowns(
@@ -149,18 +157,21 @@ def _shape(
     columns = term_columns(problem.signals, term)[joint][use]
     drawn = [v for v in variables if v != "time"][:2] or ["time"]
     n_bins = CURVE if len(drawn) == 1 else MAP
-    index, edges = np.zeros(len(columns), dtype=np.int64), []
+    index: NDArray[np.int64] = np.zeros(len(columns), dtype=np.int64)
+    edges = []
     for name in drawn:
         x = _signal(problem, name)[use]
-        cuts = np.linspace(*np.quantile(x, [0.005, 0.995]), n_bins + 1)
+        low, high = np.quantile(x, [0.005, 0.995])
+        cuts = np.linspace(low, high, n_bins + 1)
         edges.append(cuts)
-        index = index * n_bins + np.clip(np.searchsorted(cuts, x) - 1, 0, n_bins - 1)
+        place = np.clip(np.searchsorted(cuts, x) - 1, 0, n_bins - 1)
+        index = (index * n_bins + place).astype(np.int64)
     size = n_bins ** len(drawn)
     count = np.bincount(index, minlength=size)
     mean = np.column_stack([np.bincount(index, c, minlength=size) for c in columns.T])
-    mean = mean / np.maximum(count, 1)[:, None]
-    value = mean @ coefficients
-    ways = mean @ left.T
+    average: Array = mean / np.maximum(count, 1)[:, None]
+    value = average @ coefficients
+    ways = average @ left.T
     n = left.shape[0]
     spread = np.sqrt((n - 1) / n * np.sum((ways - ways.mean(1, keepdims=True)) ** 2, axis=1))
     empty = count < FEWEST
@@ -183,4 +194,5 @@ def _signal(problem: Problem, name: str) -> Array:
         return s.clock
     kind = name.rstrip("0123456789")
     table = s.temperature if kind == "temp" else getattr(s, kind)
+    assert table is not None
     return np.asarray(table[:, int(name[len(kind) :]) - 1])

@@ -2,10 +2,11 @@
 """On which signals a nameless torque depends: a test for each, on folds never trained on.
 
 A flexible learner (random Fourier features, ridge regression; Rahimi, Recht 2007) predicts the
-joint's residual, with the nameless torque put back, from a set of signals. A signal is needed if leaving it
-out makes the error of the held-out folds larger, fold against fold (one-sided paired t-test of the
-logarithm of their ratio); one outside the set is missing if adding it makes them smaller. Folds are
-whole trajectories where there are enough, so autocorrelation within one does not count twice.
+joint's residual, with the nameless torque put back, from a set of signals. A signal is needed if
+leaving it out makes the error of the held-out folds larger, fold against fold (one-sided paired
+t-test of the logarithm of their ratio); one outside the set is missing if adding it makes them
+smaller. Folds are whole trajectories where there are enough, so autocorrelation within one does
+not count twice.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.stats import ttest_1samp
 
@@ -160,11 +162,11 @@ def _p_value(worse: Array, better: Array) -> float:
 
 
 def _held_out_errors(
-    inputs: Sequence[Array], residual: Array, fold: Array, n_folds: int
+    inputs: Sequence[Array], residual: Array, fold: NDArray[np.int64], n_folds: int
 ) -> Array:
     """Squared error of every fold when it is left out, (n_folds,), best length and ridge."""
     if not inputs:
-        return np.bincount(fold, residual**2, minlength=n_folds)
+        return np.asarray(np.bincount(fold, residual**2, minlength=n_folds), dtype=float)
     x = np.column_stack(inputs)
     tried = [_ridge_errors(_features(x, length), residual, fold, n_folds) for length in LENGTHS]
     table = np.concatenate(tried)
@@ -177,7 +179,7 @@ def _features(x: Array, length: float) -> Array:
     return np.column_stack([np.ones(len(x)), x, np.cos(phase), np.sin(phase)])
 
 
-def _ridge_errors(features: Array, residual: Array, fold: Array, n_folds: int) -> Array:
+def _ridge_errors(features: Array, residual: Array, fold: NDArray[np.int64], n_folds: int) -> Array:
     """Held-out squared errors, shape (n_ridges, n_folds)."""
     parts = [(features[fold == f], residual[fold == f]) for f in range(n_folds)]
     grams = np.array([a.T @ a for a, _ in parts])

@@ -63,7 +63,8 @@ _CLASSES: tuple[type[Effect], ...] = (
     ExternalWrench,
     EnvironmentContact,
 )
-_CATALOGUE: dict[str, Effect] = {cls.kind: cls() for cls in (*_CLASSES, *NAMELESS, Formula)}
+_ALL: tuple[type[Effect], ...] = (*_CLASSES, *NAMELESS, Formula)
+_CATALOGUE: dict[str, Effect] = {cls.kind: cls() for cls in _ALL}
 
 #: What users may write for a term: a kind, a kind with joints counted from 1, or a Term.
 TermSpec = str | tuple[str, Sequence[int]] | Term

@@ -47,8 +47,9 @@ def formula(expression: str, joint: int) -> Term:
     Parameters
     ----------
     expression : str
-        In ``q1``, ``dq1``, ``ddq1``, ... (joints counted from 1, rad or m and s) and ``t`` (s), with
-        numbers, ``+ - * / **`` and ``abs cos exp sign sin sqrt tanh``. Nothing else is evaluated.
+        In ``q1``, ``dq1``, ``ddq1``, ... (joints counted from 1, rad or m and s) and ``t`` (s),
+        with numbers, ``+ - * / **`` and ``abs cos exp sign sin sqrt tanh``. Nothing else is
+        evaluated.
     joint : int
         Joint on which the torque acts, counted from 1.
 

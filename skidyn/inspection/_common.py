@@ -38,7 +38,7 @@ def robot_of(estimator: Any, robot: Robot | None) -> Robot:
 
 def read_table(estimator: Any, X: Any, y: Any, robot: Robot | None) -> tuple[Signals, Array, Robot]:
     """Signals and measured torque of a table that follows the X contract."""
-    from skidyn.diagnosis._diagnosis import read_signals
+    from skidyn.diagnosis._reading import read_signals
 
     robot = robot_of(estimator, robot)
     # A picture needs a clock only to be drawn over; without one it is drawn over the sample number.

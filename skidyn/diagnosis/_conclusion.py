@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""From the search's result to a diagnosis: held-out errors, intervals, curves, words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidyn._signals import Array
+from skidyn.diagnosis._failures import Comparison
+from skidyn.diagnosis._findings import (
+    Finding,
+    effect_curves,
+    make_finding,
+    q_values,
+    rivals_of,
+)
+from skidyn.diagnosis._floor import predictable_share
+from skidyn.diagnosis._held_out import HeldOut, held_out_residual
+from skidyn.diagnosis._intervals import parameter_intervals
+from skidyn.diagnosis._limits import Limit
+from skidyn.diagnosis._result import Diagnosis, Verdict
+from skidyn.diagnosis._search import UNKNOWN, SearchResult, replace_torque
+from skidyn.diagnosis._unknown import UnknownTorque, describe_unknowns
+from skidyn.effects import Term
+from skidyn.evidence._problem import Problem
+
+
+def conclude(
+    problem: Problem,
+    result: SearchResult,
+    limits: list[Limit],
+    sliding: NDArray[np.bool_],
+    torque: Array,
+    notes: list[str],
+    model: Any,
+    data: tuple[Any, Any],
+) -> Diagnosis:
+    """Put the result of a search into a diagnosis.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows and folds on which effects are judged.
+    result : SearchResult
+        Findings and the final fit.
+    limits : list of Limit
+        What could still hide.
+    sliding : ndarray of shape (n_samples, n_joints) of bool
+        Samples away from rest and reversals.
+    torque : ndarray of shape (n_samples, n_joints)
+        Measured torque, N m or N.
+    notes : list of str
+        Remarks on the data.
+    model : regressor
+        The model as given.
+    data : tuple
+        X and torque as given.
+
+    Returns
+    -------
+    Diagnosis
+    """
+    robot = problem.robot
+    assert robot is not None
+    base = held_out_residual(problem, problem.terms, result.fit.sigma)
+    comparisons = [_comparison(problem, torque, base, sliding)]
+    history = [_entry(comparisons[0], None, ())]
+    terms = list(problem.terms)
+    held = base
+    for hypothesis in result.findings:
+        terms += [c.term for c in hypothesis.candidates if c.term not in terms]
+        last = hypothesis is result.findings[-1]
+        held = _held_out(problem, terms, result, keep=terms[len(problem.terms) :] if last else ())
+        comparisons.append(_comparison(problem, torque, held, sliding))
+        history.append(_entry(comparisons[-1], hypothesis.kind, hypothesis.joints))
+    intervals = parameter_intervals(problem, terms, result.fit.noise)
+    q = q_values(result.findings, result.inflation, max(1, len(result.candidates)))
+    rivals = {id(s.added): rivals_of(s) for s in result.steps if s.added is not None}
+    unknowns = _unknowns(problem, result, terms)
+    findings = []
+    for i, hypothesis in enumerate(result.findings):
+        drop = _drop(history[i]["rmse"], history[i + 1]["rmse"], hypothesis.joints)
+        own = [u for u in unknowns if hypothesis.kind == UNKNOWN]
+        finding = make_finding(
+            problem, hypothesis, rivals[id(hypothesis)], q[i], drop, intervals, own
+        )
+        finding.curves.extend(effect_curves(problem, finding.terms, held.torque, held.residual))
+        findings.append(finding)
+    share = predictable_share(problem, result.fit.residual)
+    floor = np.array(history[-1]["rmse"]) * np.sqrt(1 - share)
+    return Diagnosis(
+        _verdict(findings),
+        robot.joint_names,
+        findings,
+        comparisons[0],
+        comparisons[-1],
+        history,
+        floor,
+        _unexplained(findings, unknowns),
+        limits,
+        notes + _fold_notes(problem),
+        model,
+        data,
+        problem,
+        result,
+        share,
+        unknowns,
+    )
+
+
+def _unknowns(problem: Problem, result: SearchResult, terms: Sequence[Term]) -> list[UnknownTorque]:
+    """What is known about the nameless terms, the ripple taken off."""
+    nameless = [c.term for h in result.findings if h.kind == UNKNOWN for c in h.candidates]
+    if not nameless:
+        return []
+    rest = [t for t in terms if t.kind != "torque_ripple"]
+    bare = replace_torque(problem, problem.torque - result.ripple)
+    return describe_unknowns(bare, rest, nameless, result.fit.noise)
+
+
+def _held_out(
+    problem: Problem, terms: Sequence[Term], result: SearchResult, keep: Sequence[Term]
+) -> HeldOut:
+    """Held-out residual; a ripple's coefficients come from the residual at the full rate."""
+    waves = [t for t in terms if t.kind == "torque_ripple"]
+    rest = [t for t in terms if t.kind != "torque_ripple"]
+    if not waves:
+        return held_out_residual(problem, rest, result.fit.sigma, keep)
+    torque = problem.torque - result.ripple
+    held = held_out_residual(replace_torque(problem, torque), rest, result.fit.sigma, keep)
+    for t in waves:
+        own = np.zeros_like(torque)
+        own[:, t.joints[0]] = result.ripple[:, t.joints[0]]
+        held.torque[t] = own
+    return held
+
+
+def _comparison(
+    problem: Problem, torque: Array, held: HeldOut, sliding: NDArray[np.bool_]
+) -> Comparison:
+    assert problem.robot is not None
+    return Comparison(
+        problem.signals,
+        torque,
+        torque - held.residual,
+        sliding,
+        problem.robot.joint_names,
+        problem.rows.sliding,
+    )
+
+
+def _entry(comparison: Comparison, added: str | None, joints: Sequence[int]) -> dict[str, Any]:
+    rmse = [float(x) for x in comparison.rmse(judged=True)]
+    return {"added": added, "joints": [j + 1 for j in joints], "rmse": rmse}
+
+
+def _drop(before: Sequence[float], after: Sequence[float], joints: Sequence[int]) -> float:
+    """Share of the squared error removed, on the joints of the effect, each in its own unit."""
+    pairs = [(before[j], after[j]) for j in joints if before[j] > 0]
+    if not pairs:
+        return 0.0
+    return float(np.mean([1 - (a / b) ** 2 for b, a in pairs]))
+
+
+def _verdict(findings: Sequence[Finding]) -> Verdict:
+    if not findings:
+        return "complete"
+    return "unknown" if any(f.kind == UNKNOWN for f in findings) else "missing"
+
+
+def _unexplained(
+    findings: Sequence[Finding], unknowns: Sequence[UnknownTorque]
+) -> dict[str, Any] | None:
+    for finding in findings:
+        if finding.kind == UNKNOWN:
+            return {
+                "joints": list(finding.joints),
+                "variables": list(finding.variables),
+                "share": finding.error_drop,
+                "torques": [u.to_dict() for u in unknowns],
+            }
+    return None
+
+
+def _fold_notes(problem: Problem) -> list[str]:
+    if problem.whole_trajectories:
+        return []
+    names = np.unique(problem.signals.trajectory)
+    count = "one trajectory" if len(names) == 1 else f"{len(names)} trajectories"
+    return [
+        f"The log has only {count}: errors are held out by {problem.n_folds} blocks of time with "
+        "a guard between them, not by whole trajectories, and may flatter the model."
+    ]

@@ -1,0 +1,231 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The outcome of a diagnosis, and what a user does with it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+
+from skidyn._exceptions import EffectError
+from skidyn._signals import Array
+from skidyn.diagnosis._correction import CorrectedRegressor
+from skidyn.diagnosis._failures import REGIMES, Comparison, Failure, error_map, find_failures
+from skidyn.diagnosis._findings import Finding
+from skidyn.diagnosis._limits import Limit
+from skidyn.diagnosis._search import SearchResult
+from skidyn.diagnosis._unknown import UnknownTorque
+from skidyn.effects import Term, make_terms
+from skidyn.evidence._problem import Problem
+
+Verdict = Literal["complete", "missing", "unknown"]
+
+
+@dataclass
+class Diagnosis:
+    """What a model lacks, where it shows, and what adding it does.
+
+    Made by :func:`skidyn.diagnosis.diagnose`.
+
+    Parameters
+    ----------
+    verdict : {"complete", "missing", "unknown"}
+        Nothing significant is missing; a named effect is missing; something is missing that no
+        named effect explains.
+    joint_names : tuple of str
+        Names of the joints.
+    findings : list of Finding
+        Missing effects in the order they were added.
+    comparison : Comparison
+        Measured against predicted torque of the model as given, held out.
+    comparison_after : Comparison
+        The same with the findings added.
+    history : list of dict
+        ``{"added", "joints", "rmse"}`` of every step; errors per joint, held out, N m or N.
+    noise_floor : ndarray of shape (n_joints,)
+        Error that no smooth function of the motion could remove, N m or N.
+    unexplained : dict or None
+        Joints, variables and share of what stays predictable without a name.
+    limits : list of Limit
+        Largest magnitude of every effect that was not found.
+    warnings : list of str
+        What about the data or the folds the reader should know.
+    base_model : regressor
+        The model as given.
+    data : tuple
+        X and the torque it was diagnosed on.
+    problem : Problem
+        Averaged rows and folds behind the diagnosis.
+    result : SearchResult
+        Every step of the search with its ranking.
+    predictable : ndarray of shape (n_joints,)
+        Share of the remaining squared error that a flexible learner predicts.
+    unknowns : list of UnknownTorque
+        Tested variables, shape and formula of every nameless torque that was found.
+
+    Examples
+    --------
+    >>> from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+    >>> from skidyn.diagnosis import diagnose
+    >>> from skidyn.rigid_body import RBDRegressor
+    >>> log = make_hidden_effect_log(load_planar_arm(), None)
+    >>> diagnose(RBDRegressor(log.robot), log.X, log.y).verdict
+    'complete'
+    """
+
+    verdict: Verdict
+    joint_names: tuple[str, ...]
+    findings: list[Finding]
+    comparison: Comparison
+    comparison_after: Comparison
+    history: list[dict[str, Any]]
+    noise_floor: Array
+    unexplained: dict[str, Any] | None
+    limits: list[Limit]
+    warnings: list[str]
+    base_model: Any = field(repr=False)
+    data: tuple[Any, Any] = field(repr=False)
+    problem: Problem = field(repr=False)
+    result: SearchResult = field(repr=False)
+    predictable: Array = field(repr=False, default_factory=lambda: np.zeros(0))
+    unknowns: list[UnknownTorque] = field(default_factory=list)
+
+    @property
+    def rmse_before(self) -> Array:
+        """Held-out error of the model as given on the samples judged, (n_joints,), N m or N."""
+        return np.array(self.history[0]["rmse"])
+
+    @property
+    def rmse_after(self) -> Array:
+        """Held-out error with all findings added on the samples judged, (n_joints,), N m or N."""
+        return np.array(self.history[-1]["rmse"])
+
+    @cached_property
+    def failures(self) -> list[Failure]:
+        """Regimes in which the error of the given model stands out."""
+        return find_failures(self.comparison)
+
+    @property
+    def regimes(self) -> tuple[str, ...]:
+        """Names of the columns of :meth:`error_map`."""
+        return REGIMES
+
+    def error_map(self, after: bool = False) -> Array:
+        """Error by joint and regime.
+
+        Parameters
+        ----------
+        after : bool, default=False
+            With the findings added.
+
+        Returns
+        -------
+        ndarray of shape (n_joints, n_regimes), N m or N
+            NaN where a regime does not occur.
+        """
+        return error_map(self.comparison_after if after else self.comparison)
+
+    @property
+    def budget(self) -> list[dict[str, float]]:
+        """Share of each joint's squared error by cause: findings, unexplained, noise."""
+        table = []
+        for j in range(len(self.joint_names)):
+            first = max(self.history[0]["rmse"][j] ** 2, 1e-300)
+            shares: dict[str, float] = {}
+            for before, after in zip(self.history[:-1], self.history[1:], strict=True):
+                drop = (before["rmse"][j] ** 2 - after["rmse"][j] ** 2) / first
+                shares[after["added"]] = shares.get(after["added"], 0.0) + float(drop)
+            last = self.history[-1]["rmse"][j] ** 2 / first
+            floor = float(self.noise_floor[j] ** 2 / first)
+            shares["unexplained"] = float(max(last - floor, 0.0))
+            shares["noise"] = floor
+            table.append(shares)
+        return table
+
+    @cached_property
+    def model(self) -> Any:
+        """The given model with every finding added, fitted to all data."""
+        return self._refitted([t for f in self.findings for t in f.terms])
+
+    def add(self, kind: str, joints: Sequence[int] | None = None) -> Any:
+        """Add an effect to the model and fit it again.
+
+        Parameters
+        ----------
+        kind : str
+            Kind of the catalogue; ``"unknown"`` for the nameless function that was found, or
+            ``"formula"`` for the formula proposed for it.
+        joints : sequence of int, optional
+            Joints, counted from 1; by default those of the finding of this kind, or all joints.
+
+        Returns
+        -------
+        RBDRegressor
+            Fitted to all data.
+
+        Raises
+        ------
+        EffectError
+            Unknown kind, a joint that the robot lacks, or no formula was proposed.
+        """
+        if kind == "formula":
+            return self._refitted(self._formulas(joints))
+        wanted = None if joints is None else {int(j) - 1 for j in joints}
+        for finding in self.findings:
+            if finding.kind != kind:
+                continue
+            terms = [
+                t
+                for t in finding.terms
+                if wanted is None or len(t.joints) > 1 or set(t.joints) <= wanted
+            ]
+            known = {j for t in terms for j in t.joints}
+            if terms and (wanted is None or wanted <= known):
+                return self._refitted(terms)
+        spec: Any = kind if joints is None else (kind, list(joints))
+        return self._refitted(make_terms([spec], len(self.joint_names)))
+
+    def _formulas(self, joints: Sequence[int] | None) -> list[Term]:
+        """Terms of the proposed formulas."""
+        proposals = [
+            u.proposal
+            for u in self.unknowns
+            if u.proposal is not None and (joints is None or u.joint in set(joints))
+        ]
+        if not proposals:
+            raise EffectError(
+                "no formula was proposed for these joints; diagnosis.unknowns lists what was found"
+            )
+        return [t for proposal in proposals for t in proposal.terms]
+
+    def _refitted(self, terms: Sequence[Term]) -> Any:
+        model = self.base_model
+        if not hasattr(model, "with_effects"):
+            assert self.problem.robot is not None
+            model = CorrectedRegressor(model, self.problem.robot)
+        return model.with_effects(terms).fit(*self.data)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As the report file of ``skidyn diagnose``.
+
+        Returns
+        -------
+        dict
+            Following the schema ``skidyn.diagnosis/1``; provenance is added by the report.
+        """
+        return {
+            "schema": "skidyn.diagnosis/1",
+            "verdict": self.verdict,
+            "joints": list(self.joint_names),
+            "rmse_before": [float(x) for x in self.rmse_before],
+            "rmse_after": [float(x) for x in self.rmse_after],
+            "noise_floor": [float(x) for x in self.noise_floor],
+            "effects": [finding.to_dict() for finding in self.findings],
+            "unexplained": self.unexplained,
+            "limits": [limit.to_dict() for limit in self.limits],
+            "history": self.history,
+            "warnings": list(self.warnings),
+        }
