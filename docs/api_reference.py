@@ -177,15 +177,19 @@ PAGES: tuple[Page, ...] = (
                 (
                     "ButterworthFilter",
                     "CurrentToTorque",
+                    "DelayEstimate",
                     "SignalScaler",
+                    "SmoothDerivatives",
                     "TimeDerivative",
                 ),
             ),
             Section(
                 "Functions",
                 (
+                    "advance_channels",
                     "average_repetitions",
                     "cross_fitted_residual",
+                    "estimate_delay",
                 ),
             ),
         ),

@@ -2,14 +2,20 @@
 """Transformers that keep the rows of a log, and functions on logs that change them."""
 
 from skidyn.preprocessing._current import CurrentToTorque
+from skidyn.preprocessing._delay import DelayEstimate, advance_channels, estimate_delay
+from skidyn.preprocessing._derivatives import SmoothDerivatives
 from skidyn.preprocessing._logs import average_repetitions, cross_fitted_residual
 from skidyn.preprocessing._signals import ButterworthFilter, SignalScaler, TimeDerivative
 
 __all__ = [
     "ButterworthFilter",
     "CurrentToTorque",
+    "DelayEstimate",
     "SignalScaler",
+    "SmoothDerivatives",
     "TimeDerivative",
+    "advance_channels",
     "average_repetitions",
     "cross_fitted_residual",
+    "estimate_delay",
 ]

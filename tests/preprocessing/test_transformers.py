@@ -9,7 +9,13 @@ from sklearn.utils.estimator_checks import (
     parametrize_with_checks,
 )
 
-from skidyn.preprocessing import ButterworthFilter, CurrentToTorque, SignalScaler, TimeDerivative
+from skidyn.preprocessing import (
+    ButterworthFilter,
+    CurrentToTorque,
+    SignalScaler,
+    SmoothDerivatives,
+    TimeDerivative,
+)
 
 SEQUENCE = {
     "check_methods_sample_order_invariance": "the order of rows is time, so it matters",
@@ -18,6 +24,7 @@ SEQUENCE = {
 ESTIMATORS = [
     ButterworthFilter(0.1, rate=1.0),
     TimeDerivative(rate=1.0),
+    SmoothDerivatives(rate=1.0, cutoff=0.1),
     SignalScaler(),
     CurrentToTorque(101, 0.125),
 ]
@@ -26,7 +33,7 @@ ESTIMATORS = [
 @parametrize_with_checks(
     ESTIMATORS,
     expected_failed_checks=lambda e: (
-        SEQUENCE if isinstance(e, ButterworthFilter | TimeDerivative) else {}
+        SEQUENCE if isinstance(e, ButterworthFilter | SmoothDerivatives | TimeDerivative) else {}
     ),
 )
 def test_scikit_learn_contract(estimator, check):
