@@ -9,6 +9,7 @@ from skidyn.diagnosis._limits import Limit
 from skidyn.diagnosis._proposal import Proposal
 from skidyn.diagnosis._result import Diagnosis
 from skidyn.diagnosis._search import Settings
+from skidyn.diagnosis._separation import SeparatingMotion, design_separating_motion
 from skidyn.diagnosis._unknown import UnknownTorque
 from skidyn.diagnosis._variables import VariableTest
 
@@ -20,8 +21,10 @@ __all__ = [
     "Finding",
     "Limit",
     "Proposal",
+    "SeparatingMotion",
     "Settings",
     "UnknownTorque",
     "VariableTest",
+    "design_separating_motion",
     "diagnose",
 ]

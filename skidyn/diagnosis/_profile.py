@@ -56,7 +56,8 @@ def profile_error(
             solution = np.linalg.solve(train[:-1, :-1] + ridge, train[:-1, -1]) / scale[:-1]
             b = np.append(-solution, 1.0)
             errors[f] = np.einsum("a,jab,b->j", b, gram, b)
-        sigma = np.sqrt(errors.sum(0) / np.maximum(counts, 1)) + 1e-300
+        # A joint that rests has no rows; its weight is of no account but must be finite.
+        sigma = np.where(counts > 0, np.sqrt(errors.sum(0) / np.maximum(counts, 1)) + 1e-100, 1.0)
     return errors
 
 
@@ -77,7 +78,8 @@ def _joint_grams(
 
 def log_likelihood_gain(before: Array, after: Array, counts: NDArray[np.int64]) -> Array:
     """Twice the gain of held-out log-likelihood per joint, noise profiled out, (n_joints,)."""
-    return counts * np.log(before.sum(0) / np.maximum(after.sum(0), 1e-300))
+    old, new = (np.maximum(errors.sum(0), 1e-300) for errors in (before, after))
+    return counts * np.log(old / new)
 
 
 def refine(

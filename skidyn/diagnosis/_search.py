@@ -343,6 +343,7 @@ class _Search:
             if rival.n_parameters > best.n_parameters or _simplicity(rival) >= _simplicity(best):
                 continue
             variance = best.errors.sum(0) / np.maximum(self.problem.rows.counts, 1)
+            variance = np.where(variance > 0, variance, 1.0)  # a joint that rests
             behind = ((rival.errors - best.errors) / variance).sum(1)
             error = behind.std(ddof=1) * np.sqrt(len(behind))
             cap = self.settings.simpler_share * best.score

@@ -61,7 +61,7 @@ class Fit:
     @property
     def noise(self) -> Array:
         """Root mean square of the residual rows of every joint."""
-        return np.array([np.sqrt(np.mean(r**2)) + 1e-300 if len(r) else 1.0 for r in self.residual])
+        return np.array([np.sqrt(np.mean(r**2)) + 1e-100 if len(r) else 1.0 for r in self.residual])
 
 
 @dataclass

@@ -1,0 +1,419 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A motion that tells rivals apart: optimised for what one explains and the other cannot.
+
+Two effects that a log cannot tell apart predict the same torque there, and another one elsewhere.
+The motion is a Fourier series on the joints in question, blended from and to rest, within the
+limits of position, velocity and acceleration. What is maximised is the squared torque of the first
+model, in units of the noise, that the rival leaves over with all its coefficients fitted anew (a
+T-optimal design; Atkinson, Fedorov 1975). The result is then simulated with sensor noise, once with
+each rival as the truth, and given to the same search that will judge the real recording.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.optimize import differential_evolution
+
+from skidyn._exceptions import EffectError
+from skidyn._signals import Array, Signals
+from skidyn.diagnosis._search import Hypothesis, Settings, search
+from skidyn.effects import Term, get_effect
+from skidyn.evidence._problem import Fit, Problem, hysteresis_joints, make_problem
+
+if TYPE_CHECKING:
+    from skidyn.diagnosis._result import Diagnosis
+
+#: Harmonics of the series, and lowest and highest base frequency in Hz.
+HARMONICS, SLOWEST, FASTEST = 4, 0.05, 0.5
+#: Smallest amplitude tried, as a share of the largest; hysteresis shows in small strokes.
+SMALLEST_STROKE = 0.003
+#: Time of blending from and to rest, s.
+BLEND = 0.5
+#: Squared torque, in units of the noise, below which nothing is told apart.
+LEAST_GAIN = 20.0
+#: Trajectories of the simulated check, and rounds and size of the evolution.
+TRAJECTORIES, ROUNDS, POPULATION = 4, 12, 6
+
+
+@dataclass(frozen=True)
+class SeparatingMotion:
+    """A motion that tells two explanations apart.
+
+    Parameters
+    ----------
+    kind, rival : str
+        The two effects.
+    joints : tuple of int
+        Joints that move, counted from 1.
+    time : ndarray of shape (n_samples,), s
+        Time.
+    q, dq, ddq : ndarray of shape (n_samples, n_joints)
+        Motion of all joints, SI units.
+    gain : float
+        Squared torque, in units of the noise, that the rival leaves over on this motion.
+    gain_of_log : float
+        The same for a stretch as long of the log that was diagnosed.
+    confirmed : dict of str to bool
+        For each of the two as the truth: whether a simulated recording of this motion is diagnosed
+        as it.
+
+    Examples
+    --------
+    >>> motion = design_separating_motion(diagnosis)  # doctest: +SKIP
+    >>> motion.to_frame().to_csv("separate.csv", index=False)  # doctest: +SKIP
+    """
+
+    kind: str
+    rival: str
+    joints: tuple[int, ...]
+    time: Array = field(repr=False)
+    q: Array = field(repr=False)
+    dq: Array = field(repr=False)
+    ddq: Array = field(repr=False)
+    gain: float
+    gain_of_log: float
+    confirmed: dict[str, bool]
+
+    @property
+    def sentence(self) -> str:
+        """What the motion does, in words."""
+        joints = "joint" if len(self.joints) == 1 else "joints"
+        which = f"{joints} {', '.join(map(str, self.joints))}"
+        if self.gain < LEAST_GAIN:
+            return (
+                f"No motion of {which} within the limits tells {self.kind} from {self.rival}: with "
+                "the coefficients that this log gives them, one does what the other does."
+            )
+        text = (
+            f"This motion of {which} ({self.time[-1]:.0f} s) tells {self.kind} from {self.rival}: "
+            f"what the rival cannot explain is {self.gain:.3g} in units of the noise, against "
+            f"{self.gain_of_log:.3g} in as much of the log."
+        )
+        if all(self.confirmed.values()):
+            return text + " Simulated recordings of it were told apart both ways."
+        wrong = " and ".join(k for k, right in self.confirmed.items() if not right)
+        return text + f" A simulated recording was still not recognised with {wrong} as the truth."
+
+    def to_frame(self) -> Any:
+        """Table of the motion.
+
+        Returns
+        -------
+        DataFrame
+            Columns ``time, q1.., dq1.., ddq1..``.
+        """
+        from skidyn._optional import import_optional
+
+        pandas = import_optional("pandas", extra="io")
+        n = self.q.shape[1]
+        names = [f"{s}{j + 1}" for s in ("q", "dq", "ddq") for j in range(n)]
+        table = pandas.DataFrame(np.hstack([self.q, self.dq, self.ddq]), columns=names)
+        table.insert(0, "time", self.time)
+        return table
+
+
+@dataclass(frozen=True)
+class _Duel:
+    """Two models that explain the same log, and the limits within which the robot may move."""
+
+    problem: Problem
+    first: Fit
+    second: Fit
+    joints: tuple[int, ...]
+    middle: Array
+    stroke: Array
+    speed: Array
+    acceleration: Array
+    torque_noise: Array
+    position_noise: Array
+    rate: float
+    duration: float
+
+    @property
+    def reversals(self) -> list[int]:
+        """Joints, from 0, whose rows reach up to the reversals."""
+        return hysteresis_joints((*self.first.terms, *self.second.terms))
+
+    def motion(self, x: Array) -> tuple[Array, Array, Array, Array]:
+        """Time and motion of a point of the search space, scaled to keep the limits."""
+        time = np.arange(0.0, self.duration, 1 / self.rate)
+        q = np.tile(self.middle, (len(time), 1))
+        dq, ddq = np.zeros_like(q), np.zeros_like(q)
+        window = _blend(time, self.duration)
+        omega = 2 * np.pi * SLOWEST * (FASTEST / SLOWEST) ** x[0]
+        size = len(x[1:]) // len(self.joints)
+        for i, j in enumerate(self.joints):
+            own = x[1 + i * size : 1 + (i + 1) * size]
+            wave = _fourier(time, omega, own[1:])
+            wave /= np.max(np.abs(wave[0])) + 1e-12
+            s, ds, dds = _blended(window, wave)
+            amplitude = self.stroke[j] * SMALLEST_STROKE ** (1 - own[0])
+            amplitude = min(
+                amplitude,
+                self.speed[j] / max(np.max(np.abs(ds)), 1e-9),
+                self.acceleration[j] / max(np.max(np.abs(dds)), 1e-9),
+                self.stroke[j] / max(np.max(np.abs(s)), 1e-9),
+            )
+            q[:, j] += amplitude * s
+            dq[:, j], ddq[:, j] = amplitude * ds, amplitude * dds
+        return time, q, dq, ddq
+
+    def signals(self, time: Array, q: Array, dq: Array, ddq: Array) -> Signals:
+        """Signals of a motion, with the load of the first model."""
+        robot = self.problem.robot
+        assert robot is not None
+        parameters = self.problem.inertial_parameters(self.first)
+        load = robot.inverse_dynamics(q, dq, ddq, parameters=parameters)
+        s = self.problem.signals
+        temperature = None
+        if s.temperature is not None:
+            temperature = np.tile(np.median(s.temperature, axis=0), (len(q), 1))
+        return Signals(
+            q, dq, ddq, np.zeros(len(q), dtype=np.int64), time, temperature, s.prismatic, robot,
+            load, load, load, parameters,
+        )  # fmt: skip
+
+    def gain(self, signals: Signals) -> float:
+        """Squared torque of the first model that the second leaves over, in noise units."""
+        torque = self.torque(signals, self.first)
+        problem = make_problem(
+            signals,
+            torque,
+            robot=self.problem.robot,
+            rigid_body=self.problem.rigid_body,
+            terms=self.second.terms,
+            smooth=False,
+            subtract_urdf=False,
+            reversals=self.reversals,
+        )
+        if any(count < 8 for count in problem.rows.counts[list(self.joints)]):
+            return 0.0
+        fit = problem.fit(self.second.terms, sigma=self.first.noise)
+        parts = zip(fit.residual, self.first.noise, strict=True)
+        return float(sum(np.sum((r / s) ** 2) for r, s in parts))
+
+    def torque(self, signals: Signals, fit: Fit) -> Array:
+        """Torque of a model beyond the URDF's rigid body, N m or N."""
+        on_motion = replace(self.problem, signals=signals, torque=np.zeros_like(signals.q))
+        return on_motion.explained(fit)
+
+
+def design_separating_motion(
+    diagnosis: Diagnosis,
+    kind: str | None = None,
+    rival: str | None = None,
+    *,
+    duration: float = 20.0,
+    random_state: int = 0,
+) -> SeparatingMotion:
+    """Motion that tells a finding from a rival.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        With the finding.
+    kind : str, optional
+        Kind of the finding; by default the first one that has a rival.
+    rival : str, optional
+        The other explanation; by default its closest rival.
+    duration : float, s, default=20
+        Length of the motion.
+    random_state : int, default=0
+        Seed of the optimisation and of the simulated noise.
+
+    Returns
+    -------
+    SeparatingMotion
+        Within the limits of the URDF and of what the log shows the robot to do.
+
+    Raises
+    ------
+    EffectError
+        No such finding, or the search has not weighed such a rival against it.
+
+    Examples
+    --------
+    >>> from skidyn.diagnosis import design_separating_motion
+    >>> motion = design_separating_motion(diagnosis, "dahl", "maxwell_slip")  # doctest: +SKIP
+    """
+    first, second = _opponents(diagnosis, kind, rival)
+    duel = _duel(diagnosis, first, second, duration)
+    size = 1 + 2 * HARMONICS
+
+    def loss(x: Array) -> float:
+        return -duel.gain(duel.signals(*duel.motion(x)))
+
+    bounds = [(0.0, 1.0)]
+    for _ in duel.joints:
+        bounds += [(0.0, 1.0)] + [(-1.0, 1.0)] * (size - 1)
+    best = differential_evolution(
+        loss,
+        bounds,
+        maxiter=ROUNDS,
+        popsize=POPULATION,
+        init="sobol",
+        polish=False,
+        rng=random_state,
+    )
+    motion = duel.motion(best.x)
+    return SeparatingMotion(
+        first.kind,
+        second.kind,
+        tuple(j + 1 for j in duel.joints),
+        *motion,
+        gain=float(-best.fun),
+        gain_of_log=_gain_of_log(duel),
+        confirmed={
+            one.kind: _recognised(duel, motion, fit, (one.kind, other.kind), random_state)
+            for one, other, fit in ((first, second, duel.first), (second, first, duel.second))
+        },
+    )
+
+
+def _opponents(
+    diagnosis: Diagnosis, kind: str | None, rival: str | None
+) -> tuple[Hypothesis, Hypothesis]:
+    """The finding and the other explanation of the same step of the search."""
+    known = []
+    for step, finding in zip(
+        [s for s in diagnosis.result.steps if s.added in diagnosis.result.findings],
+        diagnosis.findings,
+        strict=False,
+    ):
+        assert step.added is not None
+        others = [h for h in step.ranking if h.kind not in (step.added.kind, "unknown")]
+        known.append(f"{step.added.kind} against {', '.join(h.kind for h in others) or 'nothing'}")
+        if kind not in (None, step.added.kind):
+            continue
+        names = [rival] if rival else list(finding.rivals)
+        for other in others:
+            if other.kind in names:
+                return step.added, other
+    raise EffectError(
+        f"no finding {kind or ''} with the rival {rival or ''}; the search has weighed: "
+        + ("; ".join(known) or "nothing")
+    )
+
+
+def _duel(diagnosis: Diagnosis, first: Hypothesis, second: Hypothesis, duration: float) -> _Duel:
+    problem, robot = diagnosis.problem, diagnosis.problem.robot
+    assert robot is not None
+    findings = diagnosis.result.findings
+    rest = [c.term for h in findings if h is not first for c in h.candidates]
+    rest = [t for t in rest if t.kind != "torque_ripple"]
+    terms: list[list[Term]] = [
+        [*problem.terms, *rest, *(c.term for c in h.candidates)] for h in (first, second)
+    ]
+    problem = replace(problem, torque=problem.torque - diagnosis.result.ripple)
+    sigma = diagnosis.result.fit.noise
+    s = problem.signals
+    low, high = np.quantile(s.q, [0.001, 0.999], axis=0)
+    low = np.maximum(low, robot.position_limits[:, 0])
+    high = np.minimum(high, robot.position_limits[:, 1])
+    speed = np.minimum(np.quantile(np.abs(s.dq), 0.999, axis=0), robot.velocity_limits)
+    return _Duel(
+        problem,
+        problem.fit(terms[0], sigma=sigma),
+        problem.fit(terms[1], sigma=sigma),
+        _moving(first, second, problem.n_joints),
+        (low + high) / 2,
+        (high - low) / 2,
+        speed,
+        np.quantile(np.abs(s.ddq), 0.999, axis=0),
+        # Rows have unit noise gain: their noise is that of a sample.
+        sigma,
+        _position_noise(diagnosis),
+        min(problem.motion.rate, 200.0),
+        duration,
+    )
+
+
+def _moving(first: Hypothesis, second: Hypothesis, n_joints: int) -> tuple[int, ...]:
+    """Joints that have to move; those that load others are moved with effects of the load."""
+    joints = {j for h in (first, second) for j in h.joints}
+    if any("load" in get_effect(h.kind).needs for h in (first, second)):
+        return tuple(range(n_joints))
+    return tuple(sorted(joints))
+
+
+def _gain_of_log(duel: _Duel) -> float:
+    """What the rival leaves over on the log itself, for as much time as the motion takes."""
+    problem = duel.problem
+    bare = replace(problem, torque=problem.explained(duel.first))
+    fit = bare.fit(duel.second.terms, sigma=duel.first.noise)
+    parts = zip(fit.residual, duel.first.noise, strict=True)
+    whole = sum(float(np.sum((r / s) ** 2)) for r, s in parts)
+    signals = problem.signals
+    length = sum(float(np.ptp(signals.clock[rows])) for rows in signals.segments)
+    return whole * duel.duration / max(length, duel.duration)
+
+
+def _recognised(
+    duel: _Duel, motion: Sequence[Array], truth: Fit, kinds: tuple[str, str], random_state: int
+) -> bool:
+    """Whether simulated recordings of the motion are diagnosed as the first of two kinds."""
+    rng = np.random.default_rng(random_state)
+    time, *states = (np.concatenate([x] * TRAJECTORIES) for x in motion)
+    number = np.repeat(np.arange(TRAJECTORIES), len(motion[0]))
+    signals = duel.signals(time, *states).with_(trajectory=number)
+    torque = duel.torque(signals, truth) + duel.torque_noise * rng.normal(size=states[0].shape)
+    measured = signals.q + duel.position_noise * rng.normal(size=states[0].shape)
+    problem = make_problem(
+        signals.with_(q=measured),
+        torque,
+        robot=duel.problem.robot,
+        rigid_body=duel.problem.rigid_body,
+        terms=[t for t in duel.first.terms if t in duel.second.terms],
+        subtract_urdf=False,
+        reversals=duel.reversals,
+    )
+    result = search(problem, kinds, Settings(max_findings=1), nameless=False)
+    return [h.kind for h in result.findings] == [kinds[0]]
+
+
+def _position_noise(diagnosis: Diagnosis) -> Array:
+    """Noise of the logged positions: what the smoother takes off, (n_joints,), rad or m."""
+    from skidyn.diagnosis._reading import read_signals
+
+    model, (X, tau) = diagnosis.base_model, diagnosis.data
+    robot = diagnosis.problem.robot
+    assert robot is not None
+    keys = {k: getattr(model, k, "auto") for k in ("trajectory", "time")}
+    rate = diagnosis.problem.motion.rate
+    raw, _ = read_signals(X, tau, robot, **keys, rate=rate)
+    rough = (raw.q - diagnosis.problem.signals.q)[diagnosis.problem.motion.valid]
+    return np.asarray(np.std(rough, axis=0))
+
+
+def _fourier(time: Array, omega: float, weights: Array) -> Array:
+    """A Fourier series and its two derivatives, shape (3, n_samples)."""
+    series = np.zeros((3, len(time)))
+    for k, (a, b) in enumerate(zip(weights[::2], weights[1::2], strict=True), start=1):
+        w = k * omega
+        sine, cosine = np.sin(w * time), np.cos(w * time)
+        series[0] += (a * sine + b * cosine) / k
+        series[1] += (a * cosine - b * sine) * w / k
+        series[2] -= (a * sine + b * cosine) * w**2 / k
+    return series
+
+
+def _blend(time: Array, duration: float) -> Array:
+    """A window that rises from 0 to 1 and falls back smoothly (quintic), with its derivatives."""
+    window = np.stack([np.ones_like(time), np.zeros_like(time), np.zeros_like(time)])
+    for distance, sign in ((time, 1.0), (duration - time, -1.0)):
+        near = distance < BLEND
+        x = np.clip(distance[near] / BLEND, 0, 1)
+        window[0, near] = x**3 * (10 - 15 * x + 6 * x**2)
+        window[1, near] = sign * 30 * x**2 * (1 - x) ** 2 / BLEND
+        window[2, near] = 60 * x * (1 - 3 * x + 2 * x**2) / BLEND**2
+    return window
+
+
+def _blended(window: Array, wave: Array) -> tuple[Array, Array, Array]:
+    """The product of two functions with its two derivatives."""
+    (w, dw, ddw), (s, ds, dds) = window, wave
+    return w * s, dw * s + w * ds, ddw * s + 2 * dw * ds + w * dds

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A motion that tells rivals apart: within the limits, and it does so when simulated."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from skidyn._exceptions import EffectError
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.diagnosis import design_separating_motion, diagnose
+from skidyn.rigid_body import RBDRegressor
+
+
+def diagnosis_of(kind):
+    log = make_hidden_effect_log(load_planar_arm(), kind, joints=[2], noise="high", random_state=5)
+    return diagnose(RBDRegressor(log.robot), log.X, log.y)
+
+
+@pytest.fixture(scope="module")
+def diagnosis():
+    return diagnosis_of("maxwell_slip")
+
+
+@pytest.fixture(scope="module")
+def motion(diagnosis):
+    return design_separating_motion(diagnosis, "maxwell_slip", "dahl")
+
+
+def test_hysteresis_is_told_apart_by_a_motion_that_the_log_lacked(diagnosis, motion):
+    assert {"dahl", "maxwell_slip"} <= {diagnosis.findings[0].kind, *diagnosis.findings[0].rivals}
+    assert motion.gain > 3 * motion.gain_of_log
+    assert motion.confirmed == {"maxwell_slip": True, "dahl": True}
+    assert "told apart both ways" in motion.sentence
+
+
+def test_the_motion_keeps_the_limits_and_starts_and_ends_at_rest(diagnosis, motion):
+    robot, log = diagnosis.problem.robot, diagnosis.problem.signals
+    low, high = robot.position_limits.T
+
+    assert motion.joints == (2,)
+    assert np.all((motion.q >= low) & (motion.q <= high))
+    assert np.all(np.abs(motion.dq).max(0) <= robot.velocity_limits)
+    assert np.all(np.abs(motion.dq).max(0) <= 1.001 * np.abs(log.dq).max(0))
+    assert np.all(np.abs(motion.ddq).max(0) <= 1.001 * np.abs(log.ddq).max(0))
+    assert np.ptp(motion.q[:, 0]) == 0
+    for state in (motion.dq, motion.ddq):
+        assert np.abs(state[0]).max() < 1e-9
+
+
+def test_velocity_and_acceleration_are_the_derivatives(motion):
+    step = motion.time[1]
+    inner = slice(2, -2)
+
+    for x, dx in ((motion.q, motion.dq), (motion.dq, motion.ddq)):
+        numeric = np.gradient(x[:, 1], step)[inner]
+        assert np.abs(numeric - dx[inner, 1]).max() < 0.05 * np.abs(dx[:, 1]).max()
+
+
+def test_the_motion_as_a_table(motion):
+    table = motion.to_frame()
+
+    assert list(table.columns) == ["time", "q1", "q2", "dq1", "dq2", "ddq1", "ddq2"]
+    np.testing.assert_array_equal(table["q2"], motion.q[:, 1])
+
+
+def test_a_rival_that_contains_the_effect_cannot_be_told_from_it():
+    diagnosis = diagnosis_of("spring")
+
+    motion = design_separating_motion(diagnosis, "spring", "nonlinear_spring", duration=5)
+
+    assert motion.gain < 1
+    assert motion.sentence.startswith("No motion of joint 2")
+
+
+def test_rivals_that_were_not_weighed_are_refused_with_those_that_were(diagnosis):
+    with pytest.raises(EffectError, match="has weighed: .* against .*dahl|has weighed: dahl"):
+        design_separating_motion(diagnosis, "payload", "dahl")
