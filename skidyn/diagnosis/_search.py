@@ -21,6 +21,7 @@ from skidyn.diagnosis._split import split_effects, trajectory_offsets
 from skidyn.effects import Term, get_effect
 from skidyn.effects._catalogue import nameless_kinds
 from skidyn.effects._nameless import NamelessEffect
+from skidyn.evidence._folded import left_out_coefficients
 from skidyn.evidence._problem import Fit, Problem
 
 UNKNOWN = "unknown"
@@ -41,6 +42,9 @@ class Settings:
         Share of folds in which a candidate must lower the error.
     least_gain : float
         Least penalised gain of a finding (twice a log-likelihood).
+    sure_gain, least_t : float
+        A finding of less penalised gain than the first must have a coefficient that is so many
+        standard errors from zero when folds are left out (jackknife).
     second_same, second_any : float
         A later finding must bring this share of the first one's gain, on the same joints or
         anywhere: what is smaller is mostly the first effect's imperfect shape.
@@ -68,6 +72,8 @@ class Settings:
     relative_gate: float = 0.003
     agreeing_folds: float = 0.5
     least_gain: float = 55.0
+    sure_gain: float = 220.0
+    least_t: float = 4.5
     second_same: float = 0.06
     second_any: float = 0.015
     unknown_handicap: float = 0.03
@@ -262,6 +268,9 @@ class _Search:
             self.sigma = self.fit.noise
             ranking = self.rank()
             best = self.pick(ranking)
+            while best is not None and self.worth(best, first) and not self.stands(best):
+                ranking.remove(best)
+                best = self.pick(ranking)
             if best is None or not self.worth(best, first):
                 steps.append(Step(ranking, None))
                 break
@@ -285,6 +294,19 @@ class _Search:
         return best.score >= max(
             self.settings.second_same * same, self.settings.second_any * anywhere
         )
+
+    def stands(self, best: Hypothesis) -> bool:
+        """Whether a weak explanation holds when folds are left out."""
+        if best.score >= self.settings.sure_gain or best.errors is None:
+            return True
+        blocks = [*self.blocks, *(c.rows for c in best.candidates)]
+        design = self.problem.design(blocks)
+        whole, left = left_out_coefficients(self.problem, design, self.sigma, self.target)
+        n = len(left)
+        error = np.sqrt((n - 1) / n * np.sum((left - left.mean(0)) ** 2, axis=0))
+        new = sum(c.width for c in best.candidates)
+        t = np.abs(whole[-new:]) / np.maximum(error[-new:], 1e-300)
+        return bool(t.max() >= self.settings.least_t)
 
     def add(self, best: Hypothesis) -> None:
         if best.torque is not None:
