@@ -152,8 +152,10 @@ PAGES: tuple[Page, ...] = (
                 "Functions",
                 (
                     "check_log",
+                    "fetch_double_pendulum",
                     "fetch_emps",
                     "fetch_panda_exciting",
+                    "fetch_xl330",
                     "hidden_effect_kinds",
                     "load_demo_log",
                     "load_panda",

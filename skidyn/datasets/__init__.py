@@ -2,7 +2,12 @@
 """Logs of robots: readers of recordings, quality checks, simulated logs with a hidden effect."""
 
 from skidyn.datasets._embedded import load_demo_log
-from skidyn.datasets._fetch import fetch_emps, fetch_panda_exciting
+from skidyn.datasets._fetch import (
+    fetch_double_pendulum,
+    fetch_emps,
+    fetch_panda_exciting,
+    fetch_xl330,
+)
 from skidyn.datasets._log import read_log
 from skidyn.datasets._log_quality import JointQuality, LogQuality, check_log
 from skidyn.datasets._recording import load_recording
@@ -20,8 +25,10 @@ __all__ = [
     "JointQuality",
     "LogQuality",
     "check_log",
+    "fetch_double_pendulum",
     "fetch_emps",
     "fetch_panda_exciting",
+    "fetch_xl330",
     "hidden_effect_kinds",
     "load_demo_log",
     "load_panda",

@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from sklearn.datasets import get_data_home
 from sklearn.utils import Bunch
@@ -13,6 +15,9 @@ from sklearn.utils import Bunch
 from skidyn._exceptions import LogError
 from skidyn._optional import import_optional
 from skidyn.datasets._log import read_log
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: Files are named by the commit that holds them, so that their content cannot change.
 EMPS_URL = (
@@ -23,6 +28,23 @@ PANDA_URL = (
     "https://raw.githubusercontent.com/unisa-acg/inverse-dynamics-solver/"
     "73217267f30e3aaba229b63233c8fdb628ba156b/"
     "inverse_dynamics_interface_franka_inria/bagfiles/panda_exciting_trajectory.db3"
+)
+PENDULUM_URL = (
+    "https://raw.githubusercontent.com/dfki-ric-underactuated-lab/double_pendulum/"
+    "33b5db87afc0a3228b3e7ed10c83d885af73e995/"
+    "data/experiment_records/design_C.0/20220914/sys_id/"
+)
+PENDULUM_RUNS = tuple(f"trajectory_{k:02d}.csv" for k in (0, 1, 2, 3, 4, 5, 6, 12, 13))
+XL330_URL = (
+    "https://raw.githubusercontent.com/Rhoban/bam/"
+    "af2260462471ff45ac18af159b1327ea51d8db15/bam/data.bak/raw/"
+)
+XL330_RUNS = tuple(
+    f"2026-01-15_10h{moment}.json"
+    for moment in (
+        *("28m10", "28m17", "28m24", "28m32", "28m42", "28m49", "28m57", "29m04"),
+        *("29m14", "29m21", "29m29", "29m37", "29m47", "29m54", "30m02", "30m10"),
+    )
 )
 #: Force per volt that the authors of EMPS identified, N/V.
 EMPS_GAIN = 35.15065188248547
@@ -115,6 +137,134 @@ def fetch_panda_exciting(
     """
     path = _retrieve(url or PANDA_URL, "panda_exciting.db3", data_home, sha256)
     return Bunch(frame=read_log(path, check=False), licence="BSD-3-Clause", path=str(path))
+
+
+def fetch_double_pendulum(
+    *, data_home: str | os.PathLike[str] | None = None, url: str = "", runs: tuple[str, ...] = ()
+) -> Bunch:
+    """Download identification runs of a double pendulum: two backdrivable joints, 200 to 690 Hz.
+
+    The recordings are those of design C.0 of 14 September 2022 in the repository
+    dfki-ric-underactuated-lab/double_pendulum [1]_, whose licence is BSD-3-Clause. Nothing of them
+    comes with skidyn.
+
+    Parameters
+    ----------
+    data_home : path, optional
+        Folder to keep the files in; that of scikit-learn's data sets if None.
+    url : str, default=""
+        Another folder to download from; that of the repository if empty.
+    runs : tuple of str, default=()
+        Names of files; all nine if empty.
+
+    Returns
+    -------
+    Bunch
+        ``frame``: DataFrame ``time`` (s), ``trajectory, q1, q2`` (rad), ``dq1, dq2``,
+        ``tau1, tau2`` (N m, drive reading); ``licence``, ``paths``.
+
+    Raises
+    ------
+    LogError
+        A file's checksum is not that of its first download.
+    ImportError
+        pooch is not installed (``pip install skidyn[fetch]``).
+
+    References
+    ----------
+    .. [1] F. Wiebe et al., "Open Source Dual-Purpose Acrobot and Pendubot Platform: Benchmarking
+       Control Algorithms for Underactuated Robotics", IEEE Robotics & Automation Magazine, 2023.
+
+    Examples
+    --------
+    >>> from skidyn.datasets import fetch_double_pendulum
+    >>> pendulum = fetch_double_pendulum()  # doctest: +SKIP
+    """
+    address = url or PENDULUM_URL
+    paths = [
+        _retrieve(f"{address.rstrip('/')}/{run}", f"double_pendulum_{run}", data_home, None)
+        for run in runs or PENDULUM_RUNS
+    ]
+    columns = {
+        "time": "time",
+        "q": ["pos_meas1", "pos_meas2"],
+        "dq": ["vel_meas1", "vel_meas2"],
+        "tau": ["tau_meas1", "tau_meas2"],
+    }
+    frame = read_log(paths, columns=columns, check=False)
+    return Bunch(frame=frame, licence="BSD-3-Clause", paths=[str(p) for p in paths])
+
+
+def fetch_xl330(
+    *, data_home: str | os.PathLike[str] | None = None, url: str = "", runs: tuple[str, ...] = ()
+) -> Bunch:
+    """Download a servo that swings 0.49 kg at 0.1 m: 16 runs of a Dynamixel XL330 at about 200 Hz.
+
+    The recordings are those of [1]_ in the history of the repository Rhoban/bam, whose licence is
+    Apache-2.0. Nothing of them comes with skidyn.
+
+    Parameters
+    ----------
+    data_home : path, optional
+        Folder to keep the files in; that of scikit-learn's data sets if None.
+    url : str, default=""
+        Another folder to download from; that of the repository if empty.
+    runs : tuple of str, default=()
+        Names of files; all sixteen if empty.
+
+    Returns
+    -------
+    Bunch
+        ``frame``: DataFrame ``time`` (s), ``trajectory, q1`` (rad, zero hanging down), ``dq1``
+        (rad/s), ``i1`` (A), ``temp1`` (degrees Celsius), ``volts``, ``enabled`` (0 while the motor
+        is off); ``load``: the known ``m g l`` of 0.481 N m; ``licence``, ``paths``.
+
+    Raises
+    ------
+    LogError
+        A file's checksum is not that of its first download, or it is no recording of this kind.
+    ImportError
+        pooch is not installed (``pip install skidyn[fetch]``).
+
+    References
+    ----------
+    .. [1] M. Duclusaud et al., "Extended Friction Models for the Physics Simulation of Servo
+       Actuators", 2024.
+
+    Examples
+    --------
+    >>> from skidyn.datasets import fetch_xl330
+    >>> servo = fetch_xl330()  # doctest: +SKIP
+    """
+    pandas = import_optional("pandas", extra="io")
+    address = url or XL330_URL
+    paths, tables = [], []
+    for number, run in enumerate(runs or XL330_RUNS):
+        path = _retrieve(f"{address.rstrip('/')}/{run}", f"xl330_{run}", data_home, None)
+        paths.append(str(path))
+        tables.append(_servo_run(path).assign(trajectory=number))
+    frame = pandas.concat(tables, ignore_index=True)
+    return Bunch(frame=frame, load=0.49 * 9.81 * 0.1, licence="Apache-2.0", paths=paths)
+
+
+def _servo_run(path: Path) -> pd.DataFrame:
+    pandas = import_optional("pandas", extra="io")
+    try:
+        entries = pandas.DataFrame(json.loads(path.read_text(encoding="utf-8"))["entries"])
+        current = entries["load"].to_numpy()
+        columns = {
+            "time": entries["timestamp"],
+            "q1": entries["position"],
+            "dq1": entries["speed"],
+            # milliampere, kept as unsigned 16 bit in the source
+            "i1": ((current + 2**15) % 2**16 - 2**15) / 1000,
+            "temp1": entries["temp"],
+            "volts": entries["input_volts"],
+            "enabled": entries["torque_enable"].astype(float),
+        }
+    except (KeyError, TypeError, ValueError) as error:
+        raise LogError(f"{path} is not a recording of this kind: {error}") from None
+    return pandas.DataFrame(columns)
 
 
 def _retrieve(

@@ -4,6 +4,7 @@
 import functools
 import hashlib
 import http.server
+import json
 import sqlite3
 import threading
 
@@ -12,7 +13,12 @@ import pytest
 from scipy.io import savemat
 
 from skidyn._exceptions import LogError
-from skidyn.datasets import fetch_emps, fetch_panda_exciting
+from skidyn.datasets import (
+    fetch_double_pendulum,
+    fetch_emps,
+    fetch_panda_exciting,
+    fetch_xl330,
+)
 
 pytest.importorskip("pooch")
 
@@ -92,3 +98,39 @@ def test_panda_bag_is_read(site, tmp_path):
     panda = fetch_panda_exciting(data_home=tmp_path / "home", url=f"{address}/panda.db3")
     assert panda.licence == "BSD-3-Clause"
     assert panda.frame.shape == (30, 23) and panda.frame.attrs["joint_names"] == names
+
+
+def test_runs_of_the_double_pendulum_become_trajectories(site, tmp_path):
+    folder, address = site
+    names = [f"{s}_{k}{j}" for s in ("pos", "vel", "tau") for k in ("meas", "filt") for j in (1, 2)]
+    table = np.column_stack(
+        [np.arange(300) / 400, np.sin(np.arange(300)[:, None] / np.arange(3, 15))]
+    )
+    runs = ("trajectory_00.csv", "trajectory_01.csv")
+    for run in runs:
+        header = ",".join(["time", *names])
+        np.savetxt(folder / run, table, delimiter=",", header=header, comments="")
+
+    pendulum = fetch_double_pendulum(data_home=tmp_path / "home", url=address, runs=runs)
+
+    frame = pendulum.frame
+    assert pendulum.licence == "BSD-3-Clause"
+    assert list(frame["trajectory"].unique()) == [0, 1]
+    for name, source in {"q2": "pos_meas2", "dq1": "vel_meas1", "tau2": "tau_meas2"}.items():
+        column = table[:, 1 + names.index(source)]
+        np.testing.assert_allclose(frame[name][:300], column)
+
+
+def test_currents_of_the_servo_get_their_sign_back(site, tmp_path):
+    folder, address = site
+    entry = {"position": 0.1, "speed": -0.2, "input_volts": 7.4, "temp": 28, "torque_enable": True}
+    entries = [entry | {"timestamp": k / 200, "load": load} for k, load in enumerate((5, 65531))]
+    (folder / "run.json").write_text(json.dumps({"mass": 0.49, "entries": entries}))
+
+    servo = fetch_xl330(data_home=tmp_path / "home", url=address, runs=("run.json",))
+
+    assert servo.frame["i1"].tolist() == [0.005, -0.005]
+    assert servo.load == pytest.approx(0.481, abs=1e-3)
+    (folder / "other.json").write_text("{}")
+    with pytest.raises(LogError, match="other.json is not a recording"):
+        fetch_xl330(data_home=tmp_path / "home", url=address, runs=("other.json",))
