@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -127,13 +128,14 @@ def read_log(
         if tables:
             _refuse_other_columns(table, match.joint_names, tables[0], joints, file)
         joints = match.joint_names
-        notes += [note for note in match.notes if note not in notes]
+        notes += [note.removeprefix(f"{file}: ") for note in match.notes]
         _, number = np.unique(table["trajectory"], return_inverse=True)
         if len(paths) > 1:
             table["trajectory"] = number + len(files)
         files += [str(file)] * (int(number.max()) + 1)
         tables.append(table)
     frame = pandas.concat(tables, ignore_index=True) if len(tables) > 1 else tables[0]
+    notes = _told_once(notes, len(paths))
     frame.attrs = {"joint_names": joints, "files": files, "notes": notes}
     for note in notes:
         warn_about_log(note)
@@ -141,6 +143,18 @@ def read_log(
         for message in check_log(frame, robot).warnings:
             warn_about_log(message)
     return frame
+
+
+def _told_once(notes: Sequence[str], n_files: int) -> list[str]:
+    """Each note once, with the number of files that it holds for.
+
+    >>> _told_once(["no velocities", "cut", "no velocities"], 3)
+    ['no velocities (2 of 3 files)', 'cut (1 of 3 files)']
+    """
+    counts = Counter(notes)
+    if n_files == 1:
+        return list(counts)
+    return [f"{note} ({count} of {n_files} files)" for note, count in counts.items()]
 
 
 def _refuse_other_columns(

@@ -124,6 +124,28 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
         self.trajectory = trajectory
         self.time = time
 
+    def __getstate__(self) -> dict[str, Any]:
+        """State without dictionaries whose keys are objects, which skops cannot store."""
+        state = dict(super().__getstate__())
+        if "effect_coefficients_" in state:
+            evidence = state["evidence_"]
+            state["effect_coefficients_"] = list(state["effect_coefficients_"].items())
+            state["evidence_"] = [
+                evidence.columns,
+                list(evidence.factors.items()),
+                list(evidence.counts.items()),
+            ]
+        return state
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Restore what ``__getstate__`` gave."""
+        state = dict(state)
+        if "effect_coefficients_" in state:
+            columns, factors, counts = state["evidence_"]
+            state["effect_coefficients_"] = dict(state["effect_coefficients_"])
+            state["evidence_"] = Evidence(columns, dict(factors), dict(counts))
+        super().__setstate__(state)
+
     def __sklearn_tags__(self) -> Any:
         tags = super().__sklearn_tags__()
         tags.target_tags.multi_output = True

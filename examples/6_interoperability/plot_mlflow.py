@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""
+Runs and models in MLflow
+=========================
+
+A skidyn model is a scikit-learn model, so MLflow's scikit-learn flavour stores it. The held-out
+error of every step of the diagnosis becomes a metric, the report an artifact.
+"""
+
+# %%
+import logging
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.diagnosis import diagnose
+from skidyn.report import summarize, write_html
+from skidyn.rigid_body import RBDRegressor
+
+try:
+    import mlflow
+except ImportError:
+    print("MLflow is not installed: pip install mlflow-skinny")
+    sys.exit(0)
+
+logging.getLogger("mlflow").setLevel(logging.ERROR)
+log = make_hidden_effect_log(load_planar_arm(), "stribeck", joints=[2])
+diagnosis = diagnose(RBDRegressor(log.robot), log.X, log.y)
+
+# %%
+# One run. ``skops`` is MLflow's safe format; ``cloudpickle`` stores classes of a script too.
+folder = Path(tempfile.mkdtemp())
+mlflow.set_tracking_uri(f"sqlite:///{folder / 'runs.db'}")
+mlflow.set_experiment("planar arm")
+with mlflow.start_run(run_name="find what is missing") as run:
+    mlflow.log_params({"robot": log.robot.name, "verdict": diagnosis.verdict})
+    for step, entry in enumerate(diagnosis.history):
+        mlflow.log_metric("held_out_rmse", float(np.mean(entry["rmse"])), step=step)
+    mlflow.log_artifact(str(write_html(folder / "report.html", summarize(diagnosis))))
+    stored = mlflow.sklearn.log_model(
+        diagnosis.model, name="model", serialization_format="cloudpickle"
+    )
+
+# %%
+# Whoever finds the run later loads the model and predicts.
+loaded = mlflow.sklearn.load_model(stored.model_uri)
+print("same prediction:", np.array_equal(loaded.predict(log.X), diagnosis.model.predict(log.X)))
+history = mlflow.tracking.MlflowClient().get_metric_history(run.info.run_id, "held_out_rmse")
+for point in history:
+    print(f"step {point.step}: held-out RMSE {point.value:.4f} N m")

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""
+The identified arm in MuJoCo
+============================
+
+What was identified goes into a simulator: masses, inertias, viscous and Coulomb friction as MJCF
+fields. The written file is loaded by MuJoCo, and its inverse dynamics is compared with the model's.
+"""
+
+# %%
+import sys
+import tempfile
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.export import model_terms, write_mjcf
+from skidyn.rigid_body import RBDRegressor
+
+try:
+    import mujoco
+except ImportError:
+    print("MuJoCo is not installed: pip install mujoco")
+    sys.exit(0)
+
+log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=4, duration=5.0)
+# only bodies that can exist: a simulator refuses negative masses
+model = RBDRegressor(log.robot, consistent=True).fit(log.X, log.y)
+file = Path(tempfile.mkdtemp()) / "arm.xml"
+terms, rest = model_terms(model)
+del terms["blur"]  # MJCF has no width of the sign function
+left_out = write_mjcf(log.robot, file, **terms, effects=rest)
+print("written:", ", ".join(terms), "- no field for:", ", ".join(left_out) or "nothing")
+
+# %%
+# MuJoCo's inverse dynamics at 300 rows of the log. Its joint forces hold damping and dry friction
+# apart, so Coulomb friction is compared while the joint slides.
+arm = mujoco.MjModel.from_xml_path(str(file))
+state = mujoco.MjData(arm)
+rows = np.linspace(0, len(log.X) - 1, 300).astype(int)
+torque = np.empty((len(rows), arm.nv))
+for k, row in enumerate(rows):
+    sample = log.X.iloc[row]
+    state.qpos[:], state.qvel[:] = sample[["q1", "q2"]], sample[["dq1", "dq2"]]
+    state.qacc[:] = sample[["ddq1", "ddq2"]]
+    mujoco.mj_inverse(arm, state)
+    torque[k] = state.qfrc_inverse
+predicted = model.predict(log.X)[rows]
+
+figure, axes = plt.subplots(1, 2, figsize=(8, 3), layout="constrained")
+for j, axis in enumerate(axes):
+    sliding = np.abs(log.X[f"dq{j + 1}"].to_numpy()[rows]) > 0.1
+    difference = np.abs(torque[:, j] - predicted[:, j])[sliding]
+    print(f"joint {j + 1}: largest difference while sliding {difference.max():.2g} N m")
+    axis.plot(predicted[:, j], torque[:, j], ".", ms=3)
+    axis.axline((0, 0), slope=1, color="k", lw=0.5)
+    axis.set(xlabel=f"skidyn, joint {j + 1} (N m)", ylabel="MuJoCo (N m)")
+plt.show()

@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""
+Share a model as a file that is safe to load
+============================================
+
+A pickle runs whatever its author wrote into it. `skops <https://skops.readthedocs.io>`__ stores a
+fitted model so that the reader sees which types it holds before anything is built.
+"""
+
+# %%
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.rigid_body import RBDRegressor
+
+try:
+    import skops.io as sio
+except ImportError:
+    print("skops is not installed: pip install skidyn[share]")
+    sys.exit(0)
+
+log = make_hidden_effect_log(load_planar_arm(), "stribeck", n_trajectories=4, duration=5.0)
+model = RBDRegressor(log.robot, ("viscous", "coulomb", "stribeck")).fit(log.X, log.y)
+file = Path(tempfile.mkdtemp()) / "arm.skops"
+sio.dump(model, file)
+print(f"{file.name}: {file.stat().st_size / 1000:.0f} kB")
+
+# %%
+# What the file holds beyond numbers and scikit-learn: read the list, then say that you trust it.
+types = sio.get_untrusted_types(file=file)
+print("\n".join(types))
+loaded = sio.load(file, trusted=types)
+print("same prediction:", np.array_equal(loaded.predict(log.X), model.predict(log.X)))
