@@ -3,6 +3,7 @@
 
 import os
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 HERE = Path(__file__).parent
@@ -22,6 +23,7 @@ extensions = [
     "mathml_math",
     "myst_parser",
     "numpydoc",
+    "sklearn_labels",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
     "sphinx_copybutton",
@@ -64,14 +66,29 @@ copybutton_prompt_text = r">>> |\.\.\. |\$ "
 copybutton_prompt_is_regexp = True
 myst_heading_anchors = 3
 
-# Examples that need real recordings are shown but not run where the recordings are absent.
-_has_recordings = bool(os.environ.get("SKIDYN_DATA")) or (
-    HERE.parents[1].joinpath("shared", "data").is_dir()
-)
+# Examples that need recordings or packages that are absent are shown but not run. They must not be
+# started: an example that ends early by sys.exit would end the documentation build with it.
+_recordings = os.environ.get("SKIDYN_DATA") or HERE.parents[1] / "shared" / "data"
+_not_run = [
+    example
+    for example, package in {
+        "plot_mlflow": "mlflow",
+        "plot_mujoco": "mujoco",
+        "plot_optuna": "optuna",
+        "plot_pandas_polars": "polars",
+        "plot_skops": "skops",
+    }.items()
+    if find_spec(package) is None
+]
+if Path(_recordings).is_dir():
+    os.environ["SKIDYN_DATA"] = str(_recordings)
+else:
+    _not_run.append("plot_real_")
+
 sphinx_gallery_conf = {
     "examples_dirs": "../examples",
     "gallery_dirs": "gallery",
-    "filename_pattern": r"/plot_" if _has_recordings else r"/plot_(?!real_)",
+    "filename_pattern": rf"/(?!{'|'.join(_not_run)})plot_" if _not_run else "/plot_",
     "ignore_pattern": r"__init__\.py|_mock|conftest",
     "within_subsection_order": "FileNameSortKey",
     "remove_config_comments": True,

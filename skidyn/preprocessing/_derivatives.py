@@ -222,9 +222,9 @@ class SmoothDerivatives(_SignalTransformer):
 
         Returns
         -------
-        X_extended : ndarray of shape (n_samples, n_features + n_columns * derivatives_)
-            X with smoothed columns, then first derivatives (unit/s) of all columns, then second
-            (unit/s^2).
+        X_extended : ndarray of shape (n_samples, n_features_out)
+            X with smoothed columns, then first derivatives (unit/s) of all of them, then second
+            (unit/s^2) where two are appended.
         """
         X = self._checked(X)
         smoothed = X.copy()
