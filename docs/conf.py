@@ -92,6 +92,7 @@ sphinx_gallery_conf = {
     "ignore_pattern": r"__init__\.py|_mock|conftest",
     "within_subsection_order": "FileNameSortKey",
     "remove_config_comments": True,
+    "capture_repr": (),  # the address of a Display object says nothing
     "download_all_examples": False,
     "show_signature": False,
     "min_reported_time": 1e9,

@@ -34,6 +34,7 @@ diagnosis = diagnose(RBDRegressor(log.robot), log.X, log.y)
 # One run. ``skops`` is MLflow's safe format; ``cloudpickle`` stores classes of a script too.
 folder = Path(tempfile.mkdtemp())
 mlflow.set_tracking_uri(f"sqlite:///{folder / 'runs.db'}")
+mlflow.create_experiment("planar arm", artifact_location=(folder / "artifacts").as_uri())
 mlflow.set_experiment("planar arm")
 with mlflow.start_run(run_name="find what is missing") as run:
     mlflow.log_params({"robot": log.robot.name, "verdict": diagnosis.verdict})
