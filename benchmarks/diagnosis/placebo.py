@@ -19,8 +19,8 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from skidyn.datasets import load_recording
+from skidyn.diagnosis._hypothesis import variance_inflation
 from skidyn.diagnosis._reading import read_signals
-from skidyn.diagnosis._search import variance_inflation
 from skidyn.effects import Term, get_effect, make_terms
 from skidyn.evidence._problem import make_problem
 from skidyn.robots import Robot

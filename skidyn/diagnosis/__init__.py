@@ -5,10 +5,10 @@ from skidyn.diagnosis._diagnosis import diagnose
 from skidyn.diagnosis._effect_search import EffectSearchCV
 from skidyn.diagnosis._failures import Comparison, Failure
 from skidyn.diagnosis._findings import Finding
+from skidyn.diagnosis._hypothesis import Settings
 from skidyn.diagnosis._limits import Limit
 from skidyn.diagnosis._proposal import Proposal
 from skidyn.diagnosis._result import Diagnosis
-from skidyn.diagnosis._search import Settings
 from skidyn.diagnosis._separation import SeparatingMotion, design_separating_motion
 from skidyn.diagnosis._unknown import UnknownTorque
 from skidyn.diagnosis._variables import VariableTest

@@ -49,6 +49,11 @@ class Candidate:
         return np.array([c.sign for c in get_effect(self.term.kind).coefficients])
 
     @property
+    def limits(self) -> Array:
+        """Largest magnitude of every coefficient at which the formula holds."""
+        return np.array([c.limit for c in get_effect(self.term.kind).coefficients])
+
+    @property
     def joints(self) -> tuple[int, ...]:
         """Joints of the term, from 0."""
         return self.term.joints

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,10 +21,11 @@ from skidyn.diagnosis._findings import (
 )
 from skidyn.diagnosis._floor import predictable_share
 from skidyn.diagnosis._held_out import HeldOut, held_out_residual
+from skidyn.diagnosis._hypothesis import UNKNOWN, Hypothesis, SearchResult
 from skidyn.diagnosis._intervals import parameter_intervals
 from skidyn.diagnosis._limits import Limit
 from skidyn.diagnosis._result import Diagnosis, Verdict
-from skidyn.diagnosis._search import UNKNOWN, SearchResult, replace_torque
+from skidyn.diagnosis._search import replace_torque
 from skidyn.diagnosis._unknown import UnknownTorque, describe_unknowns
 from skidyn.effects import Term
 from skidyn.evidence._problem import Problem
@@ -66,17 +68,13 @@ def conclude(
     """
     robot = problem.robot
     assert robot is not None
-    base = held_out_residual(problem, problem.terms, result.fit.sigma)
-    comparisons = [_comparison(problem, torque, base, sliding)]
-    history = [_entry(comparisons[0], None, ())]
-    terms = list(problem.terms)
-    held = base
-    for hypothesis in result.findings:
-        terms += [c.term for c in hypothesis.candidates if c.term not in terms]
-        last = hypothesis is result.findings[-1]
-        held = _held_out(problem, terms, result, keep=terms[len(problem.terms) :] if last else ())
-        comparisons.append(_comparison(problem, torque, held, sliding))
-        history.append(_entry(comparisons[-1], hypothesis.kind, hypothesis.joints))
+    steps = _steps(problem, result, torque, sliding)
+    while harmful := [h for h in result.findings if _harms(h, result.findings, steps)]:
+        result = _without(problem, result, harmful[-1])
+        steps = _steps(problem, result, torque, sliding)
+    terms = [*problem.terms, *_found_terms(problem, result.findings)]
+    held = steps[-1].held
+    history = [step.entry for step in steps]
     intervals = parameter_intervals(problem, terms, result.fit.noise)
     q = q_values(result.findings, result.inflation, max(1, len(result.candidates)))
     rivals = {id(s.added): rivals_of(s) for s in result.steps if s.added is not None}
@@ -96,8 +94,8 @@ def conclude(
         _verdict(findings),
         robot.joint_names,
         findings,
-        comparisons[0],
-        comparisons[-1],
+        steps[0].comparison,
+        steps[-1].comparison,
         history,
         floor,
         _unexplained(findings, unknowns),
@@ -110,6 +108,54 @@ def conclude(
         share,
         unknowns,
     )
+
+
+@dataclass(frozen=True)
+class _Step:
+    """The model after a finding: its held-out residual and errors."""
+
+    held: HeldOut
+    comparison: Comparison
+    entry: dict[str, Any]
+
+
+def _steps(
+    problem: Problem, result: SearchResult, torque: Array, sliding: NDArray[np.bool_]
+) -> list[_Step]:
+    """The model as given, and after each finding."""
+    steps = []
+    for k in range(len(result.findings) + 1):
+        found = _found_terms(problem, result.findings[:k])
+        keep = found if k == len(result.findings) else ()
+        held = _held_out(problem, [*problem.terms, *found], result, keep)
+        comparison = _comparison(problem, torque, held, sliding)
+        last = result.findings[k - 1] if k else None
+        kind, joints = (last.kind, last.joints) if last else (None, ())
+        steps.append(_Step(held, comparison, _entry(comparison, kind, joints)))
+    return steps
+
+
+def _found_terms(problem: Problem, findings: Sequence[Hypothesis]) -> list[Term]:
+    """Terms of findings, each once, without those of the given model."""
+    terms = dict.fromkeys(c.term for h in findings for c in h.candidates)
+    return [t for t in terms if t not in problem.terms]
+
+
+def _harms(hypothesis: Hypothesis, findings: Sequence[Hypothesis], steps: Sequence[_Step]) -> bool:
+    """Whether a finding makes the error of samples larger, though it helped averaged rows."""
+    k = [h is hypothesis for h in findings].index(True)
+    before, after = steps[k].entry["rmse"], steps[k + 1].entry["rmse"]
+    return _drop(before, after, hypothesis.joints) <= 0
+
+
+def _without(problem: Problem, result: SearchResult, wrong: Hypothesis) -> SearchResult:
+    """The result with a finding taken back and the rest fitted again."""
+    findings = [h for h in result.findings if h is not wrong]
+    ripple = result.ripple if wrong.torque is None else result.ripple - wrong.torque
+    rest = [t for t in _found_terms(problem, findings) if t.kind != "torque_ripple"]
+    bare = replace_torque(problem, problem.torque - ripple)
+    fit = bare.fit((*problem.terms, *rest), sigma=result.fit.noise)
+    return replace(result, findings=findings, fit=fit, ripple=ripple)
 
 
 def _unknowns(problem: Problem, result: SearchResult, terms: Sequence[Term]) -> list[UnknownTorque]:

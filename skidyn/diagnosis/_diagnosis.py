@@ -16,11 +16,12 @@ from skidyn._exceptions import ColumnError, LogError, LogWarning
 from skidyn._signals import Array, Signals
 from skidyn.diagnosis._conclusion import conclude
 from skidyn.diagnosis._data_checks import suspicions
+from skidyn.diagnosis._hypothesis import SearchResult, Settings
 from skidyn.diagnosis._limits import Limit, find_limits
 from skidyn.diagnosis._reading import read_signals
 from skidyn.diagnosis._result import Diagnosis
 from skidyn.diagnosis._reversals import look_at_reversals
-from skidyn.diagnosis._search import SearchResult, Settings, search
+from skidyn.diagnosis._search import search
 from skidyn.effects import Term, get_effect, list_effects, make_terms
 from skidyn.evidence._problem import Problem, make_problem
 from skidyn.robots import Robot

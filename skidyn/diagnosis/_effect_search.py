@@ -12,8 +12,8 @@ from sklearn.utils.validation import check_is_fitted
 
 from skidyn._signals import Array
 from skidyn.diagnosis._diagnosis import diagnose
+from skidyn.diagnosis._hypothesis import Settings
 from skidyn.diagnosis._result import Diagnosis
-from skidyn.diagnosis._search import Settings
 
 
 class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):

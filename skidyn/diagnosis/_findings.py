@@ -12,7 +12,7 @@ from scipy.stats import chi2
 
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
-from skidyn.diagnosis._search import UNKNOWN, Hypothesis, Step
+from skidyn.diagnosis._hypothesis import UNKNOWN, Hypothesis, Step
 from skidyn.diagnosis._unknown import UnknownTorque
 from skidyn.effects import Term, get_effect
 from skidyn.evidence._problem import Problem

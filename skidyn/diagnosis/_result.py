@@ -15,8 +15,8 @@ from skidyn._signals import Array
 from skidyn.diagnosis._correction import CorrectedRegressor
 from skidyn.diagnosis._failures import REGIMES, Comparison, Failure, error_map, find_failures
 from skidyn.diagnosis._findings import Finding
+from skidyn.diagnosis._hypothesis import SearchResult
 from skidyn.diagnosis._limits import Limit
-from skidyn.diagnosis._search import SearchResult
 from skidyn.diagnosis._unknown import UnknownTorque
 from skidyn.effects import Term, make_terms
 from skidyn.evidence._problem import Problem

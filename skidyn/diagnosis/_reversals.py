@@ -14,7 +14,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from skidyn.diagnosis._search import SearchResult, Settings, search
+from skidyn.diagnosis._hypothesis import SearchResult, Settings
+from skidyn.diagnosis._search import search
 from skidyn.effects import get_effect
 from skidyn.evidence._problem import SHORT_MARGIN, Problem, hysteresis_joints, with_reversals
 from skidyn.evidence._rows import sliding_samples, window_rows

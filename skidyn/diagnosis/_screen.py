@@ -34,6 +34,7 @@ class _Group:
     own: Array  # (n_folds, n_candidates, width, width)
     target: Array  # (n_folds, n_candidates * width)
     signs: Array  # (n_candidates, width)
+    limits: Array  # (n_candidates, width)
 
 
 class Screen:
@@ -91,7 +92,8 @@ class Screen:
                     own[f] += np.einsum("rck,rcl->ckl", part, part, optimize=True)
                     target[f] += block[a:b].T @ self.target[j][a:b]
             signs = np.array([self.candidates[i].signs for i in index])
-            groups.append(_Group(np.array(index), rows, k, own, target, signs))
+            limits = np.array([self.candidates[i].limits for i in index])
+            groups.append(_Group(np.array(index), rows, k, own, target, signs, limits))
         return groups
 
     def model(self, blocks: Sequence[dict[int, Array]]) -> _Model:
@@ -120,8 +122,8 @@ class Screen:
     def step(self, model: _Model, wanted: NDArray[np.bool_] | None = None) -> Array:
         """Held-out error of every fold after each candidate is added, (n_candidates, n_folds).
 
-        Candidates that are not ``wanted``, and those whose coefficients come out with a sign that
-        physics forbids, get infinity.
+        Candidates that are not ``wanted``, and those whose coefficients come out with a sign or a
+        magnitude that physics forbids, get infinity.
         """
         n_folds = self.problem.n_folds
         errors = np.full((len(self.candidates), n_folds), np.inf)
@@ -142,10 +144,11 @@ class Screen:
                 errors[group.index[pick], f] = _swept_error(
                     model, train, f, np.asarray(cross), own, target
                 )
-            signs = group.signs[pick]
-            if signs.any():
+            signs, limits = group.signs[pick], group.limits[pick]
+            if signs.any() or np.isfinite(limits).any():
                 gain = _gain(whole, np.asarray(cross).sum(0), own.sum(0), target.sum(0))[0]
-                errors[group.index[pick[np.any(gain * signs < 0, axis=1)]]] = np.inf
+                forbidden = (gain * signs < 0) | (np.abs(gain) > limits)
+                errors[group.index[pick[forbidden.any(axis=1)]]] = np.inf
         return errors
 
 

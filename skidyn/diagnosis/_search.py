@@ -4,16 +4,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
+from scipy.stats import t as student_t
 
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate, catalogue_candidates
 from skidyn.diagnosis._clock import clock_line
+from skidyn.diagnosis._hypothesis import (
+    UNKNOWN,
+    Hypothesis,
+    SearchResult,
+    Settings,
+    Step,
+    variance_inflation,
+)
 from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
 from skidyn.diagnosis._screen import Screen
 from skidyn.diagnosis._spectrum import find_lines
@@ -22,174 +31,9 @@ from skidyn.effects import Term, get_effect
 from skidyn.effects._catalogue import nameless_kinds
 from skidyn.effects._nameless import NamelessEffect
 from skidyn.evidence._folded import left_out_coefficients
-from skidyn.evidence._problem import Fit, Problem
+from skidyn.evidence._problem import Problem
 
-UNKNOWN = "unknown"
 Mask = NDArray[np.bool_]
-
-
-@dataclass(frozen=True)
-class Settings:
-    """Thresholds of the search; the defaults are what is shipped, for every robot and effect.
-
-    Parameters
-    ----------
-    significance : float
-        Chance of a false candidate over the whole catalogue (Bonferroni).
-    relative_gate : float
-        A drop of squared error smaller than this share is no finding.
-    agreeing_folds : float
-        Share of folds in which a candidate must lower the error.
-    least_gain : float
-        Least penalised gain of a finding (twice a log-likelihood).
-    sure_gain, least_t : float
-        A finding of less penalised gain than the first must have a coefficient that is so many
-        standard errors from zero when folds are left out (jackknife).
-    second_same, second_any : float
-        A later finding must bring this share of the first one's gain, on the same joints or
-        anywhere: what is smaller is mostly the first effect's imperfect shape.
-    unknown_handicap : float
-        Share by which a nameless function must beat a named effect.
-    simpler_share : float
-        A simpler kind is named if it falls behind by less than this share.
-    family_share : float
-        Within a family of effects (hysteresis), the simplest one with this share of the best
-        one's score is named.
-    max_findings : int
-        Kinds added at most.
-    finalists : int
-        Kinds compared with noise re-estimated.
-    refined : int
-        So many of them with their shape parameters refined.
-
-    Examples
-    --------
-    >>> Settings(max_findings=1).max_findings
-    1
-    """
-
-    significance: float = 1e-4
-    relative_gate: float = 0.003
-    agreeing_folds: float = 0.5
-    least_gain: float = 55.0
-    sure_gain: float = 220.0
-    least_t: float = 4.5
-    second_same: float = 0.06
-    second_any: float = 0.015
-    unknown_handicap: float = 0.03
-    simpler_share: float = 0.05
-    family_share: float = 0.95
-    max_findings: int = 4
-    finalists: int = 8
-    refined: int = 4
-
-
-@dataclass(frozen=True)
-class Hypothesis:
-    """A kind of effect on certain joints, as an explanation of the residual.
-
-    Attributes
-    ----------
-    kind : str
-        Kind, ``"unknown"`` for nameless functions.
-    candidates : tuple of Candidate
-        Its terms.
-    gain : ndarray of shape (n_joints,)
-        Twice the held-out log-likelihood gain by joint.
-    score : float
-        Gain less the price of its parameters.
-    n_parameters : int
-        Coefficients and shape parameters.
-    errors : ndarray of shape (n_folds, n_joints) or None
-        Held-out squared error with it; None where it was judged otherwise.
-    torque : ndarray of shape (n_samples, n_joints) or None
-        Torque to be taken off at the full rate (ripple).
-    """
-
-    kind: str
-    candidates: tuple[Candidate, ...]
-    gain: Array
-    score: float
-    n_parameters: int
-    errors: Array | None = None
-    torque: Array | None = None
-
-    @property
-    def joints(self) -> tuple[int, ...]:
-        """Joints of its terms, from 0."""
-        return tuple(sorted({j for c in self.candidates for j in c.joints}))
-
-    @property
-    def variables(self) -> tuple[str, ...]:
-        """Signals of nameless functions."""
-        return tuple(sorted({v for c in self.candidates for v in c.variables}))
-
-
-@dataclass
-class Step:
-    """One step of the search: the ranked explanations and the one that was added."""
-
-    ranking: list[Hypothesis]
-    added: Hypothesis | None
-
-
-@dataclass
-class SearchResult:
-    """What the search found.
-
-    Attributes
-    ----------
-    findings : list of Hypothesis
-        Added kinds, in order.
-    steps : list of Step
-        Every step with its ranking.
-    fit : Fit
-        Last fit.
-    ripple : ndarray of shape (n_samples, n_joints)
-        Torque of the ripple found, N m.
-    inflation : ndarray of shape (n_joints,)
-        Variance inflation by the residual's autocorrelation.
-    """
-
-    findings: list[Hypothesis]
-    steps: list[Step]
-    fit: Fit
-    ripple: Array
-    inflation: Array
-    candidates: list[Candidate] = field(default_factory=list)
-
-
-def variance_inflation(problem: Problem, residual: Sequence[Array], lags: int = 12) -> Array:
-    """How much more a slow column's coefficient varies than with independent rows, by joint.
-
-    One plus twice the sum of the residual's autocorrelations up to the first small one.
-
-    Parameters
-    ----------
-    problem : Problem
-        Rows.
-    residual : sequence of ndarray
-        Residual rows of every joint.
-    lags : int, default=12
-        Largest lag in rows.
-
-    Returns
-    -------
-    ndarray of shape (n_joints,)
-    """
-    inflation = np.ones(problem.n_joints)
-    for j, r in enumerate(residual):
-        power, lagged = 1e-30, np.zeros(lags)
-        for name in np.unique(problem.rows.trajectory[j]):
-            x = r[problem.rows.trajectory[j] == name]
-            power += x @ x
-            for lag in range(1, min(lags, len(x))):
-                lagged[lag] += x[:-lag] @ x[lag:]
-        for rho in lagged[1:] / power:
-            if rho < 0.05:
-                break
-            inflation[j] += 2 * rho
-    return inflation
 
 
 def search(
@@ -280,6 +124,8 @@ class _Search:
             self.add(best)
             self.prune(best, first)
             self.refit()
+        self.sigma = self.fit.noise
+        self.settle()
         inflation = variance_inflation(self.problem, self.fit.residual)
         return SearchResult(self.findings, steps, self.fit, self.ripple, inflation, self.pool)
 
@@ -296,17 +142,38 @@ class _Search:
         )
 
     def stands(self, best: Hypothesis) -> bool:
-        """Whether a weak explanation holds when folds are left out."""
-        if best.score >= self.settings.sure_gain or best.errors is None:
+        """Whether an explanation holds when folds are left out."""
+        if best.errors is None:
             return True
-        blocks = [*self.blocks, *(c.rows for c in best.candidates)]
+        sure = best.score >= self.settings.sure_gain
+        most = self.settings.least_chance if sure else self.settings.weak_chance
+        return self.chance(best, self.chosen) <= most
+
+    def chance(self, hypothesis: Hypothesis, others: Sequence[Candidate]) -> float:
+        """Chance of an explanation's clearest coefficient, beside other terms (jackknife)."""
+        own = [self.problem.term_rows(term) for term in self.problem.terms]
+        blocks = [*own, *(c.rows for c in (*others, *hypothesis.candidates))]
         design = self.problem.design(blocks)
         whole, left = left_out_coefficients(self.problem, design, self.sigma, self.target)
         n = len(left)
         error = np.sqrt((n - 1) / n * np.sum((left - left.mean(0)) ** 2, axis=0))
-        new = sum(c.width for c in best.candidates)
-        t = np.abs(whole[-new:]) / np.maximum(error[-new:], 1e-300)
-        return bool(t.max() >= self.settings.least_t)
+        new = sum(c.width for c in hypothesis.candidates)
+        t = np.max(np.abs(whole[-new:]) / np.maximum(error[-new:], 1e-300))
+        return float(2 * student_t.sf(t, n - 1))
+
+    def settle(self) -> None:
+        """Take back what no longer holds beside all that was added after it."""
+        while True:
+            judged = [h for h in self.findings if h.errors is not None]
+            chances = [
+                self.chance(h, [c for c in self.chosen if c not in h.candidates]) for h in judged
+            ]
+            if not judged or max(chances) <= self.settings.least_chance:
+                return
+            weakest = judged[int(np.argmax(chances))]
+            self.findings.remove(weakest)
+            self.chosen = [c for c in self.chosen if c not in weakest.candidates]
+            self.refit()
 
     def add(self, best: Hypothesis) -> None:
         if best.torque is not None:
@@ -515,7 +382,7 @@ class _Search:
                 continue
             n_rows = int(problem.rows.counts[line.joint])
             strong = line.gain.sum() > max(40.0, 2 * self.settings.relative_gate * n_rows)
-            agree = (line.gain > 0).mean() >= 0.6
+            agree = _chance_of_mean(line.gain) < self.settings.least_chance
             if (
                 strong
                 and agree
@@ -555,6 +422,14 @@ class _Search:
 def replace_torque(problem: Problem, torque: Array) -> Problem:
     """The same problem with another torque to explain."""
     return replace(problem, torque=torque)
+
+
+def _chance_of_mean(values: Array) -> float:
+    """Chance of such a mean over folds if it were zero (one-sided Student's t)."""
+    if len(values) < 2:
+        return 1.0
+    error = np.std(values, ddof=1) / np.sqrt(len(values))
+    return float(student_t.sf(values.mean() / max(error, 1e-300), len(values) - 1))
 
 
 def _family(hypothesis: Hypothesis) -> str:

@@ -20,7 +20,8 @@ from scipy.optimize import differential_evolution
 
 from skidyn._exceptions import EffectError
 from skidyn._signals import Array, Signals
-from skidyn.diagnosis._search import Hypothesis, Settings, search
+from skidyn.diagnosis._hypothesis import Hypothesis, Settings
+from skidyn.diagnosis._search import search
 from skidyn.effects import Term, get_effect
 from skidyn.evidence._problem import Fit, Problem, hysteresis_joints, make_problem
 

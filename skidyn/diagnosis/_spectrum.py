@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from skidyn._signals import Array
+from skidyn.diagnosis._held_out import sample_folds
 from skidyn.evidence._problem import Problem
 
 #: Angle covered by the spectrum in rad and its number of bins; sets resolution and range.
@@ -32,8 +33,8 @@ class Line:
         Joint, from 0.
     waves : float
         Periods per rad times 2 pi: the N of sin(N q).
-    gain : ndarray of shape (n_trajectories,)
-        Twice the held-out log-likelihood gain, by trajectory.
+    gain : ndarray of shape (n_folds,)
+        Twice the held-out log-likelihood gain, by fold.
     coefficients : ndarray of shape (2,)
         Of sin(N q) and cos(N q), N m.
     """
@@ -59,6 +60,7 @@ def find_lines(problem: Problem, residual: Array) -> list[Line]:
     list of Line
     """
     threshold = np.log(2 * HIGHEST * problem.n_joints / FALSE_LINE)
+    fold = sample_folds(problem)
     lines = []
     for joint in range(problem.n_joints):
         use = problem.rows.sliding[:, joint]
@@ -68,7 +70,7 @@ def find_lines(problem: Problem, residual: Array) -> list[Line]:
         for waves, height in _peaks(q[use], r[use]):
             if height < threshold:
                 continue
-            line = _test_line(problem, joint, waves, use, r)
+            line = _test_line(problem, joint, waves, use, r, fold)
             if line.gain.sum() > 0 and _explained_share(q[use], r[use], line) <= 0.2:
                 # A weak line cannot gain more than its height over the local noise tells.
                 cap = 2.4 * height / line.gain.sum()
@@ -105,21 +107,25 @@ def _peaks(q: Array, r: Array, count: int = 2) -> list[tuple[float, float]]:
 
 
 def _test_line(
-    problem: Problem, joint: int, waves: float, use: NDArray[np.bool_], r: Array
+    problem: Problem,
+    joint: int,
+    waves: float,
+    use: NDArray[np.bool_],
+    r: Array,
+    fold: NDArray[np.int64],
 ) -> Line:
-    q, trajectory = problem.signals.q[:, joint], problem.signals.trajectory
+    q = problem.signals.q[:, joint]
     block = np.column_stack([np.sin(waves * q), np.cos(waves * q)])
-    gram, cross = {}, {}
-    for name in np.unique(trajectory):
-        here = use & (trajectory == name)
-        gram[name], cross[name] = block[here].T @ block[here], block[here].T @ r[here]
-    total, right = sum(gram.values()), sum(cross.values())
+    grams, cross = [], []
+    for f in np.unique(fold[use]):
+        here = use & (fold == f)
+        grams.append(block[here].T @ block[here])
+        cross.append(block[here].T @ r[here])
+    total, right = sum(grams), sum(cross)
     drop = []
-    for name in gram:
-        b = np.linalg.lstsq(total - gram[name], right - cross[name], rcond=None)[0]
-        if len(gram) == 1:
-            b = np.linalg.lstsq(total, right, rcond=None)[0]
-        drop.append(2 * b @ cross[name] - b @ gram[name] @ b)
+    for g, c in zip(grams, cross, strict=True):
+        b = np.linalg.lstsq(total - g, right - c, rcond=None)[0]
+        drop.append(2 * b @ c - b @ g @ b)
     before = float(np.sum(r[use] ** 2))
     change = np.array(drop)
     gain = use.sum() * np.log(before / max(before - change.sum(), 1e-12 * before))

@@ -202,6 +202,8 @@ def trajectory_offsets(
         return {}
     found = {}
     for j, (design, y) in enumerate(zip(problem.design(blocks), target, strict=True)):
+        if not _moves_both_ways(problem, j):
+            continue  # an offset of a recording in one direction is its friction
         ones = problem.rows.average(np.ones(problem.signals.n_samples), j)
         inside = problem.rows.trajectory[j][:, None] == names
         a = np.hstack([design[:, np.abs(design).max(0, initial=0) > 0], ones[:, None] * inside])
@@ -220,3 +222,11 @@ def trajectory_offsets(
         ]
         found[j] = (candidates, float(gain))
     return found
+
+
+def _moves_both_ways(problem: Problem, joint: int) -> bool:
+    """Whether most recordings hold motion of a joint in both directions."""
+    direction = problem.rows.average(problem.signals.sign[:, joint], joint)
+    trajectory = problem.rows.trajectory[joint]
+    shares = [np.mean(direction[trajectory == name] > 0) for name in np.unique(trajectory)]
+    return float(np.mean([0.1 < s < 0.9 for s in shares])) > 0.5

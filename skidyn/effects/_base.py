@@ -31,6 +31,8 @@ class Coefficient:
         Unit for a revolute joint; for a slider ``N m`` becomes ``N`` and ``rad`` becomes ``m``.
     sign : {0, 1}
         1 where physics allows no negative value.
+    limit : float
+        Largest magnitude at which the formula still describes the effect.
 
     Examples
     --------
@@ -41,6 +43,7 @@ class Coefficient:
     name: str
     unit: str
     sign: int = 0
+    limit: float = np.inf
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,8 @@ class TimeDelay(Effect):
     drawn_against = "ddq"
     title = "Time delay of the torque"
     formula = r"-d\,\dot\tau_\mathrm{model}"
-    coefficients = (Coefficient("delay", "s"),)
+    # Beyond it the first-order expansion of a delay has nothing to do with a delay.
+    coefficients = (Coefficient("delay", "s", limit=0.1),)
     needs = ("model_torque", "time")
     simplicity = 6
     rivals = ("joint_elasticity", "rotor_inertia", "viscous")
