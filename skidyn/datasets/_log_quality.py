@@ -150,10 +150,13 @@ class LogQuality:
             f"gaps: {self.gaps} (longest step {self.largest_gap:.3g} s), "
             f"repeated rows: {self.repeated_rows}",
             "",
-            "joint            position range     coverage  max speed  reversals  at rest  "
-            "torque range       dq/q'  delay ms",
         ]
-        lines += [_line(joint) for joint in self.joints]
+        width = max([len(joint.name) for joint in self.joints] + [5])
+        lines.append(
+            f"{'joint':{width}s}     position range  coverage      step  max speed  reversals  "
+            "at rest      torque range  at limit     dq/q'  delay ms"
+        )
+        lines += [_line(joint, width) for joint in self.joints]
         lines += ["", *(f"! {message}" for message in self.warnings)]
         return "\n".join(lines).rstrip()
 
@@ -307,14 +310,16 @@ def _joints(
     return joints
 
 
-def _line(joint: JointQuality) -> str:
+def _line(joint: JointQuality, width: int) -> str:
     """One joint as a line of the printed report."""
     (low, high), (weak, strong) = joint.position_range, joint.torque_range
+    step = f"{joint.resolution:9.2g}" if np.isfinite(joint.resolution) else "        -"
     return (
-        f"{joint.name[:15]:15s} {low:8.3f} .. {high:7.3f} {_percent(joint.position_coverage)} "
-        f"{joint.largest_velocity:10.3f} {joint.reversals:10d} {_percent(joint.rest_share)} "
-        f"{weak:8.2f} .. {strong:7.2f} {_number(joint.velocity_slope, 7)} "
-        f"{_number(1e3 * joint.torque_delay, 8, 1)}"
+        f"{joint.name:{width}s} {low:8.3f} .. {high:6.3f} {_percent(joint.position_coverage)} "
+        f"{step} {joint.largest_velocity:10.3f} {joint.reversals:10d} "
+        f"{_percent(joint.rest_share)} {weak:8.2f} .. {strong:6.2f} "
+        f"{_percent(joint.saturated_share)} {_number(joint.velocity_slope, 9)} "
+        f"{_number(1e3 * joint.torque_delay, 9, 1)}"
     )
 
 
@@ -329,7 +334,7 @@ def _plain(value: Any) -> Any:
 
 
 def _percent(share: float) -> str:
-    return f"{100 * share:8.0f} %" if np.isfinite(share) else "         -"
+    return f"{100 * share:6.0f} %" if np.isfinite(share) else "       -"
 
 
 def _number(value: float, width: int, digits: int = 3) -> str:
