@@ -2,6 +2,7 @@
 """The command line, as a user or a script runs it."""
 
 import json
+import signal
 import subprocess
 import sys
 
@@ -196,3 +197,62 @@ def test_currents_become_torques_by_drive_gains(work, tmp_path, capsys):
     code, result = run_json(capsys, *words, "--drive-gains", "[10, 5]")
     assert code == cli.DONE
     assert max(row["relative"] for row in result["table"]) < 0.5
+
+
+def test_every_command_teaches_with_an_example(capsys):
+    for command in cli.COMMANDS:
+        name = command.__name__.rpartition("_")[2]
+        with pytest.raises(SystemExit) as stopped:
+            cli.main([name, "--help"])
+        text = capsys.readouterr().out
+        assert stopped.value.code == 0
+        assert f"  skidyn {name}" in text
+
+
+def test_check_judges_a_log_without_and_with_a_robot(work, capsys):
+    log, urdf = arguments(work)[0], arguments(work)[-1]
+    assert cli.main(["check", log]) == cli.DONE
+    assert "at limit" in capsys.readouterr().out
+    code, quality = run_json(capsys, "check", log, "--urdf", urdf)
+    assert code == cli.DONE
+    assert quality["gaps"] == 0 and quality["joints"][0]["name"] == "joint1"
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh"])
+def test_completion_knows_the_commands(shell, capsys):
+    pytest.importorskip("shtab")
+    assert cli.main(["completion", shell]) == cli.DONE
+    script = capsys.readouterr().out
+    assert "diagnose" in script and "--drive-gains" in script
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C is another thing there")
+def test_ctrl_c_leaves_no_half_written_file(work, tmp_path):
+    """A real signal to a real process, while it works."""
+    out, page = tmp_path / "report.json", tmp_path / "report.html"
+    words = ["diagnose", *arguments(work), "--out", str(out), "--html", str(page)]
+    process = subprocess.Popen(
+        [sys.executable, "-c", STOPPABLE, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    assert process.stdout is not None
+    process.stdout.readline()  # the report is written beside its place, and not yet put there
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=120)
+    assert (process.returncode, errors.decode().splitlines()[-1]) == (
+        cli.STOPPED,
+        "stopped; no file was left half written",
+    )
+    assert list(tmp_path.iterdir()) == []
+
+
+STOPPABLE = """
+import os, sys, time
+from skidyn.cli import main
+
+def slow(*paths):
+    print("now", flush=True)
+    time.sleep(60)
+
+os.replace = slow
+sys.exit(main(sys.argv[1:]))
+"""

@@ -14,6 +14,7 @@ import numpy as np
 from skidyn._checks import warn_about_log
 from skidyn._exceptions import LogError
 from skidyn._optional import import_optional
+from skidyn._progress import track
 from skidyn.datasets._log_containers import read_hdf5_channels, read_matlab_channels
 from skidyn.datasets._log_files import (
     MAX_BYTES,
@@ -123,7 +124,7 @@ def read_log(
     files: list[str] = []
     notes: list[str] = []
     joints: list[str] = []
-    for file in map(Path, paths):
+    for file in track([Path(item) for item in paths], "Reading"):
         table, match = build_table(_read_channels(file, topics, max_bytes), str(file), options)
         if tables:
             _refuse_other_columns(table, match.joint_names, tables[0], joints, file)

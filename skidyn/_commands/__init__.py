@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The commands of the command line: one module each, with ``add_parser`` and ``run``."""
+
+from skidyn._commands import (
+    _add,
+    _check,
+    _compare,
+    _completion,
+    _demo,
+    _diagnose,
+    _effects,
+    _identify,
+    _report,
+    _simulate,
+)
+
+#: In the order in which ``skidyn --help`` lists them: that of the loop.
+COMMANDS = (
+    _demo,
+    _check,
+    _compare,
+    _diagnose,
+    _add,
+    _identify,
+    _report,
+    _simulate,
+    _effects,
+    _completion,
+)
+
+__all__ = ["COMMANDS"]

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``skidyn add``: add an effect to a diagnosed model."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from skidyn._commands._arguments import command, with_joints
+from skidyn._commands._input import joint_numbers, read_model_and_log, read_robot, recorded_options
+from skidyn._commands._output import parameters, print_json, run_diagnosis, write_json
+
+DESCRIPTION = """\
+Add an effect to a model that skidyn diagnose has looked at, and print the held-out error before and
+after. The report remembers the log and the model.
+
+  skidyn diagnose run*.csv --urdf robot.urdf --out report.json
+  skidyn add --from report.json --effect dahl --joints 1,4 --out better.json
+"""
+
+
+def add_parser(commands: Any) -> None:
+    parser = command(
+        commands,
+        "add",
+        run,
+        "add an effect to a diagnosed model and print the error before, after",
+        DESCRIPTION,
+    )
+    parser.add_argument("--from", dest="report", required=True, help="report.json of diagnose")
+    parser.add_argument("--effect", required=True, help="kind of the catalogue")
+    with_joints(parser, "joints that get the effect (default: all)")
+    parser.add_argument("--out", metavar="JSON", help="write the parameters of the better model")
+
+
+def run(options: argparse.Namespace) -> None:
+    from skidyn.effects import make_terms
+
+    options = recorded_options(options)
+    model, frame, tau = read_model_and_log(options)
+    robot = read_robot(options)
+    joints = joint_numbers(options.on)
+    spec = options.effect if joints is None else (options.effect, joints)
+    terms = make_terms([spec], robot.n_joints)
+    before = run_diagnosis(model, frame, tau, options, kinds=()).rmse_before
+    fitted = model.with_effects(terms).fit(frame, tau)
+    better = model.with_effects(fitted.effect_terms_[-len(terms) :])
+    after = run_diagnosis(better, frame, tau, options, kinds=()).rmse_before
+    if options.out:
+        write_json(options.out, parameters(fitted))
+    if options.json:
+        print_json({"before": before.tolist(), "after": after.tolist()})
+        return
+    print(f"held-out error with {options.effect} added (N m, N for sliders; sliding samples)")
+    for j, name in enumerate(robot.joint_names):
+        change = after[j] / before[j] - 1 if before[j] > 0 else 0.0
+        print(f"  {name:24s} {before[j]:9.4g} -> {after[j]:9.4g}  ({change:+.0%})")

@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the commands run, write and print. Files are written whole or not at all."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from skidyn._progress import listening
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from skidyn.diagnosis import Comparison, Diagnosis
+    from skidyn.rigid_body import RBDRegressor
+
+
+def run_diagnosis(
+    model: Any, frame: Any, tau: Any, options: argparse.Namespace, kinds: Any = None
+) -> Diagnosis:
+    from skidyn.diagnosis import Settings, diagnose
+
+    wanted = getattr(options, "effects", None)
+    if kinds is None and wanted:
+        kinds = [kind.strip() for kind in wanted.split(",")]
+    # Without kinds nothing is searched: the model is only compared.
+    settings = Settings(max_findings=0) if kinds == () else Settings()
+    rate = getattr(options, "rate", None)
+    with working("Comparing" if kinds == () else "Searching for what is missing", options):
+        return diagnose(model, frame, tau, effects=kinds, rate=rate, settings=settings)
+
+
+def write_reports(
+    diagnosis: Diagnosis, out: str | None, html: str | None, provenance: dict[str, Any]
+) -> None:
+    if out:
+        write_json(out, {**diagnosis.to_dict(), "provenance": provenance})
+    if html:
+        from skidyn.report import summarize, write_html
+
+        write_html(html, summarize(diagnosis, provenance=provenance))
+
+
+def write_json(path: str, content: dict[str, Any]) -> None:
+    from skidyn.report import write_json
+
+    write_json(path, content)
+
+
+def write_table(frame: pd.DataFrame, path: str) -> None:
+    """Write a log in one step: an interrupted run leaves the previous file whole."""
+    target = Path(path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    write = frame.to_parquet if target.suffix == ".parquet" else frame.to_csv
+    with tempfile.TemporaryDirectory(dir=target.parent, prefix=".skidyn-") as folder:
+        part = Path(folder, target.name)
+        write(part, index=False)
+        os.replace(part, target)
+
+
+@contextmanager
+def working(text: str, options: argparse.Namespace) -> Iterator[None]:
+    """Show how far long work is, where a person looks and rich is installed."""
+    if getattr(options, "json", False) or not sys.stderr.isatty():
+        yield
+        return
+    try:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+    except ImportError:
+        print(f"{text} ...", file=sys.stderr)
+        yield
+        return
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description}"),
+        BarColumn(bar_width=30),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task(text, total=None)
+
+        def move(told: str, share: float | None) -> None:
+            total = None if share is None else 1.0
+            progress.update(task, description=told, total=total, completed=share or 0.0)
+
+        with listening(move):
+            yield
+
+
+def provenance(options: argparse.Namespace) -> dict[str, Any]:
+    from skidyn._version import versions
+
+    # the path of the interpreter says nothing about the numbers, but much about its user
+    used = {name: version for name, version in versions().items() if name != "executable"}
+    keep = (
+        *("logs", "urdf", "model", "nominal", "columns", "units", "drive_gains", "joints"),
+        *("rate", "effects"),
+    )
+    recorded = {k: getattr(options, k, None) for k in keep}
+    digests = hashes([*options.logs, options.urdf])
+    return {"versions": used, "sha256": digests, "options": recorded}
+
+
+def hashes(files: Sequence[str]) -> dict[str, str]:
+    """SHA-256 of every file that is there."""
+    import hashlib
+
+    digests = {}
+    for name in files:
+        if Path(name).is_file():
+            with open(name, "rb") as file:
+                digests[name] = hashlib.file_digest(file, "sha256").hexdigest()
+    return digests
+
+
+def parameters(model: RBDRegressor) -> dict[str, Any]:
+    return {
+        "schema": "skidyn.parameters/1",
+        "joints": list(model.robot_.joint_names),
+        "coefficients": model.parameter_table(),
+        "base_parameters": model.base_parameters_,
+        "inertial_parameters": model.inertial_parameters_.tolist(),
+        "effects": [
+            {
+                "kind": term.kind,
+                "joints": [j + 1 for j in term.joints],
+                "shape": dict(term.shape),
+                "coefficients": model.effect_coefficients_[term].tolist(),
+            }
+            for term in model.effect_terms_
+        ],
+        "noise_std": model.noise_std_.tolist(),
+    }
+
+
+def rmse_per_joint(model: Any, X: Any, y: Any) -> Any:
+    import numpy as np
+
+    return np.sqrt(np.mean((np.asarray(model.predict(X)) - np.asarray(y)) ** 2, axis=0))
+
+
+def print_json(content: Any) -> None:
+    from skidyn.report._plain import plain
+
+    print(json.dumps(plain(content), indent=2))
+
+
+def print_diagnosis(diagnosis: Diagnosis) -> None:
+    verdicts = {
+        "complete": "Nothing significant is missing.",
+        "missing": "Something is missing, and it has a name.",
+        "unknown": "Something is missing that no named effect explains.",
+    }
+    print(verdicts[diagnosis.verdict])
+    for note in diagnosis.warnings:
+        print(f"  note: {note}")
+    for finding in diagnosis.findings:
+        print(f"  {finding.sentence}")
+        print(f"      {finding.code}")
+    print("held-out error on sliding samples (N m, N for sliders): before, after, noise floor")
+    rows = zip(
+        diagnosis.joint_names,
+        diagnosis.rmse_before,
+        diagnosis.rmse_after,
+        diagnosis.noise_floor,
+        strict=True,
+    )
+    for name, before, after, floor in rows:
+        print(f"  {name:24s} {before:9.4g} {after:9.4g} {floor:9.4g}")
+    for failure in diagnosis.failures[:3]:
+        print(f"  {failure.sentence}")
+
+
+def print_comparison(comparison: Comparison) -> None:
+    print("held-out error by joint and trajectory: rmse (N m, N for sliders), share of the torque")
+    for row in comparison.table():
+        print(
+            f"  {row['name']:24s} trajectory {row['trajectory']:4d} "
+            f"{row['rmse']:9.4g}  {row['relative']:6.1%}"
+        )
+
+
+def print_regimes(diagnosis: Diagnosis) -> None:
+    import numpy as np
+
+    print("by joint and regime (N m, N for sliders)")
+    print(" " * 26 + "".join(f"{name:>10s}" for name in diagnosis.regimes))
+    for name, errors in zip(diagnosis.joint_names, diagnosis.error_map(), strict=True):
+        cells = "".join("         -" if np.isnan(e) else f"{e:10.4g}" for e in errors)
+        print(f"  {name:24s}{cells}")
+    for failure in diagnosis.failures:
+        print(f"  {failure.sentence}")

@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``skidyn report``: turn a report into a page."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from skidyn._commands._arguments import command
+from skidyn._commands._input import read_model_and_log, recorded_options
+from skidyn._commands._output import print_json, provenance, run_diagnosis, write_reports
+
+DESCRIPTION = """\
+Turn a report into one HTML page that needs no network. The log is read anew and the diagnosis run
+again; a warning tells if a file has changed since.
+
+  skidyn report --from report.json --html report.html
+"""
+
+
+def add_parser(commands: Any) -> None:
+    parser = command(
+        commands, "report", run, "turn the log of a report.json into a page", DESCRIPTION
+    )
+    parser.add_argument("--from", dest="report", required=True, help="report.json of diagnose")
+    parser.add_argument("--html", required=True, help="page to write")
+
+
+def run(options: argparse.Namespace) -> None:
+    options = recorded_options(options)
+    model, frame, tau = read_model_and_log(options)
+    diagnosis = run_diagnosis(model, frame, tau, options)
+    write_reports(diagnosis, None, options.html, provenance(options))
+    page = str(Path(options.html).resolve())
+    if options.json:
+        print_json({"html": page})
+    else:
+        print(f"written: {page}")
