@@ -108,6 +108,14 @@ PAGES: tuple[Page, ...] = (
         ),
     ),
     Page(
+        "skidyn.excitation",
+        "Motions from which the parameters of a robot can be told.",
+        (
+            Section("Classes", ("Excitation", "MotionLimits")),
+            Section("Functions", ("design_excitation",)),
+        ),
+    ),
+    Page(
         "skidyn.inspection",
         "Pictures of torque, residuals, error budgets and error maps.",
         (

@@ -9,8 +9,11 @@ from skidyn._commands import (
     _demo,
     _diagnose,
     _effects,
+    _excite,
+    _export,
     _identify,
     _report,
+    _separate,
     _simulate,
 )
 
@@ -21,8 +24,11 @@ COMMANDS = (
     _compare,
     _diagnose,
     _add,
+    _separate,
     _identify,
     _report,
+    _excite,
+    _export,
     _simulate,
     _effects,
     _completion,

@@ -24,6 +24,7 @@ from skidyn.diagnosis._hypothesis import Hypothesis, Settings
 from skidyn.diagnosis._search import search
 from skidyn.effects import Term, get_effect
 from skidyn.evidence._problem import Fit, Problem, hysteresis_joints, make_problem
+from skidyn.excitation._fourier import fourier, product, rest_window
 
 if TYPE_CHECKING:
     from skidyn.diagnosis._result import Diagnosis
@@ -144,14 +145,14 @@ class _Duel:
         time = np.arange(0.0, self.duration, 1 / self.rate)
         q = np.tile(self.middle, (len(time), 1))
         dq, ddq = np.zeros_like(q), np.zeros_like(q)
-        window = _blend(time, self.duration)
+        window = rest_window(time, self.duration, BLEND)
         omega = 2 * np.pi * SLOWEST * (FASTEST / SLOWEST) ** x[0]
         size = len(x[1:]) // len(self.joints)
         for i, j in enumerate(self.joints):
             own = x[1 + i * size : 1 + (i + 1) * size]
-            wave = _fourier(time, omega, own[1:])
+            wave = fourier(time, omega, own[1:])
             wave /= np.max(np.abs(wave[0])) + 1e-12
-            s, ds, dds = _blended(window, wave)
+            s, ds, dds = product(window, wave)
             amplitude = self.stroke[j] * SMALLEST_STROKE ** (1 - own[0])
             amplitude = min(
                 amplitude,
@@ -388,33 +389,3 @@ def _position_noise(diagnosis: Diagnosis) -> Array:
     raw, _ = read_signals(X, tau, robot, **keys, rate=rate)
     rough = (raw.q - diagnosis.problem.signals.q)[diagnosis.problem.motion.valid]
     return np.asarray(np.std(rough, axis=0))
-
-
-def _fourier(time: Array, omega: float, weights: Array) -> Array:
-    """A Fourier series and its two derivatives, shape (3, n_samples)."""
-    series = np.zeros((3, len(time)))
-    for k, (a, b) in enumerate(zip(weights[::2], weights[1::2], strict=True), start=1):
-        w = k * omega
-        sine, cosine = np.sin(w * time), np.cos(w * time)
-        series[0] += (a * sine + b * cosine) / k
-        series[1] += (a * cosine - b * sine) * w / k
-        series[2] -= (a * sine + b * cosine) * w**2 / k
-    return series
-
-
-def _blend(time: Array, duration: float) -> Array:
-    """A window that rises from 0 to 1 and falls back smoothly (quintic), with its derivatives."""
-    window = np.stack([np.ones_like(time), np.zeros_like(time), np.zeros_like(time)])
-    for distance, sign in ((time, 1.0), (duration - time, -1.0)):
-        near = distance < BLEND
-        x = np.clip(distance[near] / BLEND, 0, 1)
-        window[0, near] = x**3 * (10 - 15 * x + 6 * x**2)
-        window[1, near] = sign * 30 * x**2 * (1 - x) ** 2 / BLEND
-        window[2, near] = 60 * x * (1 - 3 * x + 2 * x**2) / BLEND**2
-    return window
-
-
-def _blended(window: Array, wave: Array) -> tuple[Array, Array, Array]:
-    """The product of two functions with its two derivatives."""
-    (w, dw, ddw), (s, ds, dds) = window, wave
-    return w * s, dw * s + w * ds, ddw * s + 2 * dw * ds + w * dds

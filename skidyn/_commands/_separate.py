@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``skidyn separate``: design the motion that tells a finding from its rival."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from skidyn._commands._arguments import command
+from skidyn._commands._input import read_model_and_log, recorded_options
+from skidyn._commands._output import print_json, run_diagnosis, working
+
+DESCRIPTION = """\
+Where a report says "this data hardly tells A from B", design the motion that would.
+
+  skidyn separate --from report.json --out motion.csv
+
+The motion keeps the limits of the URDF and of what the log shows; it is simulated with either
+effect as the truth, and the answer says whether both were recognised.
+"""
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = command(
+        commands, "separate", run, "design the motion that tells two effects apart", DESCRIPTION
+    )
+    parser.add_argument("--from", dest="report", required=True, help="report.json of diagnose")
+    parser.add_argument("--out", required=True, metavar="CSV", help="motion to write")
+    parser.add_argument("--effect", dest="finding", help="kind of the finding (default: the first)")
+    parser.add_argument("--rival", help="the other kind (default: its closest rival)")
+    parser.add_argument("--duration", type=float, default=20.0, help="s (default: %(default)s)")
+
+
+def run(options: argparse.Namespace) -> None:
+    """Run the command."""
+    from skidyn.diagnosis import design_separating_motion
+    from skidyn.report._write import write_text
+
+    options = recorded_options(options)
+    model, frame, tau = read_model_and_log(options)
+    diagnosis = run_diagnosis(model, frame, tau, options)
+    with working("Designing the motion", options):
+        motion = design_separating_motion(
+            diagnosis, options.finding, options.rival, duration=options.duration
+        )
+    write_text(options.out, motion.to_frame().to_csv(index=False))
+    path = str(Path(options.out).resolve())
+    if options.json:
+        names = ("kind", "rival", "joints", "gain", "gain_of_log", "confirmed", "sentence")
+        print_json({name: getattr(motion, name) for name in names} | {"csv": path})
+        return
+    print(motion.sentence)
+    print(f"written: {path}")

@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A folder with a robot and its log, as commands read them."""
+
+from __future__ import annotations
+
+import json
+from importlib.resources import files
+
+import pytest
+
+from skidyn import cli
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+
+
+@pytest.fixture(scope="session")
+def work(tmp_path_factory):
+    pytest.importorskip("pandas", reason="needs skidyn[io]")
+    folder = tmp_path_factory.mktemp("commands")
+    urdf = files("skidyn.datasets").joinpath("robots", "planar_arm.urdf").read_text("utf-8")
+    (folder / "arm.urdf").write_text(urdf, encoding="utf-8")
+    log = make_hidden_effect_log(
+        load_planar_arm(), "maxwell_slip", joints=[2], noise="high", random_state=5
+    )
+    log.frame.to_csv(folder / "log.csv", index=False)
+    return folder
+
+
+@pytest.fixture
+def run(capsys):
+    def run_command(*words):
+        code = cli.main([*map(str, words), "--json"])
+        out = capsys.readouterr().out
+        return code, json.loads(out) if out.strip() else None
+
+    return run_command

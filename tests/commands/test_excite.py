@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``skidyn excite``."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from skidyn import cli
+from skidyn.datasets import load_planar_arm
+
+
+def test_a_motion_within_the_limits_is_written(work, run, tmp_path):
+    out = tmp_path / "motion.csv"
+
+    code, answer = run(
+        "excite", "--urdf", work / "arm.urdf", "--duration", 4, "--rate", 50, "--out", out
+    )
+
+    table = pd.read_csv(out)
+    limits = load_planar_arm().velocity_limits
+    assert code == cli.DONE
+    assert answer["condition_number"] > 1
+    assert len(table) == 201
+    assert (table[["dq1", "dq2"]].abs().max().to_numpy() <= limits).all()
+
+
+def test_a_motion_too_short_to_start_and_stop_is_refused(work, tmp_path, capsys):
+    out = tmp_path / "motion.csv"
+    words = ["excite", "--urdf", str(work / "arm.urdf"), "--duration", "0.5", "--out", str(out)]
+
+    assert cli.main(words) == cli.BAD_INPUT
+    assert "leaves no time" in capsys.readouterr().err
+    assert not out.exists()
