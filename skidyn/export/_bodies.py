@@ -86,7 +86,7 @@ def numbers(values: Any) -> str:
 
 
 def write_files(
-    path: str | os.PathLike, text: str, robot: Robot, not_held: Mapping[str, Any]
+    path: str | os.PathLike[str], text: str, robot: Robot, not_held: Mapping[str, Any]
 ) -> tuple[str, ...]:
     """Write the description and, for what it cannot hold, a side-car JSON next to it.
 

@@ -21,7 +21,7 @@ _SMALLEST = 1e-15
 
 def write_mjcf(
     robot: Robot,
-    path: str | os.PathLike,
+    path: str | os.PathLike[str],
     *,
     parameters: Any = None,
     viscous: Any = None,

@@ -16,7 +16,7 @@ from skidyn.robots import Robot
 
 def write_urdf(
     robot: Robot,
-    path: str | os.PathLike,
+    path: str | os.PathLike[str],
     *,
     parameters: Any = None,
     viscous: Any = None,

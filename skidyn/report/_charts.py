@@ -121,7 +121,9 @@ def fall_chart(
     }  # fmt: skip
 
 
-def budget_bars(budget: Sequence[dict[str, Number]], causes: Sequence[str]) -> list[list[dict]]:
+def budget_bars(
+    budget: Sequence[dict[str, Number]], causes: Sequence[str]
+) -> list[list[dict[str, Any]]]:
     """Stacked shares in per cent of the width, one list of pieces per joint."""
     rows = []
     for shares in budget:

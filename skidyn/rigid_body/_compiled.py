@@ -14,6 +14,7 @@ import subprocess
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -101,7 +102,7 @@ class CompiledProgram:
     def __init__(self, program: Program) -> None:
         (self._n,) = program.shape
         self._library = compile_library(_batch_text(program))
-        self._function: Callable = self._library.evaluate
+        self._function: Callable[..., Any] = self._library.evaluate
         self._function.restype = None
         self._function.argtypes = (ctypes.c_long, *5 * (ctypes.c_void_p,))
 

@@ -55,9 +55,9 @@ class Engine:
         self.tree = tree
         self.parameters = parameters
         self.gravity = gravity
-        self._programs: dict[tuple, Program] = {}
-        self._scalars: dict[tuple, ScalarFunction] = {}
-        self._compiled_programs: dict[tuple, CompiledProgram] = {}
+        self._programs: dict[tuple[Any, ...], Program] = {}
+        self._scalars: dict[tuple[Any, ...], ScalarFunction] = {}
+        self._compiled_programs: dict[tuple[Any, ...], CompiledProgram] = {}
         self._local = threading.local()
 
     def __getstate__(self) -> dict[str, Any]:
@@ -103,7 +103,7 @@ class Engine:
     @contextmanager
     def _borrowed(self, chunk: int, dtype: Any, *key: Any) -> Iterator[BoundProgram]:
         """Program with buffers that nobody else uses meanwhile, kept for the next call."""
-        free: OrderedDict[tuple, BoundProgram] = self._local.__dict__.setdefault(
+        free: OrderedDict[tuple[Any, ...], BoundProgram] = self._local.__dict__.setdefault(
             "free", OrderedDict()
         )
         name = (chunk, np.dtype(dtype), *key)

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from skidyn._exceptions import SkidynError
 from skidyn.rigid_body._recursion import Program
 from skidyn.rigid_body._tape import Node, operands
 
-_UFUNCS: dict[str, Callable] = {
+_UFUNCS: dict[str, Callable[..., Any]] = {
     "add": np.add,
     "sub": np.subtract,
     "mul": np.multiply,
@@ -48,8 +49,8 @@ class BoundProgram:
         self._live = program.tape.live(program.outputs.values())
         self.inputs = self._input_buffers()
         self._values: dict[int, np.ndarray] = {}
-        self._uniform_calls: list[tuple[Callable, tuple]] = []
-        self._calls: list[tuple[Callable, tuple]] = []
+        self._uniform_calls: list[tuple[Callable[..., Any], tuple[Any, ...]]] = []
+        self._calls: list[tuple[Callable[..., Any], tuple[Any, ...]]] = []
         self._final: list[tuple[int, tuple[int, ...]]] = []  # calls that write an output for good
         self._reread: list[tuple[int, ...]] = []  # outputs that other calls read
         self._bind(program)
@@ -184,7 +185,7 @@ def _aligned_zeros(shape: tuple[int, ...], dtype: np.dtype) -> np.ndarray:
 
 def _call(
     operation: str, arguments: tuple[np.ndarray, ...], row: np.ndarray
-) -> tuple[Callable, tuple]:
+) -> tuple[Callable[..., Any], tuple[Any, ...]]:
     """A function and its arguments that write the result of an operation into a row."""
     if operation in ("sin", "cos") and row.dtype == np.float64:
         # In float64 torch's sine is three times as fast as NumPy's; in float32 it is the slower.

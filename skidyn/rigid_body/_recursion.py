@@ -28,14 +28,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from skidyn.rigid_body._tape import Scalar, Tape
 from skidyn.rigid_body._tree import KinematicTree, transform_inertial
 
-Vector = list  # of three Scalars
-Matrix = list  # of three Vectors, the rows
+Vector = list[Any]  # of three Scalars, or floats
+Matrix = list[Any]  # of three Vectors, the rows
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +22,7 @@ class ScalarFunction:
 
     def __init__(self, program: Program) -> None:
         text = python_function(program, "evaluate")
-        namespace: dict[str, Callable] = {"sin": math.sin, "cos": math.cos}
+        namespace: dict[str, Callable[..., Any]] = {"sin": math.sin, "cos": math.cos}
         exec(compile(text, "<skidyn program>", "exec"), namespace)  # text is made of numbers only
         self._function = namespace["evaluate"]
         self._shape = program.shape

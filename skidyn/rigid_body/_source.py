@@ -78,7 +78,7 @@ def renumber(lines: list[str]) -> list[str]:
     """Number the variables ``v..`` of generated lines from 0, without gaps."""
     numbers: dict[str, str] = {}
 
-    def rename(match: re.Match) -> str:
+    def rename(match: re.Match[str]) -> str:
         return numbers.setdefault(match.group(), f"v{len(numbers)}")
 
     return [re.sub(r"\bv\d+\b", rename, line) for line in lines]

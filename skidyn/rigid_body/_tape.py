@@ -11,10 +11,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Container, Hashable, Iterable
+from typing import Any
 
 #: One entry of a tape: the operation and its operands. Operands are indices of earlier entries,
 #: except for ``("input", name, index)`` and ``("constant", value)``.
-Node = tuple
+Node = tuple[Any, ...]
 
 UNARY = frozenset({"neg", "sin", "cos"})
 BINARY = frozenset({"add", "sub", "mul"})

@@ -100,7 +100,7 @@ class Robot:
     @classmethod
     def from_urdf(
         cls,
-        source: str | bytes | os.PathLike,
+        source: str | bytes | os.PathLike[str],
         *,
         joints: Sequence[str] | None = None,
         gravity: Sequence[float] = (0.0, 0.0, -9.81),
@@ -205,7 +205,7 @@ class Robot:
                 value.flags.writeable = False
         self.__dict__.update(state)
 
-    def __deepcopy__(self, memo: dict) -> Robot:
+    def __deepcopy__(self, memo: dict[int, Any]) -> Robot:
         return self  # immutable: scikit-learn's clone shares it, with all that was traced
 
     def __repr__(self) -> str:

@@ -18,7 +18,7 @@ _KEPT_IN_LINK = frozenset({"inertial"})
 _KEPT_IN_JOINT = frozenset({"origin", "parent", "child", "axis", "limit", "dynamics", "mimic"})
 
 
-def read_description(source: str | bytes | os.PathLike) -> bytes:
+def read_description(source: str | bytes | os.PathLike[str]) -> bytes:
     """Text of a description given as a path or as the text itself.
 
     Raises
