@@ -17,7 +17,7 @@ import numpy as np
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
 from skidyn.effects import Coefficient, Effect, Shape, list_effects, register_effect
-from skidyn.inspection import ResidualDisplay
+from skidyn.inspection import ErrorBudgetDisplay
 from skidyn.rigid_body import RBDRegressor
 
 log = make_hidden_effect_log(load_planar_arm(), None, random_state=3)
@@ -66,5 +66,5 @@ for finding in diagnosis.findings:
     for name, value in finding.parameters.items():
         print(f"    {name}: {value['value']:.3g} {value['unit']}")
 print(f"true: c = {TRUE_DRAG}, entry = {TRUE_ENTRY} rad")
-ResidualDisplay.from_finding(diagnosis.findings[0])
+ErrorBudgetDisplay.from_diagnosis(diagnosis, joint=2)
 plt.show()

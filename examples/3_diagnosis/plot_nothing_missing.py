@@ -35,12 +35,12 @@ for limit in [limit for limit in diagnosis.limits if limit.joint == 1][:8]:
 
 # %%
 # The limits of dry-friction effects as a share of each joint's torque: what the log excludes.
-kinds = ("stribeck", "dahl", "load_dependent_friction", "asymmetric_friction", "spring")
+kinds = ("offset", "dahl", "stribeck", "position_dependent_friction", "maxwell_slip")
 spread = log.y.std(axis=0)
 figure, axes = plt.subplots(figsize=(7, 3), layout="constrained")
 for k, kind in enumerate(kinds):
     for limit in diagnosis.limits:
-        if limit.kind == kind and limit.largest_hidden is not None and "/" not in limit.unit:
+        if limit.kind == kind and limit.largest_hidden is not None:
             share = limit.largest_hidden / spread[limit.joint - 1]
             axes.plot(share, k + 0.12 * (limit.joint - 2.5), "o", color=f"C{limit.joint - 1}")
 for j, name in enumerate(log.robot.joint_names):

@@ -60,17 +60,17 @@ models = {
     "ELM committee, p = 0.5": ELMCommittee(trajectory=0, random_state=0),
     "ELM committee, p = 0.999": ELMCommittee(p=0.999, trajectory=0, random_state=0),
 }
-figure, axes = plt.subplots(1, 2, figsize=(9, 3.2), layout="constrained")
+figure, axes = plt.subplots(figsize=(6, 3.2), layout="constrained")
 for name, model in models.items():
     curve = trajectory_learning_curve(
         model, X, y, trajectory=0, cv=3, scoring="neg_root_mean_squared_error", random_state=0
     )
     error = -curve.test_scores.mean(axis=1)
-    axes[0].loglog(curve.n_trajectories, error, "o-", label=name)
+    axes.loglog(curve.n_trajectories, error, "o-", label=name)
     print(name, error.round(3))
-axes[0].set_xlabel("training trajectories")
-axes[0].set_ylabel("held-out RMSE (N m)")
-axes[0].legend()
+axes.set_xlabel("training trajectories")
+axes.set_ylabel("held-out RMSE (N m)")
+axes.legend()
 
 # %%
 # Learning while moving: ``partial_fit`` after every trajectory gives exactly the machine that sees
@@ -82,7 +82,8 @@ for k in np.unique(X[~last, 0]):
     rows = X[:, 0] == k
     committee.partial_fit(X[rows], y[rows])
     spread.append(committee.predict(X[last], return_std=True)[1].mean())
-axes[1].semilogy(np.arange(1, len(spread) + 1), spread)
-axes[1].set_xlabel("trajectories learned")
-axes[1].set_ylabel("spread on the next one (N m)")
+figure, axes = plt.subplots(figsize=(6, 3.2), layout="constrained")
+axes.semilogy(np.arange(1, len(spread) + 1), spread)
+axes.set_xlabel("trajectories learned")
+axes.set_ylabel("spread on the next one (N m)")
 plt.show()
