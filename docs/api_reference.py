@@ -47,6 +47,7 @@ PAGES: tuple[Page, ...] = (
                     "find_base_parameters",
                     "is_consistent",
                     "make_consistent",
+                    "regressor_from_evidence",
                 ),
             ),
         ),
@@ -82,7 +83,10 @@ PAGES: tuple[Page, ...] = (
     Page(
         "skidyn.evidence",
         "Least-squares evidence of trajectories: merged, left out, solved.",
-        (Section("Classes", ("Evidence",)),),
+        (
+            Section("Classes", ("Evidence",)),
+            Section("Functions", ("evidence_from_parquet",)),
+        ),
     ),
     Page(
         "skidyn.diagnosis",

@@ -2,5 +2,6 @@
 """Evidence: what identification and diagnosis need from a log, averaged once into few rows."""
 
 from skidyn.evidence._evidence import Evidence
+from skidyn.evidence._streaming import evidence_from_parquet
 
-__all__ = ["Evidence"]
+__all__ = ["Evidence", "evidence_from_parquet"]

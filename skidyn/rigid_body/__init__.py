@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from skidyn.rigid_body._base_parameters import BaseParameters, find_base_parameters
     from skidyn.rigid_body._consistency import is_consistent, make_consistent
+    from skidyn.rigid_body._from_evidence import regressor_from_evidence
     from skidyn.rigid_body._rbd_regressor import RBDRegressor
 
 __all__ = [
@@ -17,6 +18,7 @@ __all__ = [
     "find_base_parameters",
     "is_consistent",
     "make_consistent",
+    "regressor_from_evidence",
 ]
 
 # The engine under a Robot lives in this package, and RBDRegressor stands on Robot: names are loaded
@@ -27,6 +29,7 @@ _HOMES = {
     "find_base_parameters": "skidyn.rigid_body._base_parameters",
     "is_consistent": "skidyn.rigid_body._consistency",
     "make_consistent": "skidyn.rigid_body._consistency",
+    "regressor_from_evidence": "skidyn.rigid_body._from_evidence",
 }
 
 

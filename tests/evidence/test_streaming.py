@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Evidence from files, trajectory by trajectory, and on a cluster that loses a worker."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from skidyn._exceptions import LogError, SkidynError
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.evidence import Evidence, evidence_from_parquet
+from skidyn.evidence._problem import make_problem
+from skidyn.evidence._streaming import linear_terms
+from skidyn.rigid_body import RBDRegressor, regressor_from_evidence
+
+ROBOT = load_planar_arm()
+LOG = make_hidden_effect_log(ROBOT, None, n_trajectories=8, duration=4.0, random_state=3)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Four files of two trajectories, in row groups that cut through them."""
+    folder = tmp_path_factory.mktemp("parquet")
+    for k in range(4):
+        part = LOG.frame[LOG.frame["trajectory"] // 2 == k]
+        part.to_parquet(folder / f"part{k}.parquet", row_group_size=150)
+    return folder
+
+
+def same(one: Evidence, other: Evidence):
+    assert one.columns == other.columns and dict(one.counts) == dict(other.counts)
+    for key, factor in one.factors.items():
+        gram, wanted = factor.T @ factor, other.factors[key].T @ other.factors[key]
+        np.testing.assert_allclose(gram, wanted, rtol=1e-9, atol=1e-10 * np.abs(wanted).max())
+
+
+def test_equals_the_evidence_of_the_whole_log(folder):
+    terms = linear_terms(("viscous", "coulomb"), 2)
+    model = RBDRegressor(ROBOT, smooth=True).fit(LOG.X, LOG.y)
+    problem = make_problem(
+        model._read(LOG.X.to_numpy()), LOG.y, robot=ROBOT, rigid_body=True, terms=terms
+    )
+    same(evidence_from_parquet(folder, ROBOT, groups=None), Evidence.from_problem(problem, terms))
+
+
+def test_groups_hold_the_same_and_do_not_grow(folder):
+    every, few = (evidence_from_parquet(folder, ROBOT, groups=g) for g in (None, 3))
+    assert few.trajectories == [0, 1, 2]
+    np.testing.assert_allclose(few.solve(), every.solve(), rtol=1e-8)
+
+
+def test_regressor_predicts_like_one_fitted_in_memory(folder):
+    effects = ("viscous", "coulomb")
+    streamed = regressor_from_evidence(ROBOT, evidence_from_parquet(folder, ROBOT, effects))
+    fitted = RBDRegressor(ROBOT, effects, smooth=True).fit(LOG.X, LOG.y)
+    np.testing.assert_allclose(
+        streamed.predict(LOG.X[list(streamed.feature_names_in_)]), fitted.predict(LOG.X), atol=2e-3
+    )
+    assert np.all(streamed.coef_std_ > 0)
+
+
+def test_a_missing_value_amid_a_file_is_told(tmp_path):
+    frame = LOG.frame.copy()
+    frame.loc[700, "dq2"] = np.nan
+    frame.to_parquet(tmp_path / "log.parquet")
+    with pytest.raises(LogError, match=r"log\.parquet: 1 rows are not finite.*row 700, column dq2"):
+        evidence_from_parquet(tmp_path, ROBOT)
+
+
+def test_wrong_files_are_refused(tmp_path, folder):
+    with pytest.raises(LogError, match="no such Parquet file"):
+        evidence_from_parquet(tmp_path, ROBOT)
+    (tmp_path / "a.parquet").write_bytes(b"PAR1 nothing PAR1")
+    with pytest.raises(LogError, match=r"a\.parquet: cannot be read"):
+        evidence_from_parquet(tmp_path / "a.parquet", ROBOT)
+    LOG.frame.drop(columns="tau2").to_parquet(tmp_path / "b.parquet")
+    with pytest.raises(LogError, match="lacks tau2"):
+        evidence_from_parquet(tmp_path / "b.parquet", ROBOT)
+    with pytest.raises(LogError, match="more than max_rows = 300"):
+        evidence_from_parquet(folder, ROBOT, max_rows=300)
+    with pytest.raises(SkidynError, match="open shape parameters"):
+        evidence_from_parquet(folder, ROBOT, ["dahl"])
+
+
+def test_columnar_bomb_is_never_unpacked(tmp_path):
+    n = 3_000_000  # a few kB on disk
+    zero = np.zeros(n, dtype=np.float32)
+    names = ["time", "trajectory", "q1", "q2", "dq1", "dq2", "tau1", "tau2"]
+    pd.DataFrame(dict.fromkeys(names, zero)).to_parquet(tmp_path / "bomb.parquet")
+    assert (tmp_path / "bomb.parquet").stat().st_size < 500_000
+    with pytest.raises(LogError, match="max_rows"):
+        evidence_from_parquet(tmp_path, ROBOT, max_rows=1_000_000)
+
+
+def test_cluster_that_loses_a_worker_gives_the_same(folder):
+    distributed = pytest.importorskip("distributed")
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        files = sorted(folder.glob("*.parquet")) * 8
+        killer = client.submit(_kill_own_worker, str(folder / "killed"), pure=False)
+        got = evidence_from_parquet(files, ROBOT, client=client)
+        assert killer.result() == "done" and (folder / "killed").exists()
+    wanted = evidence_from_parquet(files, ROBOT)
+    np.testing.assert_allclose(got.solve(), wanted.solve(), rtol=1e-8)
+    assert dict(got.counts) == dict(wanted.counts)
+
+
+def _kill_own_worker(flag):
+    """Ends the worker process hard on the first call, and returns on the second."""
+    import os
+    import signal
+    import time
+
+    if os.path.exists(flag):
+        return "done"
+    with open(flag, "w"):
+        pass
+    time.sleep(0.2)
+    os.kill(os.getpid(), signal.SIGKILL)
