@@ -286,6 +286,14 @@ PAGES: tuple[Page, ...] = (
         ),
     ),
     Page(
+        "skidyn.fleet",
+        "Many robots of one type: common parameters, deviations, drift.",
+        (
+            Section("Classes", ("DriftReport", "FleetComparison")),
+            Section("Functions", ("compare_fleet", "monitor_drift")),
+        ),
+    ),
+    Page(
         "skidyn.forecasting",
         "Forecasts from past torque, which every forecast must beat.",
         (

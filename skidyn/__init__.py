@@ -20,6 +20,7 @@ __all__ = [
     "effects",
     "evidence",
     "export",
+    "fleet",
     "forecasting",
     "hybrid",
     "inspection",

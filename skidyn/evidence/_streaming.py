@@ -229,7 +229,7 @@ def _trajectories(path: Path, n_joints: int, max_rows: int) -> Iterator[pd.DataF
     try:
         with parquet.ParquetFile(path) as file:
             wanted = _wanted(file.schema_arrow.names, n_joints, path)
-            parts: list[pd.DataFrame] = []
+            parts: list[Any] = []
             length, row = 0, 0
             for batch in file.iter_batches(BATCH_ROWS, columns=wanted):
                 table = batch.to_pandas()
