@@ -10,6 +10,8 @@ HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE / "_ext"), str(HERE)]
 
 import skidyn  # noqa: E402
+from skidyn.effects import list_effects  # noqa: E402
+from skidyn.effects._catalogue import unregister_effect  # noqa: E402
 
 project = "skidyn"
 author = "The skidyn developers"
@@ -102,4 +104,14 @@ sphinx_gallery_conf = {
     "default_thumb_file": str(HERE / "_static" / "logo.png"),
     "parallel": False,
 }
+
+
+def _forget_own_effects(gallery_conf: dict, file_name: str) -> None:
+    """Take effects that an example has registered out of the catalogue before the next one."""
+    for kind in set(list_effects()) - _EFFECTS:
+        unregister_effect(kind)
+
+
+_EFFECTS = set(list_effects())
+sphinx_gallery_conf["reset_modules"] = ("matplotlib", _forget_own_effects)
 suppress_warnings = ["config.cache"]

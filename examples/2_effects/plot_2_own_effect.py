@@ -16,7 +16,7 @@ import numpy as np
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
-from skidyn.effects import Coefficient, Effect, Shape, list_effects, register_effect
+from skidyn.effects import Coefficient, Effect, Shape, register_effect
 from skidyn.inspection import ErrorBudgetDisplay
 from skidyn.rigid_body import RBDRegressor
 
@@ -55,8 +55,7 @@ class LiquidDrag(Effect):
         return (dip * signals.dq[:, joint] * np.abs(signals.dq[:, joint]))[:, None]
 
 
-if "liquid_drag" not in list_effects():
-    register_effect(LiquidDrag)
+register_effect(LiquidDrag)
 
 # %%
 # With the effect in the catalogue.

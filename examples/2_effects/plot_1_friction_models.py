@@ -4,8 +4,8 @@ Which friction model?
 =====================
 
 The honest answer is a table: fit the candidates, predict trajectories that were left out, compare.
-A model that is too poor for the joint loses; so does nothing else, as long as the data can show the
-difference. Four arms are simulated that differ only in the friction of joint 1.
+A model that is too poor for the joint loses; one that is richer than needed hardly does. Four arms
+are simulated that differ only in the friction of joint 1.
 """
 
 # %%
