@@ -142,10 +142,21 @@ def _found_terms(problem: Problem, findings: Sequence[Hypothesis]) -> list[Term]
 
 
 def _harms(hypothesis: Hypothesis, findings: Sequence[Hypothesis], steps: Sequence[_Step]) -> bool:
-    """Whether a finding makes the error of samples larger, though it helped averaged rows."""
+    """Whether a finding makes the error of samples larger, though it helped averaged rows.
+
+    The mean absolute error is compared: blows of a backlash that come a sample early or late would
+    rule the squares.
+    """
     k = [h is hypothesis for h in findings].index(True)
-    before, after = steps[k].entry["rmse"], steps[k + 1].entry["rmse"]
+    before, after = (_mean_error(steps[i].comparison) for i in (k, k + 1))
     return _drop(before, after, hypothesis.joints) <= 0
+
+
+def _mean_error(comparison: Comparison) -> list[float]:
+    """Mean absolute error of every joint on the samples judged, N m or N."""
+    use = comparison.sliding if comparison.judged is None else comparison.judged
+    total = np.where(use, np.abs(comparison.residual), 0.0).sum(0)
+    return [float(x) for x in total / np.maximum(use.sum(0), 1)]
 
 
 def _without(problem: Problem, result: SearchResult, wrong: Hypothesis) -> SearchResult:

@@ -102,6 +102,14 @@ class _Search:
         problem = replace_torque(self.problem, self.problem.torque - self.ripple)
         terms = (*self.problem.terms, *(c.term for c in self.chosen))
         self.fit = problem.fit(terms, sigma=self.fit.noise)
+        if not any(_uses_the_fit(c) for c in self.chosen):
+            return
+        # Their columns were made with the model as it was without them.
+        self.problem.with_fit(self.fit)
+        for candidate in filter(_uses_the_fit, self.chosen):
+            candidate.rows.update(self.problem.term_rows(candidate.term))
+        problem = replace_torque(self.problem, self.problem.torque - self.ripple)
+        self.fit = problem.fit(terms, sigma=self.fit.noise)
 
     # ---------------------------------------------------------------- the loop
     def run(self) -> SearchResult:
@@ -422,6 +430,11 @@ class _Search:
 def replace_torque(problem: Problem, torque: Array) -> Problem:
     """The same problem with another torque to explain."""
     return replace(problem, torque=torque)
+
+
+def _uses_the_fit(candidate: Candidate) -> bool:
+    effect = get_effect(candidate.term.kind)
+    return bool({"robot", "model_torque"} & set(effect.needs)) and effect.search == "grid"
 
 
 def _chance_of_mean(values: Array) -> float:

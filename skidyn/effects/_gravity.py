@@ -13,12 +13,21 @@ from skidyn.effects._base import Array, Coefficient, Effect
 
 
 class BaseTilt(Effect):
-    """Gravity has horizontal components in the base frame."""
+    """Gravity has horizontal components in the base frame.
+
+    A first joint that is vertical in the description carries no gravity there, so that its own
+    first moments are not identified; on a tilted base they show, as two more coefficients.
+    """
 
     kind = "base_tilt"
     title = "Tilted base"
     formula = r"\tau_g(q;\,g + \delta g) - \tau_g(q;\,g)"
-    coefficients = (Coefficient("gx", "m/s^2"), Coefficient("gy", "m/s^2"))
+    coefficients = (
+        Coefficient("gx", "m/s^2"),
+        Coefficient("gy", "m/s^2"),
+        Coefficient("first_cos", "N m"),
+        Coefficient("first_sin", "N m"),
+    )
     scope = "robot"
     needs = ("robot",)
     simplicity = 12
@@ -42,7 +51,13 @@ class BaseTilt(Effect):
             )
             for axis in self._horizontal(robot.gravity)
         ]
-        return {j: np.column_stack([part[:, j] for part in parts]) for j in joints}
+        upright = robot.inverse_dynamics(signals.q, rest, rest)[:, 0]
+        first = np.zeros((signals.n_samples, 2))
+        if not signals.prismatic[0] and np.abs(upright).max(initial=0.0) < 1e-9:
+            first = np.column_stack([np.cos(signals.q[:, 0]), np.sin(signals.q[:, 0])])
+        columns = {j: np.column_stack([*(p[:, j] for p in parts), 0 * first]) for j in joints}
+        columns[0][:, 2:] = first
+        return columns
 
     @staticmethod
     def _horizontal(gravity: Array) -> list[int]:
@@ -53,7 +68,7 @@ class BaseTilt(Effect):
     def parameters(
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
     ) -> dict[str, Any]:
-        gx, gy = map(float, coefficients)
+        gx, gy = map(float, coefficients[:2])
         sine = min(1.0, float(np.hypot(gx, gy)) / 9.81)
         return {"gx": gx, "gy": gy, "tilt_deg": float(np.rad2deg(np.arcsin(sine)))}
 

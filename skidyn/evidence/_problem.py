@@ -221,12 +221,13 @@ class Problem:
     def with_fit(self, fit: Fit) -> None:
         """Hand the load and the model torque of a fit to the effects that need them."""
         load = self.rigid_torque(fit)
-        torque = load + self.term_torque(fit)
-        dry = [t for t in fit.terms if t.kind in ("coulomb", "stribeck", "offset")]
+        # What a sensor does to the torque acts on the torque before the sensor.
+        before = [t for t in fit.terms if "model_torque" not in get_effect(t.kind).needs]
+        smooth = [t for t in before if t.kind not in ("coulomb", "stribeck", "offset")]
         self.signals = self.signals.with_(
             load=load,
-            model_torque=torque,
-            smooth_torque=torque - self.term_torque(fit, dry),
+            model_torque=load + self.term_torque(fit, before),
+            smooth_torque=load + self.term_torque(fit, smooth),
             inertial_parameters=self.inertial_parameters(fit),
         )
         self._cache = {
