@@ -4,7 +4,7 @@
     python benchmarks/diagnosis/power.py [--jobs 2] [--picture power.png]
 
 The size is the root mean square of the effect's torque over the noise of the torque sensor, on the
-joint that has it. An answer is right if it names the effect (of the hysteresis family, any member)
+joint that has it; of hysteresis, which takes the place of Coulomb friction, its largest torque. An answer is right if it names the effect (of the hysteresis family, any member)
 on that joint and nothing else.
 """
 
@@ -49,7 +49,8 @@ def answer(kind: str, size: float, length: int, robot: str, seed: int) -> tuple[
     found = [(f.kind, f.joints) for f in diagnose(RBDRegressor(log.robot), log.X, log.y).findings]
     names = HYSTERESIS if kind in HYSTERESIS else {kind}
     right = len(found) == 1 and found[0][0] in names and found[0][1] == (joint,)
-    return float(np.sqrt(np.mean(own**2)) / log.noise_std[joint - 1]), right
+    rms = np.ravel(log.parameters["Fc"])[0] if kind in HYSTERESIS else np.sqrt(np.mean(own**2))
+    return float(rms / log.noise_std[joint - 1]), right
 
 
 def main() -> None:
