@@ -24,7 +24,14 @@ class Page(NamedTuple):
 
 
 PAGES: tuple[Page, ...] = (
-    Page("skidyn", "What the package itself offers.", (Section("Versions", ("show_versions",)),)),
+    Page(
+        "skidyn",
+        "What the package itself offers.",
+        (
+            Section("Versions", ("show_versions",)),
+            Section("Models on disk", ("load_model", "save_model")),
+        ),
+    ),
     Page(
         "skidyn.robots",
         "Robots from URDF files: joints, limits, inertial parameters and dynamics.",

@@ -24,6 +24,7 @@ __all__ = [
     "forecasting",
     "hybrid",
     "inspection",
+    "load_model",
     "metrics",
     "model_selection",
     "neural_network",
@@ -31,15 +32,19 @@ __all__ = [
     "report",
     "rigid_body",
     "robots",
+    "save_model",
     "show_versions",
 ]
 
-_SUBMODULES = frozenset(__all__) - {"__version__", "show_versions"}
+_PERSISTENCE = frozenset({"load_model", "save_model"})
+_SUBMODULES = frozenset(__all__) - {"__version__", "show_versions"} - _PERSISTENCE
 
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
         return package_version()
+    if name in _PERSISTENCE:
+        return getattr(importlib.import_module("skidyn._persistence"), name)
     if name in _SUBMODULES:
         return importlib.import_module(f"skidyn.{name}")
     raise AttributeError(f"module 'skidyn' has no attribute {name!r}")
