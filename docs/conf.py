@@ -51,6 +51,7 @@ html_static_path = ["_static"]
 html_css_files = ["skidyn.css"]
 html_favicon = "_static/logo.svg"
 html_show_sourcelink = False
+html_context = {"default_mode": "auto"}
 html_theme_options = {
     "logo": {"image_light": "_static/logo.svg", "image_dark": "_static/logo.svg", "text": "skidyn"},
     "navbar_align": "left",

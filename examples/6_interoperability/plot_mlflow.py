@@ -9,6 +9,7 @@ error of every step of the diagnosis becomes a metric, the report an artifact.
 
 # %%
 import logging
+import os
 import sys
 import tempfile
 from pathlib import Path
@@ -20,6 +21,7 @@ from skidyn.diagnosis import diagnose
 from skidyn.report import summarize, write_html
 from skidyn.rigid_body import RBDRegressor
 
+os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")  # nothing leaves this machine
 try:
     import mlflow
 except ImportError:
