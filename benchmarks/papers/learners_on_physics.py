@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Ask whether a learner beats the physics that a diagnosis completed.
 
-    SKIDYN_DATA=... python benchmarks/papers/learners_on_physics.py
+    SKIDYN_DATA=... python benchmarks/papers/learners_on_physics.py [--only ur10e emps] [--no-lstm]
 
-Held-out recordings (parts of the path for the Panda, blocks for EMPS) of four logs; RMSE of every
-combination relative to the plain physics, and the learner against its own physics with a 95 %
-interval over recordings. The UR10e is in ``paper_001.py``. The practice logs are simulated; they
-are found beside the recordings (``../practice``).
+Held-out recordings (pairs of dates for the UR10e, parts of the path for the Panda, blocks for EMPS)
+of five logs; RMSE of every combination relative to the plain physics, and the learner against its
+own physics with a 95 % interval over recordings. The practice logs are simulated; they are found
+beside the recordings (``../practice``).
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import os
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
+import argparse
 import json
 from typing import Any
 
@@ -29,9 +30,11 @@ from _common import (
     data_dir,
     load_emps,
     load_panda,
+    load_ur10e,
     make_log,
 )
 from sklearn.base import clone
+from sklearn.model_selection import PredefinedSplit
 
 from skidyn.committee import ELMCommittee
 from skidyn.hybrid import HybridRegressor
@@ -56,22 +59,25 @@ def load_practice(case: str) -> tuple[Robot, pd.DataFrame, np.ndarray, tuple]:
     return Robot.from_urdf(folder / "robot.urdf"), X, y, effects
 
 
+OPTIONS = argparse.Namespace(lstm=True)
+
+
 def compare(
     title: str, robot: Robot, X: Any, y: Any, base: tuple, completed: tuple, cv: Any, inner: Any
 ) -> None:
+    """Print one table; `cv` is a splitter or the fold of every row."""
     print(f"\n**{title}** ({len(X)} rows, {y.shape[1]} joints)\n")
+    if isinstance(cv, np.ndarray):
+        cv = PredefinedSplit(cv)
     folds = list(cv.split(X, y))
     unit = X["trajectory"].to_numpy()
     if len(np.unique(unit)) == 1:
         unit = np.zeros(len(X), dtype=int)
         for k, (_, test) in enumerate(folds):
             unit[test] = k
-    network = LSTMRegressor(max_epochs=15, batch_size=8, random_state=0)
-    learners = {
-        "own joints": None,
-        "ELM": ELMCommittee(p=0.9, random_state=0),
-        "LSTM": network,
-    }
+    learners = {"own joints": None, "ELM": ELMCommittee(p=0.9, random_state=0)}
+    if OPTIONS.lstm:
+        learners["LSTM"] = LSTMRegressor(max_epochs=15, batch_size=8, random_state=0)
     first = None
     for physics_name, effects in (("BASE", base), ("completed", completed)):
         physics = LinearPhysics(robot, effects)
@@ -102,27 +108,46 @@ def compare(
             )
 
 
-def main() -> None:
+def ur10e() -> None:
+    robot, X, y, fold = load_ur10e()
+    compare("UR10e, pairs of dates held out", robot, X, y, BASE, COMPLETE, fold, 5)
+
+
+def panda() -> None:
     robot, X, y = load_panda()
     dahl = tuple(("dahl", (("presliding", width),)) for width in (0.01, 0.05, 0.2))
     cv, inner = (PhaseKFold(n, period=PANDA_PERIOD) for n in (4, 5))
     compare("Panda, parts of the path held out", robot, X, y, BASE, (*BASE, *dahl), cv, inner)
 
+
+def emps() -> None:
     robot, X, y = load_emps()
     short = tuple(("dahl", (("presliding", way),)) for way in (0.0003, 0.001, 0.005))
     base = BASE[:3]
     completed = (*base, ("asymmetric_friction", ()), *short)
     compare("EMPS, 8 blocks", robot, X, y, base, completed, TrajectoryKFold(8), 7)
 
+
+def dahl() -> None:
     robot, X, y, base = load_practice("practice_33")
     completed = (*base, *DAHL)
     compare("Practice, Dahl friction", robot, X, y, base, completed, TrajectoryKFold(5), 5)
 
+
+def unknown() -> None:
     robot, X, y, base = load_practice("practice_20")
     completed = (*base, *COMPLETE[4:])
     title = "Practice, an effect of no known kind (completed: friction added in vain)"
     compare(title, robot, X, y, base, completed, TrajectoryKFold(5), 5)
 
 
+LOGS = {f.__name__: f for f in (ur10e, panda, emps, dahl, unknown)}
+
+
 if __name__ == "__main__":
-    main()
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--only", nargs="+", choices=list(LOGS), default=list(LOGS))
+    parser.add_argument("--no-lstm", dest="lstm", action="store_false")
+    OPTIONS = parser.parse_args()
+    for name in OPTIONS.only:
+        LOGS[name]()

@@ -46,8 +46,8 @@ class HybridRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         Folds: by trajectory, or by blocks of rows of a single trajectory. A cross-validator must
         test every row exactly once; for one recording of a periodic motion use ``PhaseKFold``.
     alpha : float, default=0.05
-        Level of the one-sided paired test over trajectories that a joint's learned part must pass.
-        1 keeps every joint whose learned part helps at all.
+        Level of the one-sided paired test over trajectories that a joint's learned part must pass,
+        corrected for the number of joints. 1 keeps every joint whose learned part helps at all.
     trajectory, time : int, str or None, default="auto"
         Key columns of X.
 
@@ -63,7 +63,7 @@ class HybridRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         Relative fall of the RMSE on held-out trajectories that the learned part brought, whether
         it was kept or not.
     p_value_ : ndarray of shape (n_joints,)
-        Of that gain.
+        Of that gain, corrected for the number of joints (Holm).
     radius_ : float
         Distance from the training samples that counts as outside, in standard deviations per
         feature (root mean square).

@@ -12,6 +12,7 @@ from sklearn.neighbors import KNeighborsRegressor
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from skidyn.hybrid import HybridRegressor
+from skidyn.hybrid._gate import learned_weights
 from skidyn.model_selection import PhaseKFold, TrajectoryKFold
 
 TREES = ExtraTreesRegressor(15, min_samples_leaf=5, random_state=0)
@@ -70,8 +71,23 @@ def test_adds_nothing_to_complete_physics():
     for seed in range(10):
         X, y = make_log(6, 60, seed=seed, hidden=(0.0, 0.0))
         hybrid = HybridRegressor(LinearRegression(), KNeighborsRegressor(5), cv=3).fit(X, y)
-        kept += (hybrid.learned_weight_ > 0).sum()
-    assert kept <= 2  # of 20 joints, at a level of 5 %
+        kept += (hybrid.learned_weight_ > 0).any()
+    assert kept <= 1  # of 10 robots, at a level of 5 % for all joints of a robot
+
+
+def test_p_values_are_corrected_for_the_number_of_joints():
+    rng = np.random.default_rng(0)
+    learned = rng.normal(size=(600, 1))
+    residual = 0.5 * learned + rng.normal(size=(600, 1))
+    unit = np.repeat(np.arange(6), 100)
+    weight, gain, alone = learned_weights(residual, learned, unit, 0.05)
+    noise = rng.normal(size=(600, 3))
+    together = learned_weights(
+        np.c_[residual, rng.normal(size=(600, 3))], np.c_[learned, noise], unit, 0.05
+    )
+    assert together[2][0] == pytest.approx(4 * alone[0])
+    assert 0 < weight[0] < (residual * learned).sum() / (learned**2).sum()  # the smallest factor
+    assert together[0][0] == weight[0] and not together[0][1:].any() and 0.05 < gain[0] < 0.2
 
 
 def test_fades_out_of_range_and_says_so():
@@ -93,7 +109,7 @@ def test_single_periodic_recording_takes_its_folds_from_the_phase():
 
 
 def test_tables_searches_and_storage():
-    X, y = make_log(6, 60)
+    X, y = make_log(12, 60)
     hybrid = HybridRegressor(LinearRegression(), TREES, cv=3)
     expected = hybrid.fit(X, y).predict(X)
     np.testing.assert_array_equal(pickle.loads(pickle.dumps(hybrid)).predict(X), expected)
