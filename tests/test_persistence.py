@@ -11,7 +11,10 @@ from sklearn.base import BaseEstimator
 
 import skidyn
 from skidyn._exceptions import SkidynError
+from skidyn.committee import ELMCommittee
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.hybrid import HybridRegressor
+from skidyn.neural_network import BLLRegressor, LSTMRegressor, NDLRegressor, SDLRegressor
 from skidyn.rigid_body import RBDRegressor
 
 pytest.importorskip("skops.io")
@@ -26,6 +29,34 @@ def test_a_fitted_model_comes_back(tmp_path):
     model = RBDRegressor(log.robot).fit(log.X, log.y)
     again = skidyn.load_model(skidyn.save_model(tmp_path / "m.skops", model))
     np.testing.assert_array_equal(again.predict(log.X), model.predict(log.X))
+
+
+def learners(robot):
+    """One of each, small."""
+    small = {"window": 4, "hidden_size": 4, "max_epochs": 1, "random_state": 0}
+    lstm = LSTMRegressor(**small)
+    physics = RBDRegressor(robot)
+    return [
+        NDLRegressor(**small),
+        SDLRegressor(robot, **small),
+        BLLRegressor(lstm, n_estimators=2, random_state=0),
+        ELMCommittee(2, n_hidden=10, random_state=0),
+        HybridRegressor(physics, lstm, cv=2, alpha=1.0),
+        HybridRegressor(physics, cv=2, alpha=1.0),
+    ]
+
+
+@pytest.mark.parametrize("number", range(6))
+def test_every_learner_comes_back(tmp_path, number):
+    log = make_hidden_effect_log(
+        load_planar_arm(), "spring", n_trajectories=4, duration=3.0, rate=25.0
+    )
+    model = learners(log.robot)[number].fit(log.X, log.y)
+    again = skidyn.load_model(skidyn.save_model(tmp_path / "m.skops", model))
+    np.testing.assert_array_equal(again.predict(log.X), model.predict(log.X))
+    with zipfile.ZipFile(tmp_path / "m.skops") as archive:  # arrays and a description, no pickles
+        kinds = {name.rpartition(".")[2] for name in archive.namelist()}
+    assert kinds <= {"npy", "json"}
 
 
 def test_pickles_are_refused_and_never_run(tmp_path):

@@ -9,11 +9,16 @@ from sklearn.ensemble import ExtraTreesRegressor
 from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.model_selection import GridSearchCV, KFold, ShuffleSplit, cross_val_predict
 from sklearn.neighbors import KNeighborsRegressor
+from sklearn.pipeline import Pipeline
+from sklearn.preprocessing import FunctionTransformer
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.hybrid import HybridRegressor
 from skidyn.hybrid._gate import learned_weights
 from skidyn.model_selection import PhaseKFold, TrajectoryKFold
+from skidyn.neural_network import LSTMRegressor
+from skidyn.rigid_body import RBDRegressor
 
 TREES = ExtraTreesRegressor(15, min_samples_leaf=5, random_state=0)
 
@@ -120,6 +125,26 @@ def test_tables_searches_and_storage():
     assert "HybridRegressor" in hybrid._repr_html_()
     array = clone(hybrid).set_params(trajectory=4, time=5, cv=KFold(3)).fit(X.to_numpy(), y)
     assert array.predict(X.to_numpy()).shape == y.shape
+
+
+def test_one_search_over_physics_effects_and_network():
+    log = make_hidden_effect_log(
+        load_planar_arm(), "spring", n_trajectories=8, duration=4.0, rate=25.0
+    )
+    hybrid = HybridRegressor(
+        RBDRegressor(log.robot), LSTMRegressor(max_epochs=1, random_state=0), cv=3
+    )
+    scale = FunctionTransformer(feature_names_out="one-to-one").set_output(transform="pandas")
+    pipeline = Pipeline([("units", scale), ("hybrid", hybrid)])
+    friction = ("viscous", "coulomb")
+    grid = {
+        "hybrid__physics__effects": [friction, (*friction, "spring")],
+        "hybrid__learner__window": [4, 8],
+        "hybrid__learner__hidden_size": [4],
+    }
+    search = GridSearchCV(pipeline, grid, cv=TrajectoryKFold(2)).fit(log.X, log.y)
+    assert search.best_params_["hybrid__physics__effects"] == (*friction, "spring")
+    assert "HybridRegressor" in search._repr_html_()
 
 
 def test_weights_need_learners_that_take_them():
