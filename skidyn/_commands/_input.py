@@ -103,7 +103,7 @@ def recorded_options(options: argparse.Namespace) -> argparse.Namespace:
     provenance = report.get("provenance") if isinstance(report, dict) else None
     provenance = provenance if isinstance(provenance, dict) else {}
     recorded = provenance.get("options")
-    if not isinstance(recorded, dict) or "logs" not in recorded:
+    if not isinstance(recorded, dict) or not {"logs", "urdf"} <= set(recorded):
         raise SkidynError(f"{options.report} records no log; it must come from skidyn diagnose")
     for name, digest in hashes([*recorded["logs"], recorded["urdf"]]).items():
         if digest != provenance.get("sha256", {}).get(name):

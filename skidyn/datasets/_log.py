@@ -179,6 +179,17 @@ def _refuse_other_columns(
 
 
 def _read_channels(path: Path, topics: Sequence[str] | None, max_bytes: int) -> list[Channel]:
+    """Channels of a file; whatever a decoder says about a damaged one becomes a LogError."""
+    try:
+        return _decode(path, topics, max_bytes)
+    except (LogError, ImportError):
+        raise
+    except Exception as error:  # decoders raise whatever the bytes lead them to
+        what = f"{type(error).__name__}: {error}"
+        raise LogError(f"{path}: damaged, or not what its suffix says ({what}).") from error
+
+
+def _decode(path: Path, topics: Sequence[str] | None, max_bytes: int) -> list[Channel]:
     if not path.exists():
         raise LogError(f"{path}: no such file.")
     suffix = path.suffix.lower()

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -66,6 +68,7 @@ def read_matlab_channels(path: Path, max_bytes: int, topics: Sequence[str] | Non
     from scipy.io import loadmat
     from scipy.io.matlab import MatReadError
 
+    _refuse_crash(path)
     try:
         variables = loadmat(path, simplify_cells=True)
     except (MatReadError, ValueError, TypeError) as error:
@@ -85,6 +88,15 @@ def read_matlab_channels(path: Path, max_bytes: int, topics: Sequence[str] | Non
     columns = of_one_length(arrays, str(path))
     attributes = {"joint_names": names} if names else {}
     return [Channel(path.name, table_from_arrays(columns), attributes)]
+
+
+def _refuse_crash(path: Path) -> None:
+    """Read in another process first: scipy's compiled reader can crash on a damaged file."""
+    trial = "import sys; from scipy.io import loadmat; loadmat(sys.argv[1], simplify_cells=True)"
+    done = subprocess.run([sys.executable, "-c", trial, str(path)], capture_output=True, text=True)
+    if done.returncode:
+        lines = done.stderr.strip().splitlines()
+        raise LogError(f"{path}: not a MATLAB file: {lines[-1] if lines else 'the reader crashed'}")
 
 
 def _samples_first(values: np.ndarray) -> np.ndarray:

@@ -224,7 +224,6 @@ def _grouped(evidence: Evidence, groups: int | None) -> Evidence:
 def _trajectories(path: Path, n_joints: int, max_rows: int) -> Iterator[pd.DataFrame]:
     """Tables of the trajectories of a file, one after the other."""
     parquet = import_optional("pyarrow.parquet", extra="io")
-    arrow = import_optional("pyarrow", extra="io")
     pd = import_optional("pandas", extra="io")
     try:
         with parquet.ParquetFile(path) as file:
@@ -248,7 +247,9 @@ def _trajectories(path: Path, n_joints: int, max_rows: int) -> Iterator[pd.DataF
                         )
             if parts:
                 yield pd.concat(parts, ignore_index=True)
-    except (arrow.ArrowException, OSError) as error:
+    except (LogError, GeneratorExit):
+        raise
+    except Exception as error:  # the decoder raises whatever the bytes lead it to
         raise LogError(f"{path}: cannot be read as Parquet: {error}") from error
 
 

@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Damaged and hostile inputs for every reader: each is read, or refused by an error of skidyn.
+
+Usage: python benchmarks/scale/fuzz.py [--inputs 2000] [--seed 0] [--only urdf csv ...]
+       python benchmarks/scale/fuzz.py --atheris --only formula      (coverage-guided, endless)
+
+An input counts as a crash if anything but a skidyn error is raised, or if it takes over 10 s.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import json
+import random
+import signal
+import sys
+import tempfile
+import traceback
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+from skidyn._exceptions import SkidynError
+
+SECONDS = 10
+#: Pieces that break parsers more often than random bytes do.
+PIECES = [
+    b"nan", b"1e999", b"-1", b"0", b"<", b">", b"&lt;", b"\x00", b"\xff\xfe", b"\n", b",", b'"',
+    b"9999999999", b"../../etc/passwd", b"<!DOCTYPE a>", b"[", b"]", b"{", b"}", b"**9", b"(",
+    b")",
+    b"\xc3\x28", b"1", b"/", b"q1", b";", b"__import__", b"-", b"inf", b"\x80" * 8, b"\x00" * 64,
+]  # fmt: skip
+
+
+def _urdf(data: bytes, folder: Path) -> None:
+    from skidyn.robots import Robot
+
+    Robot.from_urdf(data)
+
+
+def _log(suffix: str):
+    def read(data: bytes, folder: Path) -> None:
+        from skidyn.datasets import read_log
+
+        file = folder / f"log{suffix}"
+        file.write_bytes(data)
+        read_log(file, max_bytes=2**26)
+
+    return read
+
+
+def _report(data: bytes, folder: Path) -> None:
+    from skidyn._commands._input import recorded_options
+
+    file = folder / "report.json"
+    file.write_bytes(data)
+    recorded_options(argparse.Namespace(report=str(file)))
+
+
+def _formula(data: bytes, folder: Path) -> None:
+    from skidyn._signals import Signals
+    from skidyn.effects import formula, get_effect
+
+    term = formula(data.decode("utf-8", errors="replace"), 1)
+    q = np.random.default_rng(0).normal(size=(5, 3))
+    signals = Signals(q, q + 1, q + 2, np.zeros(5, int), np.arange(5.0))
+    get_effect("formula").torque_columns(signals, term.joints, **term.shape)
+
+
+def _model(data: bytes, folder: Path) -> None:
+    from skidyn import load_model
+
+    file = folder / "model.skops"
+    file.write_bytes(data)
+    load_model(file)
+
+
+def _stream(data: bytes, folder: Path) -> None:
+    from skidyn.datasets import load_planar_arm
+    from skidyn.evidence import evidence_from_parquet
+
+    file = folder / "stream.parquet"
+    file.write_bytes(data)
+    evidence_from_parquet(file, load_planar_arm(), max_rows=10_000)
+
+
+TARGETS = {
+    "urdf": _urdf,
+    "csv": _log(".csv"),
+    "parquet": _log(".parquet"),
+    "feather": _log(".feather"),
+    "npz": _log(".npz"),
+    "mat": _log(".mat"),
+    "hdf5": _log(".h5"),
+    "mcap": _log(".mcap"),
+    "report": _report,
+    "formula": _formula,
+    "model": _model,
+    "stream": _stream,
+}
+
+
+def seeds(name: str) -> list[bytes]:
+    """Correct inputs that are then damaged."""
+    from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+
+    if name == "urdf":
+        import skidyn.datasets as datasets
+
+        folder = Path(datasets.__file__).parent / "robots"
+        return [file.read_bytes() for file in sorted(folder.glob("*.urdf"))[:4]]
+    if name == "formula":
+        return [b"sin(q1 - q3)", b"abs(dq2)**1.5*sign(dq2)", b"-(q1*q2)/(1+exp(-t))", b"9**9"]
+    if name == "report":
+        options = {"logs": ["a.csv"], "urdf": "a.urdf", "model": "rigid_body"}
+        provenance = {"options": options, "sha256": {"a.csv": "0"}}
+        return [json.dumps({"verdict": "complete", "provenance": provenance}).encode()]
+    if name == "model":
+        import skops.io
+        from sklearn.linear_model import Ridge
+
+        return [skops.io.dumps(Ridge().fit(np.eye(3), np.ones(3)))]
+    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=2, duration=1.0)
+    frame, buffer = log.frame, io.BytesIO()
+    arrays = {column: frame[column].to_numpy() for column in frame}
+    if name == "csv":
+        return [frame.head(30).to_csv(index=False).encode(), b"time;q1\n0,1;2\n0,2;3\n"]
+    if name in ("parquet", "stream"):
+        frame.to_parquet(buffer)
+    elif name == "feather":
+        frame.to_feather(buffer)
+    elif name == "npz":
+        np.savez(buffer, **arrays)
+    elif name == "mat":
+        from scipy.io import savemat
+
+        savemat(buffer, arrays)
+    elif name == "hdf5":
+        import h5py
+
+        with h5py.File(buffer, "w") as file:
+            for column, values in arrays.items():
+                file[column] = values
+    elif name == "mcap":
+        return [b"\x89MCAP0\r\n" + bytes(200) + b"\x89MCAP0\r\n"]
+    return [buffer.getvalue()]
+
+
+def damage(data: bytes, rng: random.Random) -> bytes:
+    """One to six changes: bytes flipped, pieces put in, cut out, repeated, or the end lost."""
+    out = bytearray(data)
+    for _ in range(rng.randint(1, 6)):
+        at = rng.randrange(len(out) + 1)
+        kind = rng.randrange(6)
+        if kind == 0 and at < len(out):
+            out[at] = rng.randrange(256)
+        elif kind == 1:
+            out[at:at] = rng.choice(PIECES)
+        elif kind == 2:
+            del out[at : at + rng.randint(1, 40)]
+        elif kind == 3:
+            piece = out[at : at + rng.randint(1, 60)]
+            out[at:at] = piece * rng.randint(1, 4)
+        elif kind == 4:
+            piece = rng.choice(PIECES)
+            out[at : at + len(piece)] = piece
+        elif rng.random() < 0.2:
+            del out[at:]
+    return bytes(out)
+
+
+class _TooSlow(Exception):
+    pass
+
+
+def _alarm(*_):
+    raise _TooSlow(f"more than {SECONDS} s")
+
+
+def try_inputs(name: str, count: int, seed: int = 0) -> tuple[int, list[tuple[bytes, str]]]:
+    """How many damaged inputs were read nevertheless, and those that crashed."""
+    rng, crashes, accepted = random.Random(f"{name} {seed}"), [], 0
+    good = seeds(name)
+    signal.signal(signal.SIGALRM, _alarm)
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for k in range(count):
+            data = good[k] if k < len(good) else damage(rng.choice(good), rng)
+            signal.alarm(SECONDS)
+            try:
+                TARGETS[name](data, Path(folder))
+                accepted += 1
+            except SkidynError:
+                pass
+            except Exception:
+                crashes.append((data, traceback.format_exc()))
+            finally:
+                signal.alarm(0)
+    return accepted, crashes
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--inputs", type=int, default=2000)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--only", nargs="+", default=list(TARGETS), choices=list(TARGETS))
+    parser.add_argument("--atheris", action="store_true")
+    options = parser.parse_args()
+    if options.atheris:
+        import atheris
+
+        folder = Path(tempfile.mkdtemp())
+
+        def once(data: bytes) -> None:
+            try:
+                TARGETS[options.only[0]](data, folder)
+            except SkidynError:
+                pass
+
+        atheris.instrument_all()
+        atheris.Setup([sys.argv[0]], once)
+        atheris.Fuzz()
+    total = 0
+    print("reader inputs read refused crashes")
+    for name in options.only:
+        accepted, crashes = try_inputs(name, options.inputs, options.seed)
+        total += len(crashes)
+        refused = options.inputs - accepted - len(crashes)
+        print(name, options.inputs, accepted, refused, len(crashes), flush=True)
+        seen = set()
+        for data, text in crashes:
+            last = text.strip().splitlines()[-1][:70]
+            if last not in seen:
+                seen.add(last)
+                print(f"--- {data[:120]!r}\n{text[-900:]}")
+    return int(total > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
