@@ -166,7 +166,7 @@ class LinearPhysics(RegressorMixin, BaseEstimator):
         signals = self._signals(X)
         y = np.asarray(y).reshape(len(X), -1)
         regressor, own = self._design(signals)
-        n, p = signals.n_joints, regressor.shape[2]
+        n, p = y.shape[1], regressor.shape[2]
         widths = [block.shape[1] for block in own]
         starts = p + np.cumsum([0, *widths])
         sigma = y.std(axis=0)
@@ -198,6 +198,48 @@ class LinearPhysics(RegressorMixin, BaseEstimator):
     def predict(self, X: pd.DataFrame) -> Array:
         check_is_fitted(self, "inertial_parameters_")
         return self._torque(*self._design(self._signals(X)))
+
+
+class ColumnPhysics(LinearPhysics):
+    """The same least squares with columns that were computed for a whole log.
+
+    Parameters
+    ----------
+    regressor : ndarray of shape (n_samples, n_joints, n_parameters)
+        Of the rigid body.
+    own : list of ndarray of shape (n_samples, n_columns)
+        Effects of each joint. X must keep the log's row numbers as its index.
+    """
+
+    def __init__(self, regressor: Array, own: list[Array]) -> None:
+        self.regressor = regressor
+        self.own = own
+
+    def __sklearn_clone__(self) -> ColumnPhysics:
+        return ColumnPhysics(self.regressor, self.own)  # the columns are not copied
+
+    def _signals(self, X: pd.DataFrame) -> NDArray[np.int64]:
+        return X.index.to_numpy()
+
+    def _design(self, rows: NDArray[np.int64]) -> tuple[Array, list[Array]]:
+        return self.regressor[rows], [block[rows] for block in self.own]
+
+
+def filtered_physics(
+    robot: Robot, X: pd.DataFrame, effects: tuple, cutoff: float, rate: float, keep_every: int
+) -> ColumnPhysics:
+    """Physics whose columns pass the low-pass of the torque before every k-th row is taken.
+
+    Friction turns over within a few samples; a torque that was low-passed can only be explained by
+    columns that were low-passed as well.
+    """
+    regressor, own = LinearPhysics(robot, effects)._design(LinearPhysics(robot)._signals(X))
+    widths = np.cumsum([regressor[0].size, *(block.shape[1] for block in own)])
+    columns = np.concatenate([regressor.reshape(len(X), -1), *own], axis=1)
+    for rows in X.groupby("trajectory").indices.values():
+        columns[rows] = ButterworthFilter(cutoff, rate=rate).fit_transform(columns[rows])
+    parts = np.split(columns[::keep_every], widths[:-1], axis=1)
+    return ColumnPhysics(parts[0].reshape(-1, *regressor.shape[1:]), parts[1:])
 
 
 #: Rigid body, viscous and Coulomb friction, offset, rotor inertia.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Ask whether a learner beats the physics that a diagnosis completed.
 
-    SKIDYN_DATA=... python benchmarks/papers/learners_on_physics.py [--only ur10e emps] [--no-lstm]
+    SKIDYN_DATA=... python benchmarks/papers/learners_on_physics.py --only emps --learners ELM
 
 Held-out recordings (pairs of dates for the UR10e, parts of the path for the Panda, blocks for EMPS)
 of five logs; RMSE of every combination relative to the plain physics, and the learner against its
@@ -28,6 +28,7 @@ from _common import (
     PANDA_PERIOD,
     LinearPhysics,
     data_dir,
+    filtered_physics,
     load_emps,
     load_panda,
     load_ur10e,
@@ -59,11 +60,12 @@ def load_practice(case: str) -> tuple[Robot, pd.DataFrame, np.ndarray, tuple]:
     return Robot.from_urdf(folder / "robot.urdf"), X, y, effects
 
 
-OPTIONS = argparse.Namespace(lstm=True)
+LEARNERS = ("own joints", "ELM", "LSTM")
+OPTIONS = argparse.Namespace(learners=LEARNERS, alpha=0.05)
 
 
 def compare(
-    title: str, robot: Robot, X: Any, y: Any, base: tuple, completed: tuple, cv: Any, inner: Any
+    title: str, models: dict[str, LinearPhysics], X: Any, y: Any, cv: Any, inner: Any
 ) -> None:
     """Print one table; `cv` is a splitter or the fold of every row."""
     print(f"\n**{title}** ({len(X)} rows, {y.shape[1]} joints)\n")
@@ -75,17 +77,19 @@ def compare(
         unit = np.zeros(len(X), dtype=int)
         for k, (_, test) in enumerate(folds):
             unit[test] = k
-    learners = {"own joints": None, "ELM": ELMCommittee(p=0.9, random_state=0)}
-    if OPTIONS.lstm:
-        learners["LSTM"] = LSTMRegressor(max_epochs=15, batch_size=8, random_state=0)
+    every = {
+        "own joints": None,
+        "ELM": ELMCommittee(p=0.9, random_state=0),
+        "LSTM": LSTMRegressor(max_epochs=15, batch_size=8, random_state=0),
+    }
+    learners = {name: every[name] for name in OPTIONS.learners}
     first = None
-    for physics_name, effects in (("BASE", base), ("completed", completed)):
-        physics = LinearPhysics(robot, effects)
+    for physics_name, physics in models.items():
         own = None
         for learner_name, learner in {"": "none", **learners}.items():
             model: Any = physics
             if learner_name:
-                model = HybridRegressor(physics, learner, cv=inner)
+                model = HybridRegressor(physics, learner, cv=inner, alpha=OPTIONS.alpha)
             prediction = np.zeros_like(y)
             kept = []
             for train, test in folds:
@@ -102,22 +106,37 @@ def compare(
                 against = f"   on its physics {paired_comparison(own, errors)}"
                 against += f"   joints kept {np.mean(kept):.1f}"
             print(
-                f"{name:24s} mean RMSE {rmse.mean():.4f}   to BASE {(rmse / first).mean():.3f}"
+                f"{name:32s} mean RMSE {rmse.mean():.4f}   to BASE {(rmse / first).mean():.3f}"
                 f"{against}",
                 flush=True,
             )
 
 
+def plain(robot: Robot, base: tuple, completed: tuple) -> dict[str, LinearPhysics]:
+    """Physics before and after an effect is added."""
+    return {"BASE": LinearPhysics(robot, base), "completed": LinearPhysics(robot, completed)}
+
+
 def ur10e() -> None:
-    robot, X, y, fold = load_ur10e()
-    compare("UR10e, pairs of dates held out", robot, X, y, BASE, COMPLETE, fold, 5)
+    robot, every_row, torque, fold = load_ur10e(keep_every=1)
+    filtered = filtered_physics(robot, every_row, COMPLETE, 5.0, 100.0, 4)
+    X, y = every_row[::4].reset_index(drop=True), torque[::4]
+    models = plain(robot, BASE, COMPLETE) | {"completed, filtered": filtered}
+    compare("UR10e, pairs of dates held out", models, X, y, fold[::4], 5)
 
 
 def panda() -> None:
-    robot, X, y = load_panda()
     dahl = tuple(("dahl", (("presliding", width),)) for width in (0.01, 0.05, 0.2))
+    completed = (*BASE, *dahl)
+    robot, every_row, torque = load_panda(rate=1000.0)
+    filtered = {
+        f"{name}, filtered": filtered_physics(robot, every_row, effects, 10.0, 1000.0, 10)
+        for name, effects in (("BASE", BASE), ("completed", completed))
+    }
+    X, y = every_row[::10].reset_index(drop=True), torque[::10]
     cv, inner = (PhaseKFold(n, period=PANDA_PERIOD) for n in (4, 5))
-    compare("Panda, parts of the path held out", robot, X, y, BASE, (*BASE, *dahl), cv, inner)
+    models = plain(robot, BASE, completed) | filtered
+    compare("Panda, parts of the path held out", models, X, y, cv, inner)
 
 
 def emps() -> None:
@@ -125,20 +144,20 @@ def emps() -> None:
     short = tuple(("dahl", (("presliding", way),)) for way in (0.0003, 0.001, 0.005))
     base = BASE[:3]
     completed = (*base, ("asymmetric_friction", ()), *short)
-    compare("EMPS, 8 blocks", robot, X, y, base, completed, TrajectoryKFold(8), 7)
+    compare("EMPS, 8 blocks", plain(robot, base, completed), X, y, TrajectoryKFold(8), 7)
 
 
 def dahl() -> None:
     robot, X, y, base = load_practice("practice_33")
-    completed = (*base, *DAHL)
-    compare("Practice, Dahl friction", robot, X, y, base, completed, TrajectoryKFold(5), 5)
+    models = plain(robot, base, (*base, *DAHL))
+    compare("Practice, Dahl friction", models, X, y, TrajectoryKFold(5), 5)
 
 
 def unknown() -> None:
     robot, X, y, base = load_practice("practice_20")
-    completed = (*base, *COMPLETE[4:])
+    models = plain(robot, base, (*base, *COMPLETE[4:]))
     title = "Practice, an effect of no known kind (completed: friction added in vain)"
-    compare(title, robot, X, y, base, completed, TrajectoryKFold(5), 5)
+    compare(title, models, X, y, TrajectoryKFold(5), 5)
 
 
 LOGS = {f.__name__: f for f in (ur10e, panda, emps, dahl, unknown)}
@@ -147,7 +166,8 @@ LOGS = {f.__name__: f for f in (ur10e, panda, emps, dahl, unknown)}
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--only", nargs="+", choices=list(LOGS), default=list(LOGS))
-    parser.add_argument("--no-lstm", dest="lstm", action="store_false")
+    parser.add_argument("--learners", nargs="*", choices=LEARNERS, default=LEARNERS)
+    parser.add_argument("--alpha", type=float, default=0.05, help="level of the hybrid's gate")
     OPTIONS = parser.parse_args()
     for name in OPTIONS.only:
         LOGS[name]()

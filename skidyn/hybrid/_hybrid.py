@@ -47,7 +47,8 @@ class HybridRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         test every row exactly once; for one recording of a periodic motion use ``PhaseKFold``.
     alpha : float, default=0.05
         Level of the one-sided paired test over trajectories that a joint's learned part must pass,
-        corrected for the number of joints. 1 keeps every joint whose learned part helps at all.
+        corrected for the number of joints. 1 keeps every joint whose learned part helped on
+        held-out trajectories, significantly or not.
     trajectory, time : int, str or None, default="auto"
         Key columns of X.
 
