@@ -4,8 +4,9 @@
     python benchmarks/diagnosis/power.py [--jobs 2] [--picture power.png]
 
 The size is the root mean square of the effect's torque over the noise of the torque sensor, on the
-joint that has it; of hysteresis, which takes the place of Coulomb friction, its largest torque. An answer is right if it names the effect (of the hysteresis family, any member)
-on that joint and nothing else.
+joint that has it; of hysteresis, which takes the place of Coulomb friction, its largest torque. An
+answer is right if it names the effect (of the hysteresis family, any member) on that joint and
+nothing else.
 """
 
 from __future__ import annotations
