@@ -119,6 +119,14 @@ PAGES: tuple[Page, ...] = (
         ),
     ),
     Page(
+        "skidyn.explorer",
+        "The loop by hand on a local page, and what it does without one.",
+        (
+            Section("Classes", ("RankedEffect", "Session")),
+            Section("Functions", ("serve",)),
+        ),
+    ),
+    Page(
         "skidyn.excitation",
         "Motions from which the parameters of a robot can be told.",
         (

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``skidyn explore``: the loop by hand, in a browser."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from skidyn._commands._arguments import command, with_log
+from skidyn._commands._input import read_model_and_log
+from skidyn._commands._output import working
+
+DESCRIPTION = """\
+Do the loop by hand on a local page: see measurement against model, click where it fails, see what
+would help there, tick it and watch error and curves fall; undo; save.
+
+  skidyn explore run*.csv --urdf robot.urdf --folder results
+
+The page is served on this machine alone, with a random token in its address; nothing leaves it.
+Saving writes model.skops, report.html and explored.py, a script that does the same. Ctrl-C stops.
+"""
+
+
+def add_parser(commands: Any) -> None:
+    parser = command(commands, "explore", run, "the loop by hand, in a browser", DESCRIPTION)
+    with_log(parser)
+    parser.add_argument("--folder", default=".", help="where results are saved (default: here)")
+    parser.add_argument("--port", type=int, default=0, help="port (default: a free one)")
+    parser.add_argument("--no-browser", action="store_true", help="only print the address")
+
+
+def run(options: argparse.Namespace) -> None:
+    import webbrowser
+
+    from skidyn.explorer import Session, serve
+
+    model, frame, tau = read_model_and_log(options)
+    with working("Preparing", options):
+        session = Session(model, frame, tau)
+
+    def ready(address: str) -> None:
+        print(f"open {address}", flush=True)
+        if not options.no_browser:
+            webbrowser.open(address)
+
+    serve(
+        session,
+        options.folder,
+        logs=options.logs,
+        urdf=options.urdf,
+        port=options.port,
+        ready=ready,
+    )

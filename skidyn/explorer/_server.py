@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The explorer's local page: an address on this machine only, and a random token to use it."""
+
+from __future__ import annotations
+
+import html
+import json
+import secrets
+import socket
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from skidyn._exceptions import SkidynError
+from skidyn._optional import import_optional
+from skidyn.explorer._session import Session
+
+HOST = "127.0.0.1"
+
+
+class Explorer:
+    """Answers of the page, one at a time.
+
+    Parameters
+    ----------
+    session : Session
+        Model and log.
+    folder : path
+        Where results are saved.
+    logs : sequence of str
+        Files of the log, for the script.
+    urdf : str
+        Description of the robot, for the script.
+    """
+
+    def __init__(
+        self, session: Session, folder: Path, logs: Sequence[str] = (), urdf: str = "robot.urdf"
+    ) -> None:
+        self.session, self.folder = session, Path(folder)
+        self.logs, self.urdf = list(logs) or ["log.csv"], urdf
+        self.token = secrets.token_urlsafe(24)
+        self._lock = threading.Lock()
+
+    def answer(self, question: str, words: dict[str, Any]) -> dict[str, Any]:
+        """Answer a question of the page.
+
+        Parameters
+        ----------
+        question : {"state", "curves", "ranked", "add", "undo", "save"}
+            What is asked.
+        words : dict
+            Its arguments.
+
+        Returns
+        -------
+        dict
+            JSON types only.
+        """
+        known: dict[str, Callable[..., dict[str, Any]]] = {
+            "state": self._state,
+            "curves": self._curves,
+            "ranked": self._ranked,
+            "add": self._add,
+            "undo": self._undo,
+            "save": self._save,
+        }
+        if question not in known:
+            raise SkidynError(f"the explorer does not know {question!r}")
+        with self._lock:
+            return known[question](**words)
+
+    def _state(self) -> dict[str, Any]:
+        s = self.session
+        units = ["N" if kind == "prismatic" else "N m" for kind in s.robot.joint_types]
+        return {
+            "joints": list(s.robot.joint_names),
+            "units": units,
+            "trajectories": s.trajectories,
+            "history": s.history,
+        }
+
+    def _curves(self, joint: int, trajectory: int) -> dict[str, Any]:
+        return self.session.curves(int(joint), int(trajectory))
+
+    def _ranked(
+        self, joint: int, trajectory: int | None = None, span: list[float] | None = None
+    ) -> dict[str, Any]:
+        chosen = None if span is None else (float(span[0]), float(span[1]))
+        effects = self.session.ranked(int(joint), trajectory, chosen)
+        return {"effects": [asdict(e) for e in effects]}
+
+    def _add(self, kind: str, joint: int) -> dict[str, Any]:
+        self.session.add(str(kind), int(joint))
+        return self._state()
+
+    def _undo(self) -> dict[str, Any]:
+        self.session.undo()
+        return self._state()
+
+    def _save(self) -> dict[str, Any]:
+        """Model, report and script, under fixed names in the folder chosen at the start."""
+        from skidyn import save_model
+        from skidyn.diagnosis import Settings, diagnose
+        from skidyn.report import summarize, write_html
+        from skidyn.report._write import write_text
+
+        model = self.session.fitted_model()
+        saved = [str(save_model(self.folder / "model.skops", model))]
+        diagnosis = diagnose(model, *self.session.data, settings=Settings(max_findings=0))
+        saved.append(str(write_html(self.folder / "report.html", summarize(diagnosis))))
+        text = self.session.script(self.logs, self.urdf)
+        saved.append(str(write_text(self.folder / "explored.py", text)))
+        return {"saved": saved}
+
+
+def page() -> str:
+    """The page with everything it needs inside.
+
+    Returns
+    -------
+    str
+        HTML.
+    """
+    folder = files("skidyn.explorer").joinpath("static")
+    text = folder.joinpath("explorer.html").read_text("utf-8")
+    for name in ("uPlot.css", "uPlot.js", "explorer.css", "explorer.js"):
+        text = text.replace(f"/*{name}*/", folder.joinpath(name).read_text("utf-8"))
+    return text
+
+
+def make_app(explorer: Explorer, port: int) -> Any:
+    """The web application.
+
+    Parameters
+    ----------
+    explorer : Explorer
+        What answers.
+    port : int
+        Port of this machine; requests for any other host are refused.
+
+    Returns
+    -------
+    starlette.applications.Starlette
+    """
+    import_optional("starlette", extra="explore")
+    from starlette.applications import Starlette
+    from starlette.concurrency import run_in_threadpool
+    from starlette.requests import Request
+    from starlette.responses import HTMLResponse, JSONResponse, Response
+    from starlette.routing import Route
+
+    hosts = {f"{HOST}:{port}", f"localhost:{port}"}
+    headers = {
+        "Cache-Control": "no-store",
+        "Content-Security-Policy": "default-src 'self' 'unsafe-inline'; img-src data:",
+        "X-Content-Type-Options": "nosniff",
+        "Referrer-Policy": "no-referrer",
+    }
+
+    def refused(request: Request, token: str | None) -> bool:
+        right = secrets.compare_digest(token or "", explorer.token)
+        return not right or request.headers.get("host") not in hosts
+
+    async def start(request: Request) -> Response:
+        if refused(request, request.query_params.get("token")):
+            return HTMLResponse("Open the address that skidyn explore printed.", 403)
+        return HTMLResponse(page(), headers=headers)
+
+    async def api(request: Request) -> Response:
+        if refused(request, request.headers.get("x-token")):
+            return JSONResponse({"error": "wrong token"}, 403)
+        try:
+            words = json.loads(await request.body() or b"{}")
+            if not isinstance(words, dict):
+                raise SkidynError("an object is expected")
+            question = request.path_params["question"]
+            content = await run_in_threadpool(explorer.answer, question, words)
+        except (SkidynError, TypeError, ValueError) as error:
+            return JSONResponse({"error": html.escape(str(error))}, 400, headers=headers)
+        return JSONResponse(content, headers=headers)
+
+    routes = [Route("/", start), Route("/api/{question}", api, methods=["POST"])]
+    return Starlette(routes=routes)
+
+
+def serve(
+    session: Session,
+    folder: str | Path = ".",
+    *,
+    logs: Sequence[str] = (),
+    urdf: str = "robot.urdf",
+    port: int = 0,
+    ready: Callable[[str], None] = print,
+) -> None:
+    """Serve the page on this machine until it is stopped by Ctrl-C.
+
+    Parameters
+    ----------
+    session : Session
+        Model and log.
+    folder : path, default="."
+        Where model, report and script are saved.
+    logs : sequence of str, default=()
+        Files of the log, for the script.
+    urdf : str, default="robot.urdf"
+        Description of the robot, for the script.
+    port : int, default=0
+        Port; a free one if 0.
+    ready : callable, default=print
+        Called with the address, which holds the token.
+
+    Raises
+    ------
+    ImportError
+        starlette or uvicorn is not installed (``pip install skidyn[explore]``).
+
+    Examples
+    --------
+    >>> serve(session, "results")  # doctest: +SKIP
+    http://127.0.0.1:54321/?token=...
+    """
+    uvicorn = import_optional("uvicorn", extra="explore")
+    explorer = Explorer(session, Path(folder), logs, urdf)
+    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    listener.bind((HOST, port))
+    port = listener.getsockname()[1]
+    app = make_app(explorer, port)
+    config = uvicorn.Config(app, log_level="error", access_log=False)
+    ready(f"http://{HOST}:{port}/?token={explorer.token}")
+    uvicorn.Server(config).run(sockets=[listener])

@@ -1,0 +1,20 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A session on a log that hides a spring on joint 2."""
+
+from __future__ import annotations
+
+import pytest
+
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.explorer import Session
+from skidyn.rigid_body import RBDRegressor
+
+
+@pytest.fixture(scope="session")
+def log():
+    return make_hidden_effect_log(load_planar_arm(), "spring", joints=[2], n_trajectories=8)
+
+
+@pytest.fixture
+def session(log):
+    return Session(RBDRegressor(log.robot), log.X, log.y)
