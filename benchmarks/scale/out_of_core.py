@@ -6,7 +6,7 @@ Usage: python benchmarks/scale/out_of_core.py [--rows 100000 1000000] [--robot p
 
 The tiles (100,000 rows each, ten of them, read again and again) lie in a temporary folder that is
 deleted. Every measurement runs in a process of its own, whose peak memory is that of the
-operating system; for pools it is the sum over the workers and excludes the tiles' page cache.
+operating system, of the process that measures; workers of a pool have their own.
 """
 
 from __future__ import annotations

@@ -107,7 +107,7 @@ def find_limits(
         unit = effect.units(bool(problem.signals.prismatic[joint]))
         first = effect.coefficients[0]
         text = unit.get(first.name, first.unit)
-        if swept < NEW_SHARE * own:
+        if swept <= NEW_SHARE * own:  # nothing at all where a joint rests
             sentence = (
                 f"This data cannot tell {effect.title.lower()} of joint {joint + 1} from what the "
                 f"model has. It would show with {effect.separating_motion}."
