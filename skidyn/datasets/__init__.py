@@ -6,6 +6,7 @@ from skidyn.datasets._fetch import (
     fetch_double_pendulum,
     fetch_emps,
     fetch_panda_exciting,
+    fetch_screw_drive,
     fetch_xl330,
 )
 from skidyn.datasets._log import read_log
@@ -28,6 +29,7 @@ __all__ = [
     "fetch_double_pendulum",
     "fetch_emps",
     "fetch_panda_exciting",
+    "fetch_screw_drive",
     "fetch_xl330",
     "hidden_effect_kinds",
     "load_demo_log",

@@ -9,6 +9,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 from sklearn.datasets import get_data_home
 from sklearn.utils import Bunch
 
@@ -46,6 +47,20 @@ XL330_RUNS = tuple(
         *("29m14", "29m21", "29m29", "29m37", "29m47", "29m54", "30m02", "30m10"),
     )
 )
+SCREW_URL = (
+    "https://raw.githubusercontent.com/RViMLab/TRO2021-Dynamic-Modelling/"
+    "a6f5ca9790b28c20bf9affc70af812c7d960d8c3/experiments/driveNo3/"
+)
+#: Speeds in rpm of the constant-speed runs, in both directions (``n`` in the names of files).
+SCREW_SPEEDS = (1, 2, 4, 6, 8, 10, 13, 17, 20, 25, 30, 40, 50, 60, 70, 80, 90, 100, 120, 140, 160)
+SCREW_RUNS = (
+    *("start_stop/10.csv", "start_stop/200.csv"),
+    *(f"steady_state/0.096kg/{way}{v}.csv" for v in SCREW_SPEEDS for way in ("", "n")),
+    *("steady_state/0.096kg/180.csv", "steady_state/0.096kg/n180.csv"),
+    *("steady_state/0.096kg/200.csv", "steady_state/0.096kg/n200.csv"),
+)
+#: Torque at 100 % in N m, nominal torque of the motor of these drives.
+SCREW_TORQUE = 9.84e-3
 #: Force per volt that the authors of EMPS identified, N/V.
 EMPS_GAIN = 35.15065188248547
 
@@ -245,6 +260,77 @@ def fetch_xl330(
         tables.append(_servo_run(path).assign(trajectory=number))
     frame = pandas.concat(tables, ignore_index=True)
     return Bunch(frame=frame, load=0.49 * 9.81 * 0.1, licence="Apache-2.0", paths=paths)
+
+
+def fetch_screw_drive(
+    *, data_home: str | os.PathLike[str] | None = None, url: str = "", runs: tuple[str, ...] = ()
+) -> Bunch:
+    """Download a worm drive at constant speeds and in start-stop runs, seen from its motor.
+
+    The recordings are those of drive 3 (worm 60:1, a hanging weight of 0.096 kg) of [1]_ in the
+    repository RViMLab/TRO2021-Dynamic-Modelling, whose licence is MIT. Nothing of them comes with
+    skidyn.
+
+    Parameters
+    ----------
+    data_home : path, optional
+        Folder to keep the files in; that of scikit-learn's data sets if None.
+    url : str, default=""
+        Another folder to download from; that of the repository if empty.
+    runs : tuple of str, default=()
+        Names of files; all if empty.
+
+    Returns
+    -------
+    Bunch
+        ``frame``: DataFrame ``time`` (s), ``trajectory, q1`` (rad, integrated from the velocity),
+        ``dq1`` (rad/s), ``tau1`` (N m at the motor); ``licence``, ``paths``.
+
+    Raises
+    ------
+    LogError
+        A file's checksum is not that of its first download, or it is no recording of this kind.
+    ImportError
+        pooch is not installed (``pip install skidyn[fetch]``).
+
+    References
+    ----------
+    .. [1] Z. Mablekos-Alexiou, L. da Cruz, C. Bergeles, "Friction-inclusive modeling of sliding
+       contact transmission systems in robotics", IEEE Transactions on Robotics 37(4), 2021.
+
+    Examples
+    --------
+    >>> from skidyn.datasets import fetch_screw_drive
+    >>> drive = fetch_screw_drive()  # doctest: +SKIP
+    """
+    pandas = import_optional("pandas", extra="io")
+    address = url or SCREW_URL
+    paths, tables = [], []
+    for number, run in enumerate(runs or SCREW_RUNS):
+        name = "screw_drive_" + run.replace("/", "_")
+        path = _retrieve(f"{address.rstrip('/')}/{run}", name, data_home, None)
+        paths.append(str(path))
+        tables.append(_drive_run(path).assign(trajectory=number))
+    frame = pandas.concat(tables, ignore_index=True)
+    return Bunch(frame=frame, licence="MIT", paths=paths)
+
+
+def _drive_run(path: Path) -> pd.DataFrame:
+    pandas = import_optional("pandas", extra="io")
+    lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    try:
+        first = lines.index("ms;rpm;%") + 1
+        # Some cells carry a remark behind their number.
+        rows = [
+            [float(c.split()[0]) for c in line.split(";")[:3]] for line in lines[first:] if line
+        ]
+        values = np.array(rows, dtype=float).reshape(-1, 3)
+    except (ValueError, IndexError) as error:
+        raise LogError(f"{path} is not a recording of this kind: {error}") from None
+    time, dq = values[:, 0] / 1000, values[:, 1] * np.pi / 30
+    q = np.concatenate([[0.0], np.cumsum(np.diff(time) * (dq[1:] + dq[:-1]) / 2)])
+    columns = {"time": time, "q1": q, "dq1": dq, "tau1": values[:, 2] / 100 * SCREW_TORQUE}
+    return pandas.DataFrame(columns)
 
 
 def _servo_run(path: Path) -> pd.DataFrame:

@@ -17,6 +17,7 @@ from skidyn.datasets import (
     fetch_double_pendulum,
     fetch_emps,
     fetch_panda_exciting,
+    fetch_screw_drive,
     fetch_xl330,
 )
 
@@ -134,3 +135,22 @@ def test_currents_of_the_servo_get_their_sign_back(site, tmp_path):
     (folder / "other.json").write_text("{}")
     with pytest.raises(LogError, match="other.json is not a recording"):
         fetch_xl330(data_home=tmp_path / "home", url=address, runs=("other.json",))
+
+
+def test_runs_of_the_worm_drive_come_in_si_units(site, tmp_path):
+    folder, address = site
+    head = "Date:;2020-07-10\n;Velocity actual value averaged;Torque actual value averaged\n"
+    text = head + "ms;rpm;%\n0.000;0;0.0\n40.000;-30;-10.0 start\n80.000;-30;-10.0\n"
+    (folder / "start_stop").mkdir()
+    (folder / "start_stop" / "10.csv").write_text(text)
+
+    drive = fetch_screw_drive(data_home=tmp_path / "home", url=address, runs=("start_stop/10.csv",))
+
+    frame = drive.frame
+    assert drive.licence == "MIT"
+    np.testing.assert_allclose(frame["dq1"], [0, -np.pi, -np.pi])
+    np.testing.assert_allclose(frame["q1"], [0, -0.02 * np.pi, -0.06 * np.pi])
+    np.testing.assert_allclose(frame["tau1"], [0, -0.984e-3, -0.984e-3])
+    (folder / "start_stop" / "bad.csv").write_text("a;b;c")
+    with pytest.raises(LogError, match="not a recording"):
+        fetch_screw_drive(data_home=tmp_path, url=address, runs=("start_stop/bad.csv",))
