@@ -9,11 +9,17 @@ import shutil
 import socket
 import threading
 import time
+import warnings
+from contextlib import contextmanager
 
 import pytest
 
 from skidyn import load_model
+from skidyn.datasets import load_recording
+from skidyn.explorer import Session
 from skidyn.explorer._server import Explorer, make_app, page
+from skidyn.rigid_body import RBDRegressor
+from skidyn.robots import Robot
 
 pytest.importorskip("starlette", reason="needs skidyn[explore]")
 uvicorn = pytest.importorskip("uvicorn", reason="needs skidyn[explore]")
@@ -30,8 +36,30 @@ def explorer(session, tmp_path):
 
 
 @pytest.fixture
+def ur10e(data_dir, tmp_path):
+    """Three recordings of a real UR10e."""
+    folder = data_dir / "ur10e"
+    runs = ["ur-20_02_10-30sec_12harm", "ur-20_02_12-40sec_12harm", "ur-20_02_05-20sec_12harm"]
+    gains = (14.87, 13.26, 11.13, 10.62, 11.03, 11.47)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the recordings' own faults are listed elsewhere
+        log = load_recording(folder / "ur10e_excitation.npz", run=runs, drive_gains=gains).frame
+    columns = ["time", "trajectory", *(f"{s}{j}" for s in ("q", "dq") for j in range(1, 7))]
+    robot = Robot.from_urdf(folder / "ur10e_min.urdf")
+    model = RBDRegressor(robot, ("viscous", "coulomb", "offset", "rotor_inertia"))
+    tau = log[[f"tau{j}" for j in range(1, 7)]].to_numpy()
+    return Explorer(Session(model, log[columns], tau), tmp_path)
+
+
+@pytest.fixture
 def port(explorer):
     """The page served on this machine."""
+    with served(explorer) as port:
+        yield port
+
+
+@contextmanager
+def served(explorer):
     listener = socket.socket()
     listener.bind(("127.0.0.1", 0))
     port = listener.getsockname()[1]
@@ -140,3 +168,32 @@ def test_the_loop_click_by_click(port, explorer, tmp_path):
     assert any(t.kind == "spring" for t in model.effect_terms_)
     assert "Term('spring', (1,)" in (tmp_path / "explored.py").read_text()
     assert "</html>" in (tmp_path / "report.html").read_text("utf-8")
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
+def test_load_dependent_friction_of_a_real_robot_is_ticked_and_the_error_falls(ur10e):
+    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    complaints: list[str] = []
+    with served(ur10e) as port, sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=list(ARGUMENTS))
+        tab = browser.new_page(viewport={"width": 1280, "height": 860})
+        tab.set_default_timeout(20_000)
+        tab.on("console", lambda message: complaints.append(message.text))
+        tab.on("pageerror", lambda error: complaints.append(str(error)))
+        tab.goto(f"http://127.0.0.1:{port}/?token={ur10e.token}")
+        tab.wait_for_selector("body[data-ranked='1 all 1']")
+        tab.select_option("#joint", "2")
+        tab.wait_for_selector("body[data-ranked='2 all 1']")
+        first = tab.get_attribute("#effects li:first-child button", "data-kind")
+        tab.click("#residual .u-over", position={"x": 300, "y": 60})
+        tab.wait_for_selector("body[data-ranked='2 span 1']")
+        tab.click("#effects button[data-kind=load_dependent_friction]")
+        tab.wait_for_selector("body[data-ranked='2 span 2']")
+        given, now = (
+            float(tab.text_content(f"#errors tbody tr:nth-child(2) td:nth-child({k})"))
+            for k in (2, 3)
+        )
+        browser.close()
+    assert complaints == []
+    assert first == "load_dependent_friction"
+    assert now < 0.7 * given
