@@ -62,7 +62,9 @@ def look_at_reversals(
     family = [k for k in kinds if _is_hysteresis(k)]
     others = [h for h in result.findings if not _is_hysteresis(h.kind)]
     room = settings.max_findings - len(others)
-    if not family or room < 1 or problem.signals.time is None:
+    # A torque that lags is late at every reversal, whatever the friction does there.
+    lags = any(h.kind == "time_delay" for h in others)
+    if not family or room < 1 or lags or problem.signals.time is None:
         return problem, result
     own = set(hysteresis_joints(problem.terms))
     before = {j for h in result.findings if _is_hysteresis(h.kind) for j in h.joints}
