@@ -17,7 +17,7 @@ _CORE = (
 )
 _OPTIONAL = (
     "matplotlib", "jinja2", "pandas", "polars", "pyarrow", "h5py", "mcap", "rosbags", "rich",
-    "cvxpy", "clarabel", "onnx", "onnxscript", "skops", "pooch", "dask",
+    "onnx", "onnxscript", "skops", "pooch", "dask",
 )  # fmt: skip
 
 
