@@ -182,6 +182,7 @@ PAGES: tuple[Page, ...] = (
                     "fetch_double_pendulum",
                     "fetch_emps",
                     "fetch_panda_exciting",
+                    "fetch_panda_gaz",
                     "fetch_screw_drive",
                     "fetch_xl330",
                     "hidden_effect_kinds",

@@ -6,6 +6,7 @@ from skidyn.datasets._fetch import (
     fetch_double_pendulum,
     fetch_emps,
     fetch_panda_exciting,
+    fetch_panda_gaz,
     fetch_screw_drive,
     fetch_xl330,
 )
@@ -29,6 +30,7 @@ __all__ = [
     "fetch_double_pendulum",
     "fetch_emps",
     "fetch_panda_exciting",
+    "fetch_panda_gaz",
     "fetch_screw_drive",
     "fetch_xl330",
     "hidden_effect_kinds",

@@ -30,6 +30,10 @@ PANDA_URL = (
     "73217267f30e3aaba229b63233c8fdb628ba156b/"
     "inverse_dynamics_interface_franka_inria/bagfiles/panda_exciting_trajectory.db3"
 )
+GAZ_URL = (
+    "https://raw.githubusercontent.com/marcocognetti/FrankaEmikaPandaDynModel/"
+    "44f1ec8a615555eb3469ca9b0abd31ef863872b5/matlab/data/Exciting_Traj/Trajectory_1/rbt_log/"
+)
 PENDULUM_URL = (
     "https://raw.githubusercontent.com/dfki-ric-underactuated-lab/double_pendulum/"
     "33b5db87afc0a3228b3e7ed10c83d885af73e995/"
@@ -260,6 +264,65 @@ def fetch_xl330(
         tables.append(_servo_run(path).assign(trajectory=number))
     frame = pandas.concat(tables, ignore_index=True)
     return Bunch(frame=frame, load=0.49 * 9.81 * 0.1, licence="Apache-2.0", paths=paths)
+
+
+def fetch_panda_gaz(*, data_home: str | os.PathLike[str] | None = None, url: str = "") -> Bunch:
+    """Download an excitation of a Franka Emika Panda without a hand: 7 joints, 28 s at 1 kHz.
+
+    The recording is that of [1]_ in the repository marcocognetti/FrankaEmikaPandaDynModel, whose
+    licence is GPL-3.0. Nothing of it comes with skidyn.
+
+    Parameters
+    ----------
+    data_home : path, optional
+        Folder to keep the files in; that of scikit-learn's data sets if None.
+    url : str, default=""
+        Another folder to download from; that of the repository if empty.
+
+    Returns
+    -------
+    Bunch
+        ``frame``: DataFrame ``time`` (s), ``trajectory, q1 .. q7`` (rad), ``dq1 .. dq7``,
+        ``tau1 .. tau7`` (N m, joint torque sensors); ``licence``, ``paths``.
+
+    Raises
+    ------
+    LogError
+        A file's checksum is not that of its first download, or the files do not fit together.
+    ImportError
+        pooch is not installed (``pip install skidyn[fetch]``).
+
+    References
+    ----------
+    .. [1] C. Gaz, M. Cognetti, A. Oliva, P. Robuffo Giordano, A. De Luca, "Dynamic identification
+       of the Franka Emika Panda robot with retrieval of feasible parameters using penalty-based
+       optimization", IEEE Robotics and Automation Letters 4(4), 2019.
+
+    Examples
+    --------
+    >>> from skidyn.datasets import fetch_panda_gaz
+    >>> panda = fetch_panda_gaz()  # doctest: +SKIP
+    """
+    pandas = import_optional("pandas", extra="io")
+    address = (url or GAZ_URL).rstrip("/")
+    paths, parts = [], {}
+    for signal, name in {"q": "positions", "dq": "velocity", "tau": "torques", "": "time"}.items():
+        file = f"exciting_traj_{name}.txt"
+        path = _retrieve(f"{address}/{file}", f"panda_gaz_{name}.txt", data_home, None)
+        paths.append(str(path))
+        try:
+            text = path.read_text(encoding="utf-8").replace(",", " ")
+            values = np.loadtxt(text.splitlines(), ndmin=2)
+        except ValueError as error:
+            raise LogError(f"{path} is not a recording of this kind: {error}") from None
+        parts[signal] = values
+    time = parts.pop("")[:, 0]
+    for signal, values in parts.items():
+        if values.shape != (len(time), 7):
+            raise LogError(f"{signal} has shape {values.shape}; ({len(time)}, 7) is expected")
+    columns = {f"{s}{j + 1}": v[:, j] for s, v in parts.items() for j in range(7)}
+    frame = pandas.DataFrame({"time": time, "trajectory": 0} | columns)
+    return Bunch(frame=frame, licence="GPL-3.0", paths=paths)
 
 
 def fetch_screw_drive(

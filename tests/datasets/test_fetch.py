@@ -17,6 +17,7 @@ from skidyn.datasets import (
     fetch_double_pendulum,
     fetch_emps,
     fetch_panda_exciting,
+    fetch_panda_gaz,
     fetch_screw_drive,
     fetch_xl330,
 )
@@ -154,3 +155,20 @@ def test_runs_of_the_worm_drive_come_in_si_units(site, tmp_path):
     (folder / "start_stop" / "bad.csv").write_text("a;b;c")
     with pytest.raises(LogError, match="not a recording"):
         fetch_screw_drive(data_home=tmp_path, url=address, runs=("start_stop/bad.csv",))
+
+
+def test_the_panda_of_gaz_is_put_together_from_its_files(site, tmp_path):
+    folder, address = site
+    rng = np.random.default_rng(0)
+    blocks = {name: rng.normal(size=(20, 7)) for name in ("positions", "velocity", "torques")}
+    for name, values in blocks.items():
+        np.savetxt(folder / f"exciting_traj_{name}.txt", values)
+    np.savetxt(folder / "exciting_traj_time.txt", np.arange(20) / 1000)
+
+    panda = fetch_panda_gaz(data_home=tmp_path / "home", url=address)
+
+    np.testing.assert_allclose(panda.frame["tau7"], blocks["torques"][:, 6])
+    assert panda.frame.shape == (20, 23)
+    np.savetxt(folder / "exciting_traj_velocity.txt", blocks["velocity"][:5])
+    with pytest.raises(LogError, match=r"dq has shape \(5, 7\); \(20, 7\) is expected"):
+        fetch_panda_gaz(data_home=tmp_path / "other", url=address)
