@@ -170,7 +170,8 @@ class Excitation:
         q, dq, ddq : ndarray of shape (n_samples, n_joints)
             Position, velocity and acceleration, SI units.
         """
-        time = np.arange(0.0, self.duration + 0.5 / rate, 1 / rate)
+        time = np.arange(0.0, self.duration - 1e-6 / rate, 1 / rate)
+        time = np.append(time, self.duration)  # the motion ends at rest, whatever the rate
         return time, *self._at(time)
 
     def _at(self, time: Array) -> tuple[Array, Array, Array]:
@@ -449,12 +450,19 @@ def _outside(robot: Robot, q: Array, limits: MotionLimits) -> float:
 
 
 def _shrunk(robot: Robot, excitation: Excitation, limits: MotionLimits) -> Excitation:
-    """Smaller strokes until torque and workspace hold on a dense grid."""
+    """Smaller strokes until every limit holds on a dense grid."""
+    low, high = limits.position.T
     for share in np.linspace(1.0, 0.025, 40):
         trial = replace(excitation, weights=share * excitation.weights)
         _, q, dq, ddq = trial.sample(CHECK_RATE)
         torque = np.abs(robot.inverse_dynamics(q, dq, ddq)).max(0)
-        if np.all(torque <= limits.torque) and _outside(robot, q, limits) == 0.0:
+        kept = (
+            np.all((q >= low) & (q <= high))
+            and np.all(np.abs(dq).max(0) <= limits.velocity)
+            and np.all(np.abs(ddq).max(0) <= limits.acceleration)
+            and np.all(torque <= limits.torque)
+        )
+        if kept and _outside(robot, q, limits) == 0.0:
             return trial
     raise SkidynError(
         "no motion around the pose that was found keeps the torque and workspace limits; widen "

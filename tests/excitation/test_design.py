@@ -33,6 +33,20 @@ def test_every_limit_holds_and_the_motion_starts_and_ends_at_rest(load):
     np.testing.assert_allclose(q[[0, -1]], np.tile(excitation.middle, (2, 1)), atol=1e-12)
 
 
+@pytest.mark.parametrize(("duration", "blend"), [(60.0, 0.5), (20.0, 0.1), (5.003, 0.5)])
+def test_limits_and_rest_hold_for_long_motions_short_blends_and_odd_times(duration, blend):
+    robot = load_planar_arm()
+
+    excitation = design_excitation(robot, duration=duration, blend=blend, iterations=0)
+
+    time, _, dq, ddq = excitation.sample(1000.0)
+    limits = MotionLimits().resolved(robot)
+    assert time[-1] == duration
+    assert np.all(np.abs(dq).max(0) <= 1.001 * limits.velocity)
+    assert np.all(np.abs(ddq).max(0) <= 1.001 * limits.acceleration)
+    assert np.abs(ddq[-1]).max() < 1e-9
+
+
 def test_torque_and_workspace_limits_shrink_the_motion():
     robot = load_planar_arm()
     free = design_excitation(robot, **FAST)
