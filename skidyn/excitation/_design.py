@@ -352,11 +352,12 @@ def design_excitation(
     rng = np.random.default_rng(random_state)
     size = 1 + 2 * harmonics
     time = np.linspace(0.0, duration, JUDGED_SAMPLES)
+    fine = np.linspace(0.0, duration, 2 * JUDGED_SAMPLES)
     raw = Excitation(robot, duration, base_frequency, np.zeros(0), np.zeros((0, 0)), blend)
 
     def motion(x: Array) -> Excitation:
         middle, weights = _unpacked(x.reshape(robot.n_joints, size), bounds)
-        return _within(replace(raw, middle=middle, weights=weights), bounds)
+        return _within(replace(raw, middle=middle, weights=weights), bounds, fine)
 
     def loss(x: Array) -> float:
         excitation = motion(x)
@@ -371,8 +372,11 @@ def design_excitation(
             loss, best, method="L-BFGS-B", options={"maxiter": iterations, "ftol": 1e-6}
         )
         best = found.x if found.fun < loss(best) else best
-    excitation = _shrunk(robot, motion(best), bounds)
-    dense, q, dq, ddq = excitation.sample(CHECK_RATE)
+    excitation = motion(best)
+    dense = excitation.sample(CHECK_RATE)[0]
+    # A long motion is judged too sparsely to see the accelerations of its blends.
+    excitation = _shrunk(robot, _within(excitation, bounds, dense), bounds)
+    q, dq, ddq = excitation._at(dense)
     matrix = judge.information(q, dq, ddq, dense) + judge.recorded
     return replace(
         excitation,
@@ -405,9 +409,8 @@ def _unpacked(x: Array, limits: MotionLimits) -> tuple[Array, Array]:
     return middle, x[:, 1:].copy()
 
 
-def _within(excitation: Excitation, limits: MotionLimits) -> Excitation:
+def _within(excitation: Excitation, limits: MotionLimits, time: Array) -> Excitation:
     """Strokes as large as position, velocity and acceleration allow."""
-    time = np.linspace(0.0, excitation.duration, 2 * JUDGED_SAMPLES)
     q, dq, ddq = excitation._at(time)
     away = q - excitation.middle
     low, high = limits.position.T

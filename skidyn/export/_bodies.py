@@ -90,14 +90,18 @@ def write_files(
 ) -> tuple[str, ...]:
     """Write the description and, for what it cannot hold, a side-car JSON next to it.
 
+    Each in one step. The side-car keeps the whole name of the file, so that a URDF and an MJCF of
+    one robot have one each.
+
     Returns
     -------
     tuple of str
         Names of what the description does not hold.
     """
+    from skidyn.report._write import write_text
+
     target = Path(path)
-    target.write_text(text, encoding="utf-8")
-    sidecar = target.with_suffix(".skidyn.json")
+    write_text(target, text)
     if not not_held:
         return ()
     content = {
@@ -106,7 +110,7 @@ def write_files(
         "joints": list(robot.joint_names),
         "not_held": {name: _plain(value) for name, value in not_held.items()},
     }
-    sidecar.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+    write_text(f"{target}.skidyn.json", json.dumps(content, indent=2) + "\n")
     return tuple(not_held)
 
 

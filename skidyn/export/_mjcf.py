@@ -33,7 +33,7 @@ def write_mjcf(
 
     Friction becomes ``damping`` and ``frictionloss``, rotor inertia ``armature``; links fixed to a
     body become sites, joints that mimic another are tied to it by an equality constraint. What MJCF
-    cannot hold goes to ``<path stem>.skidyn.json``.
+    cannot hold goes to ``<path>.skidyn.json``.
 
     Parameters
     ----------

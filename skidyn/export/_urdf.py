@@ -28,7 +28,7 @@ def write_urdf(
 
     Links that are fixed to a moving body stay as frames without mass; their mass is in the body.
     Pictures and collision shapes are not written. A URDF holds viscous and Coulomb friction
-    (``<dynamics damping friction>``); what it cannot hold goes to ``<path stem>.skidyn.json``.
+    (``<dynamics damping friction>``); what it cannot hold goes to ``<path>.skidyn.json``.
 
     Parameters
     ----------

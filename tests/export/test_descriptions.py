@@ -106,9 +106,13 @@ def test_what_a_format_cannot_hold_goes_to_the_side_car(tmp_path):
         (write_urdf, "urdf", ("torque_ripple", "rotor_inertia")),
         (write_mjcf, "xml", ("torque_ripple",)),
     ):
-        left_out = write(robot, tmp_path / f"{suffix}_robot.{suffix}", **options)
+        left_out = write(robot, tmp_path / f"robot.{suffix}", **options)
         assert left_out == expected
-        sidecar = json.loads((tmp_path / f"{suffix}_robot.skidyn.json").read_text())
+    for suffix, expected in (
+        ("urdf", ("torque_ripple", "rotor_inertia")),
+        ("xml", ("torque_ripple",)),
+    ):
+        sidecar = json.loads((tmp_path / f"robot.{suffix}.skidyn.json").read_text())
         assert sidecar["joints"] == list(robot.joint_names)
         assert tuple(sidecar["not_held"]) == expected
         assert sidecar["not_held"]["torque_ripple"] == {"amplitude": [0.1, 0.2], "harmonic": 3}
