@@ -103,13 +103,14 @@ class Explorer:
     def _save(self) -> dict[str, Any]:
         """Model, report and script, under fixed names in the folder chosen at the start."""
         from skidyn import save_model
-        from skidyn.diagnosis import Settings, diagnose
+        from skidyn.diagnosis import diagnose
         from skidyn.report import summarize, write_html
         from skidyn.report._write import write_text
 
+        self.folder.mkdir(parents=True, exist_ok=True)
         model = self.session.fitted_model()
         saved = [str(save_model(self.folder / "model.skops", model))]
-        diagnosis = diagnose(model, *self.session.data, settings=Settings(max_findings=0))
+        diagnosis = diagnose(model, *self.session.data)  # says what is missing still
         saved.append(str(write_html(self.folder / "report.html", summarize(diagnosis))))
         text = self.session.script(self.logs, self.urdf)
         saved.append(str(write_text(self.folder / "explored.py", text)))
@@ -178,7 +179,7 @@ def make_app(explorer: Explorer, port: int) -> Any:
                 raise SkidynError("an object is expected")
             question = request.path_params["question"]
             content = await run_in_threadpool(explorer.answer, question, words)
-        except (SkidynError, TypeError, ValueError) as error:
+        except (SkidynError, LookupError, OSError, TypeError, ValueError) as error:
             return JSONResponse({"error": html.escape(str(error))}, 400, headers=headers)
         return JSONResponse(content, headers=headers)
 

@@ -1,7 +1,6 @@
 "use strict";
 (() => {
   const token = new URLSearchParams(location.search).get("token");
-  history.replaceState(null, "", location.pathname); // the token does not stay in the address bar
   const el = (id) => document.getElementById(id);
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   let state = null, plots = [], span = null;
@@ -66,7 +65,7 @@
       button.dataset.kind = e.kind;
       const share = span ? e.drop_here : e.drop;
       button.append(node("span", e.title), node("span", percent(share)));
-      button.append(node("small", `joint ${e.joints.join(", ")}: takes ${percent(e.drop)} of the held-out squared error` + (span ? `, ${percent(e.drop_here)} of that here` : "")));
+      button.append(node("small", `joint ${e.joints.join(", ")}: takes ${percent(e.drop)} of the held-out squared error` + (span ? `, ${percent(e.drop_here)} of the error here` : "")));
       const bar = node("span", undefined, "bar"), fill = node("i");
       fill.style.width = 100 * Math.max(0, Math.min(1, share)) + "%";
       bar.append(fill); button.append(bar);
