@@ -14,6 +14,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from skidyn._bundled import bundled
 from skidyn._exceptions import SkidynError
 from skidyn._optional import import_optional
 from skidyn.explorer._session import Session
@@ -127,7 +128,9 @@ def page() -> str:
     """
     folder = files("skidyn.explorer").joinpath("static")
     text = folder.joinpath("explorer.html").read_text("utf-8")
-    for name in ("uPlot.css", "uPlot.js", "explorer.css", "explorer.js"):
+    for name in ("uPlot.css", "uPlot.js"):
+        text = text.replace(f"/*{name}*/", bundled(name))
+    for name in ("explorer.css", "explorer.js"):
         text = text.replace(f"/*{name}*/", folder.joinpath(name).read_text("utf-8"))
     return text
 

@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The plotting library uPlot as the pages carry it: one copy, its licence beside it."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+
+
+def bundled(name: str) -> str:
+    """Text of a file that skidyn ships for its pages.
+
+    Parameters
+    ----------
+    name : {"uPlot.js", "uPlot.css", "uPlot.LICENSE.txt"}
+        File in ``skidyn/static``.
+
+    Returns
+    -------
+    str
+    """
+    return files("skidyn").joinpath("static", name).read_text("utf-8")
