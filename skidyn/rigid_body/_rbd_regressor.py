@@ -215,7 +215,11 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
         signals = self._read(X)
         if self._smooths():
             signals = smooth_motion(signals).signals
-        signals = signals.with_(robot=self.robot_)
+        torque = self._torque(signals.with_(robot=self.robot_))
+        return torque[:, 0] if self._one_output else torque
+
+    def _torque(self, signals: Signals) -> Array:
+        """Torque of all joints; exporters call it with symbols in place of numbers."""
         torque = self.rigid_body_torque(signals.q, signals.dq, signals.ddq)
         # Effects on the transmission see the rigid body's torque; those on the sensor see the
         # model's, which includes the effects before them.
@@ -234,7 +238,7 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
             torque += own
             if term.kind not in _DRY:
                 smooth += own
-        return torque[:, 0] if self._one_output else torque
+        return torque
 
     def rigid_body_torque(self, q: Array, dq: Array, ddq: Array) -> Array:
         """Torque of the identified rigid body alone.
