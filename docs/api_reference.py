@@ -92,7 +92,7 @@ PAGES: tuple[Page, ...] = (
         "Least-squares evidence of trajectories: merged, left out, solved.",
         (
             Section("Classes", ("Evidence",)),
-            Section("Functions", ("evidence_from_parquet",)),
+            Section("Functions", ("evidence_from_motion", "evidence_from_parquet")),
         ),
     ),
     Page(

@@ -25,6 +25,7 @@ from skidyn.rigid_body._recursion import (
     trace_torque_regressor,
 )
 from skidyn.rigid_body._scalar import ScalarFunction
+from skidyn.rigid_body._tape import Scalar
 from skidyn.rigid_body._tree import KinematicTree
 
 if TYPE_CHECKING:
@@ -91,6 +92,14 @@ class Engine:
             )
         if kind == "torque_regressor":
             return trace_torque_regressor(self.tree, *options)
+        if kind == "regressor_columns":
+            gravity, columns, spare = options
+            whole = self.program("torque_regressor", gravity)
+            place = {column: i for i, column in enumerate(columns)}
+            wanted: dict[tuple[int, ...], Scalar] = {
+                (j, place[c]): x for (j, c), x in whole.outputs.items() if c in place
+            }
+            return Program(whole.tape, wanted, (whole.shape[0], len(columns) + spare))
         if kind == "mass_matrix":
             return trace_mass_matrix(self.canonical.tree, self._structure)
         return {"pose": trace_pose, "jacobian": trace_jacobian}[kind](self.tree, *options)
@@ -158,6 +167,17 @@ class Engine:
                 rows = slice(start, min(start + bound.chunk, n_samples))
                 size = bound.run(signals, rows)
                 yield rows, bound.outputs[..., :size]
+
+    def iter_regressor_columns(
+        self, signals: dict[str, np.ndarray], columns: tuple[int, ...], spare: int, chunk: int
+    ) -> Iterator[tuple[slice, np.ndarray]]:
+        """Some columns of the regressor chunk by chunk, followed by ``spare`` rows to be filled.
+
+        With the rows of the caller in the same block of memory as the columns, one product of
+        matrices serves both.
+        """
+        key = "regressor_columns", self.gravity_key(), columns, spare
+        yield from self.iter_chunks(signals, chunk, *key)
 
     def fixed_inverse_dynamics(
         self,

@@ -10,10 +10,11 @@ import numpy as np
 
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Array
-from skidyn.effects import get_effect
+from skidyn.effects import Term, get_effect
 from skidyn.evidence._evidence import Evidence
 from skidyn.evidence._streaming import linear_terms
 from skidyn.rigid_body._base_parameters import find_base_parameters
+from skidyn.rigid_body._consistency import make_consistent
 from skidyn.rigid_body._rbd_regressor import RBDRegressor
 from skidyn.robots import Robot
 
@@ -26,6 +27,7 @@ def regressor_from_evidence(
     evidence: Evidence,
     effects: Iterable[Any] = ("viscous", "coulomb"),
     *,
+    consistent: bool = False,
     feature_names: Sequence[str] | None = None,
 ) -> RBDRegressor:
     """Fitted regressor from evidence.
@@ -35,12 +37,17 @@ def regressor_from_evidence(
     robot : Robot
         The robot of the evidence.
     evidence : Evidence
-        From :func:`skidyn.evidence.evidence_from_parquet` with the same effects.
+        From :func:`skidyn.evidence.evidence_from_motion` or
+        :func:`skidyn.evidence.evidence_from_parquet`, with the same effects.
     effects : iterable of str, (str, joints) or Term, default=("viscous", "coulomb")
         Effects of the evidence.
+    consistent : bool, default=False
+        Demand bodies that can exist (positive definite pseudo-inertia) and coefficients without
+        forbidden signs.
     feature_names : sequence of str, optional
         Columns of the tables that will be predicted; by default
-        ``time, trajectory, q1..qn, dq1..dqn``. Accelerations are derived from the positions.
+        ``time, trajectory, q1..qn, dq1..dqn``. Accelerations that are not among them are derived
+        from the positions.
 
     Returns
     -------
@@ -83,7 +90,7 @@ def regressor_from_evidence(
     signal_names = [f"{s}{j + 1}" for s in ("q", "dq") for j in range(robot.n_joints)]
     names = ["time", "trajectory", *signal_names] if feature_names is None else list(feature_names)
 
-    model = RBDRegressor(robot, tuple(terms), smooth=True)
+    model = RBDRegressor(robot, tuple(terms), consistent=consistent)
     model.robot_ = robot
     model.feature_names_in_ = np.asarray(names, dtype=object)
     model.n_features_in_ = len(names)
@@ -92,6 +99,11 @@ def regressor_from_evidence(
     change = np.zeros(10 * robot.n_bodies)
     change[base.index] = coefficients[:n_rigid]
     model.inertial_parameters_ = robot.inertial_parameters + change.reshape(-1, 10)
+    if consistent:
+        model.inertial_parameters_, effect_coefficients = _consistent(
+            robot, evidence, terms, noise, coefficients[n_rigid:]
+        )
+        coefficients = np.r_[coefficients[:n_rigid], effect_coefficients]
     model.effect_terms_ = terms
     at = n_rigid + np.cumsum([0, *widths])
     model.effect_coefficients_ = {
@@ -128,6 +140,21 @@ def weighted_solution(evidence: Evidence) -> tuple[Array, dict[int, float]]:
         noise = {j: s + 1e-100 for j, s in evidence.noise(coefficients).items()}
     assert noise is not None
     return coefficients, noise
+
+
+def _consistent(
+    robot: Robot, evidence: Evidence, terms: Sequence[Term], noise: dict[int, float], start: Array
+) -> tuple[Array, Array]:
+    """Bodies that can exist and coefficients of the right sign, closest to the evidence."""
+    base = find_base_parameters(robot)
+    weighted = [factor / noise[key[1]] for key, factor in evidence.factors.items()]
+    triangle: Array = np.asarray(np.linalg.qr(np.vstack(weighted), mode="r"))
+    rigid = triangle[:, : len(base.index)]
+    # Columns of dependent parameters are combinations of those of the base parameters.
+    factor = np.hstack([rigid @ base.regrouping, triangle[:, len(base.index) : -1]])
+    target = triangle[:, -1] + rigid @ base.values(robot.inertial_parameters)
+    signs = [c.sign for term in terms for c in get_effect(term.kind).coefficients]
+    return make_consistent(robot.inertial_parameters, factor, target, np.array(signs), start)
 
 
 def _jackknife(evidence: Evidence, noise: dict[int, float]) -> Array:
