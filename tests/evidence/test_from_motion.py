@@ -78,7 +78,7 @@ def test_nearly_dependent_columns_take_the_exact_path(monkeypatch):
     monkeypatch.setattr(_from_motion, "_add_triangle", lambda *a: (taken.append(1), add(*a))[1])
     evidence_from_motion(robot, q, dq, ddq, torque)
     assert not taken
-    small = 0.02 * q, 0.02 * dq, 0.02 * ddq  # every column is nearly constant
+    small = 0.005 * q, 0.005 * dq, 0.005 * ddq  # every column is nearly constant
     found = evidence_from_motion(robot, *small, torque, ("viscous",))
     assert taken
     exact = evidence_from_motion(robot, *small, torque, ("viscous",), method="qr")
