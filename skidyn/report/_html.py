@@ -3,16 +3,12 @@
 
 from __future__ import annotations
 
-import base64
-from importlib import resources
 from typing import Any
 
-import numpy as np
+from skidyn.report._figures import budget_bars, curve_figure, fall_figure, map_figure
+from skidyn.report._page import heat, packed, render_page
 
-from skidyn._optional import import_optional
-from skidyn.report._charts import budget_bars, curve_chart, fall_chart, map_chart
-
-_VERDICTS = {
+VERDICTS = {
     "complete": ("✓", "The model is complete"),
     "missing": ("!", "The model lacks a known effect"),
     "unknown": ("?", "The model lacks something without a name"),
@@ -30,8 +26,8 @@ def render_html(summary: dict[str, Any]) -> str:
     Returns
     -------
     html : str
-        A whole page that loads nothing from anywhere: styles, script, pictures and numbers are
-        inside. Every text of the summary is escaped.
+        A whole page that loads nothing from anywhere: styles, scripts, the plotting library and
+        numbers are inside. Every text of the summary is escaped.
 
     Raises
     ------
@@ -43,65 +39,31 @@ def render_html(summary: dict[str, Any]) -> str:
     >>> from skidyn.report import render_html, summarize
     >>> page = render_html(summarize(diagnosis))  # doctest: +SKIP
     """
-    jinja2 = import_optional("jinja2", extra="report")
-    # the safeguard against names of joints that hold markup; `tojson` does it inside the script
-    environment = jinja2.Environment(
-        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
-    )
-    environment.filters.update(
-        number=_number, percent=_percent, change=_change, chance=_chance, words=_words
-    )
-    markup = environment.from_string(_resource("page.html.jinja"))
-    report = summary["report"]
+    report, units = summary["report"], summary["units"]
     causes = _causes(summary["budget"])
-    mark, headline = _VERDICTS[report["verdict"]]
-    return str(
-        markup.render(
-            s=summary,
-            r=report,
-            mark=mark,
-            headline=headline,
-            css=_resource("page.css"),
-            js=_resource("page.js"),
-            heat=_heat(summary["error_map"]),
-            findings=[_finding(finding) for finding in summary["findings"]],
-            falls=_falls(report),
-            causes=causes,
-            budget=budget_bars(summary["budget"], causes),
-            plots=_plots(summary),
-            parts=_parts(summary),
-        )
+    mark, headline = VERDICTS[report["verdict"]]
+    figures: list[dict[str, Any]] = []
+    findings = [_finding(finding, units, figures) for finding in summary["findings"]]
+    falls = []
+    if findings:
+        for j, unit in enumerate(units):
+            errors = [step["rmse"][j] for step in report["history"]]
+            figures.append(fall_figure(errors, report["noise_floor"][j], unit))
+            falls.append(len(figures) - 1)
+    return render_page(
+        "diagnosis.html.jinja",
+        s=summary,
+        r=report,
+        mark=mark,
+        headline=headline,
+        heat=heat(summary["error_map"]),
+        findings=findings,
+        falls=falls,
+        causes=causes,
+        budget=budget_bars(summary["budget"], causes),
+        parts=_parts(summary),
+        numbers={"panels": _panels(summary), "figures": figures},
     )
-
-
-def _resource(name: str) -> str:
-    return resources.files("skidyn.report").joinpath(name).read_text(encoding="utf-8")
-
-
-def _number(value: Any) -> str:
-    """Three or four digits; a dash where there is no number."""
-    if value is None:
-        return "–"
-    return f"{value:.4g}" if isinstance(value, (int, float)) else str(value)
-
-
-def _percent(value: float | None) -> str:
-    return "–" if value is None else f"{100 * value:.0f} %"
-
-
-def _change(ratio: float) -> str:
-    """Relative change in per cent, with a sign only where something changed."""
-    rounded = round(100 * ratio)
-    return f"{rounded:+d} %".replace("-", "−") if rounded else "0 %"
-
-
-def _words(kind: str) -> str:
-    return "effect without a name" if kind == "unknown" else kind.replace("_", " ")
-
-
-def _chance(q_value: float | None) -> str:
-    """A q-value; digits far below what any model of the noise can promise are not shown."""
-    return "below 1e-15" if q_value is not None and q_value < 1e-15 else _number(q_value)
 
 
 def _parts(summary: dict[str, Any]) -> list[tuple[str, str]]:
@@ -115,22 +77,33 @@ def _parts(summary: dict[str, Any]) -> list[tuple[str, str]]:
     return [*parts, ("provenance", "Provenance")]
 
 
-def _heat(table: list[list[float | None]]) -> list[list[dict[str, Any]]]:
-    """Cells of the error map; the colour is the squared error relative to the joint's largest."""
-    rows = []
-    for row in table:
-        largest = max((v for v in row if v is not None), default=0.0) or 1.0
-        rows.append(
-            [
-                {"value": v, "depth": None if v is None else round((v / largest) ** 2, 2)}
-                for v in row
-            ]
-        )
-    return rows
+def _finding(
+    finding: dict[str, Any], units: list[str], figures: list[dict[str, Any]]
+) -> dict[str, Any]:
+    """A finding with one row per parameter and joint; its pictures are added to the figures."""
+    maps, charts = [], []
+    for table in finding["maps"]:
+        maps.append({**table, "figure": len(figures)})
+        figures.append(map_figure(table))
+    for curve in finding["curves"]:
+        charts.append({**curve, "figure": len(figures)})
+        figures.append(curve_figure(curve, units[curve["joint"] - 1]))
+    return {**finding, "rows": parameter_rows(finding), "charts": charts, "map_figures": maps}
 
 
-def _finding(finding: dict[str, Any]) -> dict[str, Any]:
-    """A finding with its pictures, and one row per parameter and joint."""
+def parameter_rows(finding: dict[str, Any]) -> list[dict[str, Any]]:
+    """One row per parameter and joint.
+
+    Parameters
+    ----------
+    finding : dict
+        One of ``summary["findings"]``.
+
+    Returns
+    -------
+    list of dict
+        ``name, joint, value, low, high, unit``; the joint is a dash for a common parameter.
+    """
     rows = []
     for name, p in finding["parameters"].items():
         several = isinstance(p["value"], list)
@@ -142,17 +115,7 @@ def _finding(finding: dict[str, Any]) -> dict[str, Any]:
                 {"name": name, "joint": joint, "value": value, "low": low, "high": high,
                  "unit": p["unit"]}
             )  # fmt: skip
-    charts = [{**curve, **curve_chart(curve)} for curve in finding["curves"]]
-    maps = [{**table, **map_chart(table)} for table in finding["maps"]]
-    return {**finding, "rows": rows, "charts": charts, "maps": maps}
-
-
-def _falls(report: dict[str, Any]) -> list[dict[str, Any]]:
-    history, floor = report["history"], report["noise_floor"]
-    return [
-        fall_chart([step["rmse"][j] or 0.0 for step in history], floor[j])
-        for j in range(len(report["joints"]))
-    ]
+    return rows
 
 
 def _causes(budget: list[dict[str, float]]) -> list[str]:
@@ -162,27 +125,40 @@ def _causes(budget: list[dict[str, float]]) -> list[str]:
     return [cause for cause in seen if cause not in last] + last
 
 
-def _plots(summary: dict[str, Any]) -> dict[str, Any]:
-    """What the script draws; numbers as base64 of 32-bit floats, a fifth of their size as text."""
-    joints = []
-    for j, trace in enumerate(summary["traces"]):
-        joints.append(
-            {
-                "name": summary["report"]["joints"][j],
-                "unit": summary["units"][j],
-                "breaks": trace["breaks"],
-                **{key: _packed(trace[key]) for key in ("time", "measured", "before", "after")},
-            }
-        )
-    starts = summary["traces"][0]["starts"]
-    end = max(trace["time"][-1] for trace in summary["traces"])
+def _panels(summary: dict[str, Any]) -> dict[str, Any]:
+    """Torque and residual over time for each joint."""
     found = [joint - 1 for finding in summary["findings"] for joint in finding["joints"]]
     failing = [failure["joint"] - 1 for failure in summary["failures"]]
-    # the first joints a reader wants to see
-    shown = list(dict.fromkeys(found + failing))[:2] or [0]
-    return {"joints": joints, "starts": starts, "end": end, "shown": shown, "added": bool(found)}
-
-
-def _packed(values: list[float | None]) -> str:
-    array = np.array([np.nan if v is None else v for v in values], dtype="<f4")
-    return base64.b64encode(array.tobytes()).decode("ascii")
+    torque = [
+        {"label": "measured", "colour": "measured", "of": [0, "measured"]},
+        {"label": "as given", "colour": "before", "dash": True, "of": [0, "before"]},
+    ]
+    residual = [{"label": "as given", "colour": "before", "of": [0, "measured", "before"]}]
+    keys = ["measured", "before"]
+    if found:
+        keys.append("after")
+        torque.append({"label": "with the findings", "colour": "after", "of": [0, "after"]})
+        residual.append(
+            {"label": "with the findings", "colour": "after", "of": [0, "measured", "after"]}
+        )
+    joints = []
+    for j, trace in enumerate(summary["traces"]):
+        unit = summary["units"][j]
+        table = {
+            "time": packed(trace["time"]),
+            "breaks": trace["breaks"],
+            "columns": {key: packed(trace[key]) for key in keys},
+        }
+        plots = [
+            {"label": f"torque in {unit}", "height": 210, "series": torque},
+            {"label": f"residual in {unit}", "height": 150, "series": residual},
+        ]
+        name = f"{j + 1} {summary['report']['joints'][j]}"
+        joints.append({"name": name, "unit": unit, "tables": [table], "plots": plots})
+    return {
+        "joints": joints,
+        "starts": summary["traces"][0]["starts"],
+        "end": max(trace["time"][-1] for trace in summary["traces"]),
+        # the first joints a reader wants to see
+        "shown": list(dict.fromkeys(found + failing))[:2] or [0],
+    }

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The page in a real browser: opens from disk without an error, zooms, shows values."""
 
+import json
 import shutil
 
 import pytest
 
-from skidyn.report import summarize, write_html
+from skidyn.report import summarize, write_html, write_json
 
 CHROMIUM = shutil.which("chromium")
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
@@ -73,50 +74,123 @@ def test_opens_and_draws(open_page, fakes, verdict):
     page = open_page(fakes.make_diagnosis(verdict, names))
     assert page.get_attribute("#verdict", "data-verdict") == verdict
     assert page.locator("canvas").count() >= 1
-    drawn = page.evaluate(
-        "() => { const c = document.querySelector('canvas');"
-        " const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;"
-        " return d.some((v) => v > 0); }"
+    blank = page.evaluate(
+        "() => [...document.querySelectorAll('canvas')].filter((c) =>"
+        " !c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some((v) => v > 0)).length"
     )
-    assert drawn
+    assert blank == 0
     assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
+
+
+def over(page, number=0):
+    """Place of the curves of a plot: x, y, width, height."""
+    place = page.locator("#panels .u-over").nth(number)
+    place.scroll_into_view_if_needed()
+    box = place.bounding_box()
+    return box["x"], box["y"], box["width"], box["height"]
+
+
+def legend(page, place="#panels"):
+    """What the legends say: name to value."""
+    rows = page.locator(f"{place} .u-series").all()
+    return [(r.locator(".u-label").inner_text(), r.locator(".u-value").inner_text()) for r in rows]
+
+
+def value(text):
+    return float(text.split()[0].replace("−", "-"))
 
 
 def test_dragging_zooms_all_joints_and_double_click_goes_back(open_page, fakes):
     page = open_page(fakes.make_diagnosis())
     for tick in page.locator("fieldset input").all():
         tick.check()
-    assert page.locator("canvas").count() == 3
+    assert page.locator("#panels canvas").count() == 6
     whole = view(page)
-    box = page.locator("canvas").first.bounding_box()
-    left, wide = box["x"] + 58, box["width"] - 68
-    page.mouse.move(left + 0.25 * wide, box["y"] + 50)
+    x, y, width, _ = over(page)
+    page.mouse.move(x + 0.25 * width, y + 50)
     page.mouse.down()
-    page.mouse.move(left + 0.5 * wide, box["y"] + 50)
+    page.mouse.move(x + 0.5 * width, y + 50)
     page.mouse.up()
     wait_for_view(page, 0.25 * whole[1], 0.5 * whole[1])
-    page.mouse.dblclick(left + 20, box["y"] + 50)
+    x, y, *_ = over(page, 3)
+    page.mouse.dblclick(x + 20, y + 50)
     wait_for_view(page, *whole)
 
 
-def test_keyboard_zooms_and_moves(open_page, fakes):
+def test_keyboard_zooms_moves_and_reads(open_page, fakes):
     page = open_page(fakes.make_diagnosis())
     whole = view(page)
-    page.locator("canvas").first.focus()
+    page.locator(".panel").first.focus()
     page.keyboard.press("+")
     wait_for_view(page, whole[1] / 4, 3 * whole[1] / 4)
     page.keyboard.press("ArrowRight")
     wait_for_view(page, 0.35 * whole[1], 0.85 * whole[1])
     page.keyboard.press("0")
     wait_for_view(page, *whole)
+    page.keyboard.press("Shift+ArrowRight")
+    said = page.locator("#plots [role=status]").inner_text()
+    assert "in trajectory 1" in said and "with the findings" in said
 
 
-def test_hover_tells_values(open_page, fakes):
+def test_a_name_in_the_legend_hides_its_curve(open_page, fakes):
     page = open_page(fakes.make_diagnosis())
-    box = page.locator("canvas").first.bounding_box()
-    page.mouse.move(box["x"] + 300, box["y"] + 60)
-    text = page.locator(".tip").first.inner_text()
-    assert "in trajectory 0" in text and "measured" in text and "residual" in text
+    row = page.locator("#panels .u-series").nth(1)
+    row.locator("th").focus()
+    page.keyboard.press("Enter")
+    assert "u-off" in row.get_attribute("class")
+
+
+def test_hover_shows_the_numbers_of_the_summary(open_page, fakes):
+    diagnosis = fakes.make_diagnosis()
+    trace = summarize(diagnosis)["traces"][0]
+    page = open_page(diagnosis)
+    x, y, width, _ = over(page)
+    page.mouse.move(x + 0.4 * width, y + 60)
+    page.wait_for_function(
+        "document.querySelector('#panels .u-value').textContent.includes('s in')"
+    )
+    said = legend(page, ".panel:first-child")
+    time, trajectory = said[0][1].split(" s in trajectory ")
+    start = next(s["time"] for s in trace["starts"] if s["trajectory"] == int(trajectory))
+    k = min(range(len(trace["time"])), key=lambda i: abs(trace["time"][i] - start - float(time)))
+    shown = [value(text) for _, text in said[1:4]]
+    assert shown == pytest.approx([trace[key][k] for key in ("measured", "before", "after")], 1e-3)
+    residuals = [trace["measured"][k] - trace[key][k] for key in ("before", "after")]
+    assert [value(text) for _, text in said[5:7]] == pytest.approx(residuals, rel=1e-3, abs=1e-6)
+
+
+def test_the_cursor_of_one_joint_reads_all(open_page, fakes):
+    page = open_page(fakes.make_diagnosis())
+    x, y, width, _ = over(page)
+    page.mouse.move(x + 0.4 * width, y + 60)
+    page.wait_for_function(
+        "[...document.querySelectorAll('#panels .u-value')].every((v) => v.textContent !== '–')"
+    )
+
+
+def test_pictures_of_findings_show_values(open_page, fakes):
+    diagnosis = fakes.make_diagnosis()
+    curve = summarize(diagnosis)["findings"][0]["curves"][0]
+    page = open_page(diagnosis)
+    picture = page.locator("[data-figure='0'] .u-over")
+    picture.scroll_into_view_if_needed()
+    box = picture.bounding_box()
+    page.mouse.move(box["x"] + 0.7 * box["width"], box["y"] + 40)
+    said = legend(page, "[data-figure='0']")
+    x, residual, effect = (value(text) for _, text in (said[0], said[3], said[4]))
+    k = min(range(len(curve["x"])), key=lambda i: abs(curve["x"][i] - x))
+    shown = [residual, effect]
+    assert shown == pytest.approx([curve[n][k] for n in ("measured", "effect")], rel=1e-3)
+
+
+def test_numbers_of_the_page_are_those_of_the_file(open_page, fakes, tmp_path):
+    diagnosis = fakes.make_diagnosis()
+    file = write_json(tmp_path / "report.json", diagnosis.to_dict())
+    written = json.loads(file.read_text())
+    page = open_page(diagnosis)
+    for key in ("before", "after"):
+        cells = page.locator(f"#errors [data-{key}]").all()
+        assert [float(c.get_attribute(f"data-{key}")) for c in cells] == written[f"rmse_{key}"]
 
 
 def test_dark_and_light(open_page, fakes):

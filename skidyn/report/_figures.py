@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The page's still pictures in numbers: what the script hands to the plotting library."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+Number = float | None
+
+
+def curve_figure(curve: dict[str, Any], unit: str) -> dict[str, Any]:
+    """Residual against a signal, with the effect's curve.
+
+    Parameters
+    ----------
+    curve : dict
+        ``x, effect, measured, low, high, variable, unit``, as in ``Finding.curves``.
+    unit : str
+        Unit of the residual.
+
+    Returns
+    -------
+    dict
+        Figure of the type ``"lines"``.
+    """
+    rows = [k for k, x in enumerate(curve["x"]) if x is not None]
+    column = {
+        key: [curve[key][k] for k in rows] for key in ("x", "effect", "measured", "low", "high")
+    }
+    return {
+        "type": "lines",
+        "x": column["x"],
+        "x_label": f"{curve['variable']} in {curve['unit']}",
+        "y_label": f"residual in {unit}",
+        "series": [
+            {"label": "residual", "colour": "measured", "style": "points",
+             **{key: column[name] for key, name in
+                (("values", "measured"), ("low", "low"), ("high", "high"))}},
+            {"label": "effect", "colour": "after", "style": "line", "values": column["effect"]},
+        ],
+    }  # fmt: skip
+
+
+def fall_figure(errors: Sequence[Number], floor: Number, unit: str) -> dict[str, Any]:
+    """Error of one joint falling step by step to its noise floor.
+
+    Parameters
+    ----------
+    errors : sequence of float or None
+        Held-out error of the first model and after every step.
+    floor : float or None
+        Noise floor.
+    unit : str
+        Unit of the error.
+
+    Returns
+    -------
+    dict
+        Figure of the type ``"bars"``.
+    """
+    return {"type": "bars", "values": list(errors), "floor": floor, "y_label": f"error in {unit}"}
+
+
+def map_figure(table: dict[str, Any]) -> dict[str, Any]:
+    """Residual over two variables.
+
+    Parameters
+    ----------
+    table : dict
+        ``x`` and ``y`` (edges), ``table``, ``variables``, ``units``, as from the maps of a finding.
+
+    Returns
+    -------
+    dict
+        Figure of the type ``"map"`` with the largest absolute value.
+    """
+    values = [abs(v) for row in table["table"] for v in row if v is not None]
+    (x, y) = (f"{v} in {u}" for v, u in zip(table["variables"], table["units"], strict=True))
+    return {
+        "type": "map", "x": table["x"], "y": table["y"], "table": table["table"],
+        "x_label": x, "y_label": y, "largest": max(values, default=0.0) or 1.0,
+    }  # fmt: skip
+
+
+def budget_bars(
+    budget: Sequence[dict[str, Number]], causes: Sequence[str]
+) -> list[list[dict[str, Any]]]:
+    """Stacked shares, one list of pieces per joint.
+
+    Parameters
+    ----------
+    budget : sequence of dict
+        Share of each joint's squared error by cause.
+    causes : sequence of str
+        Causes in the order of their colours.
+
+    Returns
+    -------
+    list of list of dict
+        ``cause``, ``index`` of its colour and ``share``; the shares of a joint add up to one.
+    """
+    rows = []
+    for shares in budget:
+        # a step can raise the error of a joint it does not serve: that is no share of it
+        positive = {cause: max(shares.get(cause) or 0.0, 0.0) for cause in causes}
+        total = sum(positive.values()) or 1.0
+        rows.append(
+            [
+                {"cause": cause, "index": k, "share": positive[cause] / total}
+                for k, cause in enumerate(causes)
+            ]
+        )
+    return rows

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the pages share: templates, filters, and everything a page carries inside itself."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterable
+from importlib import resources
+from typing import Any
+
+import numpy as np
+
+from skidyn._bundled import bundled
+from skidyn._optional import import_optional
+
+#: In this order: each script uses what the ones before it define.
+SCRIPTS = ("common.js", "figures.js", "panels.js")
+
+
+def render_page(template: str, **content: Any) -> str:
+    """Fill a template of ``skidyn/report/templates``; every text in it is escaped.
+
+    Parameters
+    ----------
+    template : str
+        Name of the template.
+    **content : object
+        Its variables; ``numbers`` is what the scripts draw.
+
+    Returns
+    -------
+    html : str
+        A page that loads nothing from anywhere: styles, scripts and numbers are inside.
+    """
+    jinja2 = import_optional("jinja2", extra="report")
+    # autoescape: the safeguard against names of joints that hold markup; inside the script
+    # `tojson` does it
+    environment = jinja2.Environment(
+        loader=jinja2.FunctionLoader(lambda name: _resource("templates", name)),
+        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined,
+    )  # fmt: skip
+    environment.filters.update(
+        number=number, percent=percent, change=change, chance=chance, words=words
+    )
+    return str(
+        environment.get_template(template).render(
+            css=bundled("uPlot.css") + _resource("static", "page.css"),
+            uplot=bundled("uPlot.js"),
+            licence=bundled("uPlot.LICENSE.txt"),
+            js="\n".join(_resource("static", name) for name in SCRIPTS),
+            **content,
+        )
+    )
+
+
+def _resource(folder: str, name: str) -> str:
+    return resources.files("skidyn.report").joinpath(folder, name).read_text(encoding="utf-8")
+
+
+def number(value: Any) -> str:
+    """Three or four digits; a dash where there is no number."""
+    if value is None:
+        return "–"
+    return f"{value:.4g}".replace("-", "−") if isinstance(value, (int, float)) else str(value)
+
+
+def percent(value: float | None) -> str:
+    """Share in whole per cent."""
+    return "–" if value is None else f"{100 * value:.0f} %"
+
+
+def change(ratio: float) -> str:
+    """Relative change in per cent, with a sign only where something changed."""
+    rounded = round(100 * ratio)
+    return f"{rounded:+d} %".replace("-", "−") if rounded else "0 %"
+
+
+def words(kind: str) -> str:
+    """Kind of the vocabulary as words."""
+    return "effect without a name" if kind == "unknown" else kind.replace("_", " ")
+
+
+def chance(q_value: float | None) -> str:
+    """A q-value; digits far below what any model of the noise can promise are not shown."""
+    return "below 1e-15" if q_value is not None and q_value < 1e-15 else number(q_value)
+
+
+def packed(values: Iterable[float | None]) -> str:
+    """Base64 of 32-bit floats, a fifth of their size as text; NaN where there is no number."""
+    array = np.array([np.nan if v is None else v for v in values], dtype="<f4")
+    return base64.b64encode(array.tobytes()).decode("ascii")
+
+
+def heat(table: list[list[float | None]]) -> list[list[dict[str, Any]]]:
+    """Cells of an error map; the colour is the squared error relative to the joint's largest.
+
+    Parameters
+    ----------
+    table : list of list of float or None
+        Errors by joint and regime.
+
+    Returns
+    -------
+    list of list of dict
+        ``value`` and ``depth`` between 0 and 1.
+    """
+    rows = []
+    for row in table:
+        largest = max((v for v in row if v is not None), default=0.0) or 1.0
+        rows.append(
+            [
+                {"value": v, "depth": None if v is None else round((v / largest) ** 2, 2)}
+                for v in row
+            ]
+        )
+    return rows

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What figures and panels share: numbers, colours of the theme, options of uPlot.
+"use strict";
+const common = (() => {
+  const root = document.documentElement;
+  const numbers = JSON.parse(document.getElementById("numbers").textContent);
+  const dark = window.matchMedia("(prefers-color-scheme: dark)");
+  const plots = [];  // every uPlot of the page, for the theme and for paper
+
+  const colour = (name) => getComputedStyle(root).getPropertyValue("--" + name).trim();
+  const digits = (value) => (value == null ? "–" : Number(value.toPrecision(4)).toString().replace("-", "−"));
+  const faint = (name, alpha) => {
+    const [r, g, b] = colour(name).match(/[0-9a-f]{2}/gi).map((part) => parseInt(part, 16));
+    return `rgb(${r} ${g} ${b} / ${alpha})`;
+  };
+
+  // Base64 of 32-bit floats; uPlot draws a gap at null.
+  function unpack(text) {
+    const raw = atob(text), bytes = new Uint8Array(raw.length);
+    for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
+    return Array.from(new Float32Array(bytes.buffer), (v) => (Number.isNaN(v) ? null : v));
+  }
+
+  // whole pixels: uPlot scales the digits before "px"
+  const FONT = '12px system-ui, "DejaVu Sans", sans-serif', LABEL = '13px system-ui, "DejaVu Sans", sans-serif';
+  const axis = (label, more = {}) => ({
+    label, font: FONT, labelFont: LABEL, labelSize: 20, labelGap: 0, stroke: () => colour("soft"),
+    grid: { stroke: () => colour("grid"), width: 1 }, ticks: { stroke: () => colour("line"), width: 1, size: 4 },
+    values: (u, splits) => splits.map((v) => (v == null ? "" : digits(v))), ...more,
+  });
+  const xAxis = (label, more) => axis(label, { size: 26, space: 70, ...more });
+  const yAxis = (label, more) => axis(label, { size: 48, space: 28, ...more });
+
+  // Markers take the colours of the theme by name: they are elements, not strokes of a canvas.
+  const legend = (colours) => ({
+    live: true, markers: { width: 2, stroke: (u, i) => `var(--${colours[i - 1]})`, fill: () => "transparent" },
+  });
+
+  // A name in the legend is a button: with the keyboard too.
+  function usable(u) {
+    u.root.querySelectorAll(".u-series").forEach((row, i) => {
+      const name = row.querySelector("th");
+      if (!i || !name) return;
+      name.tabIndex = 0;
+      name.setAttribute("role", "button");
+      name.title = "show or hide";
+      name.addEventListener("keydown", (event) => {
+        if (event.key !== "Enter" && event.key !== " ") return;
+        event.preventDefault(); event.stopPropagation(); name.click();
+      });
+    });
+  }
+
+  // A plot as wide as its place; `shape` gives the options for a width.
+  function plot(place, options, data) {
+    const width = () => Math.max(place.clientWidth, 200);
+    const u = new uPlot({ ...options, width: width() }, data, place);
+    usable(u);
+    plots.push(u);
+    u.fit = () => { if (width() !== u.width) u.setSize({ width: width(), height: options.height }); };
+    new ResizeObserver(u.fit).observe(place);
+    return u;
+  }
+  const redraw = () => plots.forEach((u) => u.redraw(false));
+
+  document.getElementById("theme").addEventListener("click", () => {
+    const now = root.dataset.theme || (dark.matches ? "dark" : "light");
+    root.dataset.theme = now === "dark" ? "light" : "dark";
+    redraw();
+  });
+  dark.addEventListener("change", redraw);
+  // Paper is white and narrow: styles switch by themselves, canvases must be drawn again.
+  const paper = window.matchMedia("print");
+  paper.addEventListener("change", () => { plots.forEach((u) => u.fit()); redraw(); });
+
+  return { numbers, colour, faint, digits, unpack, xAxis, yAxis, legend, plot };
+})();
