@@ -326,18 +326,13 @@ PAGES: tuple[Page, ...] = (
     ),
     Page(
         "skidyn.export",
-        "C, Python, URDF and MJCF of an identified model.",
+        "An identified model as a function in C, Python or ONNX, as URDF or as MJCF.",
         (
             Section(
-                "Functions",
-                (
-                    "c_source",
-                    "model_terms",
-                    "python_source",
-                    "write_mjcf",
-                    "write_urdf",
-                ),
+                "Files",
+                ("write_c", "write_mjcf", "write_onnx", "write_python", "write_urdf"),
             ),
+            Section("In memory", ("c_source", "python_source", "to_onnx")),
         ),
     ),
 )

@@ -77,7 +77,7 @@ _not_run = [
     for example, package in {
         "plot_mlflow": "mlflow",
         "plot_mujoco": "mujoco",
-        "plot_onnx_runtime": "onnxscript",
+        "plot_onnx_runtime": "onnxruntime",
         "plot_optuna": "optuna",
         "plot_pandas_polars": "polars",
         "plot_skops": "skops",

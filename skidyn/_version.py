@@ -17,7 +17,7 @@ _CORE = (
 )
 _OPTIONAL = (
     "matplotlib", "jinja2", "pandas", "polars", "pyarrow", "h5py", "mcap", "rosbags", "rich",
-    "onnx", "onnxscript", "skops", "pooch", "dask",
+    "onnx", "skops", "pooch", "dask",
 )  # fmt: skip
 
 

@@ -16,7 +16,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
-from skidyn.export import model_terms, write_mjcf
+from skidyn.export import write_mjcf
 from skidyn.rigid_body import RBDRegressor
 
 try:
@@ -29,10 +29,8 @@ log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=4, duration
 # only bodies that can exist: a simulator refuses negative masses
 model = RBDRegressor(log.robot, consistent=True).fit(log.X, log.y)
 file = Path(tempfile.mkdtemp()) / "arm.xml"
-terms, rest = model_terms(model)
-del terms["blur"]  # MJCF has no width of the sign function
-left_out = write_mjcf(log.robot, file, **terms, effects=rest)
-print("written:", ", ".join(terms), "- no field for:", ", ".join(left_out) or "nothing")
+left_out = write_mjcf(model, file)
+print("no field for:", ", ".join(left_out) or "nothing")
 
 # %%
 # MuJoCo's inverse dynamics at 300 rows of the log. Its joint forces hold damping and dry friction

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``skidyn export``: a fitted model as C, Python, URDF or MJCF."""
+"""``skidyn export``: a fitted model as C, Python, ONNX, URDF or MJCF."""
 
 from __future__ import annotations
 
@@ -9,61 +9,68 @@ from typing import Any
 
 from skidyn._commands._arguments import command, with_log
 from skidyn._commands._input import read_model_and_log
-from skidyn._commands._output import print_json, working, write_json
+from skidyn._commands._output import print_json, working
 from skidyn._exceptions import SkidynError
 
 DESCRIPTION = """\
 Fit a model to a log and write it for other tools.
 
-  skidyn export run1.csv --urdf robot.urdf --c model.c --python model.py --to-urdf new.urdf
+  skidyn export run1.csv --urdf robot.urdf --format c --out model.c
+  skidyn export run1.csv --urdf robot.urdf --format urdf,mjcf --consistent --out identified
 
-C and Python get a function of q, dq, ddq for feedforward, which needs no other package. What a
-format cannot hold (a URDF knows viscous and Coulomb friction only) is listed, and written to
-FILE.skidyn.json beside it.
+C, Python and ONNX get a function of q, dq, ddq for feedforward, which needs nothing of skidyn.
+Several formats at once get the name of --out with their own suffix. What a format cannot hold (a
+URDF knows viscous and Coulomb friction only) is listed, and written to FILE.skidyn.json beside it.
 """
+
+#: Suffix of the files of every format.
+SUFFIXES = {"c": ".c", "python": ".py", "onnx": ".onnx", "urdf": ".urdf", "mjcf": ".xml"}
 
 
 def add_parser(commands: Any) -> None:
     """Add the command to the parser."""
     parser = command(commands, "export", run, "write a fitted model for other tools", DESCRIPTION)
     with_log(parser)
+    parser.add_argument(
+        "--format",
+        required=True,
+        metavar="FORMAT",
+        help=f"{', '.join(SUFFIXES)}; several separated by commas",
+    )
+    parser.add_argument("--out", required=True, metavar="FILE", help="file to write")
     parser.add_argument("--consistent", action="store_true", help="only bodies that can exist")
-    parser.add_argument("--c", metavar="FILE", help="C function to write")
-    parser.add_argument("--python", metavar="FILE", help="Python module to write")
-    parser.add_argument("--to-urdf", metavar="FILE", help="URDF to write")
-    parser.add_argument("--to-mjcf", metavar="FILE", help="MJCF to write, for MuJoCo")
 
 
 def run(options: argparse.Namespace) -> None:
     """Run the command."""
     from skidyn import export
-    from skidyn.report._write import write_text
 
-    wanted = (options.c, options.python, options.to_urdf, options.to_mjcf)
-    if not any(wanted):
-        raise SkidynError("nothing to write: give --c, --python, --to-urdf or --to-mjcf")
+    files = _files(options.format, options.out)
     model, frame, tau = read_model_and_log(options)
     model.set_params(consistent=options.consistent)
     with working("Identifying", options):
         model.fit(frame, tau)
-    terms, rest = export.model_terms(model)
-    left: dict[str, list[str]] = {}
-    for path, source in ((options.c, export.c_source), (options.python, export.python_source)):
-        if path:
-            write_text(path, source(model.robot_, **terms))
-            left[path] = sorted(rest)
-    held = {k: v for k, v in terms.items() if k not in ("blur", "offset")}
-    other = rest | ({"offset": terms["offset"]} if "offset" in terms else {})
-    for path, write in ((options.to_urdf, export.write_urdf), (options.to_mjcf, export.write_mjcf)):
-        if path:
-            left[path] = list(write(model.robot_, path, **held, effects=other))
-    for path in (options.c, options.python):
-        if path and rest:
-            write_json(f"{path}.skidyn.json", rest)
+    left = {}
+    for form, path in files.items():
+        left[str(path.resolve())] = getattr(export, f"write_{form}")(model, path)
     if options.json:
-        print_json({str(Path(path).resolve()): names for path, names in left.items()})
+        print_json(left)
         return
-    for path, names in left.items():
-        print(f"written: {Path(path).resolve()}")
-        if names:
-            print(f"  not in it: {', '.join(names)}")
+    for name, effects in left.items():
+        print(f"written: {name}")
+        if effects:
+            print(f"  not in it, but in {name}.skidyn.json: {', '.join(effects)}")
+
+
+def _files(formats: str, out: str) -> dict[str, Path]:
+    """File of every format."""
+    wanted = [word.strip() for word in formats.split(",") if word.strip()]
+    unknown = [word for word in wanted if word not in SUFFIXES]
+    if unknown or not wanted:
+        what = repr(unknown[0]) if unknown else "empty"
+        raise SkidynError(f"--format is {what}; expected some of {', '.join(SUFFIXES)}")
+    path = Path(out)
+    if len(wanted) == 1:
+        return {wanted[0]: path}
+    stem = path.with_suffix("") if path.suffix in SUFFIXES.values() else path
+    return {word: stem.with_name(stem.name + SUFFIXES[word]) for word in wanted}

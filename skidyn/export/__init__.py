@@ -1,10 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Models out of skidyn: C and Python functions for feedforward, URDF and MJCF descriptions."""
+"""Models out of skidyn: functions in C, Python and ONNX, and descriptions in URDF and MJCF."""
 
-from skidyn.export._c import c_source
+from skidyn.export._c import c_source, write_c
 from skidyn.export._mjcf import write_mjcf
-from skidyn.export._model import model_terms
-from skidyn.export._python import python_source
+from skidyn.export._onnx import to_onnx, write_onnx
+from skidyn.export._python import python_source, write_python
 from skidyn.export._urdf import write_urdf
 
-__all__ = ["c_source", "model_terms", "python_source", "write_mjcf", "write_urdf"]
+__all__ = [
+    "c_source",
+    "python_source",
+    "to_onnx",
+    "write_c",
+    "write_mjcf",
+    "write_onnx",
+    "write_python",
+    "write_urdf",
+]

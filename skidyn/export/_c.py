@@ -1,27 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The rigid-body torque as a stand-alone C function."""
+"""A model as a stand-alone C function."""
 
 from __future__ import annotations
 
 import re
-from typing import Any
 
 from skidyn._exceptions import SkidynError
-from skidyn.export._bodies import joint_vector
-from skidyn.rigid_body._source import renumber, statements
+from skidyn.export._files import PathLike, write_files
+from skidyn.export._model import StaticModel, name_term, static_model
+from skidyn.rigid_body import RBDRegressor
+from skidyn.rigid_body._source import C, renumber, statements
 from skidyn.robots import Robot
-
-#: What the coefficient of each term is multiplied by.
-_FACTORS = {
-    "viscous": "dq[{j}]",
-    "coulomb": "((dq[{j}] > 0.0) - (dq[{j}] < 0.0))",
-    "rotor_inertia": "ddq[{j}]",
-    "offset": "1.0",
-}
 
 _TEMPLATE = """\
 /* Joint torques of a model of {robot}: {terms}. Written by skidyn.
- *
+ *{left}
  * Joints: {joints}.
  * q in rad or m, dq in rad/s or m/s, ddq in rad/s^2 or m/s^2; tau in N m, in N for sliding joints.
  * Needs the C standard library only; no memory is allocated and no state is kept.
@@ -35,35 +28,13 @@ void {name}(const double q[{n}], const double dq[{n}], const double ddq[{n}], do
 """
 
 
-def c_source(
-    robot: Robot,
-    *,
-    parameters: Any = None,
-    viscous: Any = None,
-    coulomb: Any = None,
-    rotor_inertia: Any = None,
-    offset: Any = None,
-    blur: Any = None,
-    name: str = "skidyn_inverse_dynamics",
-) -> str:
+def c_source(model: RBDRegressor | Robot, *, name: str = "skidyn_inverse_dynamics") -> str:
     """Text of a C function that computes the torques of one sample.
 
     Parameters
     ----------
-    robot : Robot
-        The robot.
-    parameters : array-like of shape (n_bodies, 10), default=None
-        Identified inertial parameters in place of those of the URDF; written into the text.
-    viscous, coulomb : array-like of shape (n_joints,), default=None
-        Friction ``viscous * dq + coulomb * sign(dq)``, N m s/rad (N s/m) and N m (N); ``sign(0)``
-        is 0. None is no friction.
-    rotor_inertia : array-like of shape (n_joints,), default=None
-        ``rotor_inertia * ddq``, kg m^2 (kg) on the joint side; None is none.
-    offset : array-like of shape (n_joints,), default=None
-        Constant torque, N m (N); None is none.
-    blur : array-like of shape (n_joints,), default=None
-        Speed in rad/s (m/s) below which Coulomb friction fades: ``tanh(dq / blur)`` in place of
-        ``sign(dq)``. None is the sign itself.
+    model : RBDRegressor or Robot
+        Fitted model, or a robot for the rigid bodies of its description.
     name : str, default="skidyn_inverse_dynamics"
         Name of the function ``void name(const double *q, const double *dq, const double *ddq,
         double *tau)``.
@@ -71,12 +42,13 @@ def c_source(
     Returns
     -------
     str
-        C99 text; compile with ``-lm``.
+        C99 text; compile with ``-lm``. Effects that are no function of q, dq and ddq are not in it;
+        a comment at the top names them.
 
     Raises
     ------
     SkidynError
-        The name is not a C identifier or the parameters do not fit the robot.
+        The name is not a C identifier, or the model is not fitted.
 
     Examples
     --------
@@ -85,29 +57,54 @@ def c_source(
     >>> print(c_source(load_planar_arm()).splitlines()[8])
     void skidyn_inverse_dynamics(const double q[2], const double dq[2], const double ddq[2], double tau[2])
     """  # noqa: E501
+    return _text(static_model(model), name)
+
+
+def write_c(
+    model: RBDRegressor | Robot, path: PathLike, *, name: str = "skidyn_inverse_dynamics"
+) -> tuple[str, ...]:
+    """Write the text of :func:`c_source`; what it does not hold goes to ``<path>.skidyn.json``.
+
+    Parameters
+    ----------
+    model : RBDRegressor or Robot
+        Fitted model, or a robot for the rigid bodies of its description.
+    path : path
+        File to write.
+    name : str, default="skidyn_inverse_dynamics"
+        Name of the function.
+
+    Returns
+    -------
+    tuple of str
+        Names of the effects that the file does not hold; empty if it holds everything.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from skidyn.datasets import load_planar_arm
+    >>> from skidyn.export import write_c
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_c(load_planar_arm(), pathlib.Path(folder) / "arm.c")
+    ()
+    """
+    static = static_model(model)
+    return write_files(path, _text(static, name), model, static.left)
+
+
+def _text(static: StaticModel, name: str) -> str:
     if not re.fullmatch(r"[A-Za-z_]\w*", name, flags=re.ASCII):
         raise SkidynError(f"name is {name!r}; expected a C identifier such as 'robot_torque'.")
-    program = robot.fixed_program(parameters)
-    lines, outputs = statements(program, prefix="const double ", suffix=";")
-    added = joint_terms(
-        robot, viscous=viscous, coulomb=coulomb, rotor_inertia=rotor_inertia, offset=offset
-    )
-    factors = dict(_FACTORS)
-    widths = None if blur is None else joint_vector(robot, blur, "blur", None).tolist()
-    if widths is not None:
-        factors["coulomb"] = "tanh(dq[{j}] / {width})"
-    for (j,), value in outputs.items():
-        width = None if widths is None else widths[j]
-        summands = [
-            f"{values[j]!r} * {factors[term].format(j=j, width=width)}"
-            for term, values in added.items()
-        ]
-        lines.append(f"tau[{j}] = {' + '.join([value, *summands])};")
+    robot = static.robot
+    lines, outputs = statements(static.program, prefix="const double ", suffix=";", language=C)
+    lines += [f"tau[{j}] = {value};" for (j,), value in outputs.items()]
     unused = [x for x in ("q", "dq", "ddq") if not re.search(rf"\b{x}\[", "\n".join(lines))]
     lines[:0] = [f"(void){x};" for x in unused]
+    left = "; ".join(name_term(robot, term) for term in static.left)
     return _TEMPLATE.format(
         robot=printable(robot.name),
-        terms=", ".join(["rigid bodies", *(name.replace("_", " ") for name in added)]),
+        terms=static.title,
+        left=f"\n * Not in it: {printable(left)}.\n *" if left else "",
         joints=printable(", ".join(robot.joint_names)),
         name=name,
         n=robot.n_joints,
@@ -115,15 +112,6 @@ def c_source(
     )
 
 
-def joint_terms(robot: Robot, **terms: Any) -> dict[str, list[float]]:
-    """Coefficients per joint of the terms that are given."""
-    return {
-        name: joint_vector(robot, values, name, None).tolist()
-        for name, values in terms.items()
-        if values is not None
-    }
-
-
 def printable(text: str) -> str:
     """Text that cannot end a comment, whatever a URDF calls its joints."""
-    return re.sub(r"[^\w ,.\-]", "_", text)
+    return re.sub(r"[^\w ,;.\-]", "_", text)

@@ -3,77 +3,66 @@
 
 from __future__ import annotations
 
-import os
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from skidyn._exceptions import SkidynError
-from skidyn.export._bodies import central_inertia, joint_vector, numbers, parameters_of, write_files
+from skidyn.export._bodies import central_inertia, described, numbers
+from skidyn.export._files import PathLike, write_files
+from skidyn.rigid_body import RBDRegressor
 from skidyn.robots import Robot
 
 #: MuJoCo refuses moving bodies with less mass (kg) or inertia (kg m^2).
 _SMALLEST = 1e-15
 
 
-def write_mjcf(
-    robot: Robot,
-    path: str | os.PathLike[str],
-    *,
-    parameters: Any = None,
-    viscous: Any = None,
-    coulomb: Any = None,
-    rotor_inertia: Any = None,
-    effects: Mapping[str, Any] | None = None,
-) -> tuple[str, ...]:
-    """Write an MJCF model with identified inertial parameters, friction and rotor inertia.
+def write_mjcf(model: RBDRegressor | Robot, path: PathLike) -> tuple[str, ...]:
+    """Write an MJCF model with the identified inertial parameters, friction and springs.
 
-    Friction becomes ``damping`` and ``frictionloss``, rotor inertia ``armature``; links fixed to a
-    body become sites, joints that mimic another are tied to it by an equality constraint. What MJCF
-    cannot hold goes to ``<path>.skidyn.json``.
+    Viscous and Coulomb friction become ``damping`` and ``frictionloss``, rotor inertia
+    ``armature``, a spring ``stiffness`` and ``springref``; links fixed to a body become sites,
+    joints that mimic another are tied to it by an equality constraint. What MJCF cannot hold goes
+    to ``<path>.skidyn.json``.
 
     Parameters
     ----------
-    robot : Robot
-        The robot.
+    model : RBDRegressor or Robot
+        Fitted model, or a robot as it is described. Identified by other means: a copy of the robot,
+        ``dataclasses.replace(robot, inertial_parameters=...)``.
     path : path
         File to write.
-    parameters : array-like of shape (n_bodies, 10), default=None
-        Inertial parameters in place of those of the robot.
-    viscous, coulomb : array-like of shape (n_joints,), default=None
-        Friction coefficients, N m s/rad (N s/m) and N m (N); None keeps those of the URDF.
-    rotor_inertia : array-like of shape (n_joints,), default=None
-        kg m^2 (kg) on the joint side; None is none.
-    effects : mapping of str to Any, default=None
-        Further parts of a model, such as ``{"torque_ripple": {...}}``; go to the side-car file.
 
     Returns
     -------
     tuple of str
-        Names of what the model does not hold; empty if it holds everything.
+        Names of the effects that the MJCF does not hold; empty if it holds everything.
 
     Raises
     ------
     SkidynError
-        A body has no positive mass, or an inertia that no distribution of mass has.
+        A body has no positive mass, or an inertia that no distribution of mass has; or the model is
+        not fitted.
 
     Examples
     --------
-    >>> import tempfile, pathlib
+    >>> import pathlib, tempfile
     >>> from skidyn.datasets import load_planar_arm
     >>> from skidyn.export import write_mjcf
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_mjcf(load_planar_arm(), pathlib.Path(folder) / "arm.xml", viscous=[0.1, 0.1])
+    ...     write_mjcf(load_planar_arm(), pathlib.Path(folder) / "arm.xml")
     ()
     """
-    values = parameters_of(robot, parameters)
+    own = described(model, ("viscous", "coulomb", "rotor_inertia", "spring"))
+    robot, values = own.robot, own.parameters
+    stiffness, torque = own.joints["spring"].T
     dynamics = {
-        "damping": joint_vector(robot, viscous, "viscous", robot.joint_dynamics["damping"]),
-        "frictionloss": joint_vector(robot, coulomb, "coulomb", robot.joint_dynamics["friction"]),
-        "armature": joint_vector(robot, rotor_inertia, "rotor_inertia", None),
+        "damping": own.joints["viscous"][:, 0],
+        "frictionloss": own.joints["coulomb"][:, 0],
+        "armature": own.joints["rotor_inertia"][:, 0],
+        "stiffness": stiffness,
+        "springref": -torque / np.where(stiffness > 0.0, stiffness, np.inf),
     }
     root = ElementTree.Element("mujoco", model=robot.name)
     # Angles as they are, inertias as they are: nothing is to be derived from shapes or rounded.
@@ -89,7 +78,7 @@ def write_mjcf(
     _add_ties(root, robot)
     ElementTree.indent(root)
     text = ElementTree.tostring(root, "unicode") + "\n"
-    return write_files(path, text, robot, dict(effects or {}))
+    return write_files(path, text, model, own.left)
 
 
 def _add_body(
@@ -110,7 +99,8 @@ def _add_body(
         raise SkidynError(
             f"Body {name!r} has the principal moments {', '.join(f'{m:.3g}' for m in moments)} kg "
             "m^2, which break the triangle inequality or vanish; MuJoCo refuses them. Identify "
-            "physically consistent parameters, RBDRegressor(..., consistent=True)."
+            "physically consistent parameters, RBDRegressor(..., consistent=True), on the command "
+            "line --consistent."
         )
     I = central.inertia
     ElementTree.SubElement(

@@ -1,73 +1,189 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What exporters need to know of a fitted model."""
+"""A fitted model as one list of operations on q, dq and ddq."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from skidyn._signals import SIGN_BLUR, Signals
+from skidyn._exceptions import SkidynError
+from skidyn._signals import Signals
+from skidyn.effects import Term, get_effect
+from skidyn.export._symbols import Instant, SymbolicRobot, symbols
+from skidyn.rigid_body import RBDRegressor
+from skidyn.rigid_body._numpy import BoundProgram, evaluate_rows
+from skidyn.rigid_body._recursion import Program
+from skidyn.rigid_body._tape import Scalar, Tape
+from skidyn.robots import Robot
 
-if TYPE_CHECKING:
-    from skidyn.rigid_body import RBDRegressor
-
-#: Effects that are one coefficient per joint times dq, sign(dq), ddq or 1.
-_HELD = ("viscous", "coulomb", "rotor_inertia", "offset")
+#: Samples at which what was written down is compared with the model, and what may differ, relative.
+_SAMPLES, _ROUNDING = 64, 1e-9
 
 
-def model_terms(model: RBDRegressor) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Arguments with which the exporters write a fitted model.
+@dataclass(frozen=True)
+class StaticModel:
+    """What of a model is a function of q, dq and ddq, and what is not.
 
-    Parameters
+    Attributes
     ----------
-    model : RBDRegressor
-        A fitted model.
-
-    Returns
-    -------
-    terms : dict
-        Keyword arguments of :func:`c_source` and :func:`python_source`: ``parameters``, ``blur``
-        and those of ``viscous``, ``coulomb``, ``rotor_inertia``, ``offset`` that the model has.
-    rest : dict
-        Effects that are none of these, by name, with their coefficients and shape: what the
-        exported function leaves out; to be passed as ``effects`` to :func:`write_urdf` and
-        :func:`write_mjcf`.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from skidyn.datasets import load_planar_arm
-    >>> from skidyn.export import model_terms, python_source
-    >>> from skidyn.rigid_body import RBDRegressor
-    >>> robot = load_planar_arm()
-    >>> q, dq, ddq = np.random.default_rng(0).normal(size=(3, 300, 2))
-    >>> tau = robot.inverse_dynamics(q, dq, ddq) + 0.3 * dq
-    >>> model = RBDRegressor(robot, effects=("viscous",)).fit(np.hstack([q, dq, ddq]), tau)
-    >>> terms, rest = model_terms(model)
-    >>> sorted(terms), rest
-    (['blur', 'parameters', 'viscous'], {})
-    >>> namespace = {}
-    >>> exec(python_source(robot, **terms), namespace)
-    >>> bool(np.allclose(namespace["inverse_dynamics"](q, dq, ddq), tau, atol=0.05))
-    True
+    robot : Robot
+        The robot.
+    program : Program
+        Torques of all joints.
+    held : list of Term
+        Effects in the program.
+    left : list of Term
+        Effects with a memory, or that depend on time, temperature or the recording.
     """
-    robot = model.robot_
-    sliding = np.array([kind == "prismatic" for kind in robot.joint_types])
-    zero = np.zeros((1, robot.n_joints))
-    at_rest = Signals(zero, zero, zero, np.zeros(1, dtype=int), prismatic=sliding)
-    terms: dict[str, Any] = {
-        "parameters": model.inertial_parameters_,
-        "blur": SIGN_BLUR * at_rest.unit,
+
+    robot: Robot
+    program: Program
+    held: list[Term]
+    left: list[Term]
+
+    @property
+    def title(self) -> str:
+        """What the model holds, in words."""
+        kinds = dict.fromkeys(term.kind for term in self.held)
+        return ", ".join(["rigid bodies", *(kind.replace("_", " ") for kind in kinds)])
+
+
+def static_model(model: RBDRegressor | Robot) -> StaticModel:
+    """Write down the part of a model that is a function of q, dq and ddq.
+
+    The model's own code is run on symbols, so that an effect needs no second description, one that
+    users registered included. Each effect is then compared with itself on random numbers.
+    """
+    if isinstance(model, Robot):
+        return StaticModel(model, _fixed(model, model.inertial_parameters), [], [])
+    check_model(model)
+    held = [term for term in model.effect_terms_ if _is_static(model, term)]
+    if not _agrees(model, held, _traced(model, held)):
+        # Another effect sees the torque of the bodies without the payload.
+        held = [term for term in held if not is_carried(term)]
+    left = [term for term in model.effect_terms_ if term not in held]
+    return StaticModel(model.robot_, _traced(model, held), held, left)
+
+
+def check_model(model: Any) -> None:
+    """Refuse what is neither a robot nor a fitted model of one."""
+    if isinstance(model, Robot):
+        return
+    if not isinstance(model, RBDRegressor):
+        raise SkidynError(
+            f"model is {type(model).__name__}; expected a fitted RBDRegressor, or a Robot for the "
+            "rigid bodies of its description."
+        )
+    if not hasattr(model, "effect_terms_"):
+        raise SkidynError("the model is not fitted; call its fit before exporting it.")
+
+
+def _fixed(robot: Robot, parameters: np.ndarray) -> Program:
+    return robot._engine.fixed_inverse_dynamics(parameters)
+
+
+def _with_terms(model: RBDRegressor, terms: Sequence[Term]) -> RBDRegressor:
+    """The model with some of its effects, and with a payload as part of the last body."""
+    part = copy.copy(model)
+    carried = [t for t in terms if is_carried(t)]
+    part.effect_terms_ = [t for t in terms if t not in carried]
+    parameters = model.inertial_parameters_.copy()
+    for term in carried:
+        parameters[-1] += model.effect_coefficients_[term]
+    part.inertial_parameters_ = parameters
+    return part
+
+
+def is_carried(term: Term) -> bool:
+    """Whether a term is a payload that is always there."""
+    return term.kind == "payload" and term.shape.get("trajectories") is None
+
+
+def _traced(model: RBDRegressor, terms: Sequence[Term]) -> Program:
+    tape, n = Tape(), model.robot_.n_joints
+    robot: Any = SymbolicRobot(model.robot_, tape)
+    part = _with_terms(model, terms)
+    part.robot_ = robot
+    q, dq, ddq = (symbols(tape, name, n) for name in ("q", "dq", "ddq"))
+    instant = Instant(
+        q, dq, ddq, np.zeros(1, dtype=int), prismatic=_sliding(model.robot_), robot=robot
+    )
+    torque = part._torque(instant)[0]
+    outputs: dict[tuple[int, ...], Scalar] = {
+        (j,): tape.constant(0.0) + torque[j] for j in range(n)
     }
-    rest: dict[str, Any] = {}
-    for term, coefficients in model.effect_coefficients_.items():
-        if term.kind in _HELD and len(term.joints) == 1:
-            terms.setdefault(term.kind, np.zeros(robot.n_joints))[term.joints[0]] = coefficients[0]
-        else:
-            joints = [robot.joint_names[j] for j in term.joints]
-            rest[f"{term.kind} of {', '.join(joints)}"] = {
-                "coefficients": coefficients,
-                "shape": dict(term.shape),
-            }
-    return terms, rest
+    return Program(tape, outputs, (n,))
+
+
+def _is_static(model: RBDRegressor, term: Term) -> bool:
+    """Whether an effect can be written down, and then gives the torque that it gives."""
+    if {"trajectory", "trajectories"} & {k for k, v in term.shape.items() if v is not None}:
+        return False  # belongs to some of the recordings
+    try:
+        program = _traced(model, [term])
+    except Exception:  # whatever an effect says to symbols: it cannot be written down
+        return False
+    return _agrees(model, [term], program)
+
+
+def _agrees(model: RBDRegressor, terms: Sequence[Term], program: Program) -> bool:
+    """Whether a program gives the torque of the model with these effects, on random numbers."""
+    signals = _random_signals(model.robot_)
+    part = copy.copy(model)
+    part.effect_terms_ = list(terms)
+    expected = part._torque(signals)
+    given = {"q": signals.q, "dq": signals.dq, "ddq": signals.ddq}
+    bound = BoundProgram(program, _SAMPLES, np.dtype(float))
+    written = evaluate_rows(bound, given, _SAMPLES)
+    return bool(np.abs(written - expected).max() <= _ROUNDING * (1 + np.abs(expected).max()))
+
+
+def _random_signals(robot: Robot) -> Signals:
+    rng = np.random.default_rng(0)
+    q, dq, ddq = rng.normal(size=(3, _SAMPLES, robot.n_joints))
+    dq[::8] *= 1e-3  # where the direction of motion is blurred
+    return Signals(
+        q,
+        dq,
+        ddq,
+        np.zeros(_SAMPLES, dtype=int),
+        time=np.linspace(0.0, 1.0, _SAMPLES),
+        temperature=rng.uniform(20.0, 50.0, q.shape),
+        prismatic=_sliding(robot),
+        robot=robot,
+    )
+
+
+def _sliding(robot: Robot) -> np.ndarray:
+    return np.array([kind == "prismatic" for kind in robot.joint_types])
+
+
+def describe_term(model: RBDRegressor, term: Term) -> dict[str, Any]:
+    """An effect as plain data, complete: coefficients by name, with units."""
+    effect = get_effect(term.kind)
+    robot = model.robot_
+    prismatic = bool(_sliding(robot)[list(term.joints)].all())
+    turns = {c.name: c.unit for c in effect.coefficients}
+    units = {
+        name: unit.replace("N m", "N").replace("rad", "m") if prismatic else unit
+        for name, unit in turns.items()
+    }
+    values = model.effect_coefficients_[term]
+    return {
+        "kind": term.kind,
+        "joints": [robot.joint_names[j] for j in term.joints],
+        "coefficients": dict(zip(turns, map(float, values), strict=True)),
+        "units": units,
+        "shape": dict(term.shape),
+    }
+
+
+def name_term(robot: Robot, term: Term) -> str:
+    """An effect in words, such as ``"dahl of joint2"``."""
+    joints = [robot.joint_names[j] for j in term.joints]
+    where = "all joints" if len(joints) == robot.n_joints > 1 else ", ".join(joints)
+    return f"{term.kind} of {where}"

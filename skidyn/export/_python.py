@@ -1,32 +1,28 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The rigid-body torque as a Python function that needs NumPy only."""
+"""A model as a Python function that needs NumPy only."""
 
 from __future__ import annotations
 
 import keyword
-from typing import Any
+import re
 
 from skidyn._exceptions import SkidynError
-from skidyn.export._bodies import joint_vector
-from skidyn.export._c import joint_terms, printable
+from skidyn.export._c import printable
+from skidyn.export._files import PathLike, write_files
+from skidyn.export._model import StaticModel, name_term, static_model
+from skidyn.rigid_body import RBDRegressor
 from skidyn.rigid_body._scalar import python_function
 from skidyn.robots import Robot
 
-_SUMMANDS = {
-    "viscous": "VISCOUS * dq",
-    "coulomb": "COULOMB * np.sign(dq)",
-    "rotor_inertia": "ROTOR_INERTIA * ddq",
-    "offset": "OFFSET",
-}
+_FUNCTIONS = ("abs", "cos", "exp", "maximum", "sign", "sin", "sqrt", "tanh")
 
 _TEMPLATE = '''\
-"""Joint torques of a model of {robot}: {terms}. Written by skidyn."""
+"""Joint torques of a model of {robot}: {terms}.{left} Written by skidyn."""
 
 import numpy as np
-from numpy import cos, sin
-
+{functions}
 JOINTS = {joints!r}
-{constants}
+
 
 {columns}
 
@@ -37,52 +33,30 @@ def {name}(q, dq, ddq):
     """
     q, dq, ddq = (np.asarray(x, dtype=float) for x in (q, dq, ddq))
     columns = _columns(q.T, dq.T, ddq.T)
-    tau = np.stack([np.broadcast_to(column, q.shape[:1]) for column in columns], axis=-1)
-    return {total}
+    return np.stack([np.broadcast_to(column, q.shape[:1]) for column in columns], axis=-1)
 '''
 
 
-def python_source(
-    robot: Robot,
-    *,
-    parameters: Any = None,
-    viscous: Any = None,
-    coulomb: Any = None,
-    rotor_inertia: Any = None,
-    offset: Any = None,
-    blur: Any = None,
-    name: str = "inverse_dynamics",
-) -> str:
+def python_source(model: RBDRegressor | Robot, *, name: str = "inverse_dynamics") -> str:
     """Text of a Python module with one function, for feedforward without skidyn.
 
     Parameters
     ----------
-    robot : Robot
-        The robot.
-    parameters : array-like of shape (n_bodies, 10), default=None
-        Identified inertial parameters in place of those of the URDF; written into the text.
-    viscous, coulomb : array-like of shape (n_joints,), default=None
-        Friction ``viscous * dq + coulomb * sign(dq)``, N m s/rad (N s/m) and N m (N); ``sign(0)``
-        is 0. None is no friction.
-    rotor_inertia : array-like of shape (n_joints,), default=None
-        ``rotor_inertia * ddq``, kg m^2 (kg) on the joint side; None is none.
-    offset : array-like of shape (n_joints,), default=None
-        Constant torque, N m (N); None is none.
-    blur : array-like of shape (n_joints,), default=None
-        Speed in rad/s (m/s) below which Coulomb friction fades: ``tanh(dq / blur)`` in place of
-        ``sign(dq)``. None is the sign itself.
+    model : RBDRegressor or Robot
+        Fitted model, or a robot for the rigid bodies of its description.
     name : str, default="inverse_dynamics"
         Name of the function; it takes ``q, dq, ddq`` of shape (n_samples, n_joints).
 
     Returns
     -------
     str
-        Text of the module.
+        Text of the module. Effects that are no function of q, dq and ddq are not in it; its first
+        line names them.
 
     Raises
     ------
     SkidynError
-        The name is not a Python identifier or the parameters do not fit the robot.
+        The name is not a Python identifier, or the model is not fitted.
 
     Examples
     --------
@@ -93,24 +67,55 @@ def python_source(
     >>> namespace["inverse_dynamics"]([[0.5, 0.0]], [[0.0, 0.0]], [[0.0, 0.0]]).round(3)
     array([[5.737, 0.22 ]])
     """
+    return _text(static_model(model), name)
+
+
+def write_python(
+    model: RBDRegressor | Robot, path: PathLike, *, name: str = "inverse_dynamics"
+) -> tuple[str, ...]:
+    """Write the text of :func:`python_source`; what it lacks goes to ``<path>.skidyn.json``.
+
+    Parameters
+    ----------
+    model : RBDRegressor or Robot
+        Fitted model, or a robot for the rigid bodies of its description.
+    path : path
+        File to write.
+    name : str, default="inverse_dynamics"
+        Name of the function.
+
+    Returns
+    -------
+    tuple of str
+        Names of the effects that the file does not hold; empty if it holds everything.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from skidyn.datasets import load_planar_arm
+    >>> from skidyn.export import write_python
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_python(load_planar_arm(), pathlib.Path(folder) / "arm.py")
+    ()
+    """
+    static = static_model(model)
+    return write_files(path, _text(static, name), model, static.left)
+
+
+def _text(static: StaticModel, name: str) -> str:
     if not name.isidentifier() or keyword.iskeyword(name):
         raise SkidynError(f"name is {name!r}; expected a Python identifier such as 'torque'.")
-    added = joint_terms(
-        robot, viscous=viscous, coulomb=coulomb, rotor_inertia=rotor_inertia, offset=offset
-    )
-    constants, summands = dict(added), dict(_SUMMANDS)
-    if blur is not None:
-        constants["blur"] = joint_vector(robot, blur, "blur", None).tolist()
-        summands["coulomb"] = "COULOMB * np.tanh(dq / BLUR)"
+    robot = static.robot
+    columns = python_function(static.program, "_columns")
+    used = [f for f in _FUNCTIONS if re.search(rf"\b{f}\(", columns)]
+    left = "; ".join(name_term(robot, term) for term in static.left)
     return _TEMPLATE.format(
         robot=printable(robot.name),
-        terms=", ".join(["rigid bodies", *(name.replace("_", " ") for name in added)]),
-        constants="".join(
-            f"{key.upper()} = np.array({values})\n" for key, values in constants.items()
-        ),
-        total=" + ".join(["tau", *(summands[key] for key in added)]),
+        terms=static.title,
+        left=f" Not in it: {printable(left)}." if left else "",
+        functions=f"from numpy import {', '.join(used)}\n" if used else "",
         joints=robot.joint_names,
         name=name,
         n=robot.n_joints,
-        columns=python_function(robot.fixed_program(parameters), "_columns"),
+        columns=columns,
     )

@@ -3,28 +3,18 @@
 
 from __future__ import annotations
 
-import os
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
-from skidyn.export._bodies import central_inertia, joint_vector, numbers, parameters_of, write_files
+from skidyn.export._bodies import central_inertia, described, numbers
+from skidyn.export._files import PathLike, write_files
+from skidyn.rigid_body import RBDRegressor
 from skidyn.robots import Robot
 
 
-def write_urdf(
-    robot: Robot,
-    path: str | os.PathLike[str],
-    *,
-    parameters: Any = None,
-    viscous: Any = None,
-    coulomb: Any = None,
-    rotor_inertia: Any = None,
-    effects: Mapping[str, Any] | None = None,
-) -> tuple[str, ...]:
-    """Write a URDF with identified inertial parameters and friction.
+def write_urdf(model: RBDRegressor | Robot, path: PathLike) -> tuple[str, ...]:
+    """Write a URDF with the identified inertial parameters and friction.
 
     Links that are fixed to a moving body stay as frames without mass; their mass is in the body.
     Pictures and collision shapes are not written. A URDF holds viscous and Coulomb friction
@@ -32,56 +22,44 @@ def write_urdf(
 
     Parameters
     ----------
-    robot : Robot
-        The robot.
+    model : RBDRegressor or Robot
+        Fitted model, or a robot as it is described. Identified by other means: a copy of the robot,
+        ``dataclasses.replace(robot, inertial_parameters=...)``.
     path : path
         File to write.
-    parameters : array-like of shape (n_bodies, 10), default=None
-        Inertial parameters in place of those of the robot.
-    viscous, coulomb : array-like of shape (n_joints,), default=None
-        Friction coefficients, N m s/rad (N s/m) and N m (N); None keeps those of the URDF.
-    rotor_inertia : array-like of shape (n_joints,), default=None
-        kg m^2 (kg) on the joint side; goes to the side-car file.
-    effects : mapping of str to Any, default=None
-        Further parts of a model, such as ``{"torque_ripple": {...}}``; go to the side-car file.
 
     Returns
     -------
     tuple of str
-        Names of what the URDF does not hold; empty if it holds everything.
+        Names of the effects that the URDF does not hold; empty if it holds everything.
 
     Raises
     ------
     SkidynError
-        A body has no positive mass or no positive definite inertia.
+        A body has no positive mass or no positive definite inertia, or the model is not fitted.
 
     Examples
     --------
-    >>> import tempfile, pathlib
+    >>> import pathlib, tempfile
     >>> from skidyn.datasets import load_planar_arm
     >>> from skidyn.export import write_urdf
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = pathlib.Path(folder) / "arm.urdf"
-    ...     write_urdf(load_planar_arm(), path, rotor_inertia=[0.1, 0.05])
-    ('rotor_inertia',)
+    ...     write_urdf(load_planar_arm(), pathlib.Path(folder) / "arm.urdf")
+    ()
     """
-    values = parameters_of(robot, parameters)
-    damping = joint_vector(robot, viscous, "viscous", robot.joint_dynamics["damping"])
-    friction = joint_vector(robot, coulomb, "coulomb", robot.joint_dynamics["friction"])
+    own = described(model, ("viscous", "coulomb"))
+    robot = own.robot
     root = ElementTree.Element("robot", name=robot.name)
     for name, placement in robot.links.items():
         link = ElementTree.SubElement(root, "link", name=name)
         if placement.body >= 0 and robot.body_names[placement.body] == name:
-            _add_inertial(link, values[placement.body], name)
+            _add_inertial(link, own.parameters[placement.body], name)
     for body in range(robot.n_bodies):
-        _add_joint(root, robot, body, damping, friction)
+        _add_joint(root, robot, body, own.joints["viscous"][:, 0], own.joints["coulomb"][:, 0])
     _add_fixed_links(root, robot)
     ElementTree.indent(root)
     text = '<?xml version="1.0" encoding="utf-8"?>\n' + ElementTree.tostring(root, "unicode") + "\n"
-    not_held = dict(effects or {})
-    if rotor_inertia is not None:
-        not_held["rotor_inertia"] = joint_vector(robot, rotor_inertia, "rotor_inertia", None)
-    return write_files(path, text, robot, not_held)
+    return write_files(path, text, model, own.left)
 
 
 def _add_inertial(link: ElementTree.Element, parameters: np.ndarray, name: str) -> None:

@@ -20,7 +20,7 @@ import numpy as np
 
 from skidyn._exceptions import SkidynError
 from skidyn.rigid_body._recursion import Program
-from skidyn.rigid_body._source import renumber, statements
+from skidyn.rigid_body._source import C, renumber, statements
 from skidyn.rigid_body._tape import Scalar
 
 #: Samples that go through the loop body together: enough for every vector length, and their signals
@@ -142,7 +142,7 @@ def _lines(program: Program, given: dict[int, str], target: str) -> list[str]:
         return f"parameter[{position}]" if signal == "parameter" else f"{signal}[{position}][k]"
 
     lines, outputs = statements(
-        program, input_name=name, prefix="const double ", suffix=";", given=given
+        program, input_name=name, prefix="const double ", suffix=";", language=C, given=given
     )
     for key, value in outputs.items():
         where = f"{target}[{key[0]}][k]" if target == "result" else f"{target}[k]"

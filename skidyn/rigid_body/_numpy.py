@@ -27,6 +27,14 @@ _UFUNCS: dict[str, Callable[..., Any]] = {
     "neg": np.negative,
     "sin": np.sin,
     "cos": np.cos,
+    "tanh": np.tanh,
+    "exp": np.exp,
+    "sqrt": np.sqrt,
+    "abs": np.absolute,
+    "sign": np.sign,
+    "div": np.divide,
+    "max": lambda a, b, out: np.maximum(a, b, out=out),
+    "pow": np.power,
 }
 
 

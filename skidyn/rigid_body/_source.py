@@ -10,7 +10,22 @@ from types import MappingProxyType
 from skidyn.rigid_body._recursion import Program
 from skidyn.rigid_body._tape import operands
 
-_OPERATORS = {"add": "+", "sub": "-", "mul": "*"}
+#: How an operation is written; what is not listed is a function of the operation's name.
+PYTHON = {
+    "neg": "-{0}",
+    "add": "{0} + {1}",
+    "sub": "{0} - {1}",
+    "mul": "{0} * {1}",
+    "div": "{0} / {1}",
+    "pow": "{0} ** {1}",
+    "max": "maximum({0}, {1})",
+}
+C = PYTHON | {
+    "abs": "fabs({0})",
+    "sign": "({0} > 0.0) - ({0} < 0.0)",
+    "max": "fmax({0}, {1})",
+    "pow": "pow({0}, {1})",
+}
 
 #: Name of an input in the generated text, for example ``q[3]``.
 InputName = Callable[[str, int], str]
@@ -27,6 +42,7 @@ def statements(
     input_name: InputName = subscript,
     prefix: str = "",
     suffix: str = "",
+    language: Mapping[str, str] = MappingProxyType(PYTHON),
     given: Mapping[int, str] = MappingProxyType({}),
 ) -> tuple[list[str], dict[tuple[int, ...], str]]:
     """Assignments that compute the outputs, and the expression of every output.
@@ -38,6 +54,8 @@ def statements(
         Text of the input ``(name, position)``.
     prefix, suffix : str, default=""
         Written before and after every assignment, such as ``"double "`` and ``";"``.
+    language : mapping of str to str, default=PYTHON
+        How operations are written.
     given : mapping of int to str, default={}
         Expressions of nodes of the tape that are computed elsewhere.
 
@@ -63,12 +81,7 @@ def statements(
             names[index] = input_name(node[1], node[2])
             continue
         terms = [names[i] for i in operands(node)]
-        if node[0] == "neg":
-            text = f"-{terms[0]}"
-        elif node[0] in ("sin", "cos"):
-            text = f"{node[0]}({terms[0]})"
-        else:
-            text = f"{terms[0]} {_OPERATORS[node[0]]} {terms[1]}"
+        text = language.get(node[0], f"{node[0]}({{0}})").format(*terms)
         names[index] = f"v{index}"
         lines.append(f"{prefix}{names[index]} = {text}{suffix}")
     return lines, {key: names[scalar.index] for key, scalar in program.outputs.items()}

@@ -10,15 +10,26 @@ read (:meth:`Tape.live`). The back ends (NumPy, torch, Python text, C text) only
 from __future__ import annotations
 
 import math
-from collections.abc import Container, Hashable, Iterable
+from collections.abc import Callable, Container, Hashable, Iterable
 from typing import Any
 
 #: One entry of a tape: the operation and its operands. Operands are indices of earlier entries,
 #: except for ``("input", name, index)`` and ``("constant", value)``.
 Node = tuple[Any, ...]
 
-UNARY = frozenset({"neg", "sin", "cos"})
-BINARY = frozenset({"add", "sub", "mul"})
+#: Rigid bodies need the first line of each; effects, when a whole model is exported, the others.
+UNARY = frozenset({"neg", "sin", "cos", "tanh", "exp", "sqrt", "abs", "sign"})
+BINARY = frozenset({"add", "sub", "mul", "div", "max", "pow"})
+
+_CONSTANT: dict[str, Callable[[float], float]] = {
+    "sin": math.sin,
+    "cos": math.cos,
+    "tanh": math.tanh,
+    "exp": math.exp,
+    "sqrt": math.sqrt,
+    "abs": abs,
+    "sign": lambda x: float((x > 0) - (x < 0)),
+}
 
 
 class Tape:
@@ -166,14 +177,64 @@ class Scalar:
 
     __rmul__ = __mul__
 
+    def __truediv__(self, other: Scalar | float) -> Scalar:
+        other = self._other(other)
+        if other.value is not None:
+            return self * (1.0 / other.value)
+        return self.tape.record("div", self.index, other.index)
+
+    def __rtruediv__(self, other: float) -> Scalar:
+        return self._other(other) / self
+
+    def __pow__(self, exponent: float) -> Scalar:
+        exponent = float(exponent)
+        if self.value is not None:
+            return self.tape.constant(self.value**exponent)
+        if exponent in (1.0, 2.0):
+            return self if exponent == 1.0 else self * self
+        return self.tape.record("pow", self.index, self.tape.constant(exponent).index)
+
+    def __lt__(self, other: Scalar | float) -> bool:
+        values = self.value, self._other(other).value
+        if values[0] is None or values[1] is None:
+            raise TypeError("a branch that depends on the motion cannot be written down")
+        return values[0] < values[1]
+
+    def maximum(self, other: Scalar | float) -> Scalar:
+        """The larger of two numbers."""
+        other = self._other(other)
+        if self.value is not None and other.value is not None:
+            return self.tape.constant(max(self.value, other.value))
+        return self.tape.record("max", *sorted((self.index, other.index)))
+
+    def _function(self, name: str) -> Scalar:
+        if self.value is not None:
+            return self.tape.constant(_CONSTANT[name](self.value))
+        return self.tape.record(name, self.index)
+
+    def __abs__(self) -> Scalar:
+        return self._function("abs")
+
+    def sign(self) -> Scalar:
+        """-1, 0 or 1."""
+        return self._function("sign")
+
     def sin(self) -> Scalar:
         """Sine of an angle in rad."""
-        if self.value is not None:
-            return self.tape.constant(math.sin(self.value))
-        return self.tape.record("sin", self.index)
+        return self._function("sin")
 
     def cos(self) -> Scalar:
         """Cosine of an angle in rad."""
-        if self.value is not None:
-            return self.tape.constant(math.cos(self.value))
-        return self.tape.record("cos", self.index)
+        return self._function("cos")
+
+    def tanh(self) -> Scalar:
+        """Hyperbolic tangent."""
+        return self._function("tanh")
+
+    def exp(self) -> Scalar:
+        """Exponential function."""
+        return self._function("exp")
+
+    def sqrt(self) -> Scalar:
+        """Square root."""
+        return self._function("sqrt")

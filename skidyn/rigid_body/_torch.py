@@ -18,6 +18,7 @@ def evaluate(program: Program, inputs: dict[str, torch.Tensor]) -> torch.Tensor:
     Parameters
     ----------
     program : Program
+        Of a rigid body; the operations that only effects need are not among its functions.
     inputs : dict of str to Tensor
         Signals of shape (N, n); ``"parameter"`` has shape (n,).
 

@@ -8,6 +8,8 @@ natively.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -86,7 +88,8 @@ def test_what_mujoco_has_natively_is_named_and_sized(kind, tmp_path):
 
     field, size, name = NATIVE[kind]
     robot = load_planar_arm()
-    write_mjcf(robot, tmp_path / "arm.xml", viscous=[0.3, 0.3], coulomb=[0, 0])
+    friction = {"damping": np.array([0.3, 0.3]), "friction": np.zeros(2)}
+    write_mjcf(replace(robot, joint_dynamics=friction), tmp_path / "arm.xml")
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "arm.xml"))
     getattr(model, field)[1] += size
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT

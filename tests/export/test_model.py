@@ -1,46 +1,105 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Exported functions of a fitted model against its own predict."""
+"""Which effects are functions of q, dq and ddq, and what becomes of the others."""
 
-import ctypes
+import json
 
 import numpy as np
 import pytest
 
-from skidyn.datasets import load_scara
-from skidyn.export import c_source, model_terms, python_source
+from skidyn.datasets import load_planar_arm
+from skidyn.effects import Coefficient, Effect, Term, register_effect
+from skidyn.effects._catalogue import unregister_effect
+from skidyn.export import python_source, write_c, write_mjcf, write_onnx, write_python, write_urdf
+from skidyn.export._model import static_model
 from skidyn.rigid_body import RBDRegressor
-from skidyn.rigid_body._compiled import compile_library, find_compiler
+
+MEMORY = [
+    Term("dahl", (0,), {"presliding": 0.02}),
+    Term("maxwell_slip", (1,), {"presliding": 0.02}),
+    Term("offset", (0,), {"trajectory": 0}),
+]
 
 
-def fitted(*effects):
-    robot = load_scara()
-    q, dq, ddq = np.random.default_rng(0).normal(size=(3, 400, 4))
-    tau = robot.inverse_dynamics(q, dq, ddq) + 0.3 * dq + 0.2 * np.sign(dq) + 0.1 * ddq + 0.05
-    return RBDRegressor(robot, effects=effects).fit(np.hstack([q, dq, ddq]), tau)
+def test_static_effects_are_all_held(models):
+    for model in models.values():
+        assert static_model(model).left == []
 
 
-def test_exported_functions_equal_predict():
-    model = fitted("viscous", "coulomb", "offset")
-    terms, rest = model_terms(model)
-    assert rest == {}
-    q, dq, ddq = np.random.default_rng(1).normal(size=(3, 50, 4))
-    dq[:10] *= 1e-3  # where the direction of motion is blurred
-    expected = model.predict(np.hstack([q, dq, ddq]))
-    namespace = {}
-    exec(python_source(model.robot, **terms), namespace)
-    np.testing.assert_allclose(namespace["inverse_dynamics"](q, dq, ddq), expected, atol=1e-9)
-    if find_compiler() is None:
-        pytest.skip("no C compiler")
-    text = c_source(model.robot, **terms)
-    function = compile_library(text, ("-shared", "-fPIC")).skidyn_inverse_dynamics
-    for k in range(len(q)):
-        arrays = [np.ascontiguousarray(signal[k]) for signal in (q, dq, ddq)]
-        out = np.empty(4)
-        function(*(ctypes.c_void_p(a.ctypes.data) for a in (*arrays, out)))
-        np.testing.assert_allclose(out, expected[k], atol=1e-9)
+def test_what_no_function_holds_is_listed_and_complete_beside_every_file(fit, states, tmp_path):
+    pytest.importorskip("onnx", reason="needs skidyn[export]")
+    model = fit(load_planar_arm(), ["viscous", "offset", MEMORY[0]], consistent=True)
+    names = {"c": (), "python": (), "onnx": (), "urdf": ("offset",) * 2, "mjcf": ("offset",) * 2}
+    writers = {
+        "c": write_c, "python": write_python, "onnx": write_onnx,
+        "urdf": write_urdf, "mjcf": write_mjcf,
+    }  # fmt: skip
+    for form, write in writers.items():
+        left = write(model, tmp_path / f"arm.{form}")
+        assert [name.split()[0] for name in left] == [*names[form], "dahl"], form
+        beside = json.loads((tmp_path / f"arm.{form}.skidyn.json").read_text())
+        assert set(beside) == {"schema", "file", "joints", "not_held"}
+        assert beside["joints"] == ["joint1", "joint2"]
+        (dahl,) = (e for e in beside["not_held"] if e["kind"] == "dahl")
+        assert dahl["joints"] == ["joint1"] and dahl["units"] == {"F": "N m"}
+        assert dahl["coefficients"]["F"] == model.effect_coefficients_[MEMORY[0]][0]
+        assert dahl["shape"] == {"presliding": 0.02}
+    write_c(load_planar_arm(), tmp_path / "arm.c")
+    assert not (tmp_path / "arm.c.skidyn.json").exists()  # it would lie about the new file
 
 
-def test_effects_that_no_function_holds_are_handed_out():
-    terms, rest = model_terms(fitted("viscous", "asymmetric_friction"))
-    assert "viscous" in terms and "coulomb" not in terms
-    assert sorted(rest) == [f"asymmetric_friction of joint{j}" for j in (1, 2, 3, 4)]
+def test_the_function_is_the_model_without_what_is_left_out(fit, states):
+    robot = load_planar_arm()
+    model = fit(robot, ["viscous", *MEMORY])
+    text, namespace = python_source(model), {}
+    assert "Not in it: dahl of joint1; maxwell_slip of joint2; offset of joint1." in text
+    exec(text, namespace)
+    motion = states(robot)
+    for term in MEMORY:
+        model.effect_coefficients_[term] = 0.0 * model.effect_coefficients_[term]
+    expected = model.predict(np.hstack(motion))
+    np.testing.assert_allclose(namespace["inverse_dynamics"](*motion), expected, atol=1e-10)
+
+
+def test_effects_of_users_are_written_down_from_their_own_code(fit, states):
+    class Drag(Effect):
+        kind, title, formula = "drag", "Drag", "c dq abs(dq)"
+        coefficients = (Coefficient("c", "N m s^2/rad^2"),)
+
+        def columns(self, signals, joint, **shape):
+            dq = signals.dq[:, joint]
+            return (np.minimum(2.0, np.abs(dq)) * dq / (1.0 + dq**2) + np.sqrt(np.abs(dq)))[:, None]
+
+    class Batch(Drag):
+        kind = "batch"
+
+        def columns(self, signals, joint, **shape):
+            return (signals.dq[:, joint] - np.mean(signals.dq[:, joint]))[:, None]
+
+    register_effect(Drag)
+    register_effect(Batch)
+    try:
+        model = fit(load_planar_arm(), ["drag", ("batch", [1])])
+        static = static_model(model)
+        assert [t.kind for t in static.left] == ["batch"]  # depends on the other samples
+        namespace = {}
+        exec(python_source(model), namespace)
+        model.effect_coefficients_[static.left[0]] = np.zeros(1)
+        motion = states(model.robot_)
+        expected = model.predict(np.hstack(motion))
+        np.testing.assert_allclose(namespace["inverse_dynamics"](*motion), expected, atol=1e-10)
+    finally:
+        unregister_effect("drag")
+        unregister_effect("batch")
+
+
+def test_load_friction_without_the_load_leaves_the_payload_out(fit):
+    effects = ["load_dependent_friction", "payload"]
+    model = fit(load_planar_arm(), effects, parameters="nominal")
+    assert [t.kind for t in static_model(model).left] == ["payload"]
+
+
+def test_only_fitted_models_are_exported():
+    with pytest.raises(ValueError, match="not fitted"):
+        python_source(RBDRegressor(load_planar_arm()))
+    with pytest.raises(ValueError, match="model is dict; expected a fitted RBDRegressor"):
+        python_source({})

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Files of an exported model, and beside each what it does not hold."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from skidyn.effects import Term
+from skidyn.export._model import describe_term, name_term
+from skidyn.rigid_body import RBDRegressor
+from skidyn.robots import Robot
+
+PathLike = str | os.PathLike[str]
+
+#: Layout of the side-car file; the same for every format.
+SCHEMA = "skidyn.not_held/1"
+
+
+def write_files(
+    path: PathLike, content: str | bytes, model: RBDRegressor | Robot, left: Sequence[Term]
+) -> tuple[str, ...]:
+    """Write a file, each in one step, and ``<path>.skidyn.json`` with what it does not hold.
+
+    Returns
+    -------
+    tuple of str
+        Names of what the file does not hold. If it holds everything there is no side-car, and one
+        of an earlier export is removed.
+    """
+    from skidyn.report import write_json
+
+    _write(Path(path), content)
+    beside = Path(f"{os.fspath(path)}.skidyn.json")
+    if isinstance(model, Robot) or not left:
+        beside.unlink(missing_ok=True)
+        return ()
+    content_beside = {
+        "schema": SCHEMA,
+        "file": Path(path).name,
+        "joints": list(model.robot_.joint_names),
+        "not_held": [describe_term(model, term) for term in left],
+    }
+    write_json(beside, content_beside)
+    return tuple(name_term(model.robot_, term) for term in left)
+
+
+def _write(target: Path, content: str | bytes) -> None:
+    """Write a file in one step, so that an interrupted run leaves the previous one whole."""
+    data = content.encode() if isinstance(content, str) else content
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=target.parent, prefix=".skidyn-") as folder:
+        part = Path(folder, target.name)
+        part.write_bytes(data)
+        os.replace(part, target)
