@@ -151,13 +151,16 @@ PAGES: tuple[Page, ...] = (
     ),
     Page(
         "skidyn.report",
-        "A diagnosis as JSON and as one HTML page.",
+        "A diagnosis, or two compared, as JSON and as one HTML page.",
         (
             Section(
                 "Functions",
                 (
+                    "render_comparison",
                     "render_html",
                     "summarize",
+                    "summarize_comparison",
+                    "write_comparison",
                     "write_html",
                     "write_json",
                 ),

@@ -36,13 +36,14 @@ def with_log_only(parser: Any, urdf_required: bool = True) -> None:
     parser.add_argument("--rate", type=float, help="sampling rate in Hz of a log without time")
 
 
-def with_log(parser: Any) -> None:
+def with_log(parser: Any, urdf_required: bool = True) -> None:
     """Logs, robot and the model to start from."""
-    with_log_only(parser)
+    with_log_only(parser, urdf_required)
     parser.add_argument(
         "--model",
         default="rigid_body,viscous,coulomb",
-        help="what the model has, separated by commas (default: %(default)s)",
+        help="what the model has, separated by commas (default: %(default)s), or a model stored as "
+        "*.skops",
     )
     parser.add_argument(
         "--nominal",

@@ -1,14 +1,25 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``skidyn compare``: held-out errors by joint, trajectory and regime."""
+"""``skidyn compare``: a model with a log; or two models, or two recordings, with each other."""
 
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from skidyn._commands._arguments import command, with_log
-from skidyn._commands._input import read_model_and_log
-from skidyn._commands._output import print_comparison, print_json, print_regimes, run_diagnosis
+from skidyn._commands._input import read_model_and_log, recorded_options
+from skidyn._commands._output import (
+    print_comparison,
+    print_json,
+    print_regimes,
+    provenance,
+    run_diagnosis,
+)
+from skidyn._exceptions import SkidynError
+
+if TYPE_CHECKING:
+    from skidyn.diagnosis import Diagnosis
 
 DESCRIPTION = """\
 Compare a model with a log: the error on motion that the fit has not seen, by joint and trajectory,
@@ -16,6 +27,14 @@ and by regime (at rest, around reversals, slow, fast, loaded). Nothing is search
 
   skidyn compare run*.csv --urdf robot.urdf
   skidyn compare run*.csv --urdf robot.urdf --model rigid_body,viscous,coulomb,stribeck
+
+Compare two models, or two recordings, or two reports of skidyn diagnose, with each other: both are
+diagnosed, and their curves, errors, findings and coefficients come side by side, as a page and as
+JSON beside it.
+
+  skidyn compare run*.csv --urdf robot.urdf --against-model better.skops --html models.html
+  skidyn compare new*.csv --urdf robot.urdf --against worn*.csv --html wear.html
+  skidyn compare new.json worn.json --html wear.html
 """
 
 
@@ -24,13 +43,44 @@ def add_parser(commands: Any) -> None:
         commands,
         "compare",
         run,
-        "print the held-out error by joint, trajectory and regime",
+        "print held-out errors by joint, trajectory, regime; or compare two",
         DESCRIPTION,
     )
-    with_log(parser)
+    with_log(parser, urdf_required=False)
+    parser.add_argument("--against", nargs="+", metavar="LOG", help="the other recording")
+    parser.add_argument("--against-model", metavar="MODEL", help="the other model, as --model")
+    parser.add_argument("--names", metavar="A,B", help="what the two are called on the page")
+    parser.add_argument(
+        "--html", metavar="HTML", help="page of the two; its numbers as JSON beside"
+    )
 
 
 def run(options: argparse.Namespace) -> None:
+    pair = _pair(options)
+    if pair is None:
+        _compare_with_log(options)
+        return
+    from skidyn.report import summarize_comparison, write_comparison
+
+    names = options.names.split(",") if options.names else _names(options, pair)
+    diagnoses = [_diagnosed(side) for side in pair]
+    sources = [provenance(side) for side in pair]
+    summary = summarize_comparison(*diagnoses, names=names, provenance=sources)
+    files = write_comparison(options.html, summary) if options.html else ()
+    if options.json:
+        print_json(summary["report"])
+        return
+    _print_pair(summary)
+    for path in files:
+        print(f"written: {path.resolve()}")
+
+
+def _compare_with_log(options: argparse.Namespace) -> None:
+    if options.html or options.names:
+        raise SkidynError(
+            "--html and --names are for two: add --against, --against-model, or give two reports. "
+            "The page of one model and one log is made by skidyn diagnose --html"
+        )
     model, frame, tau = read_model_and_log(options)
     diagnosis = run_diagnosis(model, frame, tau, options, kinds=())
     comparison = diagnosis.comparison
@@ -39,3 +89,53 @@ def run(options: argparse.Namespace) -> None:
         return
     print_comparison(comparison)
     print_regimes(diagnosis)
+
+
+def _pair(options: argparse.Namespace) -> list[argparse.Namespace] | None:
+    """Options of either side; None where there is only one."""
+    reports = [name for name in options.logs if name.endswith(".json")]
+    if reports and not options.urdf:
+        if len(options.logs) != 2 or len(reports) != 2:
+            raise SkidynError("two reports of skidyn diagnose can be compared, no more and no less")
+        both = [argparse.Namespace(report=name, json=options.json) for name in reports]
+        return [recorded_options(side) for side in both]
+    if not options.urdf:
+        raise SkidynError("--urdf wants the description of the robot")
+    if not options.against and not options.against_model:
+        return None
+    other = {"logs": options.against or options.logs}
+    if options.against_model:
+        other["model"] = options.against_model
+    return [options, argparse.Namespace(**{**vars(options), **other})]
+
+
+def _names(options: argparse.Namespace, pair: list[argparse.Namespace]) -> list[str]:
+    """Names by what differs: models, or files."""
+    models = [side.model for side in pair]
+    if options.urdf and not options.against:
+        names = models
+    else:
+        of = options.logs if not options.urdf else [side.logs[0] for side in pair]
+        names = [Path(name).stem for name in of]
+    return names if names[0] != names[1] else ["first", "second"]
+
+
+def _diagnosed(options: argparse.Namespace) -> Diagnosis:
+    model, frame, tau = read_model_and_log(options)
+    return run_diagnosis(model, frame, tau, options)
+
+
+def _print_pair(summary: dict[str, Any]) -> None:
+    report = summary["report"]
+    (a, b), (first, second) = report["sides"], report["names"]
+    print(summary["sentence"])
+    print("held-out error on sliding samples (N m, N for sliders), as given and with the findings")
+    print(f"  A = {first}, B = {second}")
+    print(f"  {'':24s} {'A':>9s} {'B':>9s} {'A':>9s} {'B':>9s}")
+    for j, name in enumerate(report["joints"]):
+        row = (a["rmse_before"][j], b["rmse_before"][j], a["rmse_after"][j], b["rmse_after"][j])
+        print(f"  {name:24s} " + " ".join(f"{value:9.4g}" for value in row))
+    for finding in report["findings"]:
+        title = " or ".join(dict.fromkeys(filter(None, finding["titles"])))
+        where = "both" if len(finding["in"]) == 2 else f"only {finding['in'][0]}"
+        print(f"  joint {finding['joint']}: {title} ({where})")

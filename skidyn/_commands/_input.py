@@ -21,11 +21,14 @@ if TYPE_CHECKING:
 
 def read_model_and_log(options: argparse.Namespace) -> tuple[RBDRegressor, pd.DataFrame, Any]:
     """The model that the options describe, the log, and its torques."""
+    from skidyn._persistence import load_model
     from skidyn.rigid_body import RBDRegressor
 
     robot = read_robot(options)
     frame = read_frame(options, robot)
     tau = frame[[f"tau{j + 1}" for j in range(robot.n_joints)]].to_numpy()
+    if options.model.endswith(".skops"):
+        return load_model(options.model), frame, tau
     kinds = [kind.strip() for kind in options.model.split(",") if kind.strip()]
     if "rigid_body" not in kinds:
         raise SkidynError("--model must contain rigid_body; it may add kinds of the catalogue")

@@ -1,8 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reports: a diagnosis as a plain dictionary, and as one self-contained HTML page."""
+"""Reports: a diagnosis, or two compared, as plain dictionaries and as self-contained pages."""
 
+from skidyn.report._compare import summarize_comparison
+from skidyn.report._compare_html import render_comparison
 from skidyn.report._html import render_html
 from skidyn.report._summary import summarize
-from skidyn.report._write import write_html, write_json
+from skidyn.report._write import write_comparison, write_html, write_json
 
-__all__ = ["render_html", "summarize", "write_html", "write_json"]
+__all__ = [
+    "render_comparison",
+    "render_html",
+    "summarize",
+    "summarize_comparison",
+    "write_comparison",
+    "write_html",
+    "write_json",
+]

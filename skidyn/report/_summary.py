@@ -156,7 +156,7 @@ def _traces(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """Measured and modelled torque over time for each joint, trajectories laid end to end."""
     comparison, after = diagnosis.comparison, diagnosis.comparison_after
     signals = comparison.signals
-    clock, starts = _elapsed(signals)
+    clock, starts = elapsed(signals)
     traces = []
     for j in range(signals.n_joints):
         measured, before = comparison.measured[:, j], comparison.predicted[:, j]
@@ -180,7 +180,7 @@ def _traces(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     return traces
 
 
-def _elapsed(signals: Any) -> tuple[np.ndarray, list[dict[str, Any]]]:
+def elapsed(signals: Any) -> tuple[np.ndarray, list[dict[str, Any]]]:
     """Time in s that runs on over the borders of trajectories, and where each one starts."""
     clock = np.empty(signals.n_samples)
     starts: list[dict[str, Any]] = []

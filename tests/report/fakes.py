@@ -103,7 +103,7 @@ def make_diagnosis(verdict="missing", joint_names=("shoulder", "elbow", "slider"
         unexplained=unexplained, limits=limits, history=history, noise_floor=np.full(n, 0.2),
         rmse_before=np.array(history[0]["rmse"]), rmse_after=np.array(history[-1]["rmse"]),
         budget=[dict(share) for _ in range(n)], warnings=["one trajectory has 3 repeated rows"],
-        regimes=REGIMES,
+        regimes=REGIMES, base_model=None, data=(),
     )  # fmt: skip
     result.error_map = lambda after=False: error_map(
         result.comparison_after if after else result.comparison

@@ -63,8 +63,8 @@
 
   function clock(u, t) {
     if (t == null) return "–";
-    const part = starts.filter((s) => s.time <= t + 1e-6).pop() || starts[0];
-    return `${digits(t - part.time)} s in trajectory ${part.trajectory}`;
+    const part = starts.filter((s) => s.time <= t + 1e-6).pop();
+    return part ? `${digits(t - part.time)} s in trajectory ${part.trajectory}` : `${digits(t)} s`;
   }
 
   function draw(joint) {

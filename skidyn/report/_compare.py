@@ -1,0 +1,270 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Two diagnoses side by side, as a plain dictionary: two models of one log, or two recordings."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from skidyn._exceptions import SkidynError
+from skidyn._version import versions
+from skidyn.metrics import paired_comparison, trajectory_errors
+from skidyn.report._html import parameter_rows
+from skidyn.report._overlay import overlays, time_tables
+from skidyn.report._plain import plain
+from skidyn.report._summary import verdict_sentence
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from skidyn._signals import Array
+    from skidyn.diagnosis import Diagnosis, Finding
+
+#: Half the width of a 95 % interval in standard errors.
+NORMAL = 1.96
+
+
+def summarize_comparison(
+    first: Diagnosis,
+    second: Diagnosis,
+    *,
+    names: Sequence[str] = ("first", "second"),
+    title: str | None = None,
+    provenance: Sequence[Mapping[str, Any]] = ({}, {}),
+) -> dict[str, Any]:
+    """Compare two diagnoses: two models of one log, or one model on two recordings.
+
+    Parameters
+    ----------
+    first, second : Diagnosis
+        From :func:`skidyn.diagnosis.diagnose`, of robots with the same joints.
+    names : sequence of two str, default=("first", "second")
+        What the two are called.
+    title : str, optional
+        Heading of the page; the name of the robot by default.
+    provenance : sequence of two mappings, optional
+        Where the numbers of each come from. Versions are added.
+
+    Returns
+    -------
+    summary : dict
+        ``report`` is machine-readable (schema ``skidyn.comparison/1``): errors per joint and
+        regime, findings and coefficients of both with 95 % intervals; the rest is what the page
+        draws. Errors are in N m, N for sliding joints.
+
+    Raises
+    ------
+    SkidynError
+        The joints of the two differ, or there are not two different names.
+
+    Examples
+    --------
+    >>> from skidyn.report import summarize_comparison
+    >>> summary = summarize_comparison(new, worn, names=("new", "worn"))  # doctest: +SKIP
+    >>> summary["report"]["findings"]  # doctest: +SKIP
+    [{'kinds': ['coulomb'], 'joint': 2, 'in': ['worn'], ...}]
+    """
+    labels = [str(name) for name in names]
+    if len(labels) != 2 or labels[0] == labels[1]:
+        raise SkidynError(f"a comparison wants two different names, got {labels}")
+    both = (first, second)
+    if first.joint_names != second.joint_names:
+        raise SkidynError(
+            f"{labels[0]} has the joints {', '.join(first.joint_names)}, {labels[1]} has "
+            f"{', '.join(second.joint_names)}; only diagnoses of the same joints can be compared"
+        )
+    same = _same_log(first, second)
+    signals = first.comparison.signals
+    report = {
+        "schema": "skidyn.comparison/1",
+        "names": labels,
+        "joints": list(first.joint_names),
+        "units": ["N" if slides else "N m" for slides in signals.prismatic],
+        "same_log": same,
+        "regimes": list(first.regimes),
+        "sides": [
+            _side(d, name, source) for d, name, source in zip(both, labels, provenance, strict=True)
+        ],
+        "ratios": _ratios(first, second, same),
+        "findings": _findings(both, labels),
+        "coefficients": _coefficients(both, same),
+        "versions": {k: v for k, v in versions().items() if k != "executable"},
+    }
+    return plain(
+        {
+            "report": report,
+            "title": title or getattr(signals.robot, "name", "") or "Robot inverse dynamics",
+            "sentence": _sentence(report),
+            "overlays": overlays(both),
+            "times": time_tables(both, same),
+        }
+    )
+
+
+def _same_log(first: Diagnosis, second: Diagnosis) -> bool:
+    one, other = first.comparison, second.comparison
+    return one.measured.shape == other.measured.shape and np.array_equal(
+        one.measured, other.measured
+    )
+
+
+def _side(diagnosis: Diagnosis, name: str, provenance: Mapping[str, Any]) -> dict[str, Any]:
+    comparison = diagnosis.comparison
+    torque = np.sqrt(np.mean(comparison.measured**2, axis=0))
+    return {
+        "name": name,
+        "verdict": diagnosis.verdict,
+        "sentence": verdict_sentence(diagnosis),
+        "n_samples": comparison.signals.n_samples,
+        "n_trajectories": len(np.unique(comparison.signals.trajectory)),
+        "rms_torque": torque,
+        "rmse_before": diagnosis.rmse_before,
+        "rmse_after": diagnosis.rmse_after,
+        "noise_floor": diagnosis.noise_floor,
+        "error_map": diagnosis.error_map(),
+        "warnings": list(diagnosis.warnings),
+        "provenance": dict(provenance),
+    }
+
+
+def _ratios(first: Diagnosis, second: Diagnosis, same: bool) -> list[dict[str, Any]]:
+    """Error of the second over the first, as given; an interval where the log is the same."""
+    rows = []
+    for j in range(len(first.joint_names)):
+        before = first.rmse_before[j]
+        ratio = second.rmse_before[j] / before if before > 0 else np.nan
+        row = {"joint": j + 1, "ratio": ratio, "low": None, "high": None}
+        if same:
+            one, other = (_errors(d, j) for d in (first, second))
+            if len(one) > 1 and (one > 0).all() and (other > 0).all():
+                paired = paired_comparison(one[:, None], other[:, None])
+                row.update(ratio=paired.ratio, low=paired.low, high=paired.high)
+        rows.append(row)
+    return rows
+
+
+def _errors(diagnosis: Diagnosis, joint: int) -> Array:
+    """Mean squared error of every trajectory while the joint slides, (N m)^2 or N^2."""
+    c = diagnosis.comparison
+    use = c.sliding[:, joint]
+    _, errors = trajectory_errors(
+        c.measured[use, joint], c.predicted[use, joint], c.signals.trajectory[use]
+    )
+    return errors[:, 0]
+
+
+def _findings(both: Sequence[Diagnosis], names: Sequence[str]) -> list[dict[str, Any]]:
+    """One row per kind and joint, with the parameters each of the two gives it.
+
+    Kinds that one of the logs cannot tell apart share a row: two names, one effect.
+    """
+    rows: list[dict[str, Any]] = []
+    for side, (diagnosis, name) in enumerate(zip(both, names, strict=True)):
+        for finding in diagnosis.findings:
+            parameters = parameter_rows(plain(finding.to_dict()))
+            for joint in finding.joints:
+                row = _row(rows, finding, joint)
+                if name in row["in"]:
+                    continue
+                row["in"].append(name)
+                row["titles"][side] = finding.title
+                row["error_drop"][side] = finding.error_drop
+                row["parameters"][side] = [p for p in parameters if p["joint"] in (joint, "–")]
+    return sorted(rows, key=lambda row: (len(row["in"]), row["kinds"], row["joint"]))
+
+
+def _row(rows: list[dict[str, Any]], finding: Finding, joint: int) -> dict[str, Any]:
+    """The row of a finding on a joint; a new one where neither it nor a rival has one."""
+    for row in rows:
+        if row["joint"] != joint:
+            continue
+        if finding.kind in (*row["kinds"], *row["rivals"]) or set(row["kinds"]) & {*finding.rivals}:
+            row["kinds"] = list(dict.fromkeys([*row["kinds"], finding.kind]))
+            return row
+    rows.append(
+        {"kinds": [finding.kind], "rivals": list(finding.rivals), "joint": joint, "in": [],
+         "titles": [None, None], "error_drop": [None, None], "parameters": [[], []]}
+    )  # fmt: skip
+    return rows[-1]
+
+
+def _coefficients(both: Sequence[Diagnosis], same: bool) -> list[dict[str, Any]]:
+    """Coefficients of the models as given, fitted to all data, with 95 % intervals.
+
+    On two logs the estimates are independent, so that a difference can be judged.
+    """
+    tables = [_table(diagnosis) for diagnosis in both]
+    rows = []
+    for name in dict.fromkeys([*tables[0], *tables[1]]):
+        sides = [table.get(name) for table in tables]
+        known = [side for side in sides if side is not None]
+        differs = None
+        if len(known) == 2 and not same:
+            gap = known[0]["value"] - known[1]["value"]
+            differs = bool(abs(gap) > NORMAL * np.hypot(known[0]["std"], known[1]["std"]))
+        rows.append({"name": name, "sides": sides, "differs": differs})
+    # effects first: their names are short and their numbers mean something by themselves
+    return sorted(rows, key=lambda row: "[" not in row["name"])
+
+
+def _table(diagnosis: Diagnosis) -> dict[str, dict[str, float]]:
+    model = diagnosis.base_model
+    if not hasattr(model, "with_effects"):
+        return {}  # a regressor without physics has no coefficients to name
+    fitted = model.with_effects(()).fit(*diagnosis.data)
+    return {
+        row["name"]: {
+            "value": row["value"],
+            "std": row["std"],
+            "low": row["value"] - NORMAL * row["std"],
+            "high": row["value"] + NORMAL * row["std"],
+        }
+        for row in fitted.parameter_table()
+    }
+
+
+def _sentence(report: dict[str, Any]) -> str:
+    """The outcome in two or three sentences."""
+    first, second = (f"“{name}”" for name in report["names"])
+    ratios = np.array([row["ratio"] for row in report["ratios"]], dtype=float)
+    good = ratios[np.isfinite(ratios) & (ratios > 0)]
+    text = "The two are models of one log. " if report["same_log"] else "The two are two logs. "
+    if len(good):
+        mean = float(np.exp(np.log(good).mean()))
+        less = int((good < 1).sum())
+        text += (
+            f"As given, {second} has {_change(mean)} than {first} in the mean over joints, and the "
+            f"smaller one on {less} of {len(good)} joints. "
+        )
+    findings = report["findings"]
+    if not findings:
+        return text + "Nothing is found missing in either."
+    parts = []
+    for name in report["names"]:
+        own = [row for row in findings if row["in"] == [name]]
+        if own:
+            parts.append(f"only in “{name}”: {_listed(own)}")
+    if not parts:
+        return text + f"The same effects are missing in both: {_listed(findings)}."
+    shared = [row for row in findings if len(row["in"]) == 2]
+    if shared:
+        parts.append(f"in both: {_listed(shared)}")
+    return text + "Missing " + "; ".join(parts) + "."
+
+
+def _change(ratio: float) -> str:
+    if abs(ratio - 1) < 0.005:
+        return "no other held-out error"
+    return f"a held-out error {abs(ratio - 1):.0%} {'smaller' if ratio < 1 else 'larger'}"
+
+
+def _listed(rows: Sequence[dict[str, Any]]) -> str:
+    joints: dict[str, list[int]] = {}
+    for row in rows:
+        title = " or ".join(dict.fromkeys(filter(None, row["titles"])))
+        joints.setdefault(title, []).append(row["joint"])
+    return ", ".join(
+        f"{title} (joint{'s' if len(on) > 1 else ''} {', '.join(map(str, sorted(on)))})"
+        for title, on in joints.items()
+    )

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import json
+
+import pytest
+
+pandas = pytest.importorskip("pandas", reason="needs skidyn[io]")
+pytest.importorskip("jinja2", reason="needs skidyn[report]")
+
+from skidyn import cli, load_model, save_model  # noqa: E402
+from skidyn.rigid_body import RBDRegressor  # noqa: E402
+from skidyn.robots import Robot  # noqa: E402
+
+LOG = ("log.csv", "--urdf", "arm.urdf")
+
+
+@pytest.fixture
+def here(work, monkeypatch):
+    monkeypatch.chdir(work)
+    return work
+
+
+def test_two_models_of_one_log(here, run, tmp_path):
+    model = save_model(
+        tmp_path / "m.skops", RBDRegressor(Robot.from_urdf("arm.urdf"), ("viscous",))
+    )
+    assert load_model(model).effects == ("viscous",)
+    page = tmp_path / "models.html"
+    code, report = run(
+        "compare", *LOG, "--against-model", model, "--names", "usual,poor", "--html", page
+    )
+    assert code == cli.DONE
+    assert report == json.loads(page.with_suffix(".json").read_text("utf-8"))
+    assert report["same_log"] and report["names"] == ["usual", "poor"]
+    usual, poor = (side["rmse_before"] for side in report["sides"])
+    assert all(a < b for a, b in zip(usual, poor, strict=True))
+    assert {f["joint"] for f in report["findings"] if f["in"] == ["poor"]} == {1}
+
+
+def test_two_reports(here, capsys, tmp_path):
+    for name, joint in (("a", 1), ("b", 2)):
+        frame = pandas.read_csv("log.csv")
+        frame[f"tau{joint}"] *= 1.1
+        frame.to_csv(tmp_path / f"{name}.csv", index=False)
+        words = [str(tmp_path / f"{name}.csv"), *LOG[1:], "--effects", "offset"]
+        assert cli.main(["diagnose", *words, "--out", str(tmp_path / f"{name}.json")]) == cli.DONE
+    capsys.readouterr()
+    assert cli.main(["compare", str(tmp_path / "a.json"), str(tmp_path / "b.json")]) == cli.DONE
+    told = capsys.readouterr().out
+    assert "A = a, B = b" in told and "two logs" in told
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (["log.csv"], "--urdf wants"),
+        (["a.json"], "two reports"),
+        ([*LOG, "--html", "x.html"], "are for two"),
+    ],
+)
+def test_what_is_missing_is_said(here, capsys, words, complaint):
+    assert cli.main(["compare", *words]) == cli.BAD_INPUT
+    assert complaint in capsys.readouterr().err
