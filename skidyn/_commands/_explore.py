@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import Any
 
 from skidyn._commands._arguments import command, with_log
-from skidyn._commands._input import read_model_and_log
+from skidyn._commands._input import covered_joints, read_model_and_log, reading
 from skidyn._commands._output import working
 
 DESCRIPTION = """\
@@ -46,8 +47,11 @@ def run(options: argparse.Namespace) -> None:
     serve(
         session,
         options.folder,
-        logs=options.logs,
-        urdf=options.urdf,
+        # whole paths: the script is saved elsewhere and must find the files from anywhere
+        logs=[str(Path(log).resolve()) for log in options.logs],
+        urdf=str(Path(options.urdf).resolve()),
+        joints=covered_joints(options),
+        reading=reading(options),
         port=options.port,
         ready=ready,
     )

@@ -44,15 +44,22 @@ def read_frame(
     from skidyn.datasets import read_log
 
     with working("Reading", options):
-        return read_log(
-            list(options.logs),
-            robot=robot,
-            columns=json_option("columns", options.columns),
-            units=json_option("units", options.units),
-            drive_gains=json_option("drive-gains", getattr(options, "drive_gains", None)),
-            rate=options.rate,
-            check=check,
-        )
+        return read_log(list(options.logs), robot=robot, check=check, **reading(options))
+
+
+def reading(options: argparse.Namespace) -> dict[str, Any]:
+    """What the options say about how the log is to be read: arguments of ``read_log``."""
+    return {
+        "columns": json_option("columns", options.columns),
+        "units": json_option("units", options.units),
+        "drive_gains": json_option("drive-gains", getattr(options, "drive_gains", None)),
+        "rate": options.rate,
+    }
+
+
+def covered_joints(options: argparse.Namespace) -> list[str] | None:
+    """Joints of the robot that the log covers; None for all."""
+    return [name.strip() for name in options.joints.split(",")] if options.joints else None
 
 
 def read_robot(options: argparse.Namespace) -> Robot:
@@ -61,8 +68,7 @@ def read_robot(options: argparse.Namespace) -> Robot:
     path = Path(options.urdf)
     if not path.is_file():
         raise SkidynError(f"no file {options.urdf}; --urdf wants the description of the robot")
-    joints = options.joints.split(",") if options.joints else None
-    return Robot.from_urdf(path, joints=joints)
+    return Robot.from_urdf(path, joints=covered_joints(options))
 
 
 def embedded_robot(name: str) -> Robot:

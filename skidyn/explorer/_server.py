@@ -3,12 +3,12 @@
 
 from __future__ import annotations
 
-import html
+import asyncio
 import json
 import secrets
 import socket
-import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
 from importlib.resources import files
 from pathlib import Path
@@ -35,22 +35,32 @@ class Explorer:
         Files of the log, for the script.
     urdf : str
         Description of the robot, for the script.
+    joints : sequence of str, optional
+        Joints the log covers, for the script.
+    reading : mapping, optional
+        Further arguments with which the log was read, for the script.
     """
 
     def __init__(
-        self, session: Session, folder: Path, logs: Sequence[str] = (), urdf: str = "robot.urdf"
+        self,
+        session: Session,
+        folder: Path,
+        logs: Sequence[str] = (),
+        urdf: str = "robot.urdf",
+        joints: Sequence[str] | None = None,
+        reading: Mapping[str, Any] | None = None,
     ) -> None:
         self.session, self.folder = session, Path(folder)
         self.logs, self.urdf = list(logs) or ["log.csv"], urdf
+        self.joints, self.reading = joints, reading
         self.token = secrets.token_urlsafe(24)
-        self._lock = threading.Lock()
 
     def answer(self, question: str, words: dict[str, Any]) -> dict[str, Any]:
         """Answer a question of the page.
 
         Parameters
         ----------
-        question : {"state", "curves", "ranked", "add", "undo", "save"}
+        question : {"state", "curves", "ranked", "add", "refine", "undo", "save"}
             What is asked.
         words : dict
             Its arguments.
@@ -65,13 +75,13 @@ class Explorer:
             "curves": self._curves,
             "ranked": self._ranked,
             "add": self._add,
+            "refine": self._refine,
             "undo": self._undo,
             "save": self._save,
         }
         if question not in known:
             raise SkidynError(f"the explorer does not know {question!r}")
-        with self._lock:
-            return known[question](**words)
+        return known[question](**words)
 
     def _state(self) -> dict[str, Any]:
         s = self.session
@@ -81,25 +91,39 @@ class Explorer:
             "units": units,
             "trajectories": s.trajectories,
             "history": s.history,
+            "refinable": s.refinable,
         }
 
     def _curves(self, joint: int, trajectory: int) -> dict[str, Any]:
-        return self.session.curves(int(joint), int(trajectory))
+        return {
+            "torque": self.session.curves(int(joint), int(trajectory)),
+            "residual": self.session.residuals(int(joint), int(trajectory)),
+        }
 
     def _ranked(
-        self, joint: int, trajectory: int | None = None, span: list[float] | None = None
+        self, joint: int, trajectory: int | None = None, time: float | None = None
     ) -> dict[str, Any]:
-        chosen = None if span is None else (float(span[0]), float(span[1]))
-        effects = self.session.ranked(int(joint), trajectory, chosen)
-        return {"effects": [asdict(e) for e in effects]}
+        span = None
+        if time is not None and trajectory is not None:
+            span = self.session.stretch(int(joint), int(trajectory), float(time))
+        effects = self.session.ranked(int(joint), trajectory, span)
+        return {"effects": [asdict(e) for e in effects], "span": span}
 
-    def _add(self, kind: str, joint: int) -> dict[str, Any]:
-        self.session.add(str(kind), int(joint))
-        return self._state()
+    def _add(self, kind: str, joint: int, trajectory: int) -> dict[str, Any]:
+        """First answer, at once: the shape is that of the grid until the page asks to refine."""
+        self.session.add(str(kind), int(joint), refined=False)
+        return self._changed(joint, trajectory)
 
-    def _undo(self) -> dict[str, Any]:
+    def _refine(self, joint: int, trajectory: int) -> dict[str, Any]:
+        self.session.refine()
+        return self._changed(joint, trajectory)
+
+    def _undo(self, joint: int, trajectory: int) -> dict[str, Any]:
         self.session.undo()
-        return self._state()
+        return self._changed(joint, trajectory)
+
+    def _changed(self, joint: int, trajectory: int) -> dict[str, Any]:
+        return {**self._state(), "curves": self._curves(joint, trajectory)}
 
     def _save(self) -> dict[str, Any]:
         """Model, report and script, under fixed names in the folder chosen at the start."""
@@ -108,12 +132,13 @@ class Explorer:
         from skidyn.report import summarize, write_html
         from skidyn.report._write import write_text
 
+        self.session.refine()
         self.folder.mkdir(parents=True, exist_ok=True)
         model = self.session.fitted_model()
         saved = [str(save_model(self.folder / "model.skops", model))]
         diagnosis = diagnose(model, *self.session.data)  # says what is missing still
         saved.append(str(write_html(self.folder / "report.html", summarize(diagnosis))))
-        text = self.session.script(self.logs, self.urdf)
+        text = self.session.script(self.logs, self.urdf, joints=self.joints, reading=self.reading)
         saved.append(str(write_text(self.folder / "explored.py", text)))
         return {"saved": saved}
 
@@ -151,11 +176,12 @@ def make_app(explorer: Explorer, port: int) -> Any:
     """
     import_optional("starlette", extra="explore")
     from starlette.applications import Starlette
-    from starlette.concurrency import run_in_threadpool
     from starlette.requests import Request
     from starlette.responses import HTMLResponse, JSONResponse, Response
     from starlette.routing import Route
 
+    # one thread: one answer at a time, and the rigid body's buffers, kept per thread, stay warm
+    worker = ThreadPoolExecutor(1, "skidyn-explore")
     hosts = {f"{HOST}:{port}", f"localhost:{port}"}
     headers = {
         "Cache-Control": "no-store",
@@ -181,9 +207,10 @@ def make_app(explorer: Explorer, port: int) -> Any:
             if not isinstance(words, dict):
                 raise SkidynError("an object is expected")
             question = request.path_params["question"]
-            content = await run_in_threadpool(explorer.answer, question, words)
+            loop = asyncio.get_running_loop()
+            content = await loop.run_in_executor(worker, explorer.answer, question, words)
         except (SkidynError, LookupError, OSError, TypeError, ValueError) as error:
-            return JSONResponse({"error": html.escape(str(error))}, 400, headers=headers)
+            return JSONResponse({"error": str(error)}, 400, headers=headers)
         return JSONResponse(content, headers=headers)
 
     routes = [Route("/", start), Route("/api/{question}", api, methods=["POST"])]
@@ -196,6 +223,8 @@ def serve(
     *,
     logs: Sequence[str] = (),
     urdf: str = "robot.urdf",
+    joints: Sequence[str] | None = None,
+    reading: Mapping[str, Any] | None = None,
     port: int = 0,
     ready: Callable[[str], None] = print,
 ) -> None:
@@ -211,6 +240,10 @@ def serve(
         Files of the log, for the script.
     urdf : str, default="robot.urdf"
         Description of the robot, for the script.
+    joints : sequence of str, optional
+        Joints the log covers, for the script.
+    reading : mapping, optional
+        Further arguments with which :func:`skidyn.datasets.read_log` read the log, for the script.
     port : int, default=0
         Port; a free one if 0.
     ready : callable, default=print
@@ -227,7 +260,7 @@ def serve(
     http://127.0.0.1:54321/?token=...
     """
     uvicorn = import_optional("uvicorn", extra="explore")
-    explorer = Explorer(session, Path(folder), logs, urdf)
+    explorer = Explorer(session, Path(folder), logs, urdf, joints, reading)
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     listener.bind((HOST, port))

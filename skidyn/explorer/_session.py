@@ -3,25 +3,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skidyn._exceptions import EffectError
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate, catalogue_candidates
-from skidyn.diagnosis._profile import profile_error, refine
+from skidyn.diagnosis._diagnosis import _own_terms
+from skidyn.diagnosis._profile import refine
 from skidyn.diagnosis._reading import read_signals
-from skidyn.diagnosis._screen import Screen
-from skidyn.effects import Term, get_effect, list_effects, make_terms
+from skidyn.effects import Term, get_effect, list_effects
 from skidyn.evidence._problem import Fit, make_problem
+from skidyn.explorer._ranking import FoldedModel, HeldOutRows, Ranking
+from skidyn.explorer._samples import Samples
+from skidyn.explorer._script import script
 from skidyn.report._decimate import rows_with_peaks
 from skidyn.rigid_body import RBDRegressor
 
 #: Points of a curve, and effects in a ranking.
 POINTS, RANKED = 1500, 8
+#: A click stands for this long, s, and for at least so many averaged rows.
+STRETCH, LEAST_ROWS = 1.0, 8
+#: An effect that takes less of the squared error, held out, is not listed.
+LEAST_DROP = 1e-3
 
 
 @dataclass(frozen=True)
@@ -37,10 +45,10 @@ class RankedEffect:
     joints : tuple of int
         Joints it acts on, counted from 1.
     drop : float
-        Share of the joint's held-out squared error that it takes away; the rest of the model is
-        fitted beside it.
+        Share of the held-out squared error of the joint asked about that it takes away, the rest of
+        the model fitted beside it.
     drop_here : float
-        The same of the error in the chosen stretch of time, not held out.
+        The same in the chosen stretch of time; as ``drop`` where none is chosen.
 
     Examples
     --------
@@ -70,8 +78,8 @@ class Session:
 
     Attributes
     ----------
-    added : list of tuple of Term
-        What was added, step by step.
+    robot : Robot
+        Robot of the model.
 
     Examples
     --------
@@ -94,23 +102,42 @@ class Session:
         self.robot = robot
         signals, torque = read_signals(X, tau, robot, trajectory=model.trajectory, time=model.time)
         self.torque = torque
-        terms = make_terms(model.effects, robot.n_joints)
+        terms = _own_terms(model, robot, X, tau)
         identified = model.parameters == "identified"
         self.problem = make_problem(
             signals, torque, robot=robot, rigid_body=identified, terms=terms
         )
         base = self.problem.fit(terms, passes=3)
         self.problem.with_fit(base)
-        self._sigma = base.noise
         self._target = self.problem.target
         self._pool = catalogue_candidates(self.problem, list_effects())
-        self._screen = Screen(self.problem, self._sigma, self._pool, self._target)
-        self.added: list[tuple[Term, ...]] = []
-        self._fits: list[Fit] = [base]
-        self._drops: Array | None = None
-        self.history: list[dict[str, Any]] = [self._entry(None)]
+        self._ranking = Ranking(self.problem, self._pool, self._target)
+        self._samples = Samples(self.problem)
+        self._steps = [self._step((), base, None)]
 
     # ------------------------------------------------------------------ what is seen
+    @property
+    def added(self) -> list[tuple[Term, ...]]:
+        """What was added, step by step."""
+        return [step.terms for step in self._steps[1:]]
+
+    @property
+    def history(self) -> list[dict[str, Any]]:
+        """Held-out error of every joint (``rmse``, N m or N) as given and after every step.
+
+        It is that of :func:`skidyn.diagnosis.diagnose` (``rmse_before``): sliding samples, each
+        under a fit that left its fold out.
+
+        ``added`` is the kind that was added, ``joints`` where it acts and ``joint`` the joint for
+        which it was added, counted from 1.
+        """
+        return [step.entry for step in self._steps]
+
+    @property
+    def refinable(self) -> bool:
+        """Whether the last addition still has the shape of the grid, and :meth:`refine` is due."""
+        return self._steps[-1].coarse is not None
+
     @property
     def terms(self) -> list[Term]:
         """Effects of the model as it is now."""
@@ -121,8 +148,8 @@ class Session:
         """Numbers of the trajectories."""
         return [int(k) for k in np.unique(self.problem.signals.trajectory)]
 
-    def curves(self, joint: int, trajectory: int) -> dict[str, list[float]]:
-        """Measured torque, and the model as given and as it is now.
+    def curves(self, joint: int, trajectory: int) -> dict[str, list[float | None]]:
+        """Measured torque, and the model as given and as it is now, held out.
 
         Parameters
         ----------
@@ -134,23 +161,99 @@ class Session:
         Returns
         -------
         dict
-            ``time`` (s), ``measured``, ``given``, ``now`` (N m or N); few points, peaks kept.
+            ``time`` (s), ``measured``, ``given``, ``now`` (N m or N); few points, peaks kept. The
+            models are None where the joint rests or turns: these samples are not judged.
         """
         j = self._joint(joint)
         here = np.flatnonzero(self.problem.signals.trajectory == trajectory)
-        if not len(here):
-            raise EffectError(f"no trajectory {trajectory}; there are {self.trajectories}")
+        self._check_trajectory(trajectory)
         measured = self.torque[here, j]
-        given, now = (measured - self._residual(fit, j)[here] for fit in self._ends())
-        whole = [slice(0, len(here))]
-        rows = rows_with_peaks([measured, measured - given, measured - now], whole, POINTS // 6)[0]
-        time = self.problem.signals.clock[here]
+        sliding = self.problem.rows.sliding[here, j]
+        models = [
+            np.where(sliding, measured - step.residual[here, j], np.nan)
+            for step in (self._steps[0], self._steps[-1])
+        ]
+        drawn = [measured, *(np.where(sliding, model, measured) for model in models)]
+        rows = rows_with_peaks(drawn, [slice(0, len(here))], POINTS // 6)[0]
         return {
-            "time": time[rows].tolist(),
+            "time": self.problem.signals.clock[here][rows].tolist(),
             "measured": measured[rows].tolist(),
-            "given": given[rows].tolist(),
-            "now": now[rows].tolist(),
+            "given": _holes(models[0][rows]),
+            "now": _holes(models[1][rows]),
         }
+
+    def residuals(self, joint: int, trajectory: int) -> dict[str, list[float | None]]:
+        """Held-out residual, averaged over the windows by which models are fitted and judged.
+
+        Parameters
+        ----------
+        joint : int
+            Joint, counted from 1.
+        trajectory : int
+            Trajectory.
+
+        Returns
+        -------
+        dict
+            ``time`` (s), ``given``, ``now`` (N m or N); None where the joint rests or turns.
+        """
+        j = self._joint(joint)
+        self._check_trajectory(trajectory)
+        rows = self.problem.rows
+        here = np.flatnonzero(rows.trajectory[j] == trajectory)
+        here = here[np.argsort(rows.time[j][here], kind="stable")]
+        time = rows.time[j][here]
+        # a row is scaled to the noise of one sample: back to a mean
+        weight = np.asarray(rows.weights[j].sum(axis=1)).ravel()[here]
+        ends = [
+            self._ranking.residual(step.model, j)[here] / weight
+            for step in (self._steps[0], self._steps[-1])
+        ]
+        whole = [slice(0, len(here))]
+        keep = rows_with_peaks(ends, whole, POINTS // 4)[0] if len(here) else here
+        apart = np.diff(time[keep])
+        usual = np.median(np.diff(time)) if len(apart) else 0.0
+        gaps = np.flatnonzero(apart > 4 * usual) + 1
+        given, now = (np.insert(r[keep], gaps, np.nan) for r in ends)
+        middles = [(time[keep][k - 1] + time[keep][k]) / 2 for k in gaps]
+        return {
+            "time": _holes(np.insert(time[keep], gaps, middles)),
+            "given": _holes(given),
+            "now": _holes(now),
+        }
+
+    def stretch(self, joint: int, trajectory: int, time: float) -> tuple[float, float]:
+        """The second around a moment, longer where a joint slides too little in it.
+
+        Parameters
+        ----------
+        joint : int
+            Joint, counted from 1.
+        trajectory : int
+            Trajectory.
+        time : float, s
+            Moment.
+
+        Returns
+        -------
+        tuple of float, s
+            Start and end.
+
+        Raises
+        ------
+        EffectError
+            The joint does not slide in this trajectory: no effect can be told there.
+        """
+        j = self._joint(joint)
+        rows = self.problem.rows
+        away = np.sort(np.abs(rows.time[j][rows.trajectory[j] == trajectory] - time))
+        if not len(away):
+            raise EffectError(
+                f"joint {joint} does not slide in trajectory {trajectory}: effects cannot be told "
+                "there; choose another trajectory"
+            )
+        half = max(STRETCH / 2, float(away[min(LEAST_ROWS, len(away)) - 1]))
+        return time - half, time + half
 
     def ranked(
         self,
@@ -158,7 +261,10 @@ class Session:
         trajectory: int | None = None,
         span: tuple[float, float] | None = None,
     ) -> list[RankedEffect]:
-        """Effects that would lower the error of a joint, best first.
+        """Effects that lower the held-out error of a joint, the largest drop first.
+
+        Every number is measured: the model is fitted with the effect to the other folds, and its
+        residual compared with that of the model as it is.
 
         Parameters
         ----------
@@ -167,43 +273,38 @@ class Session:
         trajectory : int, optional
             With ``span``: where the model fails.
         span : tuple of float, s, optional
-            Stretch of time within the trajectory; the ranking is by what an effect does there.
+            Stretch of time within the trajectory; the ranking is by the drop there.
 
         Returns
         -------
         list of RankedEffect
+            The best candidate of every kind; of equal ones the simpler first.
         """
         j = self._joint(joint)
-        model = self._screen.model([self.problem.term_rows(t) for t in self.terms])
-        base = self._screen.held_out(model).sum()
-        if self._drops is None:
-            self._drops = base - self._screen.step(model).sum(1)
-        residual = self._fits[-1].residual[j]
-        own = max(float(residual @ residual) / self._sigma[j] ** 2, 1e-300)
+        found = self._held_out(j)
+        drop = found.drops()
         rows = self._rows_in(j, trajectory, span)
-        best: dict[str, tuple[float, Candidate]] = {}
-        for candidate, drop in zip(self._pool, self._drops, strict=True):
-            if j not in candidate.rows or not np.isfinite(drop) or drop <= 0:
+        here = drop if rows.all() else found.drops(rows)
+        best: dict[str, RankedEffect] = {}
+        for at in np.argsort(-drop, kind="stable"):
+            candidate = self._pool[found.index[at]]
+            if min(drop[at], here[at]) < LEAST_DROP or candidate.kind in best:
                 continue
-            if drop > best.get(candidate.kind, (0.0, candidate))[0]:
-                best[candidate.kind] = (float(drop), candidate)
-        found = []
-        for kind, (drop, candidate) in best.items():
-            effect = get_effect(kind)
-            found.append(
-                RankedEffect(
-                    kind,
-                    effect.title,
-                    effect.formula,
-                    tuple(k + 1 for k in candidate.joints),
-                    min(float(drop / own), 1.0),
-                    self._explains(candidate, j, residual, rows),
-                )
+            if self._has(candidate):
+                continue
+            effect = get_effect(candidate.kind)
+            best[candidate.kind] = RankedEffect(
+                candidate.kind,
+                effect.title,
+                effect.formula,
+                tuple(k + 1 for k in candidate.joints),
+                float(drop[at]),
+                float(here[at]),
             )
-        return sorted(found, key=lambda r: _rank(r, span is not None))[:RANKED]
+        return sorted(best.values(), key=_order)[:RANKED]
 
     # ------------------------------------------------------------------ what is done
-    def add(self, kind: str, joint: int) -> dict[str, Any]:
+    def add(self, kind: str, joint: int, *, refined: bool = True) -> dict[str, Any]:
         """Add an effect where it helps a joint most, and fit the model again.
 
         Parameters
@@ -212,11 +313,14 @@ class Session:
             Kind of the catalogue.
         joint : int
             Joint, counted from 1.
+        refined : bool, default=True
+            Search the shape parameters, beginning at the grid; False leaves that to
+            :meth:`refine`, which is for a page that shows the first answer at once.
 
         Returns
         -------
         dict
-            ``added``, ``joints`` and held-out ``rmse`` of every joint, N m or N.
+            The entry of :attr:`history`.
 
         Raises
         ------
@@ -224,20 +328,39 @@ class Session:
             The effect does not act on this joint, or is in the model already.
         """
         j = self._joint(joint)
-        self.ranked(joint)
-        assert self._drops is not None
+        found = self._held_out(j)
+        drop = found.drops()
         pool = [
-            (d, c) for d, c in zip(self._drops, self._pool, strict=True)
-            if c.kind == kind and j in c.rows and c.term.joints not in self._taken(kind)
-        ]  # fmt: skip
+            (drop[at], self._pool[i])
+            for at, i in enumerate(found.index)
+            if self._pool[i].kind == kind and not self._has(self._pool[i])
+        ]
         if not pool:
             raise EffectError(
-                f"{kind} cannot be added to joint {joint}: not shown, or there already"
+                f"{kind} cannot be added to joint {joint}: this log does not show it there, its fit "
+                "is not physical, or it is in the model already"
             )
         candidate = max(pool, key=lambda item: item[0])[1]
-        blocks = [self.problem.term_rows(t) for t in self.terms]
-        refined = refine(self.problem, blocks, [candidate], self._sigma, self._target)
-        return self._push(tuple(c.term for c in refined))
+        self._push(candidate, joint)
+        return self.refine() if refined else self.history[-1]
+
+    def refine(self) -> dict[str, Any]:
+        """Search the shape parameters of the last addition from the grid on, and fit again.
+
+        Returns
+        -------
+        dict
+            The entry of :attr:`history`.
+        """
+        last = self._steps[-1]
+        if last.coarse is not None:
+            self._steps.pop()
+            blocks = [self.problem.term_rows(t) for t in self.terms]
+            noise = self._steps[-1].fit.noise
+            better = refine(self.problem, blocks, [last.coarse], noise, self._target)[0]
+            self._push(better, last.entry["joint"])
+            self._steps[-1].coarse = None
+        return self.history[-1]
 
     def undo(self) -> dict[str, Any]:
         """Take the last addition back.
@@ -247,11 +370,8 @@ class Session:
         dict
             The step before.
         """
-        if self.added:
-            self.added.pop()
-            self._fits.pop()
-            self.history.pop()
-            self._drops = None
+        if len(self._steps) > 1:
+            self._steps.pop()
         return self.history[-1]
 
     def fitted_model(self) -> RBDRegressor:
@@ -264,7 +384,14 @@ class Session:
         terms = [t for step in self.added for t in step]
         return self.model.with_effects(terms).fit(*self.data)
 
-    def script(self, logs: Sequence[str] = ("log.csv",), urdf: str = "robot.urdf") -> str:
+    def script(
+        self,
+        logs: Sequence[str] = ("log.csv",),
+        urdf: str = "robot.urdf",
+        *,
+        joints: Sequence[str] | None = None,
+        reading: Mapping[str, Any] | None = None,
+    ) -> str:
         """Python that does the same without a browser.
 
         Parameters
@@ -273,35 +400,19 @@ class Session:
             Files of the log.
         urdf : str
             Description of the robot.
+        joints : sequence of str, optional
+            Joints the log covers, as given to :meth:`skidyn.robots.Robot.from_urdf`.
+        reading : mapping, optional
+            Further arguments with which :func:`skidyn.datasets.read_log` read the log.
 
         Returns
         -------
         str
-            A script that prints the held-out error before and after.
+            A script that makes the same additions, prints the held-out errors shown here and saves
+            the model.
         """
-        terms = [t for step in self.added for t in step]
-        lines = [
-            "from skidyn.datasets import read_log",
-            "from skidyn.diagnosis import Settings, diagnose",
-            "from skidyn.effects import Term",
-            "from skidyn.rigid_body import RBDRegressor",
-            "from skidyn.robots import Robot",
-            "",
-            f"robot = Robot.from_urdf({str(urdf)!r})",
-            f"log = read_log({list(map(str, logs))!r}, robot=robot)",
-            'tau = log[[f"tau{j + 1}" for j in range(robot.n_joints)]]',
-            f"model = RBDRegressor(robot, {list(self.model.effects)!r}, {self.model.parameters!r})",
-            "added = [",
-            *(f"    Term({t.kind!r}, {t.joints!r}, {_literal(t.shape)})," for t in terms),
-            "]",
-            "better = model.with_effects(added)",
-            "only_compare = Settings(max_findings=0)",
-            'for name, candidate in (("given", model), ("better", better)):',
-            "    print(name, diagnose(candidate, log, tau, settings=only_compare).rmse_before)",
-            "better.fit(log, tau)",
-            "",
-        ]
-        return "\n".join(lines)
+        clicks = [(entry["added"], entry["joint"]) for entry in self.history[1:]]
+        return script(self.model, clicks, logs, urdf, joints, reading or {})
 
     # ------------------------------------------------------------------ inside
     def _joint(self, joint: int) -> int:
@@ -309,35 +420,44 @@ class Session:
             raise EffectError(f"no joint {joint}; the robot has joints 1 to {self.robot.n_joints}")
         return joint - 1
 
-    def _taken(self, kind: str) -> set[tuple[int, ...]]:
-        return {t.joints for t in self.terms if t.kind == kind}
+    def _check_trajectory(self, trajectory: int) -> None:
+        if trajectory not in self.trajectories:
+            raise EffectError(f"no trajectory {trajectory}; there are {self.trajectories}")
 
-    def _ends(self) -> tuple[Fit, Fit]:
-        return self._fits[0], self._fits[-1]
+    def _has(self, candidate: Candidate) -> bool:
+        return any((t.kind, t.joints) == candidate.site for t in self.terms)
 
-    def _residual(self, fit: Fit, joint: int) -> Array:
-        return (self.problem.torque - self.problem.explained(fit))[:, joint]
+    def _held_out(self, joint: int) -> HeldOutRows:
+        step = self._steps[-1]
+        if joint not in step.rows:
+            step.rows[joint] = self._ranking.held_out(step.model, joint)
+        return step.rows[joint]
 
-    def _push(self, terms: tuple[Term, ...]) -> dict[str, Any]:
-        self.added.append(terms)
-        self._fits.append(self.problem.fit(self.terms, sigma=self._fits[-1].noise))
-        self._drops = None
-        self.history.append(self._entry(terms[0]))
-        return self.history[-1]
+    def _push(self, candidate: Candidate, joint: int) -> None:
+        terms = (candidate.term,)
+        noise = self._steps[-1].fit.noise
+        fit = self.problem.fit([*self.terms, *terms], sigma=noise)
+        self._steps.append(self._step(terms, fit, joint))
+        self._steps[-1].coarse = candidate if candidate.n_shapes else None
 
-    def _entry(self, term: Term | None) -> dict[str, Any]:
-        blocks = [self.problem.term_rows(t) for t in self.terms]
-        errors = profile_error(self.problem, blocks, self._sigma, self._target).sum(0)
-        rmse = np.sqrt(errors / np.maximum(self.problem.rows.counts, 1))
-        return {
-            "added": None if term is None else term.kind,
-            "joints": [] if term is None else [j + 1 for j in term.joints],
+    def _step(self, terms: tuple[Term, ...], fit: Fit, joint: int | None) -> _Step:
+        model = self._ranking.model([self.problem.term_rows(t) for t in fit.terms], fit.sigma)
+        left = [f.solution for f in model.fits]
+        residual = self._samples.residual(fit.terms, left, model.whole.solution)
+        sliding = self.problem.rows.sliding
+        squares = np.sum(residual**2 * sliding, axis=0)
+        rmse = np.sqrt(squares / np.maximum(sliding.sum(axis=0), 1))
+        entry = {
+            "added": terms[0].kind if terms else None,
+            "joint": joint,
+            "joints": [j + 1 for j in terms[0].joints] if terms else [],
             "rmse": [float(x) for x in rmse],
         }
+        return _Step(terms, fit, model, residual, entry)
 
     def _rows_in(
         self, joint: int, trajectory: int | None, span: tuple[float, float] | None
-    ) -> Array:
+    ) -> NDArray[np.bool_]:
         rows = self.problem.rows
         inside = np.ones(len(rows.time[joint]), dtype=bool)
         if trajectory is not None:
@@ -346,22 +466,24 @@ class Session:
             inside &= (rows.time[joint] >= min(span)) & (rows.time[joint] <= max(span))
         return inside
 
-    def _explains(self, candidate: Candidate, joint: int, residual: Array, rows: Array) -> float:
-        """Share of the squared residual in some rows that an effect alone takes away."""
-        if rows.sum() < 4:
-            return 0.0
-        block, y = candidate.rows[joint][rows], residual[rows]
-        left = y - block @ np.linalg.lstsq(block, y, rcond=1e-8)[0]
-        return float(1 - left @ left / max(y @ y, 1e-300))
+
+@dataclass
+class _Step:
+    """The model after one click, with what was worked out about it."""
+
+    terms: tuple[Term, ...]
+    fit: Fit
+    model: FoldedModel
+    residual: Array  # held out, at every sample, N m or N
+    entry: dict[str, Any]
+    coarse: Candidate | None = None
+    rows: dict[int, HeldOutRows] = field(default_factory=dict)
 
 
-def _rank(effect: RankedEffect, here: bool) -> tuple[float, int]:
-    """Best first; what does as much to within a twentieth is ordered by simplicity."""
-    worth = effect.drop * effect.drop_here if here else effect.drop
-    return -round(20 * worth) / 20, get_effect(effect.kind).simplicity
+def _holes(values: Array) -> list[float | None]:
+    """Numbers for JSON; None where there is none."""
+    return [None if np.isnan(x) else float(x) for x in values]
 
 
-def _literal(shape: Any) -> str:
-    """A shape as Python source."""
-    plain = {k: v.item() if isinstance(v, np.generic) else v for k, v in dict(shape).items()}
-    return repr(plain)
+def _order(effect: RankedEffect) -> tuple[float, int]:
+    return -effect.drop_here, get_effect(effect.kind).simplicity

@@ -1,0 +1,312 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Held-out error of one joint, row by row, with each candidate effect beside the refitted model.
+
+A candidate changes the rigid body beside it, so its rows alone do not say what it will do. As in
+the search of a diagnosis the model's columns are swept out of the candidate's (block elimination),
+fold by fold. Here the residual itself is kept, for one joint: its sums over the whole log or over a
+clicked stretch of time are exactly what the fit with the candidate leaves there.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from skidyn._signals import Array
+from skidyn.diagnosis._candidates import Candidate
+from skidyn.diagnosis._screen import CANDIDATE_RIDGE
+from skidyn.evidence._problem import RIDGE, Problem
+
+Block = dict[int, Array]
+
+
+@dataclass(frozen=True)
+class HeldOutRows:
+    """Held-out residual of the rows of a joint.
+
+    Attributes
+    ----------
+    residual : ndarray of shape (n_rows,)
+        Of the model as it is, N m or N.
+    index : ndarray of shape (n_candidates,)
+        Candidates that reach the joint and whose coefficients physics allows.
+    then : ndarray of shape (n_rows, n_candidates)
+        Square of the residual of the model with each of them added, (N m)^2 or N^2.
+    """
+
+    residual: Array
+    index: NDArray[np.int64]
+    then: Array
+
+    def drops(self, rows: NDArray[np.bool_] | slice = slice(None)) -> Array:
+        """Share of the squared error in some rows that each candidate takes away."""
+        before = float(np.sum(self.residual[rows] ** 2))
+        return 1 - self.then[rows].sum(0) / max(before, 1e-300)
+
+
+@dataclass(frozen=True)
+class FoldedModel:
+    """A model fitted to all folds, and without each.
+
+    Attributes
+    ----------
+    blocks : list of dict
+        Columns beside the rigid body.
+    design : list of ndarray of shape (n_rows_j, p)
+        All columns of every joint.
+    weight : ndarray of shape (n_joints,)
+        Weight of a row of every joint.
+    fits : list
+        Fits without each fold.
+    whole : object
+        Fit to all.
+    """
+
+    blocks: list[Block]
+    design: list[Array]
+    weight: Array
+    fits: list[_Normal]
+    whole: _Normal
+
+
+class Ranking:
+    """What every candidate would do to the held-out error of a joint.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows and folds.
+    candidates : sequence of Candidate
+        What might be added.
+    target : sequence of ndarray
+        Averaged torque of every joint.
+    """
+
+    def __init__(
+        self, problem: Problem, candidates: Sequence[Candidate], target: Sequence[Array]
+    ) -> None:
+        self.problem, self.candidates, self.target = problem, list(candidates), list(target)
+        self._edges = [
+            np.searchsorted(fold, np.arange(problem.n_folds + 1)) for fold in problem.fold
+        ]
+        widths = [c.width for c in self.candidates]
+        ends = np.cumsum([0, *widths])
+        self._columns = [np.arange(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+        members = [
+            [i for i, c in enumerate(self.candidates) if j in c.rows]
+            for j in range(problem.n_joints)
+        ]
+        self._where = [self._columns_of(np.array(some, dtype=int)) for some in members]
+        self._blocks = [
+            np.hstack([np.zeros((int(n), 0)), *(self.candidates[i].rows[j] for i in some)])
+            for j, (n, some) in enumerate(zip(problem.rows.counts, members, strict=True))
+        ]
+        everyone = dict(self._by_width(np.arange(len(widths))))
+        self._own = {k: self._grams(index) for k, index in everyone.items()}
+        self._at = {int(i): n for index in everyone.values() for n, i in enumerate(index)}
+        self._rigid: Block = dict(enumerate(problem.rigid_rows))
+        self._target = self._folded_all(
+            [y[:, None] for y in self.target], self._blocks, self._where
+        )
+        self._cross: dict[int, tuple[Block, Array]] = {}
+
+    def model(self, blocks: Sequence[Block], sigma: Array) -> FoldedModel:
+        """Fit a model to all folds and without each fold.
+
+        Parameters
+        ----------
+        blocks : sequence of dict
+            Columns beside the rigid body.
+        sigma : ndarray of shape (n_joints,)
+            Noise of one row of every joint.
+
+        Returns
+        -------
+        FoldedModel
+        """
+        design = self.problem.design(blocks)
+        weight = 1 / np.asarray(sigma) ** 2
+        gram, right = self._normal_equations(design, weight)
+        total = gram.sum(0), right.sum(0)
+        fits = [
+            _Normal(total[0] - g, total[1] - r, total[0]) for g, r in zip(gram, right, strict=True)
+        ]
+        return FoldedModel(list(blocks), design, weight, fits, _Normal(*total, total[0]))
+
+    def residual(self, model: FoldedModel, joint: int) -> Array:
+        """Residual of every row of a joint, counted from 0, under the fit without its fold."""
+        y, a = self.target[joint], model.design[joint]
+        edges = self._edges[joint]
+        return np.concatenate(
+            [
+                y[i:k] - a[i:k] @ fit.solution
+                for fit, i, k in zip(model.fits, edges[:-1], edges[1:], strict=True)
+            ]
+        )
+
+    def held_out(self, model: FoldedModel, joint: int) -> HeldOutRows:
+        """Held-out residual of a joint's rows, now and with every candidate.
+
+        Parameters
+        ----------
+        model : FoldedModel
+            The model as it is.
+        joint : int
+            Joint, counted from 0.
+
+        Returns
+        -------
+        HeldOutRows
+        """
+        index = np.array([i for i, c in enumerate(self.candidates) if joint in c.rows], dtype=int)
+        columns = self._columns_of(index)
+        parts = (self._crossed(b) for b in (self._rigid, *model.blocks))
+        cross = np.concatenate([np.tensordot(model.weight, p, 1) for p in parts], axis=1)
+        cross = cross[:, :, columns]
+        target = np.tensordot(model.weight, self._target[:, :, 0], 1)[:, columns]
+        now = self.residual(model, joint)
+        then = np.empty((len(now), len(index)))
+        edges = self._edges[joint]
+        for f, (fit, a, b) in enumerate(zip(model.fits, edges[:-1], edges[1:], strict=True)):
+            left = cross.sum(0) - cross[f], target.sum(0) - target[f]
+            gain, change = self._gain(fit, *left, index, f, model.weight)
+            explained = self._explained(joint, slice(a, b), index, gain)
+            then[a:b] = (now[a:b, None] - explained + model.design[joint][a:b] @ change) ** 2
+        gain, _ = self._gain(model.whole, cross.sum(0), target.sum(0), index, None, model.weight)
+        allowed = np.array(
+            [self._allowed(i, g) for i, g in zip(index, gain, strict=True)], dtype=bool
+        )
+        return HeldOutRows(now, index[allowed], then[:, allowed])
+
+    # ------------------------------------------------------------------ products, once
+    def _columns_of(self, index: NDArray[np.int64]) -> NDArray[np.int64]:
+        none = np.zeros(0, dtype=np.int64)
+        return np.concatenate([none, *(self._columns[i] for i in index)])
+
+    def _by_width(self, index: NDArray[np.int64]) -> Iterator[tuple[int, NDArray[np.int64]]]:
+        """Where candidates with the same number of columns stand in ``index``."""
+        members: dict[int, list[int]] = defaultdict(list)
+        for at, i in enumerate(index):
+            members[self.candidates[int(i)].width].append(at)
+        for width, places in members.items():
+            yield width, np.array(places, dtype=np.int64)
+
+    def _folded_all(
+        self, left: Sequence[Array], right: Sequence[Array], where: Sequence[NDArray[np.int64]]
+    ) -> Array:
+        """Products of every joint and fold, (n_joints, n_folds, columns of left, all columns)."""
+        n_columns = sum(len(c) for c in self._columns)
+        out = np.zeros((len(left), self.problem.n_folds, left[0].shape[1], n_columns))
+        for j, (a, b) in enumerate(zip(left, right, strict=True)):
+            edges = self._edges[j]
+            for f, (i, k) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+                out[j, f][:, where[j]] = a[i:k].T @ b[i:k]
+        return out
+
+    def _crossed(self, block: Block) -> Array:
+        """Products of a block of the model and all candidates; made once for every block."""
+        known = self._cross.get(id(block))
+        if known is not None and known[0] is block:
+            return known[1]
+        n_columns = next(iter(block.values())).shape[1]
+        left = [
+            block.get(j, np.zeros((int(n), n_columns)))
+            for j, n in enumerate(self.problem.rows.counts)
+        ]
+        found = self._folded_all(left, self._blocks, self._where)
+        self._cross[id(block)] = block, found
+        return found
+
+    def _grams(self, index: NDArray[np.int64]) -> Array:
+        """Gram matrices of candidates of one width, (n_joints, n_folds, n_candidates, k, k)."""
+        k = self.candidates[int(index[0])].width
+        shape = (self.problem.n_joints, self.problem.n_folds, len(index), k, k)
+        grams = np.zeros(shape)
+        for n, candidate in enumerate(self.candidates[int(i)] for i in index):
+            for j, rows in candidate.rows.items():
+                edges = self._edges[j]
+                for f, (a, b) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+                    grams[j, f, n] = rows[a:b].T @ rows[a:b]
+        return grams
+
+    def _normal_equations(self, design: Sequence[Array], weight: Array) -> tuple[Array, Array]:
+        p = design[0].shape[1]
+        gram = np.zeros((self.problem.n_folds, p, p))
+        right = np.zeros((self.problem.n_folds, p))
+        for j, (a, y) in enumerate(zip(design, self.target, strict=True)):
+            edges = self._edges[j]
+            for f, (i, k) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+                gram[f] += weight[j] * (a[i:k].T @ a[i:k])
+                right[f] += weight[j] * (a[i:k].T @ y[i:k])
+        return gram, right
+
+    # ------------------------------------------------------------------ one fold
+    def _gain(
+        self,
+        fit: _Normal,
+        cross: Array,
+        target: Array,
+        index: NDArray[np.int64],
+        fold: int | None,
+        weight: Array,
+    ) -> tuple[list[Array], Array]:
+        """Coefficients of every candidate, and how it changes those of the model beside it."""
+        swept = fit.solve(cross)
+        slope = target - cross.T @ fit.solution
+        change = np.empty((len(cross), len(index)))
+        gains: list[Array] = [np.zeros(0)] * len(index)
+        starts = np.cumsum([0, *(self.candidates[i].width for i in index)])
+        for k, at in self._by_width(index):
+            columns = starts[at][:, None] + np.arange(k)
+            own = self._own[k][:, :, [self._at[int(i)] for i in index[at]]]
+            total = np.tensordot(weight, own.sum(1) if fold is None else _without(own, fold), 1)
+            left, right = cross[:, columns], swept[:, columns]
+            block = total - np.einsum("pck,pcl->ckl", left, right)
+            ridge = CANDIDATE_RIDGE * np.einsum("ckk->ck", total) + 1e-12
+            block += np.eye(k) * ridge[:, None, :]
+            gain = np.linalg.solve(block, slope[columns][:, :, None])[:, :, 0]
+            change[:, at] = np.einsum("pck,ck->pc", right, gain)
+            for n, g in zip(at, gain, strict=True):
+                gains[n] = g
+        return gains, change
+
+    def _explained(
+        self, joint: int, rows: slice, index: NDArray[np.int64], gain: list[Array]
+    ) -> Array:
+        """What each candidate explains of some rows of a joint by itself."""
+        block = self._blocks[joint][rows]
+        scaled = block * np.concatenate([np.zeros(0), *gain])
+        starts = np.cumsum([0, *(len(g) for g in gain)])[:-1]
+        if not len(starts):
+            return np.zeros((len(block), 0))
+        return np.add.reduceat(scaled, starts, axis=1)
+
+    def _allowed(self, candidate: int, gain: Array) -> bool:
+        c = self.candidates[candidate]
+        return not bool(np.any((gain * c.signs < 0) | (np.abs(gain) > c.limits)))
+
+
+def _without(grams: Array, fold: int) -> Array:
+    return np.asarray(grams.sum(1) - grams[:, fold])
+
+
+class _Normal:
+    """The model fitted to some folds by its normal equations."""
+
+    def __init__(self, gram: Array, right: Array, total: Array) -> None:
+        scale = np.sqrt(np.diag(total))
+        scale[scale == 0] = 1.0
+        self._scale = scale
+        normal = gram / scale[:, None] / scale + RIDGE * np.eye(len(scale))
+        self._factor = cho_factor(normal, check_finite=False)
+        self.solution = self.solve(right[:, None])[:, 0]
+
+    def solve(self, right: Array) -> Array:
+        """Solve for a matrix of right-hand sides."""
+        scale = self._scale[:, None]
+        return np.asarray(cho_solve(self._factor, right / scale, check_finite=False)) / scale

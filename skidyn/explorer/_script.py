@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The script that does without a browser what was clicked."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from skidyn.effects import Term
+from skidyn.rigid_body import RBDRegressor
+
+
+def script(
+    model: RBDRegressor,
+    clicks: Sequence[tuple[str, int]],
+    logs: Sequence[str],
+    urdf: str,
+    joints: Sequence[str] | None,
+    reading: Mapping[str, Any],
+) -> str:
+    """Python source that repeats the clicks.
+
+    Parameters
+    ----------
+    model : RBDRegressor
+        The model at the start.
+    clicks : sequence of (str, int)
+        Kind and joint, counted from 1, of every addition.
+    logs : sequence of str
+        Files of the log.
+    urdf : str
+        Description of the robot.
+    joints : sequence of str, optional
+        Joints the log covers.
+    reading : mapping
+        Further arguments of :func:`skidyn.datasets.read_log`; None where not given.
+
+    Returns
+    -------
+    str
+    """
+    effects = ", ".join(_source(e) for e in model.effects)
+    only = "" if joints is None else f", joints={list(joints)!r}"
+    how = "".join(f", {k}={_plain(v)!r}" for k, v in reading.items() if v is not None)
+    lines = [
+        '"""What was clicked in skidyn explore; prints the held-out errors that it showed."""',
+        "",
+        "from skidyn import save_model",
+        "from skidyn.datasets import read_log",
+        *(["from skidyn.effects import Term"] if "Term(" in effects else []),
+        "from skidyn.explorer import Session",
+        "from skidyn.rigid_body import RBDRegressor",
+        "from skidyn.robots import Robot",
+        "",
+        f"robot = Robot.from_urdf({str(urdf)!r}{only})",
+        f"log = read_log({[str(name) for name in logs]!r}, robot=robot{how})",
+        'tau = log[[f"tau{j + 1}" for j in range(robot.n_joints)]].to_numpy()',
+        f"session = Session(RBDRegressor(robot, [{effects}]{_changed(model)}), log, tau)",
+        *(f"session.add({kind!r}, joint={joint})" for kind, joint in clicks),
+        "for step in session.history:",
+        '    print(step["added"] or "as given", *step["rmse"])',
+        'save_model("model.skops", session.fitted_model())',
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _changed(model: RBDRegressor) -> str:
+    """Arguments of the model that are not the default ones."""
+    defaults = inspect.signature(type(model)).parameters
+    return "".join(
+        f", {name}={_plain(value)!r}"
+        for name, value in model.get_params(deep=False).items()
+        if name not in ("robot", "effects") and value != defaults[name].default
+    )
+
+
+def _source(effect: Any) -> str:
+    """An effect of the model as Python."""
+    if isinstance(effect, Term):
+        return f"Term({effect.kind!r}, {effect.joints!r}, {_plain(dict(effect.shape))!r})"
+    return repr(effect)
+
+
+def _plain(value: Any) -> Any:
+    """A value whose repr is Python source: NumPy's numbers as Python's."""
+    if isinstance(value, Mapping):
+        return {k: _plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return type(value)(_plain(v) for v in value)
+    if isinstance(value, (np.generic, np.ndarray)):
+        return value.tolist()
+    return value
