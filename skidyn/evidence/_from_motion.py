@@ -22,9 +22,9 @@ from skidyn.robots import Robot
 Method = Literal["auto", "gram", "qr"]
 #: Samples at a time: their columns stay in the third-level cache between making and using them.
 CHUNK = 4096
-#: Condition number of the scaled columns up to which Gram matrices are exact to about nine digits:
+#: Condition number of the scaled columns up to which Gram matrices keep about nine digits:
 #: their error grows with its square, that of the QR factors with the number itself.
-LARGEST_CONDITION = 2e3
+LARGEST_CONDITION = 1e3
 
 
 def evidence_from_motion(
@@ -59,7 +59,7 @@ def evidence_from_motion(
     method : {"auto", "gram", "qr"}, default="auto"
         ``"gram"`` forms Gram matrices, ``"qr"`` triangular factors chunk by chunk [1]_ in twice the
         time. ``"auto"`` takes the first unless the columns are so nearly dependent that digits
-        would be lost (condition number above 2,000 with columns of unit size).
+        would be lost (condition number above 1,000 with columns of unit size).
 
     Returns
     -------
