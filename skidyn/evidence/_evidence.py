@@ -163,6 +163,31 @@ class Evidence:
             {key: count for key, count in self.counts.items() if key[0] in kept},
         )
 
+    def shifted(self, by: int, groups: int | None = None) -> Evidence:
+        """The same evidence under higher trajectory numbers.
+
+        Adding evidence merges what has equal numbers. This keeps the trajectories of two
+        recordings apart: ``a + b.shifted(max(a.trajectories) + 1)``.
+
+        Parameters
+        ----------
+        by : int
+            Added to every number.
+        groups : int, optional
+            Numbers are then taken modulo this; what becomes equal is merged.
+
+        Returns
+        -------
+        Evidence
+            The same columns.
+        """
+        result = Evidence(self.columns, {}, {})
+        for (trajectory, joint), factor in self.factors.items():
+            number = trajectory + by if groups is None else (trajectory + by) % groups
+            key, count = (number, joint), self.counts[trajectory, joint]
+            result += Evidence(self.columns, {key: factor}, {key: count})
+        return result
+
     def without(self, trajectory: int) -> Evidence:
         """Evidence of all trajectories but one.
 

@@ -3,33 +3,45 @@
 
 from __future__ import annotations
 
-import operator
 import os
-from collections.abc import Iterable, Iterator, Sequence
-from functools import reduce
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial, reduce
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from joblib import Parallel, delayed, effective_n_jobs
 
-from skidyn._columns import resolve_columns
 from skidyn._exceptions import LogError, SkidynError
-from skidyn._optional import import_optional
-from skidyn._signals import Array, Signals, signals_from
+from skidyn._signals import Array, Signals
 from skidyn.effects import Term, get_effect, make_terms
 from skidyn.evidence._evidence import Evidence
 from skidyn.evidence._kinematics import as_given, smooth_motion
+from skidyn.evidence._parquet import ColumnMap, read_trajectories
 from skidyn.evidence._problem import MARGIN, Problem, _regressor_rows
 from skidyn.evidence._rows import every_sample, sliding_samples, window_rows
 from skidyn.rigid_body._base_parameters import base_parameter_index
 from skidyn.robots import Robot
 
-if TYPE_CHECKING:
-    import pandas as pd
-
 PathLike = str | os.PathLike[str]
-#: Rows that are decoded at once.
-BATCH_ROWS = 65_536
+#: More tasks balance the load and lose less with a worker; fewer cost less to hand out.
+TASKS_PER_THREAD = 8
+
+
+@dataclass(frozen=True)
+class _Options:
+    columns: ColumnMap | None
+    groups: int | None
+    max_rows: int
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Evidence of some files and how many trajectories it holds."""
+
+    evidence: Evidence
+    trajectories: int
 
 
 def evidence_from_parquet(
@@ -37,8 +49,10 @@ def evidence_from_parquet(
     robot: Robot,
     effects: Iterable[Any] = ("viscous", "coulomb"),
     *,
+    columns: ColumnMap | None = None,
     groups: int | None = 20,
     max_rows: int = 2_000_000,
+    n_jobs: int | None = None,
     client: Any = None,
 ) -> Evidence:
     """Evidence of Parquet files, without ever holding more than one trajectory in memory.
@@ -46,22 +60,29 @@ def evidence_from_parquet(
     Parameters
     ----------
     paths : path or iterable of path
-        Files, or a folder of ``*.parquet``, with the columns ``q1..qn``, ``dq1..dqn``,
-        ``tau1..taun`` and, where they are known, ``time`` (s), ``trajectory`` and ``ddq1..ddqn``,
-        in SI units. Consecutive rows of one trajectory number are one trajectory; none reaches
-        over the end of a file.
+        Files, or a folder of ``*.parquet``, with position and torque of every joint and, where
+        they are known, ``time`` (s), ``trajectory``, velocity, acceleration and temperature, in SI
+        units, under any of the names that :func:`skidyn.datasets.read_log` knows. Consecutive rows
+        of one trajectory number are one trajectory; none reaches over the end of a file.
     robot : Robot
         Robot.
     effects : iterable of str, (str, joints) or Term, default=("viscous", "coulomb")
         Effects beside the rigid body. Their shape parameters must be given.
+    columns : mapping, optional
+        Which column holds which signal where the names do not tell, as in
+        :func:`skidyn.datasets.read_log`: ``{"tau": "load_{joint}"}``.
     groups : int or None, default=20
-        The factor of trajectory ``k`` is merged into that of group ``k % groups``, so that memory
-        does not grow with the number of trajectories; None keeps one factor for each.
+        Trajectories are numbered in the order of files and rows, whatever their numbers in the
+        files. The factor of trajectory ``k`` is merged into that of group ``k % groups``, so that
+        memory does not grow with the number of trajectories; None keeps one factor for each.
     max_rows : int, default=2_000_000
         Longest trajectory that is read; protects memory from damaged or hostile files.
+    n_jobs : int, optional
+        Processes that share the files, as in scikit-learn; one by default, -1 for all cores.
     client : distributed.Client, optional
-        Cluster that does the work: one task for each file, and a tree that merges them. Files must
-        be readable by the workers. A worker that dies loses its tasks, not the result.
+        Cluster that does the work: a few tasks for each of its threads, and a tree that merges
+        them. Files must be readable by the workers. A worker that dies loses its tasks, not the
+        result.
 
     Returns
     -------
@@ -94,15 +115,14 @@ def evidence_from_parquet(
     """
     files = _files(paths)
     terms = tuple(linear_terms(effects, robot.n_joints))
-    if client is None:
-        return reduce(operator.add, (_of_file(f, robot, terms, groups, max_rows) for f in files))
-    parts = [client.submit(_of_file, f, robot, terms, groups, max_rows, pure=False) for f in files]
-    while len(parts) > 1:
-        pairs = zip(parts[::2], parts[1::2], strict=False)
-        merged = [client.submit(operator.add, a, b, pure=False) for a, b in pairs]
-        parts = merged + (parts[-1:] if len(parts) % 2 else [])
-    evidence: Evidence = parts[0].result()
-    return evidence
+    options = _Options(columns, groups, max_rows)
+    if client is not None:
+        return _on_cluster(client, files, robot, terms, options).evidence
+    chunks = _chunks(files, effective_n_jobs(n_jobs))
+    parts = Parallel(n_jobs=n_jobs)(
+        delayed(_of_files)(chunk, robot, terms, options) for chunk in chunks
+    )
+    return reduce(partial(_joined, groups=groups), parts).evidence
 
 
 def evidence_of_signals(
@@ -190,102 +210,55 @@ def _files(paths: PathLike | Iterable[PathLike]) -> list[Path]:
     return files
 
 
-def _of_file(
-    path: Path, robot: Robot, terms: Sequence[Term], groups: int | None, max_rows: int
-) -> Evidence:
-    evidence = None
-    for table in _trajectories(path, robot.n_joints, max_rows):
-        names = [name for name in table.columns if not name.startswith("tau")]
-        x = table[names].to_numpy(dtype=float)
-        columns = resolve_columns(names, len(names), robot.joint_names, require_acceleration=False)
-        if columns.ddq is None:
-            # Placeholders: velocity and acceleration are derived from the positions.
-            columns = type(columns)(
-                columns.q, columns.dq, columns.dq, columns.trajectory, columns.time, None
-            )
-        torque = table[[f"tau{j + 1}" for j in range(robot.n_joints)]].to_numpy(dtype=float)
-        part = evidence_of_signals(signals_from(x, columns, robot), torque, robot, terms)
-        part = _grouped(part, groups)
-        evidence = part if evidence is None else evidence + part
-    if evidence is None:
-        raise LogError(f"{path}: holds no rows")
-    return evidence
-
-
-def _grouped(evidence: Evidence, groups: int | None) -> Evidence:
-    """The same factors under the number of their group; one trajectory at a time."""
-    if groups is None:
-        return evidence
-    factors = {(key[0] % groups, key[1]): factor for key, factor in evidence.factors.items()}
-    counts = {(key[0] % groups, key[1]): count for key, count in evidence.counts.items()}
-    return Evidence(evidence.columns, factors, counts)
-
-
-def _trajectories(path: Path, n_joints: int, max_rows: int) -> Iterator[pd.DataFrame]:
-    """Tables of the trajectories of a file, one after the other."""
-    parquet = import_optional("pyarrow.parquet", extra="io")
-    pd = import_optional("pandas", extra="io")
-    try:
-        with parquet.ParquetFile(path) as file:
-            wanted = _wanted(file.schema_arrow.names, n_joints, path)
-            parts: list[Any] = []
-            length, row = 0, 0
-            for batch in file.iter_batches(BATCH_ROWS, columns=wanted):
-                table = batch.to_pandas()
-                _refuse_missing(table, path, row)
-                row += len(table)
-                for piece in _pieces(table):
-                    if parts and _number(piece) != _number(parts[0]):
-                        yield pd.concat(parts, ignore_index=True)
-                        parts, length = [], 0
-                    parts.append(piece)
-                    length += len(piece)
-                    if length > max_rows:
-                        raise LogError(
-                            f"{path}: trajectory {_number(piece)} has more than max_rows = "
-                            f"{max_rows} rows. Number its parts as trajectories, or raise max_rows."
-                        )
-            if parts:
-                yield pd.concat(parts, ignore_index=True)
-    except (LogError, GeneratorExit):
-        raise
-    except Exception as error:  # the decoder raises whatever the bytes lead it to
-        raise LogError(f"{path}: cannot be read as Parquet: {error}") from error
-
-
-def _wanted(names: Sequence[str], n_joints: int, path: Path) -> list[str]:
-    needed = [f"{s}{j + 1}" for s in ("q", "dq", "tau") for j in range(n_joints)]
-    lost = [name for name in needed if name not in names]
-    if lost:
-        raise LogError(f"{path}: lacks {', '.join(lost)}; it has {', '.join(names)}")
-    accelerations = [f"ddq{j + 1}" for j in range(n_joints)]
-    if "time" not in names and not set(accelerations) <= set(names):
-        raise LogError(f"{path}: has neither time nor {accelerations[0]}..; one is needed")
-    keys = [name for name in ("time", "trajectory") if name in names]
-    more = accelerations if set(accelerations) <= set(names) else []
-    return keys + needed + more
-
-
-def _refuse_missing(table: pd.DataFrame, path: Path, first: int) -> None:
-    bad = ~np.isfinite(table.to_numpy(dtype=float))
-    if bad.any():
-        rows, columns = np.nonzero(bad)
-        raise LogError(
-            f"{path}: {len(np.unique(rows))} rows are not finite, the first is row "
-            f"{first + rows[0]}, column {table.columns[columns[0]]}. Leave such rows out."
+def _of_files(
+    paths: Sequence[Path], robot: Robot, terms: Sequence[Term], options: _Options
+) -> _Part:
+    """Evidence of files, their trajectories numbered from 0."""
+    parts = (
+        _Part(evidence_of_signals(signals, torque, robot, terms), 1)
+        for path in paths
+        for signals, torque in read_trajectories(
+            path, robot, columns=options.columns, max_rows=options.max_rows
         )
+    )
+    return reduce(partial(_joined, groups=options.groups), parts)
 
 
-def _pieces(table: pd.DataFrame) -> Iterator[pd.DataFrame]:
-    if "trajectory" not in table:
-        yield table
-        return
-    number = table["trajectory"].to_numpy()
-    edges = np.r_[0, np.flatnonzero(np.diff(number)) + 1, len(number)]
-    for start, stop in zip(edges[:-1], edges[1:], strict=True):
-        if stop > start:
-            yield table.iloc[start:stop]
+def _joined(one: _Part, other: _Part, groups: int | None) -> _Part:
+    """Two parts, the trajectories of the second numbered after those of the first."""
+    return _Part(
+        one.evidence + other.evidence.shifted(one.trajectories, groups),
+        one.trajectories + other.trajectories,
+    )
 
 
-def _number(table: pd.DataFrame) -> int:
-    return int(table["trajectory"].iloc[0]) if "trajectory" in table else 0
+def _chunks(files: Sequence[Path], n: int) -> list[list[Path]]:
+    """At most n lists of neighbouring files, of equal length but for one file."""
+    edges = np.linspace(0, len(files), min(n, len(files)) + 1).round().astype(int)
+    return [list(files[a:b]) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+
+
+def _on_cluster(
+    client: Any, files: list[Path], robot: Robot, terms: Sequence[Term], options: _Options
+) -> _Part:
+    threads = sum(client.nthreads().values())
+    chunks = _chunks(files, TASKS_PER_THREAD * threads if threads else len(files))
+    # A task of its own, so that each worker unpacks the robot, and compiles its equations, only
+    # once. Scattered data would do the same, but is lost with the worker that holds it.
+    known = client.submit(_together, robot, terms, options, pure=False)
+    parts = [client.submit(_task, chunk, known, pure=False) for chunk in chunks]
+    join = partial(_joined, groups=options.groups)
+    while len(parts) > 1:
+        pairs = zip(parts[::2], parts[1::2], strict=False)
+        merged = [client.submit(join, a, b, pure=False) for a, b in pairs]
+        parts = merged + (parts[-1:] if len(parts) % 2 else [])
+    result: _Part = parts[0].result()
+    return result
+
+
+def _together(*known: Any) -> tuple[Any, ...]:
+    return known
+
+
+def _task(paths: list[Path], known: tuple[Robot, Sequence[Term], _Options]) -> _Part:
+    return _of_files(paths, *known)

@@ -92,3 +92,14 @@ def test_the_model_of_a_regressor_follows_from_its_evidence():
     assert friction["viscous.Fv[1]"] == pytest.approx(
         model.effect_coefficients_[model.effect_terms_[0]][0], rel=1e-4
     )
+
+
+def test_shifted_evidence_keeps_recordings_apart():
+    rows = np.random.default_rng(1).normal(size=(3, 30, 3))
+    one = Evidence.from_rows(("a", "b"), {(k, 0): rows[k] for k in range(3)})
+    both = one + one.shifted(3)
+    assert both.trajectories == [0, 1, 2, 3, 4, 5]
+    np.testing.assert_array_equal(both.factors[4, 0], one.factors[1, 0])
+    merged = one.shifted(1, groups=2)
+    assert dict(merged.counts) == {(1, 0): 60, (0, 0): 30}
+    np.testing.assert_allclose(merged.solve(), one.solve(), rtol=1e-10)

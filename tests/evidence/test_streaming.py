@@ -120,3 +120,34 @@ def _kill_own_worker(flag):
         pass
     time.sleep(0.2)
     os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_names_of_recorders_and_of_the_user(tmp_path, folder):
+    wanted = evidence_from_parquet(folder, ROBOT)
+    joints = ROBOT.joint_names
+    spoken = {f"{s}{j + 1}": f"{s}_{name}" for s in ("q", "dq") for j, name in enumerate(joints)}
+    spoken |= {"tau1": "load a", "tau2": "load b", "time": "timestamp"}
+    for k, file in enumerate(sorted(folder.glob("*.parquet"))):
+        frame = pd.read_parquet(file).drop(columns=["dq1", "dq2"])  # derived from the positions
+        frame.rename(columns=spoken).to_parquet(tmp_path / f"{k}.parquet")
+    with pytest.raises(LogError, match="lacks tau1, tau2; it has .* load a"):
+        evidence_from_parquet(tmp_path, ROBOT)
+    same(evidence_from_parquet(tmp_path, ROBOT, columns={"tau": ["load a", "load b"]}), wanted)
+
+
+def test_trajectories_of_two_files_never_share_a_factor(tmp_path, folder):
+    for k, file in enumerate(sorted(folder.glob("*.parquet"))):
+        frame = pd.read_parquet(file)
+        frame["trajectory"] = frame["trajectory"] % 2 + 5
+        frame.to_parquet(tmp_path / f"{k}.parquet")
+    for groups in (None, 3):
+        wanted = evidence_from_parquet(folder, ROBOT, groups=groups)
+        same(evidence_from_parquet(tmp_path, ROBOT, groups=groups), wanted)
+        same(evidence_from_parquet(tmp_path, ROBOT, groups=groups, n_jobs=2), wanted)
+
+
+def test_text_in_place_of_numbers_is_refused(tmp_path):
+    frame = LOG.frame.assign(tau1="12 Nm")
+    frame.to_parquet(tmp_path / "log.parquet")
+    with pytest.raises(LogError, match=r"column tau1 holds .*string, numbers in SI units"):
+        evidence_from_parquet(tmp_path, ROBOT)
