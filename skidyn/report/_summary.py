@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from skidyn._signals import Array, Signals
 from skidyn._version import versions
 from skidyn.report._decimate import rows_with_peaks
 from skidyn.report._maps import residual_maps
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 
 #: Buckets over the whole log; up to six rows of each bucket are drawn.
 BUCKETS = 3000
+#: Gap between pieces of a log on the axis of time, as a share of the whole.
+GAP = 0.004
 #: Share of what is left of a joint's squared error that is worth a word if it is predictable.
 WORTH_A_WORD = 0.1
 
@@ -180,17 +183,31 @@ def _traces(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     return traces
 
 
-def elapsed(signals: Any) -> tuple[np.ndarray, list[dict[str, Any]]]:
-    """Time in s that runs on over the borders of trajectories, and where each one starts."""
+def elapsed(signals: Signals) -> tuple[Array, list[dict[str, Any]]]:
+    """Time that runs on over the borders of trajectories, with a gap that the eye sees.
+
+    Parameters
+    ----------
+    signals : Signals
+        Motion.
+
+    Returns
+    -------
+    clock : ndarray of shape (n_samples,), s
+        Time on the axis.
+    starts : list of dict
+        ``trajectory`` and ``time``, s, of each beginning.
+    """
+    pieces = [signals.clock[segment] for segment in signals.segments]
+    total = sum(float(piece[-1] - piece[0]) for piece in pieces)
+    gap = min(GAP * total, 0.1 * total / len(pieces))
     clock = np.empty(signals.n_samples)
     starts: list[dict[str, Any]] = []
     end = 0.0
-    for segment in signals.segments:
-        time = signals.clock[segment]
-        step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    for segment, time in zip(signals.segments, pieces, strict=True):
         clock[segment] = time - time[0] + end
         name = int(signals.trajectory[segment.start])
         if not starts or starts[-1]["trajectory"] != name:
             starts.append({"trajectory": name, "time": end})
-        end = float(clock[segment.stop - 1]) + step
+        end = float(clock[segment.stop - 1]) + gap
     return clock, starts

@@ -63,7 +63,9 @@ def test_an_effect_that_changes_nothing_is_not_praised(fakes):
 def test_trajectories_are_laid_end_to_end(fakes):
     trace = summarize(fakes.make_diagnosis())["traces"][0]
     assert [start["trajectory"] for start in trace["starts"]] == [0, 1, 2]
-    assert [start["time"] for start in trace["starts"]] == pytest.approx([0, 10, 20])
+    assert [start["time"] for start in trace["starts"]] == pytest.approx([0, 10, 20], rel=0.02)
+    # a line that goes on over a border would be drawn up or down
+    assert trace["starts"][1]["time"] - 9.99 > 0.003 * 30
     assert (np.diff(trace["time"]) > 0).all()
     assert len(trace["breaks"]) == 2
 

@@ -28,7 +28,7 @@
       }
       data.push(s.values); colours.push(s.colour);
       series.push({
-        label: s.label, stroke, width: points ? 0 : 2.2, dash: s.dash ? [6, 4] : undefined, value: told,
+        label: s.label, class: s.low ? "banded" : null, stroke, width: points ? 0 : 2.2, dash: s.dash ? [6, 4] : undefined, value: told,
         paths: points ? () => null : undefined, points: { show: points, size: 5, fill: stroke, stroke, width: 0 },
       });
     }
