@@ -127,6 +127,14 @@ PAGES: tuple[Page, ...] = (
         ),
     ),
     Page(
+        "skidyn.payload",
+        "What a robot carries, and torque per ampere from a known load.",
+        (
+            Section("Classes", ("DriveGainEstimate", "PayloadEstimate")),
+            Section("Functions", ("estimate_drive_gains", "identify_payload")),
+        ),
+    ),
+    Page(
         "skidyn.excitation",
         "Motions from which the parameters of a robot can be told.",
         (

@@ -28,6 +28,7 @@ __all__ = [
     "metrics",
     "model_selection",
     "neural_network",
+    "payload",
     "preprocessing",
     "report",
     "rigid_body",

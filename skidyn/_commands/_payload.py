@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``skidyn payload``: what the robot carries, or its drive gains from a known load."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from skidyn._commands._arguments import command, with_log_only
+from skidyn._commands._input import json_option, read_frame, read_robot
+from skidyn._commands._output import print_json, working, write_json
+from skidyn._exceptions import SkidynError
+
+DESCRIPTION = """\
+Identify a payload from runs with it (LOG) and without it (--unloaded): mass, centre of mass and
+inertia with 95 % intervals. With --known-mass the drive gains are estimated instead: torque per
+ampere of every joint, from logs of currents.
+
+  skidyn payload loaded.csv --unloaded free.csv --urdf robot.urdf
+  skidyn payload loaded.csv --unloaded free.csv --urdf robot.urdf --link tool0 --out payload.json
+  skidyn payload loaded.csv --unloaded free.csv --urdf robot.urdf --known-mass 2.805
+"""
+
+
+def add_parser(commands: Any) -> None:
+    parser = command(
+        commands, "payload", run, "identify a payload, or drive gains from one", DESCRIPTION
+    )
+    with_log_only(parser)
+    parser.add_argument(
+        "--unloaded",
+        nargs="+",
+        required=True,
+        metavar="LOG",
+        help="recordings without the payload, if possible of the same motion",
+    )
+    parser.add_argument(
+        "--link", help="link that carries it, in whose frame it is stated (default: the last)"
+    )
+    parser.add_argument(
+        "--model",
+        default="rigid_body,viscous,coulomb,offset,rotor_inertia",
+        help="what the unloaded robot has, separated by commas (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--known-mass",
+        type=float,
+        metavar="KG",
+        help="mass of the load: estimate the drive gains from logs of currents",
+    )
+    parser.add_argument("--out", metavar="JSON", help="write the result as JSON")
+
+
+def run(options: argparse.Namespace) -> None:
+    from skidyn.payload import estimate_drive_gains, identify_payload
+
+    robot = read_robot(options)
+    gains = options.drive_gains
+    if options.known_mass is not None and gains is None:
+        options.drive_gains = str([1.0] * robot.n_joints)  # torques that are the currents
+    loaded = read_frame(options, robot)
+    options.logs = options.unloaded
+    unloaded = read_frame(options, robot)
+    kinds = [kind.strip() for kind in options.model.split(",") if kind.strip()]
+    if "rigid_body" not in kinds:
+        raise SkidynError("--model must contain rigid_body; it may add kinds of the catalogue")
+    common: dict[str, Any] = {
+        "link": options.link,
+        "effects": [kind for kind in kinds if kind != "rigid_body"],
+    }
+    with working("Identifying", options):
+        found: Any
+        if options.known_mass is None:
+            found = identify_payload(robot, loaded, unloaded, **common)
+        else:
+            common["drive_gains"] = json_option("drive-gains", gains)
+            found = estimate_drive_gains(robot, loaded, unloaded, options.known_mass, **common)
+    if options.out:
+        write_json(options.out, found.to_dict())
+    if options.json:
+        print_json(found.to_dict())
+    else:
+        print(found.text)

@@ -1,0 +1,348 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Torque per ampere of every joint, from runs with and without a load of known mass."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from skidyn._exceptions import SkidynError
+from skidyn._signals import Array
+from skidyn.evidence._streaming import linear_terms
+from skidyn.payload._runs import (
+    FRICTION,
+    Runs,
+    interval_factor,
+    jackknife,
+    make_runs,
+    open_columns,
+    read_runs,
+)
+from skidyn.robots import Robot
+
+#: Rounds of weights, evaluations in each, and the relative change that ends them.
+PASSES, EVALUATIONS, SMALL = 4, 60, 1e-9
+
+
+@dataclass(frozen=True)
+class DriveGainEstimate:
+    """Torque per unit of motor current of every joint.
+
+    Parameters
+    ----------
+    joint_names : tuple of str
+        Joints.
+    units : tuple of str
+        ``"N m/A"`` or ``"N/A"`` of each joint.
+    gains : ndarray of shape (n_joints,)
+        Torque per ampere, N m/A or N/A; NaN where the motion does not show it.
+    std : ndarray of shape (n_joints,)
+        Standard errors by the jackknife over trajectories or blocks of time.
+    interval : ndarray of shape (n_joints, 2)
+        95 % intervals.
+    factors : ndarray of shape (n_joints,)
+        Gains over those by which the runs had been read.
+    mass : float
+        The known mass on which all gains rest, kg.
+    com : ndarray of shape (3,)
+        Centre of mass of the load in the frame of the link, as given or found on the way, m.
+    relative_error : ndarray of shape (n_joints,)
+        Root mean square of the residual over that of the current, averaged rows.
+    notes : tuple of str
+        What cannot be told apart or was left open, in words.
+
+    Examples
+    --------
+    >>> from skidyn.payload import DriveGainEstimate  # made by estimate_drive_gains
+    """
+
+    joint_names: tuple[str, ...]
+    units: tuple[str, ...]
+    gains: Array
+    std: Array
+    interval: Array
+    factors: Array
+    mass: float
+    com: Array
+    relative_error: Array
+    notes: tuple[str, ...]
+
+    @property
+    def text(self) -> str:
+        """The result in words."""
+        rows = zip(self.joint_names, self.gains, self.units, self.interval, strict=True)
+        lines = [
+            f"{name}: {gain:.4g} {unit} (95 %: {low:.4g} to {high:.4g})"
+            for name, gain, unit, (low, high) in rows
+        ]
+        if not np.allclose(self.factors, self.gains, equal_nan=True):
+            shown = ", ".join(f"{factor:.3f}" for factor in self.factors)
+            lines.append(f"over the gains by which the runs were read: {shown}")
+        return "\n".join([*lines, *self.notes])
+
+    def __str__(self) -> str:
+        return self.text
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain numbers, for JSON.
+
+        Returns
+        -------
+        dict
+            All attributes and ``text``.
+        """
+        return {
+            "schema": "skidyn.drive_gains/1",
+            "joints": list(self.joint_names),
+            "units": list(self.units),
+            "gains": self.gains.tolist(),
+            "std": self.std.tolist(),
+            "interval": self.interval.tolist(),
+            "factors": self.factors.tolist(),
+            "mass": self.mass,
+            "com": self.com.tolist(),
+            "relative_error": self.relative_error.tolist(),
+            "notes": list(self.notes),
+            "text": self.text,
+        }
+
+
+def estimate_drive_gains(
+    robot: Robot,
+    loaded: Any,
+    unloaded: Any,
+    mass: float,
+    *,
+    com: Sequence[float] | None = None,
+    drive_gains: Sequence[float] | None = None,
+    link: str | None = None,
+    effects: Sequence[Any] = FRICTION,
+    smooth: bool | None = None,
+) -> DriveGainEstimate:
+    """Estimate the drive gains from runs with and without a load of known mass.
+
+    Rigid body, friction, the unknown parameters of the load and all gains are fitted together
+    [1]_. The noise sits in the currents, which are what is fitted: a least-squares fit with the
+    currents as regressors would pull every gain toward zero.
+
+    Parameters
+    ----------
+    robot : Robot
+        Robot; its inertial parameters are not used.
+    loaded, unloaded : DataFrame or sequence of DataFrame
+        Runs with and without the load: ``time`` (s), ``q1..``, ``dq1..`` (rad, m) and ``tau1..``,
+        torque by the gains in ``drive_gains`` or, without them, the current in A.
+    mass : float
+        Known mass of the load, kg.
+    com : sequence of 3 floats, optional
+        Its centre of mass in the frame of the link, m, if that is known too; found otherwise.
+    drive_gains : sequence of float, N m/A or N/A, optional
+        Gains by which the torque columns were made from currents; 1 by default.
+    link : str, optional
+        Link of the URDF to which the load is fixed; the last moving link by default.
+    effects : sequence of str, (str, joints) or Term
+        Effects beside the rigid body; viscous and dry friction, offset and rotor inertia by
+        default.
+    smooth : bool or None, default=None
+        Derive velocity and acceleration from the positions. None does so where the runs have no
+        accelerations.
+
+    Returns
+    -------
+    DriveGainEstimate
+        Gains with intervals, and what cannot be told in words.
+
+    Raises
+    ------
+    SkidynError
+        Runs that cannot be used, a link that is not there, or a mass that is not positive.
+
+    References
+    ----------
+    .. [1] M. Gautier, S. Briot, "Global identification of joint drive gains and dynamic parameters
+       of robots", J. Dynamic Systems, Measurement, and Control 136(5), 2014.
+
+    Examples
+    --------
+    >>> from skidyn.datasets import load_ur5, make_hidden_effect_log
+    >>> from skidyn.payload import estimate_drive_gains
+    >>> log = make_hidden_effect_log(
+    ...     load_ur5(), "payload", base=("viscous", "coulomb"), random_state=0
+    ... )
+    >>> runs = log.frame.copy()
+    >>> runs["tau2"] /= 12.0  # the current of a joint with 12 N m/A
+    >>> carries = runs["trajectory"].isin(log.parameters["trajectories"])
+    >>> found = estimate_drive_gains(
+    ...     log.robot, runs[carries], runs[~carries], log.parameters["mass"],
+    ...     effects=("viscous", "coulomb"),
+    ... )
+    >>> bool(abs(found.gains[1] / 12 - 1) < 0.02)
+    True
+    """
+    if not (np.isfinite(mass) and mass > 0):
+        raise SkidynError(f"mass is {mass}; expected the mass of the load in kg")
+    n = robot.n_joints
+    nominal = np.ones(n) if drive_gains is None else np.asarray(drive_gains, dtype=np.float64)
+    if nominal.shape != (n,) or not np.all(np.isfinite(nominal)) or np.any(nominal == 0):
+        raise SkidynError(f"drive_gains needs {n} numbers other than zero, one for each joint")
+    signals, torque, carries, smooths = read_runs(robot, loaded, unloaded, smooth)
+    if carries.all():
+        raise SkidynError("no run without the load was given")
+    runs = make_runs(
+        signals,
+        torque / nominal,
+        carries,
+        robot=robot,
+        link=link,
+        terms=linear_terms(effects, n),
+        smooth=smooths,
+    )
+    known = np.full(10, np.nan)
+    known[0] = mass
+    if com is not None:
+        known[1:4] = mass * np.asarray(com, dtype=np.float64)
+    return _estimate(runs, robot, known, nominal)
+
+
+def _estimate(runs: Runs, robot: Robot, known: Array, nominal: Array) -> DriveGainEstimate:
+    system = _System.of(runs, known)
+    currents = np.array([np.sqrt(np.mean(y**2)) + 1e-100 for y in runs.target])
+    factors = system.factors(runs)
+    whole = _merged(factors)
+    noise = currents.copy()
+    solution = system.start(whole, noise)
+    for _ in range(PASSES):
+        solution = system.refine(whole, noise, solution)
+        noise = system.noise(whole, solution, runs)
+    left = np.array(
+        [
+            1 / system.refine(_merged(factors[:f] + factors[f + 1 :]), noise, solution)[-system.n :]
+            for f in range(len(factors))
+        ]
+    )
+    gains, std = 1 / solution[-system.n :], jackknife(left)
+    place = range(len(solution) - system.n, len(solution))
+    is_open = open_columns(system.linearised(whole, noise, solution)[1], place)
+    gains, std = np.where(is_open, np.nan, gains), np.where(is_open, np.nan, std)
+    half = interval_factor(len(factors)) * std[:, None] * [-1.0, 1.0]
+    notes = [
+        f"All gains rest on the mass of {known[0]:g} kg: if it is 1 % too large, so are they. "
+        "Friction and every inertial parameter scale with them."
+    ]
+    hardly = is_open | (np.abs(half[:, 1]) >= np.abs(gains))
+    if hardly.any():
+        names = ", ".join(np.array(robot.joint_names)[hardly])
+        notes.append(
+            f"These runs hardly show the gain of {names}: little ties its current to the load. "
+            "Turn the load about it, out of balance."
+        )
+    body = known.copy()
+    body[system.unknown] = solution[: len(system.unknown)]
+    return DriveGainEstimate(
+        joint_names=robot.joint_names,
+        units=tuple("N/A" if kind == "prismatic" else "N m/A" for kind in robot.joint_types),
+        gains=gains,
+        std=std,
+        interval=gains[:, None] + half,
+        factors=gains / nominal,
+        mass=float(known[0]),
+        com=body[1:4] / body[0],
+        relative_error=noise / currents,
+        notes=tuple(notes),
+    )
+
+
+@dataclass(frozen=True)
+class _System:
+    """Currents as functions of the unknown parameters and of one over the gains.
+
+    The current of joint j is ``k_j (A_j x + b_j)``: A_j the columns of the unknown parameters of
+    load, robot and friction, b_j the torque of what is known of the load.
+    """
+
+    known: Array
+    unknown: list[int]
+    n: int
+
+    @classmethod
+    def of(cls, runs: Runs, known: Array) -> _System:
+        unknown = [k for k in range(10) if np.isnan(known[k])]
+        return cls(known, unknown, len(runs.target))
+
+    def factors(self, runs: Runs) -> list[list[Array]]:
+        """Per fold and joint, the triangular factor of [A | b | current]."""
+        given = [k for k in range(10) if k not in self.unknown]
+        rows = []
+        for body, rest, current in zip(runs.body, runs.rest, runs.target, strict=True):
+            certain = body[:, given] @ self.known[given]
+            rows.append(np.column_stack([body[:, self.unknown], rest, certain, current]))
+        return [
+            [_triangle(block[fold == f]) for block, fold in zip(rows, runs.fold, strict=True)]
+            for f in range(runs.problem.n_folds)
+        ]
+
+    def start(self, whole: list[Array], noise: Array) -> Array:
+        """The combination of columns and currents that vanishes best (total least squares)."""
+        width = whole[0].shape[1] - 1
+        blocks = []
+        for j, (factor, s) in enumerate(zip(whole, noise, strict=True)):
+            currents = np.zeros((len(factor), self.n))
+            currents[:, j] = -factor[:, -1]
+            blocks.append(np.hstack([factor[:, :width], currents]) / s)
+        stacked = np.vstack(blocks)
+        size = np.linalg.norm(stacked, axis=0)
+        size[size == 0] = 1.0
+        # With the torque of the known load as the right-hand side, gains are linear unknowns.
+        columns = np.delete(stacked / size, width - 1, axis=1)
+        found = np.linalg.lstsq(columns, -stacked[:, width - 1], rcond=1e-9)[0]
+        found /= np.delete(size, width - 1)
+        gains = found[width - 1 :]
+        if np.any(gains <= 0):
+            # Noise drowns what ties some joint to the load: begin with gains that fit in size.
+            gains = np.where(gains > 0, gains, np.median(np.abs(gains)) + 1e-300)
+        return np.r_[found[: width - 1], 1 / gains]
+
+    def linearised(self, whole: list[Array], noise: Array, solution: Array) -> tuple[Array, Array]:
+        """Residual and its derivative by the unknowns."""
+        x, k = solution[: -self.n], solution[-self.n :]
+        residuals, slopes = [], []
+        for j, (factor, s) in enumerate(zip(whole, noise, strict=True)):
+            torque = factor[:, :-2] @ x + factor[:, -2]
+            by_gain = np.zeros((len(factor), self.n))
+            by_gain[:, j] = torque
+            residuals.append((k[j] * torque - factor[:, -1]) / s)
+            slopes.append(np.hstack([k[j] * factor[:, :-2], by_gain]) / s)
+        return np.concatenate(residuals), np.vstack(slopes)
+
+    def refine(self, whole: list[Array], noise: Array, solution: Array) -> Array:
+        """Levenberg-Marquardt from a solution nearby."""
+        found = least_squares(
+            lambda z: self.linearised(whole, noise, z)[0],
+            solution,
+            jac=lambda z: self.linearised(whole, noise, z)[1],
+            method="lm",
+            x_scale="jac",
+            ftol=SMALL,
+            xtol=SMALL,
+            max_nfev=EVALUATIONS,
+        )
+        return np.asarray(found.x)
+
+    def noise(self, whole: list[Array], solution: Array, runs: Runs) -> Array:
+        """Root mean square residual of the current of every joint."""
+        residual, _ = self.linearised(whole, np.ones(self.n), solution)
+        edges = np.cumsum([0, *(len(factor) for factor in whole)])
+        sums = [np.sum(residual[a:b] ** 2) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        return np.sqrt(np.array(sums) / np.array([len(y) for y in runs.target])) + 1e-100
+
+
+def _merged(factors: list[list[Array]]) -> list[Array]:
+    return [_triangle(np.vstack(parts)) for parts in zip(*factors, strict=True)]
+
+
+def _triangle(rows: Array) -> Array:
+    return np.asarray(np.linalg.qr(rows, mode="r"))

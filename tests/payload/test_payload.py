@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Payloads: found with their intervals, possible as bodies, and honest about what stays open."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from importlib import resources
+
+import numpy as np
+import pytest
+
+from skidyn._exceptions import SkidynError
+from skidyn.datasets import load_planar_arm, load_recording, load_ur5, make_hidden_effect_log
+from skidyn.payload import identify_payload
+from skidyn.rigid_body import RBDRegressor, is_consistent
+from skidyn.robots import Robot
+
+FRICTION = ("viscous", "coulomb")
+TOOL = """<link name="tool"/><joint name="tool_joint" type="fixed">
+<parent link="{last}"/><child link="tool"/><origin xyz="0.01 0.02 0.08" rpy="0.3 -0.2 0.5"/></joint>
+</robot>"""
+
+
+@pytest.fixture(scope="module")
+def runs():
+    """A log of a UR5 that carries a payload in some trajectories: loaded, unloaded, the truth."""
+    log = make_hidden_effect_log(
+        load_ur5(), "payload", base=FRICTION, n_trajectories=6, duration=8.0, random_state=3
+    )
+    carries = log.frame["trajectory"].isin(log.parameters["trajectories"])
+    return log, log.frame[carries], log.frame[~carries]
+
+
+@pytest.fixture(scope="module")
+def found(runs):
+    log, loaded, unloaded = runs
+    return identify_payload(log.robot, loaded, unloaded, effects=FRICTION)
+
+
+def test_mass_and_centre_of_mass(runs, found):
+    truth = runs[0].parameters
+    assert found.mass == pytest.approx(truth["mass"], rel=0.02)
+    np.testing.assert_allclose(found.com, truth["com"], atol=0.003)
+    assert np.all(found.rmse_after[:3] < found.rmse_before[:3])
+
+
+def test_body_that_can_exist(found):
+    assert is_consistent(found.inertial_parameters[None])
+    inertia = np.linalg.eigvalsh(found.inertia)
+    assert inertia[0] > 0 and inertia[2] < inertia[0] + inertia[1]
+
+
+def test_says_what_cannot_be_told_apart(found):
+    assert "Mass and drive gains scale alike" in found.text
+    assert found.text.startswith("payload at wrist_3_link")
+    again = json.loads(json.dumps(found.to_dict()))
+    assert again["mass"] == found.mass and again["text"] == str(found)
+
+
+def test_mass_scales_with_the_drive_gains(runs, found):
+    log, loaded, unloaded = runs
+    torques = [f"tau{j}" for j in range(1, 7)]
+    scaled = [
+        frame.assign(**{name: 1.1 * frame[name] for name in torques})
+        for frame in (loaded, unloaded)
+    ]
+    other = identify_payload(log.robot, *scaled, effects=FRICTION)
+    assert other.mass == pytest.approx(1.1 * found.mass, rel=1e-3)
+
+
+def test_in_the_frame_of_a_link(runs, found):
+    log, loaded, unloaded = runs
+    text = resources.files("skidyn.datasets").joinpath("robots", "ur5.urdf").read_text("utf-8")
+    text = text.replace("</robot>", TOOL.format(last=log.robot.body_names[-1]))
+    robot = Robot.from_urdf(text)
+    other = identify_payload(robot, loaded, unloaded, link="tool", effects=FRICTION)
+    placement = robot.links["tool"]
+    assert other.mass == pytest.approx(found.mass, rel=1e-3)
+    back = placement.rotation @ other.com + placement.translation
+    np.testing.assert_allclose(back, found.com, atol=1e-4)
+
+
+def test_a_fitted_model_stands_for_unloaded_runs(runs, found):
+    log, loaded, unloaded = runs
+    columns = [c for c in loaded if not c.startswith("tau")]
+    model = RBDRegressor(log.robot, FRICTION).fit(
+        unloaded[columns], unloaded[[f"tau{j}" for j in range(1, 7)]]
+    )
+    other = identify_payload(model, loaded)
+    assert other.mass == pytest.approx(found.mass, rel=0.02)
+    assert any("taken as exact" in note for note in other.notes)
+    with pytest.raises(SkidynError, match="a fitted RBDRegressor is needed"):
+        identify_payload(log.robot, loaded)
+
+
+def test_what_the_motion_leaves_open_is_said():
+    log = make_hidden_effect_log(
+        load_planar_arm(), "payload", n_trajectories=4, duration=6.0, random_state=0
+    )
+    carries = log.frame["trajectory"].isin(log.parameters["trajectories"])
+    found = identify_payload(log.robot, log.frame[carries], log.frame[~carries], effects=())
+    assert "leaves open" in found.text
+    assert np.isnan(found.std[6])  # Ixz: a planar arm never turns about another axis
+
+
+def test_errors_name_what_is_wrong(runs):
+    log, loaded, unloaded = runs
+    with pytest.raises(SkidynError, match="no link 'tool'"):
+        identify_payload(log.robot, loaded, unloaded, link="tool")
+    with pytest.raises(SkidynError, match=r"lacks the torque column\(s\) tau4"):
+        identify_payload(log.robot, loaded.drop(columns="tau4"), unloaded)
+    with pytest.raises(SkidynError, match="loaded holds a ndarray"):
+        identify_payload(log.robot, [loaded.to_numpy()], unloaded)
+    with pytest.raises(SkidynError, match="no column time"):
+        identify_payload(log.robot, loaded.drop(columns="time"), unloaded)
+
+
+def test_real_payload(data_dir):
+    """2.805 kg at the flange of a UR10e, with the calibrated drive gains."""
+    gains = 0.91 * np.array([14.87, 13.26, 11.13, 10.62, 11.03, 11.47])
+    file = data_dir / "ur10e" / "ur10e_excitation.npz"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        loaded, unloaded = (
+            load_recording(file, run=run, drive_gains=gains).frame
+            for run in ("ur-20_02_19_14harm50secLoad", "ur-20_02_19_14harm50sec")
+        )
+    found = identify_payload(
+        Robot.from_urdf(data_dir / "ur10e" / "ur10e_min.urdf"), loaded, unloaded
+    )
+    assert found.mass == pytest.approx(2.805, rel=0.02)
+    assert found.mass_interval[0] < 2.805 < found.mass_interval[1]
