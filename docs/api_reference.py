@@ -103,11 +103,13 @@ PAGES: tuple[Page, ...] = (
                 "Classes",
                 (
                     "Comparison",
+                    "Confirmation",
                     "Diagnosis",
                     "EffectSearchCV",
                     "Failure",
                     "Finding",
                     "Limit",
+                    "ParquetDiagnosis",
                     "Proposal",
                     "SeparatingMotion",
                     "Settings",
@@ -115,7 +117,7 @@ PAGES: tuple[Page, ...] = (
                     "VariableTest",
                 ),
             ),
-            Section("Functions", ("design_separating_motion", "diagnose")),
+            Section("Functions", ("design_separating_motion", "diagnose", "diagnose_parquet")),
         ),
     ),
     Page(

@@ -7,6 +7,7 @@ from skidyn.diagnosis._failures import Comparison, Failure
 from skidyn.diagnosis._findings import Finding
 from skidyn.diagnosis._hypothesis import Settings
 from skidyn.diagnosis._limits import Limit
+from skidyn.diagnosis._out_of_core import Confirmation, ParquetDiagnosis, diagnose_parquet
 from skidyn.diagnosis._proposal import Proposal
 from skidyn.diagnosis._result import Diagnosis
 from skidyn.diagnosis._separation import SeparatingMotion, design_separating_motion
@@ -15,11 +16,13 @@ from skidyn.diagnosis._variables import VariableTest
 
 __all__ = [
     "Comparison",
+    "Confirmation",
     "Diagnosis",
     "EffectSearchCV",
     "Failure",
     "Finding",
     "Limit",
+    "ParquetDiagnosis",
     "Proposal",
     "SeparatingMotion",
     "Settings",
@@ -27,4 +30,5 @@ __all__ = [
     "VariableTest",
     "design_separating_motion",
     "diagnose",
+    "diagnose_parquet",
 ]

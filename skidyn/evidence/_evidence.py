@@ -16,12 +16,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import lstsq
 
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Array
 from skidyn.effects import Term, get_effect
 from skidyn.evidence._problem import Problem
+from skidyn.robots import Robot
 
 #: Trajectory and joint (from 0) that a factor belongs to.
 Key = tuple[int, int]
@@ -107,12 +109,7 @@ class Evidence:
             Factors by trajectory and joint.
         """
         terms = list(terms)
-        names = []
-        if problem.robot is not None:
-            names = [problem.robot.parameter_names[i] for i in problem.rigid_index]
-        for term in terms:
-            joints = ",".join(str(j + 1) for j in term.joints)
-            names += [f"{term.kind}.{c.name}[{joints}]" for c in get_effect(term.kind).coefficients]
+        names = column_names(problem.robot, problem.rigid_index, terms)
         design = problem.design([problem.term_rows(t) for t in terms])
         rows = {}
         for j, (block, y) in enumerate(zip(design, problem.target, strict=True)):
@@ -187,6 +184,28 @@ class Evidence:
             key, count = (number, joint), self.counts[trajectory, joint]
             result += Evidence(self.columns, {key: factor}, {key: count})
         return result
+
+    def select(self, columns: Sequence[str]) -> Evidence:
+        """Evidence of a smaller model.
+
+        Parameters
+        ----------
+        columns : sequence of str
+            Columns to keep, in their new order.
+
+        Returns
+        -------
+        Evidence
+            The same trajectories, fewer columns.
+
+        Raises
+        ------
+        SkidynError
+            A column that is not there.
+        """
+        index = [*self._index(columns), -1]
+        factors = {key: _triangle(factor[:, index]) for key, factor in self.factors.items()}
+        return Evidence(tuple(columns), factors, self.counts)
 
     def without(self, trajectory: int) -> Evidence:
         """Evidence of all trajectories but one.
@@ -313,6 +332,32 @@ class Evidence:
         if unknown:
             raise SkidynError(f"no column {unknown[0]!r}; there are {', '.join(self.columns)}")
         return [self.columns.index(name) for name in columns]
+
+
+def column_names(
+    robot: Robot | None, rigid_index: Sequence[int] | NDArray[np.int64], terms: Iterable[Term]
+) -> tuple[str, ...]:
+    """Names of the columns of a model.
+
+    Parameters
+    ----------
+    robot : Robot or None
+        Robot, if its rigid body is part of the model.
+    rigid_index : sequence of int
+        Which of its parameters have a column.
+    terms : iterable of Term
+        Effects.
+
+    Returns
+    -------
+    tuple of str
+        Such as ``"m_link1"`` and ``"viscous.Fv[1]"``, joints counted from 1.
+    """
+    names = [] if robot is None else [robot.parameter_names[i] for i in rigid_index]
+    for term in terms:
+        joints = ",".join(str(j + 1) for j in term.joints)
+        names += [f"{term.kind}.{c.name}[{joints}]" for c in get_effect(term.kind).coefficients]
+    return tuple(names)
 
 
 def _triangle(rows: Array) -> Array:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -84,25 +85,71 @@ def read_trajectories(
     yield _split(parts, layout, robot)
 
 
+def trajectory_lengths(path: Path, robot: Robot, columns: ColumnMap | None = None) -> list[int]:
+    """Rows of every trajectory of a file; only the column of their numbers is decoded.
+
+    Parameters
+    ----------
+    path : Path
+        File.
+    robot : Robot
+        Its joints.
+    columns : mapping, optional
+        As in :func:`skidyn.datasets.read_log`.
+
+    Returns
+    -------
+    list of int
+        In the order of the rows.
+
+    Raises
+    ------
+    LogError
+        A missing column, or a file that cannot be decoded.
+    """
+    parquet = import_optional("pyarrow.parquet", extra="io")
+    with _decoder_errors(path), parquet.ParquetFile(path) as file:
+        layout = _layout(file.schema_arrow.names, robot, columns, path)
+        if layout.trajectory is None:
+            return [file.metadata.num_rows]
+        name = layout.names[layout.trajectory]
+        lengths: list[int] = []
+        last = None
+        for batch in file.iter_batches(BATCH_ROWS, columns=[name], use_threads=False):
+            for piece in _pieces(_numbers(batch.column(0), name, path)[:, None], 0):
+                if piece[0, 0] == last:
+                    lengths[-1] += len(piece)
+                else:
+                    lengths.append(len(piece))
+                last = piece[0, 0]
+        return lengths
+
+
+@contextmanager
+def _decoder_errors(path: Path) -> Iterator[None]:
+    """Tell in which file the decoder failed; it raises whatever the bytes lead it to."""
+    try:
+        yield
+    except (LogError, GeneratorExit):
+        raise
+    except Exception as error:
+        raise LogError(f"{path}: cannot be read as Parquet: {error}") from error
+
+
 def _decoded(path: Path, parquet: Any, robot: Robot, columns: ColumnMap | None) -> Iterator[Any]:
     """The layout, then tables of ``BATCH_ROWS`` rows and fewer."""
     row = 0
-    try:
-        with parquet.ParquetFile(path) as file:
-            layout = _layout(file.schema_arrow.names, robot, columns, path)
-            yield layout
-            # Threads of its own would compete with the other workers of a machine.
-            for batch in file.iter_batches(BATCH_ROWS, columns=layout.names, use_threads=False):
-                table = np.empty((batch.num_rows, len(layout.names)))
-                for k, name in enumerate(layout.names):
-                    table[:, k] = _numbers(batch.column(name), name, path)
-                _refuse_missing(table, layout.names, path, row)
-                row += len(table)
-                yield table
-    except (LogError, GeneratorExit):
-        raise
-    except Exception as error:  # the decoder raises whatever the bytes lead it to
-        raise LogError(f"{path}: cannot be read as Parquet: {error}") from error
+    with _decoder_errors(path), parquet.ParquetFile(path) as file:
+        layout = _layout(file.schema_arrow.names, robot, columns, path)
+        yield layout
+        # Threads of its own would compete with the other workers of a machine.
+        for batch in file.iter_batches(BATCH_ROWS, columns=layout.names, use_threads=False):
+            table = np.empty((batch.num_rows, len(layout.names)))
+            for k, name in enumerate(layout.names):
+                table[:, k] = _numbers(batch.column(name), name, path)
+            _refuse_missing(table, layout.names, path, row)
+            row += len(table)
+            yield table
 
 
 def _layout(names: Sequence[str], robot: Robot, columns: ColumnMap | None, path: Path) -> _Layout:

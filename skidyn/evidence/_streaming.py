@@ -16,7 +16,7 @@ from joblib import Parallel, delayed, effective_n_jobs
 from skidyn._exceptions import LogError, SkidynError
 from skidyn._signals import Array, Signals
 from skidyn.effects import Term, get_effect, make_terms
-from skidyn.evidence._evidence import Evidence
+from skidyn.evidence._evidence import Evidence, column_names
 from skidyn.evidence._kinematics import as_given, smooth_motion
 from skidyn.evidence._parquet import ColumnMap, read_trajectories
 from skidyn.evidence._problem import MARGIN, Problem, _regressor_rows
@@ -29,8 +29,14 @@ PathLike = str | os.PathLike[str]
 TASKS_PER_THREAD = 8
 
 
+#: A file, and which of its trajectories, counted from 0, are left out.
+Source = tuple[Path, frozenset[int]]
+
+
 @dataclass(frozen=True)
-class _Options:
+class Options:
+    """How files are read; see :func:`evidence_from_parquet`."""
+
     columns: ColumnMap | None
     groups: int | None
     max_rows: int
@@ -113,16 +119,49 @@ def evidence_from_parquet(
     >>> evidence.trajectories
     [0, 1, 2]
     """
-    files = _files(paths)
+    files = parquet_files(paths)
     terms = tuple(linear_terms(effects, robot.n_joints))
-    options = _Options(columns, groups, max_rows)
-    if client is not None:
-        return _on_cluster(client, files, robot, terms, options).evidence
-    chunks = _chunks(files, effective_n_jobs(n_jobs))
-    parts = Parallel(n_jobs=n_jobs)(
-        delayed(_of_files)(chunk, robot, terms, options) for chunk in chunks
+    options = Options(columns, groups, max_rows)
+    return evidence_of_sources(
+        [(f, frozenset()) for f in files], robot, terms, options, n_jobs, client
     )
-    return reduce(partial(_joined, groups=groups), parts).evidence
+
+
+def evidence_of_sources(
+    sources: Sequence[Source],
+    robot: Robot,
+    terms: Sequence[Term],
+    options: Options,
+    n_jobs: int | None = None,
+    client: Any = None,
+) -> Evidence:
+    """Evidence of all trajectories of files but some.
+
+    Parameters
+    ----------
+    sources : sequence of (Path, frozenset of int)
+        Files, and which of their trajectories, from 0, are left out and not numbered.
+    robot : Robot
+        Robot.
+    terms : sequence of Term
+        Effects with their shape parameters.
+    options : Options
+        How files are read.
+    n_jobs, client
+        See :func:`evidence_from_parquet`.
+
+    Returns
+    -------
+    Evidence
+        By trajectory or group, and joint.
+    """
+    if client is not None:
+        return _on_cluster(client, sources, robot, terms, options).evidence
+    parts = Parallel(n_jobs=n_jobs)(
+        delayed(_of_files)(chunk, robot, terms, options)
+        for chunk in _chunks(sources, effective_n_jobs(n_jobs))
+    )
+    return reduce(partial(_joined, groups=options.groups), parts).evidence
 
 
 def evidence_of_signals(
@@ -184,7 +223,7 @@ def linear_terms(effects: Iterable[Any], n_joints: int) -> list[Term]:
     terms = make_terms(effects, n_joints)
     for term in terms:
         effect = get_effect(term.kind)
-        if {"load", "model_torque"} & set(effect.needs):
+        if needs_a_fit(term):
             raise SkidynError(
                 f"the columns of {term.kind!r} need a fit of the model first, so no evidence can "
                 "be had in one pass; leave it out, or fit an RBDRegressor on data in memory"
@@ -198,7 +237,19 @@ def linear_terms(effects: Iterable[Any], n_joints: int) -> list[Term]:
     return terms
 
 
-def _files(paths: PathLike | Iterable[PathLike]) -> list[Path]:
+def needs_a_fit(term: Term) -> bool:
+    """Whether a term's columns are known only when a model has been fitted."""
+    return bool({"load", "model_torque"} & set(get_effect(term.kind).needs))
+
+
+def parquet_files(paths: PathLike | Iterable[PathLike]) -> list[Path]:
+    """Files that the user named, those of a folder in the order of their names.
+
+    Raises
+    ------
+    LogError
+        None, or one that is not there.
+    """
     if isinstance(paths, (str, os.PathLike)):
         folder = Path(paths)
         files = sorted(folder.glob("*.parquet")) if folder.is_dir() else [folder]
@@ -211,17 +262,19 @@ def _files(paths: PathLike | Iterable[PathLike]) -> list[Path]:
 
 
 def _of_files(
-    paths: Sequence[Path], robot: Robot, terms: Sequence[Term], options: _Options
+    sources: Sequence[Source], robot: Robot, terms: Sequence[Term], options: Options
 ) -> _Part:
     """Evidence of files, their trajectories numbered from 0."""
     parts = (
         _Part(evidence_of_signals(signals, torque, robot, terms), 1)
-        for path in paths
-        for signals, torque in read_trajectories(
-            path, robot, columns=options.columns, max_rows=options.max_rows
+        for path, left_out in sources
+        for k, (signals, torque) in enumerate(
+            read_trajectories(path, robot, columns=options.columns, max_rows=options.max_rows)
         )
+        if k not in left_out
     )
-    return reduce(partial(_joined, groups=options.groups), parts)
+    nothing = _Part(Evidence(column_names(robot, base_parameter_index(robot), terms), {}, {}), 0)
+    return reduce(partial(_joined, groups=options.groups), parts, nothing)
 
 
 def _joined(one: _Part, other: _Part, groups: int | None) -> _Part:
@@ -232,14 +285,14 @@ def _joined(one: _Part, other: _Part, groups: int | None) -> _Part:
     )
 
 
-def _chunks(files: Sequence[Path], n: int) -> list[list[Path]]:
+def _chunks(files: Sequence[Source], n: int) -> list[list[Source]]:
     """At most n lists of neighbouring files, of equal length but for one file."""
     edges = np.linspace(0, len(files), min(n, len(files)) + 1).round().astype(int)
     return [list(files[a:b]) for a, b in zip(edges[:-1], edges[1:], strict=True)]
 
 
 def _on_cluster(
-    client: Any, files: list[Path], robot: Robot, terms: Sequence[Term], options: _Options
+    client: Any, files: Sequence[Source], robot: Robot, terms: Sequence[Term], options: Options
 ) -> _Part:
     threads = sum(client.nthreads().values())
     chunks = _chunks(files, TASKS_PER_THREAD * threads if threads else len(files))
@@ -260,5 +313,5 @@ def _together(*known: Any) -> tuple[Any, ...]:
     return known
 
 
-def _task(paths: list[Path], known: tuple[Robot, Sequence[Term], _Options]) -> _Part:
-    return _of_files(paths, *known)
+def _task(sources: list[Source], known: tuple[Robot, Sequence[Term], Options]) -> _Part:
+    return _of_files(sources, *known)

@@ -1,0 +1,301 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Diagnosis of recordings larger than memory: searched in a sample, judged on all the rest."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from skidyn._exceptions import LogError, SkidynError
+from skidyn._optional import import_optional
+from skidyn._signals import Array
+from skidyn.diagnosis._diagnosis import _own_terms, diagnose
+from skidyn.diagnosis._findings import Finding
+from skidyn.diagnosis._hypothesis import Settings
+from skidyn.diagnosis._result import Diagnosis
+from skidyn.effects import make_terms
+from skidyn.evidence import Evidence
+from skidyn.evidence._evidence import column_names
+from skidyn.evidence._parquet import ColumnMap, read_trajectories, trajectory_lengths
+from skidyn.evidence._streaming import (
+    Options,
+    Source,
+    evidence_of_sources,
+    needs_a_fit,
+    parquet_files,
+)
+from skidyn.rigid_body._base_parameters import base_parameter_index
+from skidyn.rigid_body._from_evidence import regressor_from_evidence, weighted_solution
+from skidyn.robots import Robot
+
+#: Trajectories that cross-validation within the sample needs, and that the rest must have.
+FEWEST_TRAJECTORIES = 4
+#: Groups of trajectories that the rest is divided into; each is predicted from all others.
+GROUPS = 20
+#: A finding whose drop of error is more likely by chance than this is not confirmed.
+LEVEL = 0.01
+
+
+@dataclass(frozen=True)
+class Confirmation:
+    """What a finding of the sample is worth on all trajectories that the search did not see.
+
+    Parameters
+    ----------
+    finding : Finding
+        The finding.
+    rmse_without, rmse_with : dict of int to float
+        Held-out error of averaged rows by joint (from 1), of the model with all other findings,
+        and with this one too; N m or N.
+    error_drop : float
+        Share of the held-out squared error on the joints of the finding that it removes.
+    p_value : float
+        Probability of such a drop by chance, from the spread of its logarithm over groups of
+        trajectories.
+    confirmed : bool or None
+        Whether it is less than 1 %; None, with a drop of 0, for effects whose columns need a fit
+        of the model first, such as friction that grows with the load: the sample alone speaks for
+        these.
+
+    Examples
+    --------
+    >>> [(c.finding.kind, c.confirmed) for c in result.confirmations]  # doctest: +SKIP
+    [('stribeck', True)]
+    """
+
+    finding: Finding
+    rmse_without: dict[int, float]
+    rmse_with: dict[int, float]
+    error_drop: float
+    p_value: float
+    confirmed: bool | None
+
+
+@dataclass(frozen=True)
+class ParquetDiagnosis:
+    """A diagnosis of part of a recording, and what the rest says to it.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Of the sampled trajectories.
+    confirmations : list of Confirmation
+        One for each finding.
+    model : RBDRegressor
+        The given model with all findings that were confirmed, identified from all trajectories
+        that the search did not see.
+    evidence : Evidence
+        Of these trajectories, with the columns of all findings.
+    trajectories, sampled : int
+        How many there are, and how many of them were searched.
+    rows : int
+        Rows of the whole recording.
+
+    Examples
+    --------
+    >>> result.diagnosis.verdict, result.sampled, result.trajectories  # doctest: +SKIP
+    ('missing', 100, 10000)
+    """
+
+    diagnosis: Diagnosis
+    confirmations: list[Confirmation]
+    model: Any
+    evidence: Evidence
+    trajectories: int
+    sampled: int
+    rows: int
+
+
+def diagnose_parquet(
+    model: Any,
+    paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
+    *,
+    columns: ColumnMap | None = None,
+    sample_rows: int = 100_000,
+    effects: Iterable[str] | None = None,
+    settings: Settings | None = None,
+    max_rows: int = 2_000_000,
+    random_state: int = 0,
+    n_jobs: int | None = None,
+    client: Any = None,
+) -> ParquetDiagnosis:
+    """Learn what a model lacks from Parquet files that need not fit into memory.
+
+    The search for effects needs the rows again and again, so it is done on trajectories drawn at
+    random. What it finds is then put to all other trajectories, in one pass over the files: is the
+    error of each group of them, predicted by a model fitted to the others, smaller with the
+    effect? Memory is that of the sample and the longest trajectory, time is linear in the rows.
+
+    Parameters
+    ----------
+    model : RBDRegressor
+        The model to be judged; its effects with open shape parameters are fitted to the sample.
+    paths : path or iterable of path
+        Files or a folder, see :func:`skidyn.evidence.evidence_from_parquet`. They need ``time``.
+    columns : mapping, optional
+        Which column holds which signal, where the names do not tell.
+    sample_rows : int, default=100_000
+        Rows that are searched: as many trajectories as they hold, four at least, and half of all
+        at most.
+    effects : iterable of str, optional
+        Kinds to try; by default the whole catalogue.
+    settings : Settings, optional
+        Thresholds of the search.
+    max_rows : int, default=2_000_000
+        Longest trajectory that is read.
+    random_state : int, default=0
+        Draws the sample.
+    n_jobs : int, optional
+        Processes that make the evidence, see :func:`skidyn.evidence.evidence_from_parquet`.
+    client : distributed.Client, optional
+        Cluster that makes it.
+
+    Returns
+    -------
+    ParquetDiagnosis
+        The diagnosis of the sample, what the rest says to its findings, and the better model.
+
+    Raises
+    ------
+    LogError
+        Fewer than eight trajectories, files without time, or what
+        :func:`~skidyn.evidence.evidence_from_parquet` refuses.
+    SkidynError
+        An effect of the model whose columns need a fit of the model first.
+
+    References
+    ----------
+    D. R. Cox (1975), A note on data-splitting for the evaluation of significance levels,
+    Biometrika 62(2), 441-444.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+    >>> from skidyn.diagnosis import diagnose_parquet
+    >>> from skidyn.rigid_body import RBDRegressor
+    >>> log = make_hidden_effect_log(
+    ...     load_planar_arm(), "stribeck", joints=[2], n_trajectories=16, rate=100.0
+    ... )
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     log.frame.to_parquet(pathlib.Path(folder, "log.parquet"))
+    ...     result = diagnose_parquet(
+    ...         RBDRegressor(log.robot), folder, effects=["stribeck", "spring"]
+    ...     )
+    >>> [(c.finding.kind, c.finding.joints, c.confirmed) for c in result.confirmations]
+    [('stribeck', (2,), True)]
+    """
+    robot = model.robot
+    refused = [t.kind for t in make_terms(model.effects, robot.n_joints) if needs_a_fit(t)]
+    if refused:
+        raise SkidynError(
+            f"the columns of {refused[0]!r} need a fit of the model first, so recordings cannot be "
+            "gone through once; leave it out, or diagnose data in memory"
+        )
+    files = parquet_files(paths)
+    lengths = [trajectory_lengths(file, robot, columns) for file in files]
+    sources = list(zip(files, _draw(lengths, sample_rows, random_state), strict=True))
+    X, tau = _sample(sources, robot, columns, max_rows)
+    diagnosis = diagnose(model, X, tau, effects=effects, settings=settings)
+    own = _own_terms(model, robot, X, tau)
+    tried = [f for f in diagnosis.findings if not any(map(needs_a_fit, f.terms))]
+    terms = [*own, *(t for f in tried for t in f.terms)]
+    options = Options(columns, GROUPS, max_rows)
+    evidence = evidence_of_sources(sources, robot, terms, options, n_jobs, client)
+    confirmations = [_confirm(f, evidence, f in tried) for f in diagnosis.findings]
+    kept = [*own, *(t for c in confirmations if c.confirmed for t in c.finding.terms)]
+    names = column_names(robot, base_parameter_index(robot), kept)
+    return ParquetDiagnosis(
+        diagnosis,
+        confirmations,
+        regressor_from_evidence(robot, evidence.select(names), kept),
+        evidence,
+        sum(map(len, lengths)),
+        sum(len(drawn) for _, drawn in sources),
+        sum(map(sum, lengths)),
+    )
+
+
+def _draw(lengths: Sequence[Sequence[int]], rows: int, seed: int) -> list[frozenset[int]]:
+    """Which trajectories of every file are searched."""
+    every = [(f, k) for f, of_file in enumerate(lengths) for k in range(len(of_file))]
+    n = len(every)
+    if n < 2 * FEWEST_TRAJECTORIES:
+        raise LogError(
+            f"{n} trajectories are too few to search some and judge by the rest; "
+            f"{2 * FEWEST_TRAJECTORIES} are needed. Number parts of them as trajectories, or read "
+            "them with read_log and use diagnose."
+        )
+    order = np.random.default_rng(seed).permutation(n)
+    filled = np.cumsum([lengths[every[k][0]][every[k][1]] for k in order])
+    wanted = int(np.searchsorted(filled, rows, side="right"))
+    drawn = [every[k] for k in order[: int(np.clip(wanted, FEWEST_TRAJECTORIES, n // 2))]]
+    return [frozenset(k for file, k in drawn if file == f) for f in range(len(lengths))]
+
+
+def _sample(
+    sources: Sequence[Source], robot: Robot, columns: ColumnMap | None, max_rows: int
+) -> tuple[Any, Array]:
+    """The trajectories that were drawn, as a table, and their torque."""
+    pd = import_optional("pandas", extra="io")
+    tables: list[Any] = []
+    torques: list[Array] = []
+    for path, drawn in sources:
+        if not drawn:
+            continue
+        for k, (signals, torque) in enumerate(
+            read_trajectories(path, robot, columns=columns, max_rows=max_rows)
+        ):
+            if k not in drawn:
+                continue
+            if signals.time is None:
+                raise LogError(f"{path}: lacks time, which a diagnosis needs")
+            table = {"time": signals.time, "trajectory": np.full(len(torque), float(len(tables)))}
+            blocks = {"q": signals.q, "dq": signals.dq, "temp": signals.temperature}
+            for name, block in blocks.items():
+                if block is not None:
+                    table |= {f"{name}{j + 1}": block[:, j] for j in range(robot.n_joints)}
+            tables.append(pd.DataFrame(table))
+            torques.append(torque)
+    return pd.concat(tables, ignore_index=True), np.vstack(torques)
+
+
+def _confirm(finding: Finding, evidence: Evidence, tried: bool) -> Confirmation:
+    """Held-out error of all groups with and without the columns of a finding."""
+    own = set(column_names(None, (), finding.terms)) if tried else set()
+    _, noise = weighted_solution(evidence)
+    errors = [
+        evidence.held_out_error([c for c in evidence.columns if c not in left_out], noise)
+        for left_out in (own, set())
+    ]
+    squared = [
+        {key: evidence.counts[key] * value**2 for key, value in error.items()} for error in errors
+    ]
+    groups = evidence.trajectories
+    joints = [j - 1 for j in finding.joints]
+    before, after = (
+        np.array([sum(part.get((g, j), 0.0) for j in joints) for g in groups]) for part in squared
+    )
+    drop = float(1 - after.sum() / before.sum()) if before.sum() > 0 else 0.0
+    # Ratios, since one long or lively group would outweigh all others in differences.
+    here = (before > 0) & (after > 0)
+    ratio = np.log(before[here] / after[here])
+    p = 1.0
+    if tried:
+        p = float(stats.ttest_1samp(ratio, 0.0, alternative="greater").pvalue)
+    without, complete = (_by_joint(part, evidence) for part in squared)
+    return Confirmation(finding, without, complete, drop, p, p < LEVEL if tried else None)
+
+
+def _by_joint(squared: dict[tuple[int, int], float], evidence: Evidence) -> dict[int, float]:
+    result = {}
+    for joint in evidence.joints:
+        keys = [key for key in squared if key[1] == joint]
+        rows = sum(evidence.counts[key] for key in keys)
+        result[joint + 1] = float(np.sqrt(sum(squared[key] for key in keys) / max(1, rows)))
+    return result

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Effects found in a sample of a recording and put to all the rest of it."""
+
+import pytest
+
+from skidyn._exceptions import LogError, SkidynError
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.diagnosis import diagnose_parquet
+from skidyn.diagnosis._out_of_core import _confirm
+from skidyn.evidence import evidence_from_parquet
+from skidyn.rigid_body import RBDRegressor
+
+ROBOT = load_planar_arm()
+TRIED = ["stribeck", "spring"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("parquet")
+    log = make_hidden_effect_log(
+        ROBOT, "stribeck", joints=[2], n_trajectories=18, duration=8.0, rate=100.0
+    )
+    for k in range(3):
+        part = log.frame[log.frame["trajectory"] // 6 == k]
+        part.to_parquet(folder / f"{k}.parquet")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def result(folder):
+    return diagnose_parquet(RBDRegressor(ROBOT), folder, sample_rows=7000, effects=TRIED)
+
+
+def test_a_hidden_effect_is_found_and_confirmed(result):
+    (only,) = result.confirmations
+    assert (only.finding.kind, only.finding.joints, only.confirmed) == ("stribeck", (2,), True)
+    assert only.rmse_with[2] < only.rmse_without[2] and only.error_drop > 0.05
+    assert [t.kind for t in result.model.effect_terms_].count("stribeck") == 1
+
+
+def test_the_search_and_the_judgement_share_no_trajectory(result):
+    assert (result.trajectories, result.sampled, result.rows) == (18, 8, 18 * 800)
+    assert len(result.diagnosis.data[0]) == 8 * 800
+    assert result.evidence.trajectories == list(range(10))
+
+
+def test_an_effect_that_the_rest_does_not_show_is_not_confirmed(result, tmp_path):
+    finding = result.confirmations[0].finding
+    healthy = make_hidden_effect_log(
+        ROBOT, None, n_trajectories=12, duration=8.0, rate=100.0, random_state=5
+    )
+    healthy.frame.to_parquet(tmp_path / "log.parquet")
+    terms = [*("viscous", "coulomb"), *finding.terms]
+    answer = _confirm(finding, evidence_from_parquet(tmp_path, ROBOT, terms), True)
+    assert answer.confirmed is False and answer.error_drop < 0.01
+
+
+def test_what_cannot_be_judged_out_of_core_is_refused(folder, tmp_path):
+    with pytest.raises(SkidynError, match="need a fit of the model first"):
+        diagnose_parquet(RBDRegressor(ROBOT, ("load_dependent_friction",)), folder)
+    make_hidden_effect_log(ROBOT, None, n_trajectories=7, duration=2.0).frame.to_parquet(
+        tmp_path / "few.parquet"
+    )
+    with pytest.raises(LogError, match="7 trajectories are too few"):
+        diagnose_parquet(RBDRegressor(ROBOT), tmp_path)
