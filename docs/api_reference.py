@@ -45,6 +45,7 @@ PAGES: tuple[Page, ...] = (
                 "Classes",
                 (
                     "BaseParameters",
+                    "BodyConstraints",
                     "RBDRegressor",
                 ),
             ),

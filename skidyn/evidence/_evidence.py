@@ -41,8 +41,8 @@ class Evidence:
         Names of the columns.
     factors : mapping of (int, int) to ndarray of shape (n_columns + 1, n_columns + 1)
         Upper triangular factor of each trajectory and joint (from 0).
-    counts : mapping of (int, int) to int
-        Rows behind each factor.
+    counts : mapping of (int, int) to float
+        Rows behind each factor; less than a row where older evidence was weighed down.
 
     Examples
     --------
@@ -57,7 +57,7 @@ class Evidence:
 
     columns: tuple[str, ...]
     factors: Mapping[Key, Array]
-    counts: Mapping[Key, int]
+    counts: Mapping[Key, float]
 
     @classmethod
     def from_rows(cls, columns: Sequence[str], rows: Mapping[Key, Array]) -> Evidence:
@@ -139,6 +139,25 @@ class Evidence:
             else:
                 factors[key], counts[key] = factor, other.counts[key]
         return Evidence(self.columns, factors, counts)
+
+    def scaled(self, weight: float) -> Evidence:
+        """The same evidence as if every row counted less.
+
+        Parameters
+        ----------
+        weight : float
+            Weight of a row, 0 to 1.
+
+        Returns
+        -------
+        Evidence
+            The same columns and trajectories.
+        """
+        return Evidence(
+            self.columns,
+            {key: np.sqrt(weight) * factor for key, factor in self.factors.items()},
+            {key: weight * count for key, count in self.counts.items()},
+        )
 
     def only(self, trajectories: Iterable[int]) -> Evidence:
         """Evidence of some trajectories.
@@ -222,6 +241,25 @@ class Evidence:
         """
         return self.only(t for t in self.trajectories if t != trajectory)
 
+    def stacked(self, noise: Mapping[int, float] | None = None) -> Array:
+        """All factors on top of each other, joints weighted by their noise.
+
+        Parameters
+        ----------
+        noise : mapping of int to float, optional
+            Noise of a row of every joint (from 0); equal by default.
+
+        Returns
+        -------
+        ndarray of shape (n_factors * (n_columns + 1), n_columns + 1)
+            Has the same normal equations as all weighted rows.
+        """
+        parts = [
+            factor / (1.0 if noise is None else noise[key[1]])
+            for key, factor in self.factors.items()
+        ]
+        return np.vstack([np.zeros((0, len(self.columns) + 1)), *parts])
+
     def solve(
         self, columns: Sequence[str] | None = None, noise: Mapping[int, float] | None = None
     ) -> Array:
@@ -247,12 +285,7 @@ class Evidence:
         if not self.factors:
             raise SkidynError("no evidence: every trajectory was left out")
         index = self._index(columns)
-        stacked = np.vstack(
-            [
-                factor / (1.0 if noise is None else noise[key[1]])
-                for key, factor in self.factors.items()
-            ]
-        )
+        stacked = self.stacked(noise)
         a, y = stacked[:, index], stacked[:, -1]
         size = np.linalg.norm(a, axis=0)
         size[size == 0] = 1.0

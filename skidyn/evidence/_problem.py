@@ -138,13 +138,14 @@ class Problem:
             design.append(np.hstack(parts))
         return design
 
-    def with_all_rigid_columns(self) -> Problem:
-        """The same problem with every column of the torque regressor, dependent or not."""
+    def with_base_columns(self) -> Problem:
+        """The same problem with the columns of all base parameters, also of those left open."""
         if not self.rigid_body or self.robot is None:
             return self
-        whole = replace(self, rigid_index=np.arange(10 * self.robot.n_bodies))
-        whole.rigid_rows = _regressor_rows(self)
-        return whole
+        base = base_parameter_index(self.robot)
+        if len(base) == len(self.rigid_index):
+            return self
+        return replace(self, rigid_index=base, rigid_rows=regressor_rows(self, base))
 
     def fit(self, terms: Iterable[Term], sigma: Array | None = None, passes: int = 1) -> Fit:
         """Weighted least squares of the rigid body and terms.
@@ -166,7 +167,7 @@ class Problem:
         design = self.design([self.term_rows(t) for t in terms])
         target = self.target
         if sigma is None:
-            sigma = np.array([_own_noise(a, y) for a, y in zip(design, target, strict=True)])
+            sigma = np.array([own_noise(a, y, len(y)) for a, y in zip(design, target, strict=True)])
         fit = _weighted(terms, design, target, sigma)
         for _ in range(passes - 1):
             fit = _weighted(terms, design, target, fit.noise)
@@ -290,12 +291,7 @@ def make_problem(
     -------
     Problem
     """
-    if signals.time is None:
-        motion = as_given(signals)
-    else:
-        motion = smooth_motion(signals)
-        if not smooth:
-            motion = replace(motion, signals=signals)
+    motion = read_motion(signals, smooth)
     rows, fold, n_folds, whole = _rows_and_folds(motion, reversals)
     problem = Problem(
         robot,
@@ -351,48 +347,74 @@ def with_reversals(problem: Problem, terms: Iterable[Term], joints: Sequence[int
     return wider
 
 
+def read_motion(signals: Signals, smooth: bool) -> SmoothedMotion:
+    """Motion as the rows see it: smoothed, or as logged."""
+    if signals.time is None:
+        return as_given(signals)
+    motion = smooth_motion(signals)
+    return motion if smooth else replace(motion, signals=signals)
+
+
+def motion_rows(motion: SmoothedMotion, reversals: Sequence[int]) -> Rows:
+    """Averaging windows over the samples that count."""
+    signals = motion.signals
+    if signals.time is None:
+        return every_sample(signals)
+    margin = np.full(signals.n_joints, max(1, round(MARGIN * motion.half_width)))
+    margin[list(reversals)] = SHORT_MARGIN
+    use = sliding_samples(signals, motion.valid, margin.tolist())
+    return window_rows(signals, use, motion.rate)
+
+
 def _rows_and_folds(
     motion: SmoothedMotion, reversals: Sequence[int]
 ) -> tuple[Rows, list[NDArray[np.int64]], int, bool]:
     """Averaging windows and the folds they fall into."""
-    signals = motion.signals
-    if signals.time is None:
-        return _folds(every_sample(signals), WINDOW_GUARD)
-    margin = np.full(signals.n_joints, max(1, round(MARGIN * motion.half_width)))
-    margin[list(reversals)] = SHORT_MARGIN
-    use = sliding_samples(signals, motion.valid, margin.tolist())
-    # A slow log has wider windows, which reach further over a border.
-    guard = max(WINDOW_GUARD, _half_window(motion.rate))
-    return _folds(window_rows(signals, use, motion.rate), guard)
+    # A slow log has wider windows, which reach further over a border; samples reach over none.
+    clock = motion.signals.time is not None
+    guard = max(WINDOW_GUARD, _half_window(motion.rate)) if clock else 0.0
+    return _folds(motion_rows(motion, reversals), guard)
 
 
-def _regressor_rows(problem: Problem) -> list[Array]:
-    """Averaged columns of the torque regressor, chunk by chunk."""
+def regressor_rows(problem: Problem, index: NDArray[np.int64] | None = None) -> list[Array]:
+    """Averaged columns of the torque regressor, chunk by chunk; some of them if told which."""
     robot, signals = problem.robot, problem.signals
     assert robot is not None
-    rows = [np.zeros((count, 10 * robot.n_bodies)) for count in problem.rows.counts]
+    index = np.arange(10 * robot.n_bodies) if index is None else index
+    rows = [np.zeros((count, len(index))) for count in problem.rows.counts]
     for chunk, regressor in robot.iter_torque_regressor(signals.q, signals.dq, signals.ddq):
         for j, block in enumerate(rows):
-            block += problem.rows.weights[j][:, chunk] @ regressor[j].T
+            block += problem.rows.weights[j][:, chunk] @ regressor[j][index].T
     return rows
 
 
 def _add_rigid_body(problem: Problem) -> None:
     """Average the torque regressor and keep its independent columns."""
     assert problem.robot is not None
-    rows = _regressor_rows(problem)
-    stacked = np.vstack(rows)
-    size = np.linalg.norm(stacked, axis=0)
     base = base_parameter_index(problem.robot)
-    moved = base[size[base] > 1e-9 * max(size.max(initial=0.0), 1e-300)]
+    rows = regressor_rows(problem, base)
+    shown = independent_columns(np.vstack(rows))
+    problem.rigid_index = base[shown]
+    problem.rigid_rows = (
+        rows
+        if len(shown) == len(base)
+        else [np.ascontiguousarray(block[:, shown]) for block in rows]
+    )
+
+
+def independent_columns(rows: Array) -> NDArray[np.int64]:
+    """Columns of base parameters that the data determines, by QR with pivoting; sorted.
+
+    The triangular factor of the rows gives the same answer as the rows themselves.
+    """
+    size = np.linalg.norm(rows, axis=0)
+    moved = np.flatnonzero(size > 1e-9 * max(size.max(initial=0.0), 1e-300))
     if not len(moved):
-        problem.rigid_rows = [block[:, :0] for block in rows]
-        return
-    triangle, pivots = qr(stacked[:, moved] / size[moved], mode="r", pivoting=True)
+        return moved
+    triangle, pivots = qr(rows[:, moved] / size[moved], mode="r", pivoting=True)
     diagonal = np.abs(np.diag(triangle))
     rank = int(np.sum(diagonal > RANK_TOLERANCE * diagonal[0]))
-    problem.rigid_index = np.sort(moved[pivots[:rank]])
-    problem.rigid_rows = [block[:, problem.rigid_index] for block in rows]
+    return np.sort(moved[pivots[:rank]])
 
 
 def _half_window(rate: float) -> float:
@@ -442,15 +464,23 @@ def _folds(rows: Rows, guard: float) -> tuple[Rows, list[NDArray[np.int64]], int
 WINDOW_GUARD = 1 / 16
 
 
-def _own_noise(design: Array, target: Array) -> float:
-    """Residual of a joint fitted by itself, which never hides what other joints spoil."""
-    if not len(target):
+def own_noise(design: Array, target: Array, count: float) -> float:
+    """Residual of a joint fitted by itself, which never hides what other joints spoil.
+
+    The rows may be a triangular factor; ``count`` says how many rows there really are.
+    """
+    if not count:
         return 1.0
     size = np.linalg.norm(design, axis=0)
     used = size > 0
     scaled = design[:, used] / size[used]
     solution = np.linalg.lstsq(scaled, target, rcond=1e-7)[0]
-    return float(np.sqrt(np.mean((target - scaled @ solution) ** 2))) + 1e-9
+    return float(np.sqrt(np.sum((target - scaled @ solution) ** 2) / count)) + 1e-9
+
+
+def weighted_least_squares(design: list[Array], target: list[Array], sigma: Array) -> Array:
+    """Coefficients of least squares with joints weighted by their noise."""
+    return _weighted((), design, target, sigma).coefficients
 
 
 def _weighted(

@@ -17,10 +17,8 @@ from skidyn._exceptions import LogError, SkidynError
 from skidyn._signals import Array, Signals
 from skidyn.effects import Term, get_effect, make_terms
 from skidyn.evidence._evidence import Evidence, column_names
-from skidyn.evidence._kinematics import as_given, smooth_motion
 from skidyn.evidence._parquet import ColumnMap, read_trajectories
-from skidyn.evidence._problem import MARGIN, Problem, _regressor_rows
-from skidyn.evidence._rows import every_sample, sliding_samples, window_rows
+from skidyn.evidence._problem import Problem, hysteresis_joints, motion_rows, read_motion
 from skidyn.rigid_body._base_parameters import base_parameter_index
 from skidyn.robots import Robot
 
@@ -165,7 +163,13 @@ def evidence_of_sources(
 
 
 def evidence_of_signals(
-    signals: Signals, torque: Array, robot: Robot, terms: Iterable[Term]
+    signals: Signals,
+    torque: Array,
+    robot: Robot,
+    terms: Iterable[Term],
+    *,
+    rigid_body: bool = True,
+    smooth: bool = True,
 ) -> Evidence:
     """Evidence of signals in memory, with the base parameters of the robot as columns.
 
@@ -179,37 +183,35 @@ def evidence_of_signals(
         Robot.
     terms : iterable of Term
         Effects with their shape parameters.
+    rigid_body : bool, default=True
+        Whether base parameters are among the columns.
+    smooth : bool, default=True
+        Derive velocity and acceleration from the positions; False takes the given ones.
 
     Returns
     -------
     Evidence
         By trajectory and joint.
     """
-    if signals.time is None:
-        motion = as_given(signals)
-        rows = every_sample(signals)
-    else:
-        motion = smooth_motion(signals)
-        margin = max(1, round(MARGIN * motion.half_width))
-        use = sliding_samples(motion.signals, motion.valid, margin)
-        rows = window_rows(motion.signals, use, motion.rate)
+    terms = tuple(terms)
+    motion = read_motion(signals, smooth)
+    rows = motion_rows(motion, hysteresis_joints(terms))
     s = motion.signals
     problem = Problem(
         robot=robot,
         motion=motion,
         signals=s.with_(robot=robot),
         torque=torque - robot.inverse_dynamics(s.q, s.dq, s.ddq),
-        terms=tuple(terms),
+        terms=terms,
         rows=rows,
         fold=[np.zeros(n, dtype=np.int64) for n in rows.counts],
         n_folds=1,
         whole_trajectories=True,
-        rigid_body=True,
+        rigid_body=rigid_body,
+        rigid_rows=[np.zeros((n, 0)) for n in rows.counts],
     )
-    # All trajectories must have the same columns, also those that move few joints.
-    problem.rigid_index = base_parameter_index(robot)
-    problem.rigid_rows = [block[:, problem.rigid_index] for block in _regressor_rows(problem)]
-    return Evidence.from_problem(problem, problem.terms)
+    # All trajectories have the same columns, also those that move few joints.
+    return Evidence.from_problem(problem.with_base_columns(), terms)
 
 
 def linear_terms(effects: Iterable[Any], n_joints: int) -> list[Term]:

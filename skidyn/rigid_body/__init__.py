@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from skidyn.rigid_body._base_parameters import BaseParameters, find_base_parameters
     from skidyn.rigid_body._consistency import is_consistent, make_consistent
+    from skidyn.rigid_body._constraints import BodyConstraints
     from skidyn.rigid_body._from_evidence import regressor_from_evidence
     from skidyn.rigid_body._rbd_regressor import RBDRegressor
 
 __all__ = [
     "BaseParameters",
+    "BodyConstraints",
     "RBDRegressor",
     "find_base_parameters",
     "is_consistent",
@@ -25,6 +27,7 @@ __all__ = [
 # when they are first used, so that neither has to wait for the other.
 _HOMES = {
     "BaseParameters": "skidyn.rigid_body._base_parameters",
+    "BodyConstraints": "skidyn.rigid_body._constraints",
     "RBDRegressor": "skidyn.rigid_body._rbd_regressor",
     "find_base_parameters": "skidyn.rigid_body._base_parameters",
     "is_consistent": "skidyn.rigid_body._consistency",

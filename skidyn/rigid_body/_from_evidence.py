@@ -10,12 +10,13 @@ import numpy as np
 
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Array
-from skidyn.effects import Term, get_effect
+from skidyn.effects import get_effect
 from skidyn.evidence._evidence import Evidence
 from skidyn.evidence._streaming import linear_terms
 from skidyn.rigid_body._base_parameters import find_base_parameters
-from skidyn.rigid_body._consistency import make_consistent
+from skidyn.rigid_body._constraints import BodyConstraints
 from skidyn.rigid_body._rbd_regressor import RBDRegressor
+from skidyn.rigid_body._regression import Regression, Solution
 from skidyn.robots import Robot
 
 #: Times the noise of the joints is estimated anew and the fit repeated.
@@ -27,7 +28,7 @@ def regressor_from_evidence(
     evidence: Evidence,
     effects: Iterable[Any] = ("viscous", "coulomb"),
     *,
-    consistent: bool = False,
+    consistent: bool | BodyConstraints = False,
     feature_names: Sequence[str] | None = None,
 ) -> RBDRegressor:
     """Fitted regressor from evidence.
@@ -41,9 +42,9 @@ def regressor_from_evidence(
         :func:`skidyn.evidence.evidence_from_parquet`, with the same effects.
     effects : iterable of str, (str, joints) or Term, default=("viscous", "coulomb")
         Effects of the evidence.
-    consistent : bool, default=False
-        Demand bodies that can exist (positive definite pseudo-inertia) and coefficients without
-        forbidden signs.
+    consistent : bool or BodyConstraints, default=False
+        Demand bodies that can exist (positive definite pseudo-inertia), coefficients without
+        forbidden signs, and what else is known about the bodies.
     feature_names : sequence of str, optional
         Columns of the tables that will be predicted; by default
         ``time, trajectory, q1..qn, dq1..dqn``. Accelerations that are not among them are derived
@@ -96,26 +97,11 @@ def regressor_from_evidence(
     model.n_features_in_ = len(names)
     model._one_output = False
     model.columns_ = model._resolve(len(names))
-    change = np.zeros(10 * robot.n_bodies)
-    change[base.index] = coefficients[:n_rigid]
-    model.inertial_parameters_ = robot.inertial_parameters + change.reshape(-1, 10)
-    if consistent:
-        model.inertial_parameters_, effect_coefficients = _consistent(
-            robot, evidence, terms, noise, coefficients[n_rigid:]
-        )
-        coefficients = np.r_[coefficients[:n_rigid], effect_coefficients]
-    model.effect_terms_ = terms
-    at = n_rigid + np.cumsum([0, *widths])
-    model.effect_coefficients_ = {
-        term: coefficients[a:b] for term, a, b in zip(terms, at[:-1], at[1:], strict=True)
-    }
-    values = base.values(model.inertial_parameters_)
-    model.base_parameters_ = dict(zip(base.expressions, map(float, values), strict=True))
-    model.coef_names_ = [*base.expressions, *evidence.columns[n_rigid:]]
-    model.coef_ = np.r_[values, coefficients[n_rigid:]]
-    model.coef_std_ = _jackknife(evidence, noise)
-    model.noise_std_ = np.array([noise.get(j, np.nan) for j in range(robot.n_joints)])
     model.evidence_ = evidence
+    model.n_parts_ = 0
+    spread = np.array([noise.get(j, np.nan) for j in range(robot.n_joints)])
+    solution = Solution(coefficients, _left_out(evidence, noise), spread)
+    model._store(Regression.from_evidence(evidence, robot, terms, whole=True), solution)
     return model
 
 
@@ -142,25 +128,8 @@ def weighted_solution(evidence: Evidence) -> tuple[Array, dict[int, float]]:
     return coefficients, noise
 
 
-def _consistent(
-    robot: Robot, evidence: Evidence, terms: Sequence[Term], noise: dict[int, float], start: Array
-) -> tuple[Array, Array]:
-    """Bodies that can exist and coefficients of the right sign, closest to the evidence."""
-    base = find_base_parameters(robot)
-    weighted = [factor / noise[key[1]] for key, factor in evidence.factors.items()]
-    triangle: Array = np.asarray(np.linalg.qr(np.vstack(weighted), mode="r"))
-    rigid = triangle[:, : len(base.index)]
-    # Columns of dependent parameters are combinations of those of the base parameters.
-    factor = np.hstack([rigid @ base.regrouping, triangle[:, len(base.index) : -1]])
-    target = triangle[:, -1] + rigid @ base.values(robot.inertial_parameters)
-    signs = [c.sign for term in terms for c in get_effect(term.kind).coefficients]
-    return make_consistent(robot.inertial_parameters, factor, target, np.array(signs), start)
-
-
-def _jackknife(evidence: Evidence, noise: dict[int, float]) -> Array:
+def _left_out(evidence: Evidence, noise: dict[int, float]) -> Array:
+    """Coefficients without one trajectory each; none where there is only one."""
     groups = evidence.trajectories
-    if len(groups) < 2:
-        return np.full(len(evidence.columns), np.nan)
-    left = np.array([evidence.without(k).solve(noise=noise) for k in groups])
-    spread = np.sum((left - left.mean(0)) ** 2, axis=0)
-    return np.asarray(np.sqrt((len(groups) - 1) / len(groups) * spread))
+    left = [evidence.without(k).solve(noise=noise) for k in groups if len(groups) > 1]
+    return np.array(left).reshape(-1, len(evidence.columns))

@@ -5,28 +5,43 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.linalg import block_diag
+from scipy.optimize import lsq_linear
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from skidyn._columns import Columns, ColumnSpec, resolve_columns
-from skidyn._exceptions import ColumnError
+from skidyn._exceptions import ColumnError, SkidynError
 from skidyn._signals import Array, Signals, signals_from
 from skidyn.effects import Term, get_effect, make_terms
 from skidyn.evidence._evidence import Evidence
-from skidyn.evidence._folded import left_out_coefficients
 from skidyn.evidence._kinematics import smooth_motion
-from skidyn.evidence._problem import Fit, Problem, hysteresis_joints, make_problem, term_columns
+from skidyn.evidence._problem import (
+    Fit,
+    Problem,
+    hysteresis_joints,
+    make_problem,
+    read_motion,
+    regressor_rows,
+    term_columns,
+)
 from skidyn.evidence._shapes import Gain, best_on_grid, refine_term
+from skidyn.evidence._streaming import evidence_of_signals, linear_terms
 from skidyn.rigid_body._base_parameters import find_base_parameters
 from skidyn.rigid_body._consistency import make_consistent
+from skidyn.rigid_body._constraints import BodyConstraints
+from skidyn.rigid_body._estimators import Estimator, find_estimator
+from skidyn.rigid_body._regression import Regression, Solution
 from skidyn.robots import Robot
 
 #: Rounds of weights, loads and shape parameters.
 ROUNDS = 3
+#: Groups of trajectories whose evidence partial_fit keeps apart, for standard errors.
+GROUPS = 20
 
 
 class RBDRegressor(RegressorMixin, BaseEstimator):
@@ -42,9 +57,19 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
         parameters that are not given are searched.
     parameters : {"identified", "nominal"}, default="identified"
         Whether inertial parameters are identified, or those of the URDF kept.
-    consistent : bool, default=False
-        Demand bodies that can exist (positive definite pseudo-inertia) and coefficients without
-        forbidden signs.
+    estimator : str, default="weighted"
+        How coefficients are found: ``"weighted"`` (least squares, joints weighted by their noise,
+        iterated), ``"ordinary"`` (all rows alike), ``"robust"`` (rows that the majority
+        contradicts lose their weight), ``"ridge"`` and ``"entropic"`` (pulled toward the bodies
+        of the URDF), ``"instrumental"`` (for noisy motion; fit needs instruments).
+    prior_std : float or None, default=None
+        How far the true bodies may be from those of the URDF, relative, for ``"ridge"`` and
+        ``"entropic"``: 0.3 is 30 %. None takes what predicts left-out folds best.
+    consistent : bool or BodyConstraints, default=False
+        Demand bodies that can exist (positive definite pseudo-inertia), coefficients without
+        forbidden signs, and what else is known about the bodies.
+    forgetting : float, default=1.0
+        Weight of all earlier rows at each call of ``partial_fit``; 1 forgets nothing.
     smooth : bool or None, default=None
         Derive velocity and acceleration from the positions by a zero-phase smoother. None does so
         where X has no accelerations. Needs time.
@@ -71,6 +96,10 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
     evidence_ : Evidence
         Triangular factors of [columns | torque] of every trajectory and joint; the torque is that
         beyond the URDF's rigid body.
+    prior_std_ : float
+        The relative uncertainty of the URDF's bodies that was used; estimators with a prior only.
+    row_weights_ : list of ndarray of shape (n_rows_j,)
+        Weight of every averaged row by joint, 1.25 at most; the robust estimator only.
     noise_std_ : ndarray of shape (n_joints,)
         Standard deviation of one averaged residual row, N m or N.
     robot_ : Robot
@@ -88,6 +117,8 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
 
     Notes
     -----
+    :doc:`/user_guide/identification` tells when to use which estimator.
+
     With a time column, torque and all regressor columns are averaged over the same short windows
     (parallel filtering), without samples at rest and around reversals. Joints are weighted by their
     noise, iterated.
@@ -111,7 +142,10 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
         effects: Iterable[Any] = ("viscous", "coulomb"),
         parameters: Literal["identified", "nominal"] = "identified",
         *,
-        consistent: bool = False,
+        estimator: str = "weighted",
+        prior_std: float | None = None,
+        consistent: bool | BodyConstraints = False,
+        forgetting: float = 1.0,
         smooth: bool | None = None,
         trajectory: ColumnSpec = "auto",
         time: ColumnSpec = "auto",
@@ -119,7 +153,10 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
         self.robot = robot
         self.effects = effects
         self.parameters = parameters
+        self.estimator = estimator
+        self.prior_std = prior_std
         self.consistent = consistent
+        self.forgetting = forgetting
         self.smooth = smooth
         self.trajectory = trajectory
         self.time = time
@@ -152,13 +189,70 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
         return tags
 
     # ------------------------------------------------------------------ public
-    def fit(self, X: Any, y: Any) -> RBDRegressor:
+    def fit(self, X: Any, y: Any, instruments: Any = None) -> RBDRegressor:
         """Identify the model.
 
         Parameters
         ----------
         X : DataFrame or array of shape (n_samples, n_features)
             Motion, following the X contract.
+        y : array-like of shape (n_samples, n_joints) or (n_samples,) for one joint
+            Torque, N m or N.
+        instruments : DataFrame or array of shape (n_samples, n_features), optional
+            The columns of X along a motion whose errors have nothing to do with those of X, such
+            as the reference of the controller; for ``estimator="instrumental"`` only.
+
+        Returns
+        -------
+        RBDRegressor
+            The model itself.
+
+        Raises
+        ------
+        ColumnError
+            X does not follow the contract, or y has the wrong number of joints.
+        ValueError
+            A parameter has no meaning, or instruments are missing, not wanted or of other rows.
+        """
+        method = self._method()
+        if instruments is not None and self.estimator != "instrumental":
+            raise ValueError(
+                f"estimator={self.estimator!r} takes no instruments; 'instrumental' does"
+            )
+        signals, torque = self._begin(X, y, first=True)
+        terms = make_terms(self.effects, self.robot_.n_joints)
+        problem = make_problem(
+            signals,
+            torque,
+            robot=self.robot_,
+            rigid_body=self.parameters == "identified",
+            terms=terms,
+            smooth=self._smooths(),
+            reversals=hysteresis_joints(terms),
+        )
+        fit = self._identify(problem)
+        whole = problem.with_base_columns()
+        others = None
+        if instruments is not None:
+            others = self._instrument_rows(problem, fit, instruments)
+        regression = Regression.from_problem(whole if method.whole else problem, fit, others)
+        self.evidence_ = Evidence.from_problem(whole, fit.terms)
+        self.n_parts_ = 0
+        self._store(regression, method.solve(regression, self.prior_std))
+        return self
+
+    def partial_fit(self, X: Any, y: Any) -> RBDRegressor:
+        """Add a part of the data, and identify the model from all parts so far.
+
+        Only the evidence is kept, not the data: memory does not grow. The order of the parts does
+        not matter, and the result is that of ``fit`` on all of them, where these are trajectories
+        that are whole in one part and more than six, or data without time (``fit`` leaves out rows
+        at the borders of the blocks of time into which it cuts few trajectories).
+
+        Parameters
+        ----------
+        X : DataFrame or array of shape (n_samples, n_features)
+            Motion, following the X contract. Without a column of trajectories each part is one.
         y : array-like of shape (n_samples, n_joints) or (n_samples,) for one joint
             Torque, N m or N.
 
@@ -171,30 +265,36 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
         ------
         ColumnError
             X does not follow the contract, or y has the wrong number of joints.
+        SkidynError
+            An effect with open shape parameters, or one whose columns depend on the fitted model.
+            After a ``fit`` its shape parameters are kept.
         ValueError
-            ``parameters`` is neither ``"identified"`` nor ``"nominal"``.
+            A parameter has no meaning, or an estimator that needs all rows at once.
         """
-        if self.parameters not in ("identified", "nominal"):
-            raise ValueError(f"parameters={self.parameters!r}; expected 'identified' or 'nominal'")
-        X, y = validate_data(self, X, y, multi_output=True, y_numeric=True, dtype=np.float64)
-        self._one_output = y.ndim == 1
-        torque = y.reshape(len(y), -1)
-        self.robot_ = self.robot if isinstance(self.robot, Robot) else Robot.from_urdf(self.robot)
-        self.columns_ = self._resolve(X.shape[1])
-        self._check_targets(torque)
-        signals = self._read(X)
-        terms = make_terms(self.effects, self.robot_.n_joints)
-        problem = make_problem(
+        method = self._method()
+        if method.rows:
+            raise ValueError(
+                f"estimator={self.estimator!r} looks at single rows, which partial_fit does not "
+                "keep; use fit, or another estimator"
+            )
+        first = not hasattr(self, "evidence_")
+        signals, torque = self._begin(X, y, first=first)
+        given = self.effects if first else self.effect_terms_
+        terms = linear_terms(given, self.robot_.n_joints)
+        part = evidence_of_signals(
             signals,
             torque,
-            robot=self.robot_,
+            self.robot_,
+            terms,
             rigid_body=self.parameters == "identified",
-            terms=terms,
             smooth=self._smooths(),
-            reversals=hysteresis_joints(terms),
         )
-        fit = self._identify(problem)
-        self._store(problem, fit)
+        self.n_parts_ = 1 if first else self.n_parts_ + 1
+        if self.columns_.trajectory is None:
+            part = part.shifted(self.n_parts_)
+        if not first:
+            part = self.evidence_.scaled(self.forgetting) + part
+        self._store_evidence(part.shifted(0, GROUPS), terms)
         return self
 
     def predict(self, X: Any) -> Array:
@@ -293,6 +393,33 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
             for name, value, std in rows
         ]
 
+    def durbin_wu_hausman(self) -> list[dict[str, Any]]:
+        """Whether least squares would have been biased by noise in the motion.
+
+        Compares the instrumental-variable estimate with least squares, coefficient by coefficient
+        (Durbin-Wu-Hausman). A small ``p_value`` speaks against least squares; with many
+        coefficients, compare it with the level divided by their number.
+
+        Returns
+        -------
+        list of dict
+            ``name``, ``difference`` (instrumental variables less least squares), ``std`` and
+            ``p_value``.
+
+        Raises
+        ------
+        SkidynError
+            The model was not fitted with ``estimator="instrumental"``.
+        """
+        check_is_fitted(self)
+        if self.estimator != "instrumental":
+            raise SkidynError("the test compares with estimator='instrumental': fit with it first")
+        columns = (self.hausman_[key] for key in ("difference", "std", "p_value"))
+        return [
+            {"name": n, "difference": float(d), "std": float(s), "p_value": float(p)}
+            for n, d, s, p in zip(self.coef_names_, *columns, strict=True)
+        ]
+
     # ------------------------------------------------------------------ hooks for tests
     def _resolve(self, n_features: int) -> Columns:
         names = getattr(self, "feature_names_in_", None)
@@ -314,6 +441,30 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
             )
 
     # ------------------------------------------------------------------ reading
+    def _method(self) -> Estimator:
+        """The estimator; parameters without a meaning are refused."""
+        if self.parameters not in ("identified", "nominal"):
+            raise ValueError(f"parameters={self.parameters!r}; expected 'identified' or 'nominal'")
+        if not 0 < self.forgetting <= 1:
+            raise ValueError(f"forgetting={self.forgetting!r}; expected a weight above 0, up to 1")
+        if self.prior_std is not None and not self.prior_std > 0:
+            raise ValueError(f"prior_std={self.prior_std!r}; expected a number above 0, or None")
+        return find_estimator(self.estimator)
+
+    def _begin(self, X: Any, y: Any, first: bool) -> tuple[Signals, Array]:
+        """Motion and torque of validated data."""
+        X, y = validate_data(
+            self, X, y, reset=first, multi_output=True, y_numeric=True, dtype=np.float64
+        )
+        if first:
+            self._one_output = y.ndim == 1
+            given = self.robot
+            self.robot_ = given if isinstance(given, Robot) else Robot.from_urdf(given)
+            self.columns_ = self._resolve(X.shape[1])
+        torque = y.reshape(len(y), -1)
+        self._check_targets(torque)
+        return self._read(X), torque
+
     def _smooths(self) -> bool:
         if self.smooth is not None:
             return self.smooth
@@ -366,56 +517,90 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
             open_.append(i)
         return shaped
 
-    def _store(self, problem: Problem, fit: Fit) -> None:
-        n_rigid = len(problem.rigid_index)
-        coefficients = fit.coefficients
-        parameters = problem.inertial_parameters(fit)
-        assert parameters is not None
+    def _instrument_rows(self, problem: Problem, fit: Fit, instruments: Any) -> list[Array]:
+        """The columns of the fit along the motion of the instruments, averaged like its rows."""
+        Z = validate_data(self, instruments, reset=False, dtype=np.float64)
+        signals = self._read(Z)
+        own = problem.motion.signals
+        same = len(Z) == own.n_samples and np.array_equal(signals.trajectory, own.trajectory)
+        if not same:
+            raise ValueError(
+                f"instruments must have the rows of X, in its trajectories: {len(Z)} rows for "
+                f"{own.n_samples}"
+            )
+        motion = read_motion(signals, self._smooths())
+        moved = motion.signals.with_(robot=self.robot_)
+        other = replace(problem, motion=motion, signals=moved, _cache={})
+        other.with_fit(fit)
+        other.rigid_rows = regressor_rows(problem=other, index=problem.rigid_index)
+        return other.design([other.term_rows(t) for t in fit.terms])
+
+    def _store_evidence(self, evidence: Evidence, terms: Sequence[Term]) -> None:
+        """Identify from evidence alone."""
+        method = self._method()
+        regression = Regression.from_evidence(evidence, self.robot_, terms, whole=method.whole)
+        self.evidence_ = evidence
+        self._store(regression, method.solve(regression, self.prior_std))
+
+    def _store(self, regression: Regression, solution: Solution) -> None:
+        robot, n_rigid = self.robot_, regression.n_rigid
+        base = find_base_parameters(robot)
+        effects = solution.coefficients[n_rigid:]
+        parameters = solution.parameters
+        if parameters is None:
+            change = np.zeros(10 * robot.n_bodies)
+            change[regression.rigid_index] = solution.coefficients[:n_rigid]
+            parameters = robot.inertial_parameters + change.reshape(-1, 10)
+        self.effect_terms_ = list(regression.terms)
         if self.consistent:
-            parameters, effects = self._consistent(problem, fit)
-            coefficients = np.r_[coefficients[:n_rigid], effects]
+            parameters, effects = self._consistent(parameters, effects, solution)
         self.inertial_parameters_ = parameters
-        self.effect_terms_ = list(fit.terms)
         self.effect_coefficients_ = {}
-        names, at = [], n_rigid
-        for term in fit.terms:
+        names, at = [], 0
+        for term in regression.terms:
             effect = get_effect(term.kind)
             k = len(effect.coefficients)
-            self.effect_coefficients_[term] = coefficients[at : at + k]
+            self.effect_coefficients_[term] = effects[at : at + k]
             joints = ",".join(str(j + 1) for j in term.joints)
             names += [f"{term.kind}.{c.name}[{joints}]" for c in effect.coefficients]
             at += k
-        base = find_base_parameters(self.robot_)
         values = base.values(parameters)
         self.base_parameters_ = dict(zip(base.expressions, map(float, values), strict=True))
-        where = np.searchsorted(base.index, problem.rigid_index)
+        where = np.searchsorted(base.index, regression.rigid_index)
         self.coef_names_ = [base.expressions[i] for i in where] + names
-        self.coef_ = np.r_[values[where], coefficients[n_rigid:]]
-        self.coef_std_ = _jackknife(problem, fit)
-        self.noise_std_ = fit.noise
-        self.evidence_ = Evidence.from_problem(problem, fit.terms)
+        self.coef_ = np.r_[values[where], effects]
+        self.coef_std_ = solution.std
+        self.noise_std_ = solution.noise
+        for name, value in solution.attributes.items():
+            setattr(self, name, value)
 
-    def _consistent(self, problem: Problem, fit: Fit) -> tuple[Array, Array]:
-        """Bodies that can exist and coefficients of the right sign, closest to the data."""
-        whole = problem.with_all_rigid_columns()
-        design = whole.design([whole.term_rows(t) for t in fit.terms])
-        nominal = self.robot_.inertial_parameters
-        n = nominal.size if self.parameters == "identified" else 0
-        a = np.vstack([block / s for block, s in zip(design, fit.noise, strict=True)])
-        y = np.concatenate([t / s for t, s in zip(whole.target, fit.noise, strict=True)])
-        signs = np.concatenate(
-            [[c.sign for c in get_effect(t.kind).coefficients] for t in fit.terms] or [[]]
+    def _consistent(
+        self, parameters: Array, effects: Array, solution: Solution
+    ) -> tuple[Array, Array]:
+        """Bodies that can exist and coefficients of the right sign, closest in the data's eyes."""
+        known = self.consistent if isinstance(self.consistent, BodyConstraints) else None
+        rows = self.evidence_.stacked(dict(enumerate(solution.noise)))[:, :-1]
+        signs = np.array(
+            [c.sign for t in self.effect_terms_ for c in get_effect(t.kind).coefficients]
         )
-        start = fit.coefficients[len(problem.rigid_index) :]
-        if n == 0:
-            from scipy.optimize import lsq_linear
-
+        if self.parameters == "nominal":
             low = np.where(signs > 0, 0.0, -np.inf)
-            return nominal, lsq_linear(a, y, (low, np.inf)).x if len(signs) else start
-        # The columns act on the change from the URDF's parameters.
-        measured = y + a[:, :n] @ nominal.ravel()
-        factor: Array = np.asarray(np.linalg.qr(np.column_stack([a, measured]), mode="r"))
-        return make_consistent(nominal, factor[:, :-1], factor[:, -1], signs, start)
+            return parameters, lsq_linear(rows, rows @ effects, (low, np.inf)).x
+        regrouping = find_base_parameters(self.robot_).regrouping
+        factor = rows @ block_diag(regrouping, np.eye(len(effects)))
+        if solution.prior is not None:
+            factor = np.vstack([factor, solution.prior])
+        factor = np.asarray(np.linalg.qr(factor, mode="r"))
+        target = factor @ np.r_[parameters.ravel(), effects]
+        return make_consistent(
+            self.robot_.inertial_parameters,
+            factor,
+            target,
+            signs,
+            effects,
+            known=known,
+            body_names=self.robot_.body_names,
+        )
 
     def _in_order(self) -> list[Term]:
         """Terms, those that look at the model's torque last."""
@@ -441,12 +626,3 @@ def _plain_grid() -> Any:
     from skidyn.effects import Effect
 
     return Effect.grid
-
-
-def _jackknife(problem: Problem, fit: Fit) -> NDArray[np.float64]:
-    """Standard errors from leaving out one fold at a time (Efron, Stein 1981)."""
-    design = problem.design([problem.term_rows(t) for t in fit.terms])
-    _, left = left_out_coefficients(problem, design, fit.noise, problem.target)
-    n = len(left)
-    spread = np.sum((left - left.mean(0)) ** 2, axis=0)
-    return np.asarray(np.sqrt((n - 1) / n * spread))

@@ -2,12 +2,8 @@
 import numpy as np
 
 from skidyn.datasets import load_panda, load_planar_arm
-from skidyn.rigid_body._consistency import (
-    from_pseudo_inertia,
-    is_consistent,
-    make_consistent,
-    pseudo_inertia,
-)
+from skidyn.rigid_body._consistency import is_consistent, make_consistent
+from skidyn.rigid_body._log_det import from_pseudo_inertia, pseudo_inertia
 
 
 def test_pseudo_inertia_of_points():
