@@ -8,6 +8,7 @@ from numbers import Integral
 from typing import Any, ClassVar
 
 import numpy as np
+from joblib import parallel_config
 from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, MetaEstimatorMixin, RegressorMixin, clone
 from sklearn.compose import TransformedTargetRegressor
@@ -27,12 +28,15 @@ from sklearn.utils.validation import (
 from skidyn._columns import ColumnSpec
 from skidyn._compat import HasMethods, Interval, StrOptions, fit_context
 from skidyn.model_selection._split import held_out_folds
+from skidyn.neural_network._base import SequenceRegressor, deferred_training, train_together
 from skidyn.neural_network._lstm import LSTMRegressor
 from skidyn.preprocessing._keys import Keys, resolve_keys
 
 Array = NDArray[np.float64]
 
-#: Folds of the stacking where the bootstrap leaves no trajectory out.
+#: Folds of the trajectories that members leave out in turn.
+FOLDS = 10
+#: Folds of the stacking where members are trained again for it.
 BLOCKS = 3
 
 
@@ -55,17 +59,21 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         Meta-regressor; a linear one (ridge) if None.
     n_estimators : int, default=10
         Members.
-    resample : {"trajectory", "window"}, default="trajectory"
-        Draw whole trajectories or single target rows with replacement. Rows that are not drawn
-        still serve as history.
+    resample : {"window", "trajectory"}, default="window"
+        Draw single target rows or whole trajectories with replacement. Rows that are not drawn
+        still serve as history. Trajectories give a more honest spread; but every member then
+        misses a third of them, which costs accuracy.
     cv : int, cross-validator or None, default=None
         How the meta-regressor gets honest inputs. None takes each trajectory's mean over the
-        members whose bootstrap left it out, which costs no training; a number (or a
-        cross-validator) trains the members again without each fold. With ``resample="window"``, or
-        fewer than three trajectories, None means 3 folds, by trajectory or, of a single one, by
-        blocks of rows.
+        members that have not seen it, which costs no training: with ``resample="trajectory"``
+        those whose bootstrap left it out; with ``"window"`` every member leaves out one of ten
+        folds of the trajectories in turn. A number (or a cross-validator) trains the members
+        again without each fold; so does None with fewer than three trajectories or members that
+        are no networks of this package (3 folds, by trajectory or, of a single one, by blocks of
+        rows).
     n_jobs : int, default=None
-        Members trained at the same time (processes).
+        Processes. Five networks are trained side by side in each, since most of a small network's
+        step is overhead that they can share.
     trajectory, time : int, str or None, default="auto"
         Key columns of X.
     random_state : int, RandomState or None, default=None
@@ -121,7 +129,7 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         final_estimator: Any = None,
         *,
         n_estimators: int = 10,
-        resample: str = "trajectory",
+        resample: str = "window",
         cv: Any = None,
         n_jobs: int | None = None,
         trajectory: ColumnSpec = "auto",
@@ -208,16 +216,19 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         keys = self._keys()
         rng = check_random_state(self.random_state)
         bagging = self._bagging(keys, sample_weight is not None, int(rng.randint(2**31 - 1)))
-        self.bagging_ = _fit(clone(bagging), X, y, sample_weight)
         trajectories = keys.trajectories(X)
-        out_of_bag = self.cv is None and self.resample == "trajectory"
-        if out_of_bag and len(np.unique(trajectories)) > 2:
-            inputs = _out_of_bag_means(self.bagging_, X)
+        leave_out = self.cv is None and len(np.unique(trajectories)) > 2
+        self.bagging_, unseen = self._train(bagging, X, y, sample_weight, trajectories, leave_out)
+        if unseen is not None:
+            inputs = _unseen_means(self.bagging_, X, unseen)
         else:
-            folds = self._folds(table, X, y, trajectories)
-            inputs = _cross_fitted_means(bagging, X, y, sample_weight, folds)
-        for member in self.bagging_.estimators_:
-            member.__dict__.pop("_in_bag", None)  # one flag per row, not needed any more
+            inputs = np.full((len(X), y[:1].size), np.nan)
+            for train, test in self._folds(table, X, y, trajectories):
+                part = None if sample_weight is None else sample_weight[train]
+                again, _ = self._train(
+                    bagging, X[train], y[train], part, trajectories[train], False
+                )
+                inputs[test] = _member_mean(again, X[test])
         honest = np.isfinite(inputs).all(axis=1)
         if not honest.any():  # too few rows to hold any out: stack what there is
             inputs, honest = _member_mean(self.bagging_, X), np.ones(len(X), dtype=bool)
@@ -228,6 +239,32 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         weight = None if sample_weight is None else sample_weight[honest]
         self.final_estimator_ = _fit(head, inputs[honest], y[honest], weight)
         return self
+
+    def _train(
+        self,
+        bagging: BaggingRegressor,
+        X: Array,
+        y: Array,
+        weight: Array | None,
+        trajectories: NDArray[Any],
+        leave_out: bool,
+    ) -> tuple[BaggingRegressor, NDArray[np.bool_] | None]:
+        """Fitted members, and which rows each has not seen (None if that is unknown)."""
+        fitted = clone(bagging)
+        if not isinstance(fitted.estimator, SequenceRegressor):
+            return _fit(fitted, X, y, weight), None
+        # the bagging only draws and seeds, in this process whatever backend is set
+        with parallel_config("sequential"), deferred_training() as pending:
+            _fit(fitted, X, y, weight)
+        unseen = None
+        if leave_out:
+            if self.resample == "window":
+                folds = held_out_folds(trajectories, FOLDS)
+                for k, fit in enumerate(pending):
+                    fit.leave_out(folds[k % len(folds)][1])
+            unseen = np.array([fit.unseen(trajectories) for fit in pending])
+        train_together(pending, self.n_jobs)
+        return fitted, unseen
 
     def _bagging(self, keys: Keys, weighted: bool, seed: int) -> BaggingRegressor:
         member = LSTMRegressor() if self.estimator is None else clone(self.estimator)
@@ -248,7 +285,7 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             n_estimators=self.n_estimators,
             # scikit-learn's bagging honours weights by drawing rows in proportion to them
             bootstrap=weighted or self.resample == "window",
-            n_jobs=self.n_jobs,
+            n_jobs=self.n_jobs,  # for members that are not trained side by side
             random_state=seed,
         )
 
@@ -306,23 +343,10 @@ def _member_mean(bagging: BaggingRegressor, X: Array) -> Array:
     return np.mean(members, axis=0)
 
 
-def _out_of_bag_means(bagging: BaggingRegressor, X: Array) -> Array:
+def _unseen_means(bagging: BaggingRegressor, X: Array, unseen: NDArray[np.bool_]) -> Array:
     """Mean over the members that have not seen a row; nan where every member has."""
     total: Any = 0.0
-    count = np.zeros((len(X), 1))
-    for member in bagging.estimators_:
-        unseen = ~member._in_bag[:, None]
-        total = total + np.where(unseen, member.predict(X).reshape(len(X), -1), 0.0)
-        count += unseen
+    for member, rows in zip(bagging.estimators_, unseen[..., None], strict=True):
+        total = total + np.where(rows, member.predict(X).reshape(len(X), -1), 0.0)
+    count = unseen.sum(axis=0)[:, None]
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)
-
-
-def _cross_fitted_means(
-    bagging: BaggingRegressor, X: Array, y: Array, weight: Array | None, folds: Iterable[Any]
-) -> Array:
-    """Mean over members trained without the row's fold; nan where a row is in no test fold."""
-    means = np.full((len(X), y[:1].size), np.nan)
-    for train, test in folds:
-        part = None if weight is None else weight[train]
-        means[test] = _member_mean(_fit(clone(bagging), X[train], y[train], part), X[test])
-    return means

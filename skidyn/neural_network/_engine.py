@@ -10,12 +10,12 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from skorch import NeuralNet
-from skorch.callbacks import Callback, EarlyStopping, GradientNormClipping, LRScheduler
+from skorch.callbacks import Callback, EarlyStopping, LRScheduler
 from skorch.helper import predefined_split
 from torch import nn
 
 from skidyn._compat import FitProgress
-from skidyn.neural_network._network import Weights, single_thread, to_arrays
+from skidyn.neural_network._network import Members, Weights, single_thread, to_arrays
 from skidyn.neural_network._windows import WindowLoader, WindowSet, window_rows, window_starts
 
 Array = NDArray[np.float64]
@@ -26,32 +26,53 @@ ROWS_AT_ONCE = 65536
 
 @dataclass(frozen=True)
 class TrainingPlan:
-    """How a network is trained.
+    """How networks are trained.
 
     Attributes
     ----------
-    window, max_epochs, batch_size : int
-        Rows per window, passes over the log, windows per step.
+    window, stride, max_epochs, batch_size : int
+        Rows of history and targets per window, passes over the log, windows per step.
     learning_rate : float
         Step size of Adam.
     patience : int
         Epochs without improvement on the validation rows after which training ends.
-    seed : int
-        Draws initial weights, order of windows and dropout.
     device : str
-        Where the network is trained.
+        Where the networks are trained.
     slow_parameters : str
         Name of a parameter that moves at a tenth of the learning rate; empty for none.
     """
 
     window: int
+    stride: int
     max_epochs: int
     batch_size: int
     learning_rate: float
     patience: int
-    seed: int
     device: str
     slow_parameters: str = ""
+
+
+@dataclass(frozen=True)
+class Task:
+    """One network and what it is to learn.
+
+    Attributes
+    ----------
+    network : Module
+        Initialised; maps (n_windows, window + stride, n_inputs) to (n_windows, stride, n_outputs).
+    inputs, targets : ndarray of shape (n_samples, n_inputs) and (n_samples, n_outputs)
+        Scaled.
+    weight : ndarray of shape (n_samples,)
+        Weight of each row's error; rows of weight zero still serve as history.
+    seed : int
+        Draws the order of windows.
+    """
+
+    network: nn.Module
+    inputs: NDArray[Any]
+    targets: NDArray[Any]
+    weight: Array
+    seed: int
 
 
 @dataclass(frozen=True)
@@ -73,12 +94,18 @@ class Training:
 
 
 class _WeightedNet(NeuralNet):
-    """Mean squared error in which each target row has a weight (last column of the targets)."""
+    """Mean squared error in which each target row has a weight (last column of the targets).
+
+    The members' errors are added up, so each member's gradient is that of its own error.
+    """
 
     def get_loss(self, y_pred: Any, y_true: Any, X: Any = None, training: bool = False) -> Any:
         weight = y_true[..., -1:]
-        squares = weight * (y_pred - y_true[..., :-1]) ** 2
-        return squares.sum() / (weight.sum().clamp_min(1e-12) * y_pred.shape[-1])
+        squares = (weight * (y_pred - y_true[..., :-1]) ** 2).sum(dim=(1, 2, 3))
+        losses = squares / (weight.sum(dim=(1, 2, 3)).clamp_min(1e-12) * y_pred.shape[-1])
+        if training:
+            self.batch_losses_.append(losses.detach())
+        return losses.sum()
 
 
 class _Progress(Callback):
@@ -86,42 +113,42 @@ class _Progress(Callback):
 
     def __init__(self, progress: FitProgress) -> None:
         self.progress = progress
+        self.loss_curves: list[NDArray[Any]] = []
 
     def on_epoch_begin(self, net: NeuralNet, **kwargs: Any) -> None:
+        net.batch_losses_ = []
         self.progress.begin_step()
 
     def on_epoch_end(self, net: NeuralNet, **kwargs: Any) -> None:
-        loss = net.history[-1, "train_loss"]
-        if not np.isfinite(loss):
+        losses = torch.stack(net.batch_losses_).mean(dim=0).cpu().numpy()
+        if not np.isfinite(losses).all():
             raise ValueError(
-                f"training diverged in epoch {len(net.history)} (loss {loss}); lower learning_rate."
+                f"training diverged in epoch {len(net.history)} (loss {losses.max()}); "
+                "lower learning_rate."
             )
+        self.loss_curves.append(losses.astype(np.float64))
         if self.progress.end_step():
             raise KeyboardInterrupt  # skorch's way to end a fit cleanly
 
 
 def train(
-    network: nn.Module,
-    inputs: Array,
-    targets: Array,
-    weight: Array,
+    tasks: list[Task],
     validation: NDArray[np.bool_] | None,
     segments: list[slice],
     plan: TrainingPlan,
     progress: FitProgress,
-) -> Training:
-    """Train a network on a log.
+) -> list[Training]:
+    """Train networks of one architecture side by side on one log.
+
+    Most of a small network's step is overhead (gathering, optimiser, bookkeeping), which all
+    networks share here.
 
     Parameters
     ----------
-    network : Module
-        Initialised; maps (n_windows, 2 window, n_inputs) to (n_windows, window, n_outputs).
-    inputs, targets : ndarray of shape (n_samples, n_inputs) and (n_samples, n_outputs)
-        Scaled.
-    weight : ndarray of shape (n_samples,)
-        Weight of each row's error; rows of weight zero still serve as history.
+    tasks : list of Task
+        Networks and what they learn.
     validation : ndarray of bool of shape (n_samples,) or None
-        Rows that only judge; training ends when they stop improving.
+        Rows that only judge; training ends when they stop improving. For a single task.
     segments : list of slice
         Rows that belong together.
     plan : TrainingPlan
@@ -131,51 +158,55 @@ def train(
 
     Returns
     -------
-    Training
+    list of Training
     """
     device = torch.device(plan.device)
-    table = torch.as_tensor(inputs, dtype=torch.float32, device=device)
+    tables = [torch.as_tensor(t.inputs, dtype=torch.float32, device=device) for t in tasks]
 
-    def window_set(row_weight: Array) -> WindowSet:
-        weighted = np.c_[targets, row_weight]
-        tensor = torch.as_tensor(weighted, dtype=torch.float32, device=device)
-        return WindowSet(table, tensor, segments, plan.window)
+    def window_set(row_weights: list[Array]) -> WindowSet:
+        targets = [
+            torch.as_tensor(np.c_[task.targets, weight], dtype=torch.float32, device=device)
+            for task, weight in zip(tasks, row_weights, strict=True)
+        ]
+        return WindowSet(tables, targets, segments, plan.window, plan.stride)
 
-    callbacks: list[Any] = [GradientNormClipping(1.0), _Progress(progress)]
-    split = None
+    follow = _Progress(progress)
+    callbacks: list[Any] = [follow]
+    split, weights = None, [task.weight for task in tasks]
     if validation is None:
         # steps that shrink to nothing average the noise of small batches away
         cosine = torch.optim.lr_scheduler.CosineAnnealingLR
         callbacks.append(LRScheduler(cosine, T_max=plan.max_epochs))
     else:
-        callbacks.insert(1, EarlyStopping(patience=plan.patience, load_best=True, sink=_silent))
-        split = predefined_split(window_set(np.where(validation, weight, 0.0)))
-        weight = np.where(validation, 0.0, weight)
-    slow = [(plan.slow_parameters, {"lr": 0.1 * plan.learning_rate})]
+        callbacks.append(EarlyStopping(patience=plan.patience, load_best=True, sink=_silent))
+        split = predefined_split(window_set([np.where(validation, w, 0.0) for w in weights]))
+        weights = [np.where(validation, 0.0, w) for w in weights]
+    slow = [(f"*.{plan.slow_parameters}", {"lr": 0.1 * plan.learning_rate})]
     net = _WeightedNet(
-        network,
+        Members([task.network for task in tasks]),
         criterion=nn.MSELoss,
         optimizer=torch.optim.Adam,
         optimizer__param_groups=slow if plan.slow_parameters else [],
+        optimizer__fused=True,
         lr=plan.learning_rate,
         max_epochs=plan.max_epochs,
         batch_size=plan.batch_size,
         train_split=split,
         iterator_train=WindowLoader,
-        iterator_train__generator=np.random.default_rng(plan.seed),
+        iterator_train__generators=[np.random.default_rng(task.seed) for task in tasks],
         iterator_valid=WindowLoader,
         callbacks=callbacks,
         device=plan.device,
         verbose=0,
     )
     with single_thread():
-        net.fit(window_set(weight), None)
-    history = net.history
-    return Training(
-        to_arrays(net.module_),
-        history[:, "train_loss"],
-        history[:, "valid_loss"] if validation is not None else [],
-    )
+        net.fit(window_set(weights), None)
+    curves = np.array(follow.loss_curves).T.tolist()
+    judged = net.history[:, "valid_loss"] if validation is not None else []
+    return [
+        Training(to_arrays(network), curve, judged)
+        for network, curve in zip(net.module_, curves, strict=True)
+    ]
 
 
 def _silent(*args: Any, **kwargs: Any) -> None:
@@ -183,11 +214,16 @@ def _silent(*args: Any, **kwargs: Any) -> None:
 
 
 def run(
-    network: nn.Module, inputs: Array, segments: list[slice], window: int, device: str
+    network: nn.Module,
+    inputs: Array,
+    segments: list[slice],
+    window: int,
+    stride: int,
+    device: str,
 ) -> Array:
     """Outputs of a network for every row of a log.
 
-    Every segment is cut at multiples of ``window`` rows from its start, so the output of a row
+    Every segment is cut at multiples of ``stride`` rows from its start, so the output of a row
     depends on rows before it alone and does not change when the log grows.
 
     Parameters
@@ -198,7 +234,7 @@ def run(
         Scaled.
     segments : list of slice
         Rows that belong together.
-    window : int
+    window, stride : int
         As in training.
     device : str
         Where to run it.
@@ -208,9 +244,9 @@ def run(
     ndarray of shape (n_samples, n_outputs)
     """
     table = torch.as_tensor(inputs, dtype=torch.float32, device=device)
-    rows, valid = window_rows(window_starts(segments, window), window)
+    rows, valid = window_rows(window_starts(segments, stride), window, stride)
     network = network.to(device).eval()
-    step = max(1, ROWS_AT_ONCE // (2 * window))
+    step = max(1, ROWS_AT_ONCE // (window + stride))
     parts = []
     with single_thread(), torch.inference_mode():
         for i in range(0, len(rows), step):

@@ -13,15 +13,18 @@ class LSTMRegressor(SequenceRegressor):
     """Long short-term memory network: one LSTM layer and a linear output.
 
     Each row is predicted from itself and the rows before it in its segment (contiguous rows of
-    one trajectory without a gap in time). The log is cut into windows of `window` rows; the
-    network reads the `window` rows before each of them as history, and is trained on all rows of
-    a window at once, which costs two LSTM steps per target instead of `window`.
+    one trajectory without a gap in time). The log is cut into pieces of `stride` rows; the network
+    reads the `window` rows before each of them as history, and is trained on all rows of a piece
+    at once.
 
     Parameters
     ----------
     window : int, default=32
-        Rows per window: each prediction has at least `window` and less than `2 * window` rows of
-        history behind it.
+        Rows of history: each prediction has at least `window` and less than `window + stride` rows
+        behind it.
+    stride : int, default=8
+        Rows per piece. Neighbouring rows tell a network nearly the same, so shorter pieces learn
+        more from an epoch, and cost more: ``1 + window / stride`` LSTM steps per row.
     hidden_size : int, default=32
         Cells of the LSTM.
     max_epochs : int, default=100
@@ -29,7 +32,7 @@ class LSTMRegressor(SequenceRegressor):
     learning_rate : float, default=0.01
         First step size of Adam; it falls to zero along a cosine unless `early_stopping` is on.
     batch_size : int, default=16
-        Windows per step.
+        Pieces per step.
     scaling : {"standard", "minmax"}, default="standard"
         Inputs and outputs are scaled to zero mean and unit variance, or to the range 0 to 1.
     early_stopping : bool, default=False
@@ -103,6 +106,7 @@ class LSTMRegressor(SequenceRegressor):
         self,
         *,
         window: int = 32,
+        stride: int = 8,
         hidden_size: int = 32,
         max_epochs: int = 100,
         learning_rate: float = 0.01,
@@ -119,6 +123,7 @@ class LSTMRegressor(SequenceRegressor):
         random_state: Any = None,
     ) -> None:
         self.window = window
+        self.stride = stride
         self.hidden_size = hidden_size
         self.max_epochs = max_epochs
         self.learning_rate = learning_rate
@@ -146,7 +151,9 @@ class NDLRegressor(SequenceRegressor):
     Parameters
     ----------
     window : int, default=32
-        Rows per window.
+        Rows of history.
+    stride : int, default=8
+        Rows predicted at once.
     hidden_size : int, default=32
         Cells of the LSTM.
     dense_size : int, default=32
@@ -158,7 +165,7 @@ class NDLRegressor(SequenceRegressor):
     learning_rate : float, default=0.01
         First step size of Adam; it falls to zero along a cosine unless `early_stopping` is on.
     batch_size : int, default=16
-        Windows per step.
+        Pieces per step.
     scaling : {"minmax", "standard"}, default="minmax"
         Inputs and outputs are scaled to the range 0 to 1 (eq. 8 of the paper), or to zero mean and
         unit variance.
@@ -216,6 +223,7 @@ class NDLRegressor(SequenceRegressor):
         self,
         *,
         window: int = 32,
+        stride: int = 8,
         hidden_size: int = 32,
         dense_size: int = 32,
         dropout: float = 0.1,
@@ -234,6 +242,7 @@ class NDLRegressor(SequenceRegressor):
         random_state: Any = None,
     ) -> None:
         self.window = window
+        self.stride = stride
         self.hidden_size = hidden_size
         self.dense_size = dense_size
         self.dropout = dropout

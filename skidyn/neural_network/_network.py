@@ -57,12 +57,21 @@ class LSTMNetwork(nn.Module):
         Width of the fully connected layer; 0 leaves it and the dropout out.
     dropout : float
         Share of its outputs dropped in training.
+    window : int
+        Rows of history, for which there is no output.
     """
 
     def __init__(
-        self, n_inputs: int, n_outputs: int, hidden_size: int, dense_size: int, dropout: float
+        self,
+        n_inputs: int,
+        n_outputs: int,
+        hidden_size: int,
+        dense_size: int,
+        dropout: float,
+        window: int,
     ) -> None:
         super().__init__()
+        self.window = window
         # made on "meta" nothing is drawn from torch's global generator
         with torch.device("meta"):
             self.lstm = nn.LSTM(n_inputs, hidden_size, batch_first=True)
@@ -87,11 +96,19 @@ class LSTMNetwork(nn.Module):
         self.dropout.generator = torch.Generator(device).manual_seed(seed)
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
-        """Outputs of the second half of every window."""
-        hidden = self.lstm(x)[0][:, x.shape[1] // 2 :]
+        """Outputs of the rows after the history of every window."""
+        hidden = self.lstm(x)[0][:, self.window :]
         if self.dense is not None:
             hidden = self.dropout(torch.relu(self.dense(hidden)))
         return self.output(hidden)
+
+
+class Members(nn.ModuleList):
+    """Networks of one architecture side by side, each with its own inputs."""
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        """Map (n_members, n_windows, n_rows, n_inputs) to outputs, member by member."""
+        return torch.stack([network(own) for network, own in zip(self, x, strict=True)])
 
 
 def to_arrays(network: nn.Module) -> Weights:

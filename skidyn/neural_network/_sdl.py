@@ -13,14 +13,16 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 from torch import nn
 
 from skidyn._columns import Columns, ColumnSpec, resolve_columns
-from skidyn._compat import StrOptions, fit_progress
+from skidyn._compat import StrOptions
 from skidyn.hybrid._range import TrainingRange, distances, fade
 from skidyn.model_selection._split import held_out_folds
 from skidyn.neural_network._base import SequenceRegressor
-from skidyn.neural_network._engine import run, train
+from skidyn.neural_network._engine import Task, Training, TrainingPlan, run
 from skidyn.neural_network._network import LSTMNetwork, from_arrays
+from skidyn.neural_network._physics import BareRigidBody, IdentifiedPhysics, robot_of
 from skidyn.preprocessing._affine import scaling_of
 from skidyn.preprocessing._keys import Keys
+from skidyn.rigid_body import RBDRegressor
 from skidyn.robots import Robot
 
 Array = NDArray[np.float64]
@@ -54,31 +56,34 @@ class _JointNetwork(nn.Module):
         regressor = regressor.reshape(*torque.shape, len(self.rigid_body))
         torque = torque + regressor @ self.rigid_body
         output = self.core(torch.cat([features, torque], dim=-1))
-        return output + torque[:, x.shape[1] // 2 :] if self.residual else output
+        return output + torque[:, self.core.window :] if self.residual else output
 
 
 class SDLRegressor(SequenceRegressor):
-    """Semiparametric deep learning model: an LSTM network that also reads the rigid-body torque.
+    """Semiparametric deep learning model: an LSTM network that also reads a physical torque.
 
-    The network of :class:`NDLRegressor` with the rigid-body torque among its inputs [1]_. The
-    inertial parameters start at their least-squares values and are optimised together with the
-    network through the torque regressor, in which they are linear (``rigid_body="joint"``), or
-    stay at these values (``"frozen"``). Directions of the parameters that the log does not show
-    keep the robot's own values.
+    The network of :class:`NDLRegressor` with the torque of a physical model among its inputs [1]_.
+    The model's coefficients (inertial parameters, and effects such as friction) start at their
+    least-squares values and are optimised together with the network through the columns in which
+    the torque is linear (``rigid_body="joint"``), or stay at these values (``"frozen"``).
+    Directions of the coefficients that the log does not show keep the model's own values.
 
-    Far from the training samples the network's output fades into the rigid-body torque.
+    Far from the training samples the network's output fades into the physical torque.
 
     Parameters
     ----------
-    robot : Robot
-        Robot whose joints the columns of X describe.
+    physics : Robot or RBDRegressor
+        What is read: the rigid body of a robot, as in the paper, or a rigid body with effects,
+        which is identified first. Its robot's joints are those that the columns of X describe.
     rigid_body : {"joint", "frozen"}, default="joint"
-        Whether the inertial parameters are optimised with the network.
+        Whether the coefficients are optimised with the network.
     residual : bool, default=True
-        Add the rigid-body torque to the network's output, so that the network learns what is
+        Add the physical torque to the network's output, so that the network learns what is
         missing. False is the paper's architecture, which only reads it.
     window : int, default=32
-        Rows per window.
+        Rows of history.
+    stride : int, default=8
+        Rows predicted at once.
     hidden_size : int, default=32
         Cells of the LSTM.
     dense_size : int, default=32
@@ -89,9 +94,9 @@ class SDLRegressor(SequenceRegressor):
         Passes over the log.
     learning_rate : float, default=0.01
         First step size of Adam, which falls to zero along a cosine unless `early_stopping` is on; a
-        tenth of it for the inertial parameters.
+        tenth of it for the coefficients of the physics.
     batch_size : int, default=16
-        Windows per step.
+        Pieces per step.
     scaling : {"minmax", "standard"}, default="minmax"
         Scaling of inputs and outputs.
     early_stopping : bool, default=False
@@ -111,6 +116,13 @@ class SDLRegressor(SequenceRegressor):
 
     Attributes
     ----------
+    physics_ : Robot or RBDRegressor
+        The physics as given, identified where it has effects.
+    coef_ : ndarray of shape (n_coefficients,)
+        What the optimisation added to the coefficients of ``physics_``: inertial parameters of
+        every body, then its effects.
+    initial_coef_ : ndarray of shape (n_coefficients,)
+        The least-squares values that it started from.
     inertial_parameters_ : ndarray of shape (n_bodies, 10)
         Rigid-body parameters in the model; see :attr:`skidyn.robots.Robot.inertial_parameters`.
     initial_inertial_parameters_ : ndarray of shape (n_bodies, 10)
@@ -153,7 +165,7 @@ class SDLRegressor(SequenceRegressor):
 
     _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
         **{k: v for k, v in SequenceRegressor._parameter_constraints.items() if k != "per_joint"},
-        "robot": [Robot],
+        "physics": [Robot, RBDRegressor],
         "rigid_body": [StrOptions({"joint", "frozen"})],
         "residual": ["boolean"],
     }
@@ -161,11 +173,12 @@ class SDLRegressor(SequenceRegressor):
 
     def __init__(
         self,
-        robot: Robot,
+        physics: Robot | RBDRegressor,
         *,
         rigid_body: str = "joint",
         residual: bool = True,
         window: int = 32,
+        stride: int = 8,
         hidden_size: int = 32,
         dense_size: int = 32,
         dropout: float = 0.1,
@@ -182,10 +195,11 @@ class SDLRegressor(SequenceRegressor):
         time: ColumnSpec = "auto",
         random_state: Any = None,
     ) -> None:
-        self.robot = robot
+        self.physics = physics
         self.rigid_body = rigid_body
         self.residual = residual
         self.window = window
+        self.stride = stride
         self.hidden_size = hidden_size
         self.dense_size = dense_size
         self.dropout = dropout
@@ -204,121 +218,123 @@ class SDLRegressor(SequenceRegressor):
 
     # The two hooks that the common tests replace, because their tables are of any width.
 
+    @property
+    def _robot(self) -> Robot:
+        return robot_of(self.physics)
+
     def _resolve(self) -> Columns:
         names = getattr(self, "feature_names_in_", None)
         return resolve_columns(
             None if names is None else list(names),
             self.n_features_in_,
-            self.robot.joint_names,
+            self._robot.joint_names,
             trajectory=self.trajectory,
             time=self.time,
         )
 
     def _check_targets(self, y: Array) -> None:
-        n_targets, n_joints = y[:1].size, self.robot.n_joints
+        n_targets, n_joints = y[:1].size, self._robot.n_joints
         if n_targets != n_joints:
             raise ValueError(
                 f"y has {n_targets} columns; the robot has {n_joints} joints: "
-                f"{', '.join(self.robot.joint_names)}."
+                f"{', '.join(self._robot.joint_names)}."
             )
 
     def _keys(self) -> Keys:
         columns = self._resolve()
         return Keys(columns.trajectory, columns.time, tuple(columns.state()))
 
-    def _state(self, X: Array) -> tuple[Array, Array, Array]:
-        columns = self._resolve()
-        assert columns.ddq is not None
-        return X[:, list(columns.q)], X[:, list(columns.dq)], X[:, list(columns.ddq)]
+    def _read(self, physics: Any) -> BareRigidBody | IdentifiedPhysics:
+        if isinstance(physics, Robot):
+            return BareRigidBody(physics, self._resolve())
+        return IdentifiedPhysics(physics, self._resolve())
 
-    def _fit_arrays(
-        self,
-        X: Array,
-        y: Array,
-        weight: Array,
-        validation: NDArray[np.bool_] | None,
-        keys: Keys,
-        seed: int,
-    ) -> None:
+    def _tasks(self, X: Array, y: Array, weight: Array, keys: Keys, seed: int) -> list[Task]:
         self._check_targets(y)
-        self._one_dimensional = y.ndim == 1
         targets, used = y.reshape(len(y), -1), weight > 0
-        training_rows = used if validation is None else used & ~validation
         features = self._inputs(X, keys)
         self.input_offset_, self.input_scale_ = scaling_of(features[used], self.scaling)
         self.output_offset_, self.output_scale_ = scaling_of(targets[used], self.scaling)
-        directions, start = self._identify(X, targets, training_rows)
-        own = self.robot.inertial_parameters
-        self.initial_inertial_parameters_ = own + (directions @ start).reshape(own.shape)
+        physics = self._read(self.physics)
+        self.physics_ = self.physics
+        if isinstance(physics, IdentifiedPhysics):
+            self.physics_ = physics.fit(X[used], targets[used])
+        torque = physics.torque(X)
+        self._directions, self._start = self._identify(physics, X, targets - torque, used)
 
         folds = held_out_folds(keys.trajectories(X), 5)
         training_range = TrainingRange(features, folds)
         self.radius_ = training_range.radius
         self._scale, self._reference = training_range.scale, training_range.reference
 
-        joint = self.rigid_body == "joint"
         n_features, n_joints = features.shape[1], targets.shape[1]
         core = self._network(n_features + n_joints, n_joints)
         core.initialise(seed, torch.device(self.device))
-        network = _JointNetwork(core, start, n_features, n_joints, self.residual)
-        network.rigid_body.requires_grad_(joint)
-        with fit_progress(self, self.max_epochs, X, y) as progress:
-            training = train(
-                network,
-                self._joint_inputs(X, features, directions),
-                (targets - self.output_offset_) / self.output_scale_,
-                weight,
-                validation,
-                keys.segments(X),
-                replace(self._plan(seed), slow_parameters="rigid_body" if joint else ""),
-                progress,
-            )
-        learned = training.weights.pop("rigid_body").astype(np.float64) if joint else start
-        self.inertial_parameters_ = own + (directions @ learned).reshape(own.shape)
-        self.weights_ = [
-            {name.removeprefix("core."): array for name, array in training.weights.items()}
-        ]
-        self.weights_[0].pop("rigid_body", None)
-        self.loss_curve_, self.validation_curve_ = training.loss_curve, training.validation_curve
-        self.n_iter_ = len(self.loss_curve_)
+        network = _JointNetwork(core, self._start, n_features, n_joints, self.residual)
+        network.rigid_body.requires_grad_(self.rigid_body == "joint")
+        inputs = self._joint_inputs(physics, X, features, torque)
+        scaled_targets = (targets - self.output_offset_) / self.output_scale_
+        return [Task(network, inputs, scaled_targets, weight, seed)]
 
-    def _identify(self, X: Array, targets: Array, rows: NDArray[np.bool_]) -> tuple[Array, Array]:
-        """Directions of the parameters that the log shows, and their least-squares coordinates.
+    def _plan(self) -> TrainingPlan:
+        return replace(super()._plan(), slow_parameters="rigid_body")
+
+    def _store(self, trainings: list[Training]) -> None:
+        super()._store(trainings)
+        learned = self.weights_[0].pop("rigid_body").astype(np.float64)
+        if self.rigid_body == "frozen":
+            learned = self._start  # in double precision
+        self.weights_ = [
+            {name.removeprefix("core."): array for name, array in self.weights_[0].items()}
+        ]
+        self.initial_coef_ = self._directions @ self._start
+        self.coef_ = self._directions @ learned
+        del self._directions, self._start
+        own = self._read(self.physics_).inertial_parameters
+        self.inertial_parameters_, self.initial_inertial_parameters_ = (
+            own + change[: own.size].reshape(own.shape)
+            for change in (self.coef_, self.initial_coef_)
+        )
+
+    def _identify(
+        self, physics: Any, X: Array, missing: Array, rows: NDArray[np.bool_]
+    ) -> tuple[Array, Array]:
+        """Directions of the coefficients that the log shows, and their least-squares coordinates.
 
         Moving by 1 along any of them changes the scaled torque by 1 (root mean square), so one
         step size suits all of them.
         """
-        q, dq, ddq = (signal[rows] for signal in self._state(X))
-        missing = (targets[rows] - self.robot.inverse_dynamics(q, dq, ddq)) / self.output_scale_
-        n_parameters = self.robot.inertial_parameters.size
-        gram, cross = np.zeros((n_parameters, n_parameters)), np.zeros(n_parameters)
-        for part, regressor in self.robot.iter_torque_regressor(q, dq, ddq):
-            scaled = regressor / self.output_scale_[:, None, None]
-            for joint, block in enumerate(scaled):
-                gram += block @ block.T
-                cross += block @ missing[part, joint]
-        n_torques = missing.size
+        missing = missing / self.output_scale_
+        gram: Any = 0.0
+        cross: Any = 0.0
+        for part, columns in physics.columns(X):
+            for joint, block in enumerate(columns / self.output_scale_[:, None, None]):
+                own = block[:, rows[part]]
+                gram = gram + own @ own.T
+                cross = cross + own @ missing[part, joint][rows[part]]
+        n_torques = missing[rows].size
         values, vectors = np.linalg.eigh(gram / n_torques)
         seen = values > IDENTIFIABLE**2 * values[-1]
         directions = vectors[:, seen] / np.sqrt(values[seen])
         return directions, directions.T @ cross / n_torques
 
-    def _joint_inputs(self, X: Array, features: Array, directions: Array) -> Array:
-        """Features, the torque of the robot's own parameters and the reduced regressor, scaled."""
-        state = self._state(X)
-        n_joints = self.robot.n_joints
-        reduced = np.empty((len(X), n_joints, directions.shape[1]), dtype=np.float32)
-        for part, regressor in self.robot.iter_torque_regressor(*state):
-            scaled = regressor / self.output_scale_[:, None, None]
-            reduced[part] = np.einsum("jpc,pd->cjd", scaled, directions, optimize=True)
-        torque = (self.robot.inverse_dynamics(*state) - self.output_offset_) / self.output_scale_
+    def _joint_inputs(
+        self, physics: Any, X: Array, features: Array, torque: Array
+    ) -> NDArray[np.float32]:
+        """Features, the torque of the given physics and the reduced columns, scaled."""
+        n_joints = torque.shape[1]
+        reduced = np.empty((len(X), n_joints, self._directions.shape[1]), dtype=np.float32)
+        for part, columns in physics.columns(X):
+            scaled = columns / self.output_scale_[:, None, None]
+            reduced[part] = np.einsum("jpc,pd->cjd", scaled, self._directions, optimize=True)
+        scaled_torque = (torque - self.output_offset_) / self.output_scale_
         scaled_features = (features - self.input_offset_) / self.input_scale_
         return np.concatenate(
-            [scaled_features, torque, reduced.reshape(len(X), -1)], axis=1, dtype=np.float32
+            [scaled_features, scaled_torque, reduced.reshape(len(X), -1)], axis=1, dtype=np.float32
         )
 
     def rigid_body_torque(self, X: Any) -> Array:
-        """Torque of the rigid body with the learned inertial parameters.
+        """Torque of the physics with the learned coefficients.
 
         Parameters
         ----------
@@ -356,7 +372,11 @@ class SDLRegressor(SequenceRegressor):
         return distances(features, self._scale, self._reference) / self.radius_
 
     def _rigid_body(self, X: Array) -> Array:
-        return self.robot.inverse_dynamics(*self._state(X), parameters=self.inertial_parameters_)
+        physics = self._read(self.physics_)
+        torque = physics.torque(X)
+        for part, columns in physics.columns(X):
+            torque[part] += np.einsum("jpc,p->cj", columns, self.coef_)
+        return torque
 
     def _output(self, X: Array) -> Array:
         keys = self._keys()
@@ -367,7 +387,7 @@ class SDLRegressor(SequenceRegressor):
         ]
         network = self._network(scaled.shape[1], rigid_body.shape[1])
         from_arrays(network, self.weights_[0])
-        output = run(network, scaled, keys.segments(X), self.window, self.device)
+        output = run(network, scaled, keys.segments(X), self.window, self.stride, self.device)
         if self.residual:
             torque = rigid_body + output * self.output_scale_
         else:

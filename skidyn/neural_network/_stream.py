@@ -57,8 +57,9 @@ class TorqueStream:
         log = np.concatenate([self._past, new])
         torque = estimator._predict_array(log)[len(self._past) :]
         last = estimator._keys().segments(log)[-1]
-        # the current window and the one before it; cut at a window's edge, so the grid stays
-        n_windows = (last.stop - last.start) // estimator.window
-        keep_from = last.start + max(0, n_windows - 1) * estimator.window
+        # the current piece and the history before it; cut at a piece's edge, so the grid stays
+        window, stride = estimator.window, estimator.stride
+        n_pieces = (last.stop - last.start) // stride - -(-window // stride)
+        keep_from = last.start + max(0, n_pieces) * stride
         self._past = log[keep_from:]
         return torque

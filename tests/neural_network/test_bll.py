@@ -24,7 +24,7 @@ SEQUENCE = {
 @parametrize_with_checks(
     [
         BLLRegressor(
-            LSTMRegressor(window=2, hidden_size=8, max_epochs=25, learning_rate=0.03),
+            LSTMRegressor(window=2, stride=2, hidden_size=8, max_epochs=25, learning_rate=0.03),
             n_estimators=2,
             random_state=0,
         )
@@ -96,4 +96,4 @@ def test_paper_head_and_weights(log):
 
 def test_members_that_cannot_draw_trajectories(log):
     with pytest.raises(ValueError, match="use resample='window'"):
-        BLLRegressor(Ridge()).fit(*log)
+        BLLRegressor(Ridge(), resample="trajectory").fit(*log)

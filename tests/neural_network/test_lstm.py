@@ -28,9 +28,17 @@ SEQUENCE = {
 
 @parametrize_with_checks(
     [
-        LSTMRegressor(window=3, hidden_size=8, max_epochs=40, learning_rate=0.03, random_state=0),
+        LSTMRegressor(
+            window=3, stride=3, hidden_size=8, max_epochs=40, learning_rate=0.03, random_state=0
+        ),
         NDLRegressor(
-            window=3, hidden_size=8, dropout=0, max_epochs=40, learning_rate=0.03, random_state=0
+            window=3,
+            stride=3,
+            hidden_size=8,
+            dropout=0,
+            max_epochs=40,
+            learning_rate=0.03,
+            random_state=0,
         ),
     ],
     expected_failed_checks=lambda estimator: SEQUENCE,
@@ -71,7 +79,7 @@ def test_stream_gives_the_numbers_of_the_whole_log(log, step):
     stream = model.stream()
     parts = [stream.predict(X[i : i + step]) for i in range(0, len(X), step)]
     np.testing.assert_allclose(np.concatenate(parts), model.predict(X), atol=1e-5)
-    assert len(stream._past) <= 3 * model.window
+    assert len(stream._past) <= model.window + 2 * model.stride
 
 
 def test_bit_equal_for_any_number_of_processes_and_global_state_untouched(log):

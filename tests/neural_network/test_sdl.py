@@ -7,9 +7,11 @@ import pytest
 from sklearn.base import clone
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
+from skidyn._columns import Columns
 from skidyn.datasets import load_planar_arm
 from skidyn.neural_network import SDLRegressor
 from skidyn.preprocessing._keys import Keys
+from skidyn.rigid_body import RBDRegressor
 from skidyn.robots import Robot
 
 PENDULUM = """
@@ -26,9 +28,9 @@ class AnyWidth(SDLRegressor):
     def _keys(self):
         return Keys(None, None, tuple(range(self.n_features_in_)))
 
-    def _state(self, X):
-        columns = np.resize(np.arange(X.shape[1]), 3)
-        return tuple(X[:, [c]] for c in columns)
+    def _resolve(self):
+        q, dq, ddq = np.resize(np.arange(self.n_features_in_), 3)
+        return Columns((q,), (dq,), (ddq,))
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
@@ -70,10 +72,10 @@ def arm_log():
     return robot, pd.concat(frames, ignore_index=True), np.concatenate(torques)
 
 
-def fitted(arm_log, **parameters):
+def fitted(arm_log, physics=None, **parameters):
     robot, X, y = arm_log
     settings = {"window": 8, "hidden_size": 12, "max_epochs": 10, "random_state": 0} | parameters
-    return SDLRegressor(robot, **settings).fit(X, y)
+    return SDLRegressor(physics or robot, **settings).fit(X, y)
 
 
 def test_rigid_body_and_network_are_optimised_together(arm_log):
@@ -89,6 +91,21 @@ def test_rigid_body_and_network_are_optimised_together(arm_log):
     # identified parameters, not the description's, although friction disturbs them
     nominal = robot.inverse_dynamics(*(X[[f"{s}1", f"{s}2"]] for s in ("q", "dq", "ddq")))
     assert np.abs(frozen.rigid_body_torque(X) - y).mean() < 0.6 * np.abs(nominal - y).mean()
+
+
+def test_physics_with_effects(arm_log):
+    """The network has less to learn where the physics has the friction."""
+    robot, X, y = arm_log
+    physics = RBDRegressor(robot, ("viscous", "coulomb"), trajectory="trajectory")
+    bare, complete = fitted(arm_log, max_epochs=3), fitted(arm_log, physics, max_epochs=3)
+    errors = [np.abs(model.rigid_body_torque(X) - y).mean() for model in (bare, complete)]
+    assert errors[1] < 0.5 * errors[0]
+    assert len(complete.coef_) == robot.inertial_parameters.size + 2 * 2
+    assert np.abs(complete.coef_[-4:]).max() > 0  # friction is optimised as well
+    assert complete.score(X, y) > bare.score(X, y) - 0.01
+    assert "effect_coefficients_" not in vars(physics)  # the one given stays as it is
+    far = X.assign(q1=X["q1"] + 50.0)
+    np.testing.assert_allclose(complete.predict(far), complete.rigid_body_torque(far))
 
 
 @pytest.mark.parametrize("residual", [True, False])
