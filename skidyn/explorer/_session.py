@@ -337,8 +337,8 @@ class Session:
         ]
         if not pool:
             raise EffectError(
-                f"{kind} cannot be added to joint {joint}: this log does not show it there, its fit "
-                "is not physical, or it is in the model already"
+                f"{kind} cannot be added to joint {joint}: this log does not show it there, its "
+                "fit is not physical, or it is in the model already"
             )
         candidate = max(pool, key=lambda item: item[0])[1]
         self._push(candidate, joint)
