@@ -168,7 +168,7 @@ def main() -> None:
             python = environment(folder, framework.packages)
             packages, size = (a - b for a, b in zip(weigh(python), bare, strict=True))
             (folder / "app.py").write_text(framework.source, encoding="utf-8")
-            uplot = files("skidyn.explorer").joinpath("static", "uPlot.js").read_text("utf-8")
+            uplot = files("skidyn").joinpath("static", "uPlot.js").read_text("utf-8")
             (folder / "uPlot.js").write_text(uplot, encoding="utf-8")
             start(folder, framework, browser)  # compiles, and fills the disk's cache
             runs = [start(folder, framework, browser) for _ in range(options.runs)]

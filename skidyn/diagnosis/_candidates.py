@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from skidyn._progress import track
 from skidyn._signals import Array
 from skidyn.effects import Term, get_effect
 from skidyn.evidence._problem import Problem
@@ -80,7 +81,7 @@ def catalogue_candidates(problem: Problem, kinds: Iterable[str]) -> list[Candida
     """
     present = {(term.kind, term.joints) for term in problem.terms}
     candidates = []
-    for kind in kinds:
+    for kind in track(list(kinds), "Preparing effects"):
         effect = get_effect(kind)
         if effect.search == "trajectories" and not problem.rigid_body and problem.robot is not None:
             # With the URDF's own bodies even a load carried all the time shows.

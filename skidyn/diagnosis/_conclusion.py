@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from skidyn._progress import track
 from skidyn._signals import Array
 from skidyn.diagnosis._failures import Comparison
 from skidyn.diagnosis._findings import (
@@ -124,7 +125,7 @@ def _steps(
 ) -> list[_Step]:
     """The model as given, and after each finding."""
     steps = []
-    for k in range(len(result.findings) + 1):
+    for k in track(range(len(result.findings) + 1), "Judging what was found"):
         found = _found_terms(problem, result.findings[:k])
         keep = found if k == len(result.findings) else ()
         held = _held_out(problem, [*problem.terms, *found], result, keep)

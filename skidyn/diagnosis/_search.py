@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 from scipy.stats import t as student_t
 
+from skidyn._progress import track
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate, catalogue_candidates
 from skidyn.diagnosis._clock import clock_line
@@ -110,6 +111,10 @@ class _Search:
             candidate.rows.update(self.problem.term_rows(candidate.term))
         problem = replace_torque(self.problem, self.problem.torque - self.ripple)
         self.fit = problem.fit(terms, sigma=self.fit.noise)
+
+    @property
+    def _round(self) -> str:
+        return f"Round {len(self.findings) + 1}"
 
     # ---------------------------------------------------------------- the loop
     def run(self) -> SearchResult:
@@ -281,7 +286,7 @@ class _Search:
         base = screen.held_out(base_model)
         first = screen.step(base_model)
         found = []
-        for kind in dict.fromkeys(kinds):
+        for kind in track(list(dict.fromkeys(kinds)), f"{self._round}: screening effects"):
             chosen, drop = self._greedy(screen, kinds == kind, base, first)
             if chosen:
                 found.append((chosen, -(drop - 2 * sum(c.width for c in chosen))))
@@ -354,7 +359,7 @@ class _Search:
         before = profile_error(self.problem, self.blocks, self.sigma, self.target)
         price = 2 * float(self.inflation.max())
         ranking = []
-        for i, candidates in enumerate(rough):
+        for i, candidates in enumerate(track(rough, f"{self._round}: refining the best")):
             kind = candidates[0].kind
             if i < self.settings.refined:
                 candidates = refine(self.problem, self.blocks, candidates, self.sigma, self.target)
