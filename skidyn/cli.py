@@ -8,8 +8,12 @@ import os
 import sys
 import warnings
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext, redirect_stdout
+from shutil import get_terminal_size
+from typing import Any, TextIO, cast
 
 from skidyn._commands import COMMANDS
+from skidyn._commands._terminal import FittingStream, TeachingFormatter, fit
 from skidyn._exceptions import LogWarning, SkidynError
 
 #: Exit codes: done; the input is at fault; stopped by the user.
@@ -58,18 +62,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.print_help()
         return BAD_INPUT
     try:
-        with warnings.catch_warnings(record=True) as caught:
+        with warnings.catch_warnings(record=True) as caught, _fitting():
             warnings.simplefilter("always")
             try:
                 options.run(options)
             finally:  # what is odd about a log often explains why it was refused
                 for text in dict.fromkeys(str(w.message) for w in caught if _is_ours(w)):
-                    print(f"warning: {text}", file=sys.stderr)
+                    _complain(f"warning: {text}")
     except BrokenPipeError:  # the reader, such as head, has seen enough
         # what is still buffered must not raise again when Python shuts down
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except (SkidynError, OSError, ImportError) as error:
-        print(f"skidyn {options.command}: {error}", file=sys.stderr)
+        _complain(f"skidyn {options.command}: {error}")
         return BAD_INPUT
     except KeyboardInterrupt:
         print("stopped; no file was left half written", file=sys.stderr)
@@ -91,13 +95,26 @@ def make_parser() -> argparse.ArgumentParser:
         prog="skidyn",
         description=_DESCRIPTION,
         epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=TeachingFormatter,
     )
     parser.add_argument("--version", action="version", version=f"skidyn {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     for command in COMMANDS:
         command.add_parser(commands)
     return parser
+
+
+def _fitting() -> AbstractContextManager[Any]:
+    """Print lines that fit where a person looks; the bytes of a pipe or file are left alone."""
+    if not sys.stdout.isatty():
+        return nullcontext()
+    return redirect_stdout(cast(TextIO, FittingStream(sys.stdout)))
+
+
+def _complain(text: str) -> None:
+    if sys.stderr.isatty():
+        text = "\n".join(fit(line, get_terminal_size().columns) for line in text.split("\n"))
+    print(text, file=sys.stderr)
 
 
 def _is_ours(caught: warnings.WarningMessage) -> bool:

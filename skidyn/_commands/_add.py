@@ -53,5 +53,5 @@ def run(options: argparse.Namespace) -> None:
         return
     print(f"held-out error with {options.effect} added (N m, N for sliders; sliding samples)")
     for j, name in enumerate(robot.joint_names):
-        change = after[j] / before[j] - 1 if before[j] > 0 else 0.0
-        print(f"  {name:24s} {before[j]:9.4g} -> {after[j]:9.4g}  ({change:+.0%})")
+        change = round(after[j] / before[j] - 1, 2) if before[j] > 0 else 0.0
+        print(f"  {name:24s} {before[j]:9.4g} -> {after[j]:9.4g}  ({change + 0.0:+.0%})")

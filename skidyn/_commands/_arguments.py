@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
-import argparse
 from typing import Any
+
+from skidyn._commands._terminal import TeachingFormatter
 
 
 def command(commands: Any, name: str, run: Any, text: str, description: str = "") -> Any:
@@ -12,7 +13,7 @@ def command(commands: Any, name: str, run: Any, text: str, description: str = ""
         name,
         help=text,
         description=description or text,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=TeachingFormatter,
     )
     parser.set_defaults(run=run)
     parser.add_argument("--json", action="store_true", help="print the result as JSON")

@@ -73,7 +73,14 @@ def working(text: str, options: argparse.Namespace) -> Iterator[None]:
         return
     try:
         from rich.console import Console
-        from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+        from rich.progress import (
+            BarColumn,
+            Progress,
+            SpinnerColumn,
+            TaskProgressColumn,
+            TextColumn,
+            TimeElapsedColumn,
+        )
     except ImportError:
         print(f"{text} ...", file=sys.stderr)
         yield
@@ -81,7 +88,8 @@ def working(text: str, options: argparse.Namespace) -> Iterator[None]:
     columns = (
         SpinnerColumn(),
         TextColumn("{task.description}"),
-        BarColumn(bar_width=30),
+        BarColumn(bar_width=24),
+        TaskProgressColumn(),
         TimeElapsedColumn(),
     )
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
@@ -192,9 +200,10 @@ def print_regimes(diagnosis: Diagnosis) -> None:
     import numpy as np
 
     print("by joint and regime (N m, N for sliders)")
-    print(" " * 26 + "".join(f"{name:>10s}" for name in diagnosis.regimes))
+    width = max(len(name) for name in diagnosis.joint_names)
+    print(f"  {'':{width}s}" + "".join(f"{name:>9s}" for name in diagnosis.regimes))
     for name, errors in zip(diagnosis.joint_names, diagnosis.error_map(), strict=True):
-        cells = "".join("         -" if np.isnan(e) else f"{e:10.4g}" for e in errors)
-        print(f"  {name:24s}{cells}")
+        cells = "".join("        -" if np.isnan(e) else f"{e:9.3g}" for e in errors)
+        print(f"  {name:{width}s}{cells}")
     for failure in diagnosis.failures:
         print(f"  {failure.sentence}")

@@ -152,11 +152,11 @@ class LogQuality:
             "",
         ]
         width = max([len(joint.name) for joint in self.joints] + [5])
-        lines.append(
-            f"{'joint':{width}s}     position range  coverage      step  max speed  reversals  "
-            "at rest      torque range  at limit     dq/q'  delay ms"
-        )
-        lines += [_line(joint, width) for joint in self.joints]
+        # two tables, so that a terminal of 80 columns holds them
+        lines.append(f"{'joint':{width}s}{_MOTION_HEAD}")
+        lines += [f"{joint.name:{width}s}{_motion_cells(joint)}" for joint in self.joints]
+        lines += ["", f"{'joint':{width}s}{_TORQUE_HEAD}"]
+        lines += [f"{joint.name:{width}s}{_torque_cells(joint)}" for joint in self.joints]
         lines += ["", *(f"! {message}" for message in self.warnings)]
         return "\n".join(lines).rstrip()
 
@@ -310,16 +310,26 @@ def _joints(
     return joints
 
 
-def _line(joint: JointQuality, width: int) -> str:
-    """One joint as a line of the printed report."""
-    (low, high), (weak, strong) = joint.position_range, joint.torque_range
-    step = f"{joint.resolution:9.2g}" if np.isfinite(joint.resolution) else "        -"
+_MOTION_HEAD = "  position range  coverage     step   speed reversals  at rest"
+_TORQUE_HEAD = "      torque range  at limit     dq/q'  delay ms"
+
+
+def _motion_cells(joint: JointQuality) -> str:
+    """How one joint was moved, as a row of the printed report."""
+    low, high = joint.position_range
+    step = f"{joint.resolution:8.2g}" if np.isfinite(joint.resolution) else "       -"
     return (
-        f"{joint.name:{width}s} {low:8.3f} .. {high:6.3f} {_percent(joint.position_coverage)} "
-        f"{step} {joint.largest_velocity:10.3f} {joint.reversals:10d} "
-        f"{_percent(joint.rest_share)} {weak:8.2f} .. {strong:6.2f} "
-        f"{_percent(joint.saturated_share)} {_number(joint.velocity_slope, 9)} "
-        f"{_number(1e3 * joint.torque_delay, 9, 1)}"
+        f" {low:6.3f} ..{high:7.3f} {_percent(joint.position_coverage)} {step} "
+        f"{joint.largest_velocity:7.3f} {joint.reversals:9d} {_percent(joint.rest_share)}"
+    )
+
+
+def _torque_cells(joint: JointQuality) -> str:
+    """Torque of one joint, as a row of the printed report."""
+    weak, strong = joint.torque_range
+    return (
+        f" {weak:8.2f} ..{strong:7.2f} {_percent(joint.saturated_share)} "
+        f"{_number(joint.velocity_slope, 9)} {_number(1e3 * joint.torque_delay, 9, 1)}"
     )
 
 

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Text that fits the terminal: what is printed, and what ``--help`` teaches."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import shutil
+import textwrap
+from itertools import groupby
+from typing import Any, TextIO
+
+
+class FittingStream:
+    """A terminal whose long lines are broken between words, not within them.
+
+    Programs that read the output get no such stream, and every line as it is.
+
+    Parameters
+    ----------
+    stream : text stream
+        The terminal.
+    """
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream, self._rest = stream, ""
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        """Write the lines that are complete; the rest waits."""
+        *lines, self._rest = (self._rest + text).split("\n")
+        width = shutil.get_terminal_size().columns
+        for line in lines:
+            self._stream.write(fit(line, width) + "\n")
+        return len(text)
+
+    def flush(self) -> None:
+        """Write what waits."""
+        self._stream.write(self._rest)
+        self._rest = ""
+        self._stream.flush()
+
+
+def fit(line: str, width: int, more: str = "    ", end: str = "") -> str:
+    """A line broken between words to fit a width.
+
+    Parameters
+    ----------
+    line : str
+        Without its line break.
+    width : int
+        Columns.
+    more : str, default=4 spaces
+        What is put before further lines, beside the indentation of the first.
+    end : str, default=""
+        What ends every line but the last.
+
+    Returns
+    -------
+    str
+        One line or several.
+
+    Examples
+    --------
+    >>> print(fit("  one two three", 10))
+      one two
+          three
+    """
+    if len(line) <= width:
+        return line
+    lead = line[: len(line) - len(line.lstrip())]
+    parts = textwrap.wrap(
+        line.strip(),
+        max(width - len(end), 20),
+        initial_indent=lead,
+        subsequent_indent=lead + more,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return f"{end}\n".join(parts)
+
+
+class TeachingFormatter(argparse.RawDescriptionHelpFormatter):
+    """Help whose paragraphs fit the terminal, and whose indented examples stay examples."""
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        lines = []
+        for example, group in groupby(text.splitlines(), key=_is_example):
+            if example:
+                lines += [_example(line, width) for line in group]
+            else:
+                lines.append(textwrap.fill(" ".join(group), width))
+        return "\n".join(lines)
+
+
+def _is_example(line: str) -> bool:
+    return line.startswith("  ") or not line
+
+
+def _example(line: str, width: int) -> str:
+    """A command that can still be copied; what is said about it follows below where it must."""
+    if len(line) <= width:
+        return line
+    command, *said = re.split(r"(?<=\S) {2,}(?=\S)", line, maxsplit=1)
+    return "\n".join([fit(command, width, end=" \\"), *(fit(" " * 6 + s, width) for s in said)])
