@@ -52,6 +52,7 @@ PAGES: tuple[Page, ...] = (
             Section(
                 "Functions",
                 (
+                    "bootstrap_coefficients",
                     "find_base_parameters",
                     "is_consistent",
                     "make_consistent",

@@ -12,11 +12,13 @@ if TYPE_CHECKING:
     from skidyn.rigid_body._constraints import BodyConstraints
     from skidyn.rigid_body._from_evidence import regressor_from_evidence
     from skidyn.rigid_body._rbd_regressor import RBDRegressor
+    from skidyn.rigid_body._uncertainty import bootstrap_coefficients
 
 __all__ = [
     "BaseParameters",
     "BodyConstraints",
     "RBDRegressor",
+    "bootstrap_coefficients",
     "find_base_parameters",
     "is_consistent",
     "make_consistent",
@@ -29,6 +31,7 @@ _HOMES = {
     "BaseParameters": "skidyn.rigid_body._base_parameters",
     "BodyConstraints": "skidyn.rigid_body._constraints",
     "RBDRegressor": "skidyn.rigid_body._rbd_regressor",
+    "bootstrap_coefficients": "skidyn.rigid_body._uncertainty",
     "find_base_parameters": "skidyn.rigid_body._base_parameters",
     "is_consistent": "skidyn.rigid_body._consistency",
     "make_consistent": "skidyn.rigid_body._consistency",

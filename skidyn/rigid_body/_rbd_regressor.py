@@ -36,6 +36,7 @@ from skidyn.rigid_body._consistency import make_consistent
 from skidyn.rigid_body._constraints import BodyConstraints
 from skidyn.rigid_body._estimators import Estimator, find_estimator
 from skidyn.rigid_body._regression import Regression, Solution
+from skidyn.rigid_body._uncertainty import PredictionBands, find_bands
 from skidyn.robots import Robot
 
 #: Rounds of weights, loads and shape parameters.
@@ -100,6 +101,8 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
         The relative uncertainty of the URDF's bodies that was used; estimators with a prior only.
     row_weights_ : list of ndarray of shape (n_rows_j,)
         Weight of every averaged row by joint, 1.25 at most; the robust estimator only.
+    bands_ : PredictionBands
+        What :meth:`predict_interval` knows about the errors of left-out folds.
     noise_std_ : ndarray of shape (n_joints,)
         Standard deviation of one averaged residual row, N m or N.
     robot_ : Robot
@@ -239,6 +242,7 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
         self.evidence_ = Evidence.from_problem(whole, fit.terms)
         self.n_parts_ = 0
         self._store(regression, method.solve(regression, self.prior_std))
+        self.bands_ = PredictionBands.calibrate(self, problem, fit, torque)
         return self
 
     def partial_fit(self, X: Any, y: Any) -> RBDRegressor:
@@ -295,27 +299,70 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
         if not first:
             part = self.evidence_.scaled(self.forgetting) + part
         self._store_evidence(part.shifted(0, GROUPS), terms)
+        # Evidence holds no single samples, from whose errors bands are made.
+        self.__dict__.pop("bands_", None)
         return self
 
-    def predict(self, X: Any) -> Array:
+    def predict(self, X: Any, return_std: bool = False) -> Any:
         """Torque of the model.
 
         Parameters
         ----------
         X : DataFrame or array of shape (n_samples, n_features)
             Motion. Effects with memory run along each trajectory.
+        return_std : bool, default=False
+            Also return the standard deviation of a measured torque from the prediction: errors of
+            left-out folds, and what the spread of the coefficients makes of this motion.
 
         Returns
         -------
-        ndarray of shape (n_samples, n_joints) or (n_samples,), N m or N
+        torque : ndarray of shape (n_samples, n_joints) or (n_samples,), N m or N
             Predicted torque.
+        std : ndarray of the same shape, N m or N
+            If asked for.
         """
+        signals = self._motion(X)
+        torque = self._shaped_like_y(self._torque(signals))
+        if not return_std:
+            return torque
+        return torque, self._shaped_like_y(find_bands(self).std(self, signals))
+
+    def predict_interval(self, X: Any, level: float = 0.95) -> tuple[Array, Array]:
+        """Band around the prediction that holds a share of the measured torques.
+
+        Parameters
+        ----------
+        X : DataFrame or array of shape (n_samples, n_features)
+            Motion.
+        level : float, default=0.95
+            Share of the samples, of motion and rest each, that lies in the band.
+
+        Returns
+        -------
+        low, high : ndarray of shape (n_samples, n_joints) or (n_samples,), N m or N
+            Borders of the band.
+
+        Raises
+        ------
+        SkidynError
+            The model was not fitted by ``fit``, so that no errors of left-out folds are known.
+        ValueError
+            ``level`` is not between 0 and 1.
+        """
+        signals = self._motion(X)
+        half = find_bands(self).half_width(self, signals, level)
+        torque = self._torque(signals)
+        return self._shaped_like_y(torque - half), self._shaped_like_y(torque + half)
+
+    def _motion(self, X: Any) -> Signals:
         check_is_fitted(self)
         X = validate_data(self, X, reset=False, dtype=np.float64)
         signals = self._read(X)
         if self._smooths():
             signals = smooth_motion(signals).signals
-        torque = self._torque(signals.with_(robot=self.robot_))
+        return signals.with_(robot=self.robot_)
+
+    def _shaped_like_y(self, torque: Array) -> Array:
         return torque[:, 0] if self._one_output else torque
 
     def _torque(self, signals: Signals) -> Array:
@@ -324,20 +371,16 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
         # Effects on the transmission see the rigid body's torque; those on the sensor see the
         # model's, which includes the effects before them.
         smooth = torque.copy()
-        load = torque.copy()
+        signals = signals.with_(load=torque.copy(), inertial_parameters=self.inertial_parameters_)
         for term in self._in_order():
-            state = signals.with_(
-                load=load,
-                model_torque=torque.copy(),
-                smooth_torque=smooth.copy(),
-                inertial_parameters=self.inertial_parameters_,
-            )
-            own = np.zeros_like(torque)
+            state = signals
+            if "model_torque" in get_effect(term.kind).needs:
+                state = signals.with_(model_torque=torque.copy(), smooth_torque=smooth.copy())
             for j, block in term_columns(state, term).items():
-                own[:, j] += block @ self.effect_coefficients_[term]
-            torque += own
-            if term.kind not in _DRY:
-                smooth += own
+                own = block @ self.effect_coefficients_[term]
+                torque[:, j] += own
+                if term.kind not in _DRY:
+                    smooth[:, j] += own
         return torque
 
     def rigid_body_torque(self, q: Array, dq: Array, ddq: Array) -> Array:
