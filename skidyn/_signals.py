@@ -31,7 +31,8 @@ def find_segments(trajectory: NDArray[Any], time: Array | None = None) -> list[s
     trajectory : ndarray of shape (n_samples,)
         Trajectory number of every row.
     time : ndarray of shape (n_samples,), s, optional
-        A step that is negative or longer than 5 median steps starts a new segment.
+        A step that is negative or longer than 5 median steps of its trajectory starts a new
+        segment.
 
     Returns
     -------
@@ -41,14 +42,21 @@ def find_segments(trajectory: NDArray[Any], time: Array | None = None) -> list[s
     n = len(trajectory)
     if n == 0:
         return []
-    starts = trajectory[1:] != trajectory[:-1]
+    starts = np.flatnonzero(trajectory[1:] != trajectory[:-1]) + 1
+    edges = [0, *starts.tolist(), n]
     if time is not None and n > 1:
-        steps = np.diff(time)
-        inside = steps[~starts & (steps > 0)]
-        if len(inside):
-            starts = starts | (steps < 0) | (steps > GAP_STEPS * np.median(inside))
-    edges = np.r_[0, np.flatnonzero(starts) + 1, n]
+        gaps = [
+            a + 1 + _gaps(np.diff(time[a:b])) for a, b in zip(edges[:-1], edges[1:], strict=True)
+        ]
+        edges = np.unique(np.concatenate([edges, *gaps])).tolist()
     return [slice(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+
+
+def _gaps(steps: Array) -> NDArray[np.intp]:
+    """Steps back, and steps much longer than most of the same trajectory."""
+    forward = steps[steps > 0]
+    longest = GAP_STEPS * np.median(forward) if len(forward) else np.inf
+    return np.flatnonzero((steps < 0) | (steps > longest))
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,9 @@ from skidyn.diagnosis._unknown import UnknownTorque, describe_unknowns
 from skidyn.effects import Term
 from skidyn.evidence._problem import Problem
 
+#: Share of the error of samples that a finding must remove to be worth a word.
+LEAST_DROP = 0.002
+
 
 def conclude(
     problem: Problem,
@@ -143,14 +146,14 @@ def _found_terms(problem: Problem, findings: Sequence[Hypothesis]) -> list[Term]
 
 
 def _harms(hypothesis: Hypothesis, findings: Sequence[Hypothesis], steps: Sequence[_Step]) -> bool:
-    """Whether a finding makes the error of samples larger, though it helped averaged rows.
+    """Whether a finding leaves the error of samples as large, though it helped averaged rows.
 
-    The mean absolute error is compared: blows of a backlash that come a sample early or late would
-    rule the squares.
+    Neither the mean absolute error nor the squared one, which few samples rule, may stay.
     """
     k = [h is hypothesis for h in findings].index(True)
-    before, after = (_mean_error(steps[i].comparison) for i in (k, k + 1))
-    return _drop(before, after, hypothesis.joints) <= 0
+    errors = [(_mean_error(step.comparison), step.entry["rmse"]) for step in steps[k : k + 2]]
+    drops = [_drop(a, b, hypothesis.joints) for a, b in zip(*errors, strict=True)]
+    return min(drops) < LEAST_DROP
 
 
 def _mean_error(comparison: Comparison) -> list[float]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from skidyn._signals import Array, Signals
+from skidyn.evidence._broken import broken_notes
 from skidyn.robots import Robot
 
 #: Positions of more than this many turns on every joint, or velocities of this many units per s.
@@ -43,6 +44,7 @@ def suspicions(signals: Signals, torque: Array, robot: Robot) -> list[str]:
         *_repeats(signals),
         *_still_joints(signals, robot),
         *_saturation(torque, robot),
+        *broken_notes(signals, torque, robot.joint_names),
         *_currents(signals, torque, robot),
     ]
 

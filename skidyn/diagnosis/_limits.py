@@ -95,7 +95,8 @@ def find_limits(
     scale[scale == 0] = 1.0
     factor = cho_factor(gram / scale[:, None] / scale + RIDGE * np.eye(len(scale)))
     needed = np.sqrt(least_gain) + norm.ppf(POWER)
-    limits: dict[tuple[str, int], Limit] = {}
+    power = [float(np.sum(t**2)) / s**2 for t, s in zip(problem.target, sigma, strict=True)]
+    largest: dict[tuple[str, int], list[tuple[Candidate, float]]] = {}
     for candidate in candidates:
         effect = get_effect(candidate.term.kind)
         # The coefficient of some effects is a share of their shape and no magnitude by itself.
@@ -104,29 +105,45 @@ def find_limits(
             continue
         joint = candidate.joints[0]
         own, swept = _information(candidate, design, sigma, scale, factor)
-        unit = effect.units(bool(problem.signals.prismatic[joint]))
-        first = effect.coefficients[0]
-        text = unit.get(first.name, first.unit)
-        if swept <= NEW_SHARE * own:  # nothing at all where a joint rests
-            sentence = (
-                f"This data cannot tell {effect.title.lower()} of joint {joint + 1} from what the "
-                f"model has. It would show with {effect.separating_motion}."
-            )
-            new = Limit(effect.kind, joint + 1, None, text, sentence)
-        else:
-            largest = float(needed * np.sqrt(inflation[joint] / swept))
-            sentence = (
-                f"{effect.title} of joint {joint + 1}: absent, or {first.name} below "
-                f"{largest:.3g} {text}."
-            )
-            new = Limit(effect.kind, joint + 1, largest, text, sentence)
-        old = limits.get((effect.kind, joint))
-        # Among the shapes tried, the statement must hold for the one hardest to see.
-        if old is None or (old.largest_hidden or np.inf) < (new.largest_hidden or np.inf):
-            limits[effect.kind, joint] = new
-    return sorted(
-        [*limits.values(), *_not_shown(problem)], key=lambda limit: (limit.joint, limit.kind)
-    )
+        size = needed * np.sqrt(inflation[joint] / swept) if swept > NEW_SHARE * own else np.inf
+        # More than all that the torque holds is no limit.
+        told = size if size**2 * own < power[joint] else np.inf
+        largest.setdefault((effect.kind, joint), []).append((candidate, float(told)))
+    limits = [_limit(problem, joint, tried) for (_, joint), tried in largest.items()]
+    return sorted([*limits, *_not_shown(problem)], key=lambda limit: (limit.joint, limit.kind))
+
+
+def _limit(problem: Problem, joint: int, tried: Sequence[tuple[Candidate, float]]) -> Limit:
+    """The limit of one effect on one joint, which holds for every shape that would show."""
+    effect = get_effect(tried[0][0].term.kind)
+    first = effect.coefficients[0]
+    unit = effect.units(bool(problem.signals.prismatic[joint])).get(first.name, first.unit)
+    shown = [size for _, size in tried if np.isfinite(size)]
+    if not shown:
+        sentence = (
+            f"This data cannot tell {effect.title.lower()} of joint {joint + 1} from what the "
+            f"model has. It would show with {effect.separating_motion}."
+        )
+        return Limit(effect.kind, joint + 1, None, unit, sentence)
+    most = f"{max(shown):.3g} {unit}"
+    sentence = f"{effect.title} of joint {joint + 1}: absent, or {first.name} below {most}"
+    if hidden := _hidden_shapes(tried):
+        values = ", ".join(f"{value:.3g}" for value in hidden)
+        sentence += f"; with {effect.shapes[0].name} of {values} it could not be seen"
+    return Limit(effect.kind, joint + 1, max(shown), unit, sentence + ".")
+
+
+def _hidden_shapes(tried: Sequence[tuple[Candidate, float]]) -> list[float]:
+    """Values of the first shape parameter with which an effect would not show at any size."""
+    effect = get_effect(tried[0][0].term.kind)
+    if not effect.shapes:
+        return []
+    name = effect.shapes[0].name
+    sizes: dict[float, list[float]] = {}
+    for candidate, size in tried:
+        if name in candidate.term.shape:
+            sizes.setdefault(float(candidate.term.shape[name]), []).append(size)
+    return sorted(value for value, some in sizes.items() if not np.isfinite(some).any())
 
 
 def _information(

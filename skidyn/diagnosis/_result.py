@@ -24,7 +24,7 @@ from skidyn.evidence._problem import Problem
 Verdict = Literal["complete", "missing", "unknown"]
 
 
-@dataclass
+@dataclass(repr=False)
 class Diagnosis:
     """What a model lacks, where it shows, and what adding it does.
 
@@ -92,6 +92,13 @@ class Diagnosis:
     result: SearchResult = field(repr=False)
     predictable: Array = field(repr=False, default_factory=lambda: np.zeros(0))
     unknowns: list[UnknownTorque] = field(default_factory=list)
+
+    def __repr__(self) -> str:
+        units = ["N" if slides else "N m" for slides in self.problem.signals.prismatic]
+        errors = zip(self.joint_names, self.rmse_before, self.rmse_after, units, strict=True)
+        lines = [f"Diagnosis: {self.verdict}", *(f.sentence for f in self.findings)]
+        lines += [f"error of {n}: {a:.4g} -> {b:.4g} {unit}" for n, a, b, unit in errors]
+        return "\n  ".join([*lines, *(f"note: {note}" for note in self.warnings)])
 
     @property
     def rmse_before(self) -> Array:

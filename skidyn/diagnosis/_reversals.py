@@ -110,7 +110,7 @@ def failing_joints(problem: Problem, result: SearchResult) -> list[int]:
     """
     motion, n = problem.motion, problem.signals.n_samples
     close = sliding_samples(motion.signals, motion.valid, SHORT_MARGIN)
-    rows = window_rows(motion.signals, close, motion.rate)
+    rows = window_rows(motion.signals, close)
     residual = problem.torque - result.ripple - problem.explained(result.fit)
     dry = [t for t in result.fit.terms if t.kind in DRY or _is_hysteresis(t.kind)]
     friction = problem.term_torque(result.fit, dry)

@@ -387,5 +387,5 @@ def _position_noise(diagnosis: Diagnosis) -> Array:
     keys = {k: getattr(model, k, "auto") for k in ("trajectory", "time")}
     rate = diagnosis.problem.motion.rate
     raw, _ = read_signals(X, tau, robot, **keys, rate=rate)
-    rough = (raw.q - diagnosis.problem.signals.q)[diagnosis.problem.motion.valid]
+    rough = (raw.q - diagnosis.problem.signals.q)[diagnosis.problem.motion.valid.all(1)]
     return np.asarray(np.std(rough, axis=0))

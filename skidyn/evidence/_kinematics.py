@@ -28,14 +28,15 @@ class SmoothedMotion:
     ----------
     signals : Signals
         With smoothed q, dq and ddq.
-    valid : ndarray of shape (n_samples,) of bool
-        False near the ends of a segment, where the polynomial is one-sided.
+    valid : ndarray of shape (n_samples, n_joints) of bool
+        False near the ends of a segment, where the polynomial is one-sided, and where a sample is
+        broken.
     half_width : int
-        Half the width of the smoothing window, in samples.
+        Half the width of the smoothing window, in samples at the median rate.
     cutoff : float
         Cut-off of the smoother in Hz.
     rate : float
-        Sampling rate in Hz.
+        Median sampling rate in Hz.
     """
 
     signals: Signals
@@ -47,14 +48,14 @@ class SmoothedMotion:
 
 def sampling_rate(signals: Signals) -> float:
     """Median sampling rate in Hz (1 where no time is logged)."""
-    steps = np.concatenate([np.diff(signals.clock[rows]) for rows in signals.segments])
+    steps = np.diff(signals.clock)[np.diff(signals.trajectory) == 0]
     steps = steps[steps > 0]
     return 1.0 / float(np.median(steps)) if len(steps) else 1.0
 
 
 def as_given(signals: Signals) -> SmoothedMotion:
     """Motion without a clock, taken as it is."""
-    return SmoothedMotion(signals, np.ones(signals.n_samples, dtype=bool), 0, np.inf, 1.0)
+    return SmoothedMotion(signals, np.ones(signals.q.shape, dtype=bool), 0, np.inf, 1.0)
 
 
 def smooth_motion(signals: Signals, cutoff: float | None = None) -> SmoothedMotion:
@@ -72,23 +73,32 @@ def smooth_motion(signals: Signals, cutoff: float | None = None) -> SmoothedMoti
     SmoothedMotion
     """
     rate = sampling_rate(signals)
-    cutoff = min(HIGHEST_CUTOFF, CUTOFF_SHARE * rate) if cutoff is None else cutoff
-    # Cut-off of a Savitzky-Golay filter of this order and half width (Schafer 2011, IEEE SPM 28).
-    half = int(np.clip(round(((ORDER + 1) / (2 * cutoff / rate) + 4.6) / 3.2), 4, 60))
+    half, used = _half_width(rate, cutoff)
     q, dq, ddq = (np.array(x, dtype=float) for x in (signals.q, signals.dq, signals.ddq))
-    valid = np.ones(signals.n_samples, dtype=bool)
-    edge = max(2, half // 2)
+    valid = np.ones(signals.q.shape, dtype=bool)
     for rows in signals.segments:
-        if rows.stop - rows.start <= 2 * half + 1:
+        own = sampling_rate(signals.take(rows))
+        own = own if abs(own - rate) > EVEN_STEPS * rate else rate  # recordings of several rates
+        width, _ = _half_width(own, cutoff)
+        if rows.stop - rows.start <= 2 * width + 1:
             valid[rows] = False  # too short to smooth; kept as logged, and not used
             continue
         q[rows], dq[rows], ddq[rows] = _local_polynomial(
-            signals.clock[rows], signals.q[rows], rate, half
+            signals.clock[rows], signals.q[rows], own, width
         )
+        edge = max(2, width // 2)
         valid[rows.start : rows.start + edge] = False
         valid[rows.stop - edge : rows.stop] = False
     smoothed = signals.with_(q=q, dq=dq, ddq=ddq)
-    return SmoothedMotion(smoothed, valid, half, cutoff, rate)
+    return SmoothedMotion(smoothed, valid, half, used, rate)
+
+
+def _half_width(rate: float, cutoff: float | None) -> tuple[int, float]:
+    """Half width of the smoother in samples, and its cut-off in Hz."""
+    cutoff = min(HIGHEST_CUTOFF, CUTOFF_SHARE * rate) if cutoff is None else cutoff
+    # Cut-off of a Savitzky-Golay filter of this order and half width (Schafer 2011, IEEE SPM 28).
+    half = ((ORDER + 1) / (2 * cutoff / rate) + 4.6) / 3.2
+    return int(np.clip(round(half), 4, 60)), cutoff
 
 
 def _local_polynomial(time: Array, q: Array, rate: float, half: int) -> list[Array]:

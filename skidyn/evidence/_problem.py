@@ -12,6 +12,7 @@ from scipy.linalg import cho_factor, cho_solve, qr
 
 from skidyn._signals import Array, Signals
 from skidyn.effects import Term, get_effect
+from skidyn.evidence._broken import without_broken
 from skidyn.evidence._kinematics import SmoothedMotion, as_given, smooth_motion
 from skidyn.evidence._rows import (
     FEWEST_SAMPLES,
@@ -291,7 +292,7 @@ def make_problem(
     -------
     Problem
     """
-    motion = read_motion(signals, smooth)
+    motion = read_motion(signals, smooth, torque)
     rows, fold, n_folds, whole = _rows_and_folds(motion, reversals)
     problem = Problem(
         robot,
@@ -347,11 +348,11 @@ def with_reversals(problem: Problem, terms: Iterable[Term], joints: Sequence[int
     return wider
 
 
-def read_motion(signals: Signals, smooth: bool) -> SmoothedMotion:
-    """Motion as the rows see it: smoothed, or as logged."""
+def read_motion(signals: Signals, smooth: bool, torque: Array) -> SmoothedMotion:
+    """Motion as the rows see it, smoothed or as logged, without broken samples."""
     if signals.time is None:
         return as_given(signals)
-    motion = smooth_motion(signals)
+    motion = without_broken(smooth_motion(signals), signals, torque)
     return motion if smooth else replace(motion, signals=signals)
 
 
@@ -363,7 +364,7 @@ def motion_rows(motion: SmoothedMotion, reversals: Sequence[int]) -> Rows:
     margin = np.full(signals.n_joints, max(1, round(MARGIN * motion.half_width)))
     margin[list(reversals)] = SHORT_MARGIN
     use = sliding_samples(signals, motion.valid, margin.tolist())
-    return window_rows(signals, use, motion.rate)
+    return window_rows(signals, use)
 
 
 def _rows_and_folds(

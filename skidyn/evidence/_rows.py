@@ -100,8 +100,8 @@ def sliding_samples(
     ----------
     signals : Signals
         Smoothed motion.
-    valid : ndarray of shape (n_samples,) of bool
-        Samples where the motion can be trusted.
+    valid : ndarray of shape (n_samples, n_joints) of bool
+        Samples where motion and torque can be trusted.
     margin : int or sequence of int
         Samples left out on each side, such as the reach of the smoother; by joint if several.
 
@@ -120,13 +120,11 @@ def sliding_samples(
             still[np.minimum(turns + 1, len(still) - 1)] = True
             if margins[joint] > 0:
                 still = binary_dilation(still, iterations=int(margins[joint]))
-            sliding[rows, joint] = ~still & valid[rows]
+            sliding[rows, joint] = ~still & valid[rows, joint]
     return sliding
 
 
-def window_rows(
-    signals: Signals, use: NDArray[np.bool_], rate: float, window: float = WINDOW
-) -> Rows:
+def window_rows(signals: Signals, use: NDArray[np.bool_], window: float = WINDOW) -> Rows:
     """Averaging windows over the samples that may enter.
 
     Parameters
@@ -135,17 +133,14 @@ def window_rows(
         Motion.
     use : ndarray of shape (n_samples, n_joints) of bool
         Samples that may enter.
-    rate : float
-        Sampling rate in Hz.
     window : float, s, default=1/8
-        Width of the window; widened to hold six samples.
+        Width of the window; widened to hold six samples of each trajectory.
 
     Returns
     -------
     Rows
     """
-    width = max(window, FEWEST_SAMPLES / rate)
-    spans = [_windows(signals.clock[rows], rows.start, width) for rows in signals.segments]
+    spans = [_windows(signals.clock[rows], rows.start, window) for rows in signals.segments]
     weights, trajectory, time, quarter = [], [], [], []
     for joint in range(signals.n_joints):
         parts = [_weigh(span, use[:, joint]) for span in spans]
@@ -172,7 +167,10 @@ class _Windows:
     weight: Array
 
 
-def _windows(time: Array, offset: int, width: float) -> _Windows:
+def _windows(time: Array, offset: int, window: float) -> _Windows:
+    steps = np.diff(time)
+    forward = steps[steps > 0]
+    width = max(window, FEWEST_SAMPLES * np.median(forward)) if len(forward) else window
     middle = np.arange(time[0] + width / 2, time[-1] - width / 2 + 1e-9, width / 2)
     first = np.searchsorted(time, middle - width / 2)
     last = np.searchsorted(time, middle + width / 2)

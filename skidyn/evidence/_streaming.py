@@ -194,7 +194,7 @@ def evidence_of_signals(
         By trajectory and joint.
     """
     terms = tuple(terms)
-    motion = read_motion(signals, smooth)
+    motion = read_motion(signals, smooth, torque)
     rows = motion_rows(motion, hysteresis_joints(terms))
     s = motion.signals
     problem = Problem(

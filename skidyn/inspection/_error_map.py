@@ -156,7 +156,7 @@ class ErrorMapDisplay:
 
         measured, predicted = both_torques(y_true, y_pred)
         names = tuple(joint_names or (f"joint {j + 1}" for j in range(measured.shape[1])))
-        rows = np.ones(len(measured), dtype=bool)
+        rows = np.ones(measured.shape, dtype=bool)
         sliding = sliding_samples(signals, rows, _reversal_margin(signals))
         comparison = Comparison(signals, measured, predicted, sliding, names)
         return cls(error_map(comparison), comparison.rmse(), names, REGIMES).plot(ax)

@@ -14,10 +14,12 @@ from scipy.optimize import lsq_linear
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
+from skidyn._checks import warn_about_log
 from skidyn._columns import Columns, ColumnSpec, resolve_columns
 from skidyn._exceptions import ColumnError, SkidynError
 from skidyn._signals import Array, Signals, signals_from
 from skidyn.effects import Term, get_effect, make_terms
+from skidyn.evidence._broken import broken_notes
 from skidyn.evidence._evidence import Evidence
 from skidyn.evidence._kinematics import smooth_motion
 from skidyn.evidence._problem import (
@@ -506,7 +508,10 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
             self.columns_ = self._resolve(X.shape[1])
         torque = y.reshape(len(y), -1)
         self._check_targets(torque)
-        return self._read(X), torque
+        signals = self._read(X)
+        for note in broken_notes(signals, torque, self.robot_.joint_names):
+            warn_about_log(note)
+        return signals, torque
 
     def _smooths(self) -> bool:
         if self.smooth is not None:
@@ -571,7 +576,7 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
                 f"instruments must have the rows of X, in its trajectories: {len(Z)} rows for "
                 f"{own.n_samples}"
             )
-        motion = read_motion(signals, self._smooths())
+        motion = read_motion(signals, self._smooths(), problem.torque)
         moved = motion.signals.with_(robot=self.robot_)
         other = replace(problem, motion=motion, signals=moved, _cache={})
         other.with_fit(fit)

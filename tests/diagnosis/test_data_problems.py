@@ -40,9 +40,10 @@ def test_a_few_broken_rows(log):
     rows = rng.choice(len(torque), 20, replace=False)
     torque[rows] += 30 * rng.normal(size=(20, 2)) * np.std(torque, axis=0)
 
-    kinds, _ = found(log, log.X, torque)
+    kinds, said = found(log, log.X, torque)
 
     assert kinds == []
+    assert "leaps away and back" in said
 
 
 def test_rows_repeated_by_a_logger_that_polls_too_fast(log):

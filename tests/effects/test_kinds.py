@@ -2,16 +2,13 @@
 """Every kind of the vocabulary is found in a log that another code path has made.
 
 The kinds of tests/diagnosis/test_hidden_effects.py are left out here. The simulator integrates
-states and play at about 1 kHz and shares no code with the catalogue; MuJoCo makes what it has
-natively.
+states and play at about 1 kHz and shares no code with the catalogue. What MuJoCo has natively is
+tested in test_mujoco.py.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
-import pandas as pd
 import pytest
 
 from skidyn.datasets import load_planar_arm, load_srs_arm, load_ur5, make_hidden_effect_log
@@ -71,58 +68,3 @@ def test_a_simulated_effect_is_named_with_its_joints_and_size(kind):
     if name:
         value, truth = finding.parameters[name]["value"], np.ravel(log.parameters[name])[0]
         assert value == pytest.approx(truth, rel=tolerance)
-
-
-#: What MuJoCo calls it, on which joint, how large, and the coefficient of the finding.
-NATIVE = {
-    "viscous": ("dof_damping", 0.8, "Fv"),
-    "rotor_inertia": ("dof_armature", 0.3, "Ia"),
-    "spring": ("jnt_stiffness", 2.5, "k"),
-}
-
-
-@pytest.mark.parametrize("kind", NATIVE)
-def test_what_mujoco_has_natively_is_named_and_sized(kind, tmp_path):
-    mujoco = pytest.importorskip("mujoco")
-    from skidyn.export import write_mjcf
-
-    field, size, name = NATIVE[kind]
-    robot = load_planar_arm()
-    friction = {"damping": np.array([0.3, 0.3]), "friction": np.zeros(2)}
-    write_mjcf(replace(robot, joint_dynamics=friction), tmp_path / "arm.xml")
-    model = mujoco.MjModel.from_xml_path(str(tmp_path / "arm.xml"))
-    getattr(model, field)[1] += size
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
-    data = mujoco.MjData(model)
-    rng = np.random.default_rng(4)
-    tables, torques = [], []
-    for trajectory in range(8):
-        t = np.arange(0, 6, 0.01)
-        w = 2 * np.pi * np.array([0.2, 0.5, 0.9])
-        a, b = rng.normal(size=(2, 3, 2)) / 3
-        phase = np.outer(t, w)
-        q = np.sin(phase) @ a + np.cos(phase) @ b
-        dq = np.cos(phase) @ (a * w[:, None]) - np.sin(phase) @ (b * w[:, None])
-        ddq = -np.sin(phase) @ (a * w[:, None] ** 2) - np.cos(phase) @ (b * w[:, None] ** 2)
-        tau = np.zeros_like(q)
-        for i in range(len(t)):
-            data.qpos[:], data.qvel[:], data.qacc[:] = q[i], dq[i], ddq[i]
-            mujoco.mj_inverse(model, data)
-            tau[i] = data.qfrc_inverse
-        frame = {"time": t, "trajectory": trajectory, "q1": q[:, 0], "q2": q[:, 1]}
-        tables.append(pd.DataFrame(frame | {"dq1": dq[:, 0], "dq2": dq[:, 1]}))
-        torques.append(tau + 0.02 * rng.normal(size=tau.shape))
-    base = ("coulomb",) if kind == "viscous" else ("viscous", "coulomb")
-
-    diagnosis = diagnose(RBDRegressor(robot, base), pd.concat(tables), np.vstack(torques))
-
-    (finding,) = diagnosis.findings
-    assert finding.kind == kind
-    if kind == "viscous":  # every joint has some, and the model none
-        assert finding.joints == (1, 2)
-        values = finding.parameters[name]["value"]
-        np.testing.assert_allclose(values, [0.3, 0.3 + size], rtol=0.05)
-    else:
-        assert finding.joints == (2,)
-        row = finding.parameters[name]
-        assert row["value"] == pytest.approx(size, rel=0.05)

@@ -16,7 +16,7 @@ def signals():
 def test_averaging_keeps_a_linear_model_exact(signals):
     rng = np.random.default_rng(0)
     columns, truth = rng.normal(size=(800, 3)), np.array([1.0, -2.0, 0.5])
-    rows = window_rows(signals, rng.random((800, 1)) > 0.3, 100.0)
+    rows = window_rows(signals, rng.random((800, 1)) > 0.3)
     np.testing.assert_allclose(
         rows.average(columns, 0) @ truth, rows.average(columns @ truth, 0), atol=1e-12
     )
@@ -25,7 +25,7 @@ def test_averaging_keeps_a_linear_model_exact(signals):
 def test_windows_have_unit_noise_gain_and_stay_in_their_trajectory(signals):
     use = np.ones((800, 1), dtype=bool)
     use[100:150] = False
-    rows = window_rows(signals, use, 100.0)
+    rows = window_rows(signals, use)
     weights = rows.weights[0].toarray()
     np.testing.assert_allclose((weights**2).sum(1), 1.0)
     assert not weights[:, 100:150].any()
@@ -35,7 +35,7 @@ def test_windows_have_unit_noise_gain_and_stay_in_their_trajectory(signals):
 
 
 def test_rest_and_reversals_do_not_slide(signals):
-    sliding = sliding_samples(signals, np.ones(800, dtype=bool), margin=3)
+    sliding = sliding_samples(signals, np.ones((800, 1), dtype=bool), margin=3)
     turn = int(np.pi / 4 / 0.01)
     assert not sliding[turn - 3 : turn + 4].any()
     assert sliding[turn + 20 : turn + 60].all()

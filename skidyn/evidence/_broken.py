@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Broken samples: values that leap away from their neighbours and back.
+
+A dropped packet, a bus error or a reset register leaves one to three samples far off. They are
+found by the distance to a running median (Hampel 1974, JASA 69), which a step of the torque at a
+reversal does not raise, and are left out of the rows with a word to the user.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation, median_filter
+
+from skidyn._signals import Array, Signals
+from skidyn.evidence._kinematics import SmoothedMotion
+
+#: Samples of the running median; up to three of them may be broken.
+WIDTH = 7
+#: A broken sample is further from the median than this many times the distance between these
+#: quantiles of all such distances in its trajectory,
+FAR, TAILS = 3.0, (0.01, 0.99)
+#: and than this share of the range of the signal itself.
+TORQUE_SHARE, POSITION_SHARE = 0.25, 0.05
+
+
+def leaps(values: Array, signals: Signals, share: float) -> NDArray[np.bool_]:
+    """Samples that leap away from their neighbours and back.
+
+    Parameters
+    ----------
+    values : ndarray of shape (n_samples, n_joints)
+        Torque or position.
+    signals : Signals
+        Motion, which tells where trajectories and gaps are.
+    share : float
+        Least size of a leap as a share of the range of the signal in its trajectory.
+
+    Returns
+    -------
+    ndarray of shape (n_samples, n_joints) of bool
+    """
+    away = np.zeros(values.shape)
+    least = np.full((len(values), 1), share)
+    for rows in signals.segments:
+        if rows.stop - rows.start >= 2 * WIDTH:
+            block = values[rows]
+            away[rows] = block - median_filter(block, size=(WIDTH, 1), mode="reflect")
+            # At either end a step has no other side to be told from a leap.
+            for end in (rows.start, rows.stop - WIDTH // 2):
+                least[end : end + WIDTH // 2] = 1.0
+    broken = np.zeros(values.shape, dtype=bool)
+    for name in np.unique(signals.trajectory):
+        own = signals.trajectory == name
+        low, high = np.quantile(away[own], TAILS, axis=0)
+        bottom, top = np.quantile(values[own], TAILS, axis=0)
+        # Strictly above: a signal that rests has no range and no leaps.
+        broken[own] = np.abs(away[own]) > np.maximum(
+            FAR * (high - low), least[own] * (top - bottom)
+        )
+    return broken
+
+
+def without_broken(motion: SmoothedMotion, logged: Signals, torque: Array) -> SmoothedMotion:
+    """Trust no sample whose torque is broken, nor those that a broken position reaches.
+
+    Parameters
+    ----------
+    motion : SmoothedMotion
+        Smoothed motion.
+    logged : Signals
+        Motion before smoothing.
+    torque : ndarray of shape (n_samples, n_joints)
+        Logged torque.
+
+    Returns
+    -------
+    SmoothedMotion
+    """
+    wrong = leaps(torque, logged, TORQUE_SHARE)
+    # The torque of every joint depends on all positions.
+    position = leaps(logged.q, logged, POSITION_SHARE).any(1)
+    if position.any():
+        position = binary_dilation(position, iterations=max(1, motion.half_width))
+    valid = motion.valid & ~wrong & ~position[:, None]
+    return replace(motion, valid=valid)
+
+
+def broken_notes(signals: Signals, torque: Array, joint_names: tuple[str, ...]) -> list[str]:
+    """What is to be said of broken samples.
+
+    Parameters
+    ----------
+    signals : Signals
+        Logged motion.
+    torque : ndarray of shape (n_samples, n_joints)
+        Logged torque, N m or N.
+    joint_names : tuple of str
+        Names of the joints.
+
+    Returns
+    -------
+    list of str
+        A sentence for every joint and signal with broken samples.
+    """
+    if signals.time is None:
+        return []
+    notes = []
+    for what, values, share in (
+        ("torque", torque, TORQUE_SHARE),
+        ("position", signals.q, POSITION_SHARE),
+    ):
+        broken = leaps(values, signals, share)
+        for j in np.flatnonzero(broken.any(0)):
+            rows = np.flatnonzero(broken[:, j])
+            first = rows[0]
+            near = np.median(values[max(0, first - WIDTH) : first + WIDTH, j])
+            count = f"{len(rows)} samples" if len(rows) > 1 else "1 sample"
+            notes.append(
+                f"The {what} of joint {j + 1} ({joint_names[j]}) leaps away and back in {count} "
+                f"(the first in row {first}: {values[first, j]:.4g} among {near:.4g}): left out."
+            )
+    return notes

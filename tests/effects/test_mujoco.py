@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Effects that MuJoCo has natively are named, placed and sized in the torque it computes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from skidyn.datasets import load_planar_arm, load_srs_arm, load_ur5
+from skidyn.diagnosis import diagnose
+from skidyn.export import write_mjcf
+from skidyn.rigid_body import RBDRegressor
+
+mujoco = pytest.importorskip("mujoco")
+
+
+@dataclass
+class Native:
+    """An effect as MuJoCo has it, and what the diagnosis is to say of it."""
+
+    joints: tuple[int, ...]
+    parameter: str
+    value: float | tuple[float, ...]
+    #: Attributes of a tendon that turns with the sum of the two joints.
+    tendon: str = ""
+    #: Changes the model; changes it before the second half of the trajectories.
+    edit: Callable = lambda model: None
+    loaded: Callable = lambda model: None
+    #: Force on the last body in the second half of the trajectories, N.
+    force: tuple[float, ...] = ()
+    load: Callable = load_planar_arm
+    base: tuple[str, ...] = ("viscous", "coulomb")
+
+
+def more(name, index, value):
+    def edit(model):
+        getattr(model, name)[index] += value
+
+    return edit
+
+
+def tilt(model):
+    angle = np.deg2rad(3.0)
+    model.opt.gravity[:] = -9.81 * np.array([np.sin(angle), 0.0, np.cos(angle)])
+
+
+def stiff_limits(model):
+    """Joint 2 ends at 0.6 rad in a linear spring of 30 N m/rad for a unit of effective inertia."""
+    model.jnt_limited[1], model.jnt_range[1] = True, (-50.0, 0.6)
+    model.jnt_solref[1], model.jnt_solimp[1] = (-400.0, -1.0), (0.9, 0.9, 1e-3, 0.5, 1)
+
+
+NATIVE = {
+    "viscous": Native(
+        (1, 2), "Fv", (0.3, 1.1), edit=more("dof_damping", 1, 0.8), base=("coulomb",)
+    ),
+    "coulomb": Native((2,), "Fc", 0.7, edit=more("dof_frictionloss", 1, 0.7), base=("viscous",)),
+    "rotor_inertia": Native((2,), "Ia", 0.3, edit=more("dof_armature", 1, 0.3)),
+    "spring": Native((2,), "k", 2.5, edit=more("jnt_stiffness", 1, 2.5)),
+    "coupling_spring": Native((1, 2), "k", 2.0, tendon='stiffness="2" springlength="0"'),
+    "coupled_friction": Native((1, 2), "Fc", 0.6, tendon='frictionloss="0.6"'),
+    "coupled_inertia": Native((5, 6), "Ia", 0.2, tendon='armature="0.2"', load=load_ur5),
+    "payload": Native((2,), "mass", 0.8, loaded=more("body_mass", -1, 0.8)),
+    "external_wrench": Native((1, 2), "force", (3.0, 0.0, -4.0), force=(3.0, 0.0, -4.0)),
+    "base_tilt": Native((), "tilt_deg", 3.0, edit=tilt, load=load_srs_arm),
+    "end_stop": Native((2,), "q_lim", 0.6, edit=stiff_limits),
+}
+
+
+def motion(rng, n, seconds=6.0, step=0.01):
+    t = np.arange(0, seconds, step)
+    w = 2 * np.pi * np.array([0.2, 0.5, 0.9])
+    a, b = rng.normal(size=(2, 3, n)) / 3
+    phase = np.outer(t, w)
+    q = np.sin(phase) @ a + np.cos(phase) @ b
+    dq = np.cos(phase) @ (a * w[:, None]) - np.sin(phase) @ (b * w[:, None])
+    ddq = -np.sin(phase) @ (a * w[:, None] ** 2) - np.cos(phase) @ (b * w[:, None] ** 2)
+    return t, q, dq, ddq
+
+
+def torque_of(force, model, data):
+    """Joint torque of a force on the origin of the last body."""
+    torque = np.zeros(model.nv)
+    nothing, last = np.zeros(3), model.nbody - 1
+    mujoco.mj_applyFT(model, data, np.array(force), nothing, data.xpos[last], last, torque)
+    return torque
+
+
+def simulate(native, path, trajectories=8):
+    """Motion and torque of a log that MuJoCo made."""
+    robot = native.load()
+    n = robot.n_joints
+    write_mjcf(robot, path)
+    text = path.read_text()
+    if native.tendon:
+        pair = [robot.joint_names[j - 1] for j in native.joints]
+        joints = "".join(f'<joint joint="{name}" coef="1"/>' for name in pair)
+        shaft = f"<tendon><fixed {native.tendon}>{joints}</fixed></tendon>"
+        text = text.replace("</mujoco>", shaft + "</mujoco>")
+    model = mujoco.MjModel.from_xml_string(text)
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+    model.dof_damping[:] = 0.3
+    native.edit(model)
+    data = mujoco.MjData(model)
+    rng = np.random.default_rng(4)
+    tables, torques = [], []
+    for trajectory in range(trajectories):
+        if trajectory == trajectories // 2:
+            native.loaded(model)
+        t, q, dq, ddq = motion(rng, n)
+        tau = np.zeros_like(q)
+        for i in range(len(t)):
+            data.qpos[:], data.qvel[:], data.qacc[:] = q[i], dq[i], ddq[i]
+            mujoco.mj_inverse(model, data)
+            tau[i] = data.qfrc_inverse
+            if native.force and trajectory >= trajectories // 2:
+                tau[i] -= torque_of(native.force, model, data)
+        columns = {"time": t, "trajectory": trajectory}
+        for j in range(n):
+            columns |= {f"q{j + 1}": q[:, j], f"dq{j + 1}": dq[:, j]}
+        tables.append(pd.DataFrame(columns))
+        torques.append(tau + 0.02 * rng.normal(size=tau.shape))
+    return robot, pd.concat(tables, ignore_index=True), np.vstack(torques)
+
+
+@pytest.mark.parametrize("kind", NATIVE)
+def test_what_mujoco_has_natively_is_named_and_sized(kind, tmp_path):
+    native = NATIVE[kind]
+    robot, X, torque = simulate(native, tmp_path / "arm.xml")
+
+    diagnosis = diagnose(RBDRegressor(robot, native.base), X, torque)
+
+    (finding,) = diagnosis.findings
+    assert finding.kind == kind
+    assert finding.joints == native.joints or not native.joints
+    value = finding.parameters[native.parameter]["value"]
+    np.testing.assert_allclose(value, native.value, rtol=0.05, atol=0.1)
+    # Not always to the noise of 0.02 N m: MuJoCo's dry friction yields a little before it slides,
+    # and its end stop is as stiff as the inertia that meets it.
+    left = diagnosis.rmse_after < np.maximum(0.025, 0.3 * diagnosis.rmse_before)
+    assert left.all()

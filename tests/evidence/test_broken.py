@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Samples that leap away and back are found, told and left out; jumps of dry friction are not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from skidyn._exceptions import LogWarning
+from skidyn._signals import Signals
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.evidence._broken import TORQUE_SHARE, broken_notes, leaps
+from skidyn.rigid_body import RBDRegressor
+
+
+def swing(n=2000, rate=200.0):
+    t = np.arange(n) / rate
+    q, dq = np.sin(3 * t)[:, None], 3 * np.cos(3 * t)[:, None]
+    return Signals(q, dq, -9 * q, np.arange(n) // (n // 2), t, None, np.array([False]))
+
+
+def friction(signals, noise=0.05):
+    rng = np.random.default_rng(0)
+    return 2 * np.sign(signals.dq) + signals.q + noise * rng.normal(size=signals.q.shape)
+
+
+def test_a_dropped_packet_at_either_end_or_within_is_found():
+    signals = swing()
+    torque = friction(signals)
+    torque[[0, 500, 501, 1999]] = 9.0
+
+    found = leaps(torque, signals, TORQUE_SHARE)
+
+    assert np.flatnonzero(found).tolist() == [0, 500, 501, 1999]
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02, 0.5])
+def test_the_jumps_of_dry_friction_are_no_leaps(noise):
+    signals = swing()
+
+    assert not leaps(friction(signals, noise), signals, TORQUE_SHARE).any()
+
+
+def test_a_signal_at_rest_has_no_leaps():
+    signals = swing()
+
+    assert not leaps(np.zeros_like(signals.q), signals, TORQUE_SHARE).any()
+
+
+def test_the_note_names_joint_row_and_value():
+    signals = swing()
+    torque = friction(signals)
+    torque[700] = 40.0
+
+    (note,) = broken_notes(signals, torque, ("elbow",))
+
+    assert all(word in note for word in ("torque", "joint 1 (elbow)", "1 sample", "row 700", "40"))
+
+
+def test_the_fit_is_that_without_the_broken_samples_and_says_so():
+    log = make_hidden_effect_log(load_planar_arm(), None, noise="low", random_state=3)
+    torque = np.array(log.y)
+    torque[::977] += 500.0
+    clean = RBDRegressor(log.robot).fit(log.X, log.y)
+
+    with pytest.warns(LogWarning, match="leaps away and back"):
+        model = RBDRegressor(log.robot).fit(log.X, torque)
+
+    assert np.allclose(model.coef_, clean.coef_, rtol=0.02, atol=0.02 * np.abs(clean.coef_).max())
+
+
+def test_a_broken_position_spoils_no_more_than_its_surroundings():
+    log = make_hidden_effect_log(load_planar_arm(), None, noise="low", random_state=3)
+    X = log.X.copy()
+    X.loc[[700, 1900], "q2"] = 0.0
+    X.loc[[700, 1900], "q2"] += X["q2"].max() + 1.0
+    clean = RBDRegressor(log.robot).fit(log.X, log.y)
+
+    with pytest.warns(LogWarning, match="position of joint 2"):
+        model = RBDRegressor(log.robot).fit(X, log.y)
+
+    assert np.allclose(model.coef_, clean.coef_, rtol=0.02, atol=0.02 * np.abs(clean.coef_).max())
