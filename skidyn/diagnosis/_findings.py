@@ -260,17 +260,24 @@ def _sentence(
     motion: str,
 ) -> str:
     where = f"joint {joints[0]}" if len(joints) == 1 else f"joints {', '.join(map(str, joints))}"
-    first = next(iter(parameters.items()), None)
-    what = ""
-    if first is not None and not isinstance(first[1]["value"], list):
-        name, row = first
-        if isinstance(row["value"], float) and row["low"] is not None:
-            half = (row["high"] - row["low"]) / 2
-            what = f": {name} = {row['value']:.3g} ± {half:.2g} {row['unit']}"
+    if "trajectories" in parameters:
+        which = parameters["trajectories"]["value"]
+        where += f" in trajector{'y' if len(which) == 1 else 'ies'} {', '.join(map(str, which))}"
+    what = next((_value(name, row) for name, row in parameters.items()), "")
     text = f"{title} on {where}{what}. Adding it removes {drop:.0%} of the held-out squared error"
     if rivals:
         text += f"; this data hardly tells it from {', '.join(rivals)} ({motion} would)"
     return text + "."
+
+
+def _value(name: str, row: dict[str, Any]) -> str:
+    """The first parameter of a finding in words; of a few joints or axes, all values."""
+    value, unit = row["value"], f" {row['unit']}".rstrip()
+    if isinstance(value, float) and row["low"] is not None:
+        return f": {name} = {value:.3g} ± {(row['high'] - row['low']) / 2:.2g}{unit}"
+    if isinstance(value, list) and 1 < len(value) <= 7 and all(isinstance(v, float) for v in value):
+        return f": {name} = {', '.join(f'{v:.3g}' for v in value)}{unit}"
+    return ""
 
 
 def effect_curves(

@@ -121,20 +121,21 @@ def _own_estimates(
 
 def _splits(kind: str, own: Array, names: NDArray[Any]) -> list[list[Any]]:
     """Groups of trajectories worth trying: those beyond a gap in the estimates."""
-    if kind == "payload":
-        score = own[:, 0]
-    else:
-        away = own - np.median(own, axis=0)
-        score = away @ np.linalg.svd(away, full_matrices=False)[2][0]
+    away = own - np.median(own, axis=0)
+    moved = away @ np.linalg.svd(away, full_matrices=False)[2][0]
+    groups = _beyond_gaps(moved, names, sides=2)
+    # A payload adds mass, be it to most of the trajectories; a force acts in the smaller group.
+    return _beyond_gaps(own[:, 0], names, sides=1) + groups if kind == "payload" else groups
+
+
+def _beyond_gaps(score: Array, names: NDArray[Any], sides: int) -> list[list[Any]]:
+    """Trajectories above the largest gaps of a score; with two sides, the smaller groups."""
     order = np.argsort(score)
     groups = []
     for cut in np.argsort(-np.diff(score[order]))[:CUTS]:
         above, below = names[order[cut + 1 :]], names[order[: cut + 1]]
-        # A payload adds mass; a force acts in the smaller group.
-        if kind == "payload":
-            groups.append(list(above))
-        else:
-            groups += [list(g) for g in (above, below) if len(g) <= len(names) / 2]
+        small = [list(g) for g in (above, below) if len(g) <= len(names) / 2]
+        groups += [list(above)] if sides == 1 else small
     return groups
 
 

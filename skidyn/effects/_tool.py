@@ -20,6 +20,10 @@ def _inside(signals: Signals, shape: Mapping[str, Any]) -> Array:
     return np.isin(signals.trajectory, list(chosen)).astype(float)[:, None]
 
 
+#: Distance of a centre of mass from its link, in m, beyond which the motion does not tell the mass.
+FARTHEST = 5.0
+
+
 class _ToolEffect(Effect):
     scope = "robot"
     needs = ("robot",)
@@ -70,12 +74,14 @@ class Payload(_ToolEffect):
     def parameters(
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
     ) -> dict[str, Any]:
-        mass = float(coefficients[0])
-        com = [float(v) / mass if mass else 0.0 for v in coefficients[1:4]]
-        return {"mass": mass, "com": com, **shape}
+        mass, moment = float(coefficients[0]), [float(v) for v in coefficients[1:4]]
+        if max(map(abs, moment)) > FARTHEST * abs(mass):
+            # Fewer joints than it takes to weigh it, as on a single pendulum.
+            return {"first_moment": moment, **shape}
+        return {"mass": mass, "com": [v / mass if mass else 0.0 for v in moment], **shape}
 
     def units(self, prismatic: bool = False) -> dict[str, str]:
-        return {"mass": "kg", "com": "m"}
+        return {"mass": "kg", "com": "m", "first_moment": "kg m"}
 
 
 class ExternalWrench(_ToolEffect):
