@@ -103,7 +103,7 @@ def simulate(native, path, trajectories=8):
         text = text.replace("</mujoco>", shaft + "</mujoco>")
     model = mujoco.MjModel.from_xml_string(text)
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
-    model.dof_damping[:] = 0.3
+    model.dof_damping[:], model.dof_frictionloss[:] = 0.3, 0.0
     native.edit(model)
     data = mujoco.MjData(model)
     rng = np.random.default_rng(4)
