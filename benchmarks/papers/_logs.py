@@ -14,16 +14,18 @@ from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.model_selection import PredefinedSplit
 
-from skidyn._signals import Signals
-from skidyn.diagnosis import EffectSearchCV
-from skidyn.evidence._kinematics import smooth_motion
-from skidyn.evidence._problem import term_columns
+from skidyn._columns import resolve_columns
+from skidyn._signals import Signals, signals_from
+from skidyn.diagnosis import EffectSearchCV, Settings
 from skidyn.model_selection import PhaseKFold, TrajectoryKFold
+from skidyn.model_selection._split import held_out_folds
+from skidyn.neural_network._physics import effect_columns
 from skidyn.preprocessing import ButterworthFilter, TimeDerivative
 from skidyn.rigid_body import RBDRegressor
-from skidyn.rigid_body._rbd_regressor import _DRY
 from skidyn.robots import Robot
 
+#: The diagnosis may add so many kinds of effects, one after the other.
+MAX_FINDINGS = 8
 #: Seconds at both ends of a recording that no one is judged on: the filters need them.
 END = 0.2
 
@@ -70,7 +72,6 @@ class RecordedLog:
     y: Array = field(init=False)
     kept: NDArray[np.int64] = field(init=False)
     cache: dict[Any, Any] = field(init=False, default_factory=dict)
-    kept_alive: list[Any] = field(init=False, default_factory=list)
 
     def __post_init__(self) -> None:
         smooth = ButterworthFilter(self.cutoff, rate=self.rate).set_output(transform="pandas")
@@ -78,19 +79,22 @@ class RecordedLog:
         X = motion.fit_transform(smooth.fit_transform(self.raw))
         y = self.low_pass(self.raw_torque)
         end = int(END * self.rate)
-        kept = np.concatenate(
-            [rows[end : -end : self.keep_every] for rows in self.raw.groupby("trajectory").indices.values()]
-        )
+        kept = np.concatenate([rows[end : -end : self.keep_every] for rows in self.recordings()])
         self.X, self.y, self.kept = X.iloc[kept].reset_index(drop=True), y[kept], kept
         if self.n_blocks:
             block = np.arange(len(kept)) * self.n_blocks // len(kept)
             self.X = self.X.assign(trajectory=block)
 
+    def recordings(self) -> list[NDArray[np.int64]]:
+        """Raw rows of every recording."""
+        return list(self.raw.groupby("trajectory").indices.values())
+
     def low_pass(self, torque: Array) -> Array:
         """Torque after the zero-phase low-pass, recording by recording."""
         filtered = np.empty_like(torque)
-        for rows in self.raw.groupby("trajectory").indices.values():
-            filtered[rows] = ButterworthFilter(self.cutoff, rate=self.rate).fit_transform(torque[rows])
+        smooth = ButterworthFilter(self.cutoff, rate=self.rate)
+        for rows in self.recordings():
+            filtered[rows] = smooth.fit_transform(torque[rows])
         return filtered
 
     def raw_rows(self, X: pd.DataFrame) -> NDArray[np.int64]:
@@ -98,44 +102,52 @@ class RecordedLog:
         rows = self.kept[X.index.to_numpy()][:, None] + np.arange(self.keep_every)
         return np.minimum(rows.ravel(), len(self.raw) - 1)
 
-    def motion(self, model: RBDRegressor) -> Signals:
-        """Smoothed motion of the whole log, as the model sees it."""
-        model.columns_ = model._resolve(self.raw.shape[1])
-        return smooth_motion(model._read(self.raw.to_numpy())).signals.with_(robot=self.robot)
+    def motion(self, cutoff: float) -> Signals:
+        """Motion of the whole log below a frequency."""
+        if ("motion", cutoff) not in self.cache:
+            smooth = ButterworthFilter(cutoff, rate=self.rate).set_output(transform="pandas")
+            derive = TimeDerivative().set_output(transform="pandas")
+            table = derive.fit_transform(smooth.fit_transform(self.raw))
+            columns = resolve_columns(list(table), table.shape[1], self.robot.joint_names)
+            self.cache["motion", cutoff] = signals_from(table.to_numpy(), columns, self.robot)
+        return self.cache["motion", cutoff]
 
-    def rigid_columns(self) -> Array:
-        """Torque per inertial parameter, low-passed, at the rows of X."""
-        if "rigid" not in self.cache:
-            model = RBDRegressor(self.robot)
-            model.robot_, model.feature_names_in_ = self.robot, self.raw.columns.to_numpy()
-            s = self.motion(model)
-            columns = [
-                self.low_pass(np.ascontiguousarray(joint))[self.kept]
-                for joint in self.robot.torque_regressor(s.q, s.dq, s.ddq).transpose(1, 0, 2)
-            ]
-            self.cache["rigid"] = np.stack(columns, axis=1)
-        return self.cache["rigid"]
-
-    def effect_columns(self, model: RBDRegressor) -> list[Array]:
-        """Low-passed columns of a fitted model's effects for each joint, at the rows of X."""
-        s = self.motion(model)
-        torque = model.rigid_body_torque(s.q, s.dq, s.ddq)
-        load, smooth = torque.copy(), torque.copy()
+    def columns(self, model: RBDRegressor, cutoff: float) -> ColumnPhysics:
+        """Columns of an identified model, low-passed as the torque, at the rows of X."""
+        s = self.motion(cutoff)
+        if ("rigid", cutoff) not in self.cache:
+            regressor = self.robot.torque_regressor(s.q, s.dq, s.ddq).transpose(1, 0, 2)
+            rigid = [self.low_pass(np.ascontiguousarray(joint))[self.kept] for joint in regressor]
+            self.cache["rigid", cutoff] = np.stack(rigid, axis=1)
         own: list[list[Array]] = [[] for _ in range(self.robot.n_joints)]
-        for term in model._in_order():  # as RBDRegressor.predict does
-            state = s.with_(
-                load=load,
-                model_torque=torque.copy(),
-                smooth_torque=smooth.copy(),
-                inertial_parameters=model.inertial_parameters_,
-            )
-            for j, block in term_columns(state, term).items():
-                own[j].append(self.low_pass(block)[self.kept])
-                part = block @ model.effect_coefficients_[term]
-                torque[:, j] += part
-                if term.kind not in _DRY:
-                    smooth[:, j] += part
-        return [np.concatenate(blocks, axis=1) for blocks in own]
+        for block in effect_columns(model, s):
+            for joint, values in block.items():
+                own[joint].append(self.low_pass(values)[self.kept])
+        effects = [np.concatenate(blocks, axis=1) for blocks in own]
+        return ColumnPhysics(self.cache["rigid", cutoff], effects)
+
+    def inner_folds(self, train: NDArray[np.int64]) -> list[Any]:
+        """Folds within training rows, as row numbers of X."""
+        X = self.X.iloc[train]
+        if hasattr(self.inner, "split"):
+            folds = list(self.inner.split(X))
+        else:
+            folds = held_out_folds(X["trajectory"].to_numpy(), self.inner)
+        return [(train[a], train[b]) for a, b in folds]
+
+    def choose_motion(self, train: NDArray[np.int64]) -> float:
+        """Cut-off of the motion, Hz, with which the plain physics predicts inner folds best."""
+        rows = self.raw_rows(self.X.iloc[train])
+        model = RBDRegressor(self.robot, self.effects)
+        model.fit(self.raw.iloc[rows], self.raw_torque[rows])
+        errors = {}
+        for cutoff in (self.cutoff, min(3 * self.cutoff, 30.0, 0.4 * self.rate)):
+            physics, squares = self.columns(model, cutoff), []
+            for a, b in self.inner_folds(train):
+                physics.fit(self.X.iloc[a], self.y[a])
+                squares.append((self.y[b] - physics.predict(self.X.iloc[b])) ** 2)
+            errors[cutoff] = np.log(np.concatenate(squares).mean(axis=0)).mean()
+        return min(errors, key=lambda cutoff: errors[cutoff])
 
     def units(self) -> NDArray[Any]:
         """What counts as independent: recordings, blocks, or the outer folds of a single path."""
@@ -147,24 +159,29 @@ class RecordedLog:
             part[test] = k
         return part
 
-    def plain(self) -> LowPassedPhysics:
-        """Rigid body and the friction that everybody has."""
-        return LowPassedPhysics(self, RBDRegressor(self.robot, self.effects))
+    def physics(
+        self, train: NDArray[np.int64]
+    ) -> tuple[LowPassedPhysics, LowPassedPhysics, list[str]]:
+        """Plain physics, physics that the diagnosis completes, and what it added.
 
-    def completed(self, train: NDArray[np.int64]) -> tuple[LowPassedPhysics, list[str]]:
-        """Physics that the diagnosis completes on training rows alone, and what it added."""
+        Cut-off of the motion, effects and their shapes are found on training rows alone.
+        """
+        cutoff = self.choose_motion(train)
+        plain = RBDRegressor(self.robot, self.effects)
         rows = self.raw_rows(self.X.iloc[train])
-        search = EffectSearchCV(RBDRegressor(self.robot, self.effects))
+        search = EffectSearchCV(plain, settings=Settings(max_findings=MAX_FINDINGS))
         search.fit(self.raw.iloc[rows], self.raw_torque[rows])
-        added = [f"{f.kind} {list(f.joints)}" for f in search.diagnosis_.findings]
-        return LowPassedPhysics(self, search.best_estimator_), added
+        added = [f"motion below {cutoff:.3g} Hz"]
+        added += [f"{f.kind} {list(f.joints)}" for f in search.diagnosis_.findings]
+        completed = LowPassedPhysics(self, search.best_estimator_, cutoff)
+        return LowPassedPhysics(self, plain, cutoff), completed, added
 
 
 class LowPassedPhysics(RegressorMixin, BaseEstimator):
     """Physics whose columns are low-passed like the torque that it is to explain.
 
     Friction turns over within a few samples: a torque that was low-passed can only be explained by
-    columns that were computed from the raw motion and low-passed as well. The model is identified
+    columns that were computed from faster motion and low-passed as well. The model is identified
     on the raw rows first, which gives the loads that some effects see; its coefficients are then
     fitted again to the low-passed torque. Beyond the rows of X only the motion is read, no torque.
 
@@ -172,27 +189,29 @@ class LowPassedPhysics(RegressorMixin, BaseEstimator):
     ----------
     log : RecordedLog
         The rows of X must keep its index.
-    physics : RBDRegressor
+    model : RBDRegressor
         Not fitted.
+    cutoff : float, Hz
+        Low-pass of the motion that the columns see.
     """
 
-    def __init__(self, log: RecordedLog, physics: RBDRegressor) -> None:
+    def __init__(self, log: RecordedLog, model: RBDRegressor, cutoff: float) -> None:
         self.log = log
-        self.physics = physics
+        self.model = model
+        self.cutoff = cutoff
 
     def __sklearn_clone__(self) -> LowPassedPhysics:
-        return LowPassedPhysics(self.log, self.physics)  # the log is not copied
+        return LowPassedPhysics(self.log, self.model, self.cutoff)  # the log is not copied
 
     def fit(self, X: pd.DataFrame, y: Array) -> LowPassedPhysics:
         log = self.log
-        key = (id(self.physics), X.index.to_numpy().tobytes())
+        key = (id(self.model), self.cutoff, X.index.to_numpy().tobytes())
         if key not in log.cache:  # every learner meets the same physics again
             rows = log.raw_rows(X)
-            identified = clone(self.physics).fit(log.raw.iloc[rows], log.raw_torque[rows])
-            columns = ColumnPhysics(log.rigid_columns(), log.effect_columns(identified))
-            log.cache[key] = columns.fit(X, y).predict(log.X)
-            log.kept_alive.append(self.physics)  # no other object may get its id
-        self.torque_ = log.cache[key]
+            identified = clone(self.model).fit(log.raw.iloc[rows], log.raw_torque[rows])
+            torque = log.columns(identified, self.cutoff).fit(X, y).predict(log.X)
+            log.cache[key] = torque, self.model  # no other model may get its id
+        self.torque_ = log.cache[key][0]
         return self
 
     def predict(self, X: pd.DataFrame) -> Array:

@@ -11,6 +11,11 @@ from scipy import stats
 
 Array = NDArray[np.float64]
 
+#: One-sided p-value of a gain of one standard error.
+ONE_STANDARD_ERROR = 0.16
+#: Keeps ratios finite.
+TINY = np.finfo(np.float64).tiny
+
 
 def learned_weights(
     residual: Array, learned: Array, unit: NDArray[Any], alpha: float
@@ -18,10 +23,12 @@ def learned_weights(
     """Weight of the learned part for each joint; zero where its gain may be chance.
 
     The least-squares factor of the cross-fitted learned part, between 0 and 1, is taken from all
-    units (recordings, or blocks of the only one) but one, and its gain is measured on that one. A
-    joint is kept if a one-sided paired t-test over units passes `alpha` after Holm's correction
-    over the joints, so `alpha` bounds the chance that any joint is kept in vain. Its weight is the
-    smallest of those factors: what no single unit can talk it into.
+    units (recordings, or blocks of the only one) but one, and its gain is measured on that one.
+    Two one-sided paired t-tests over units are made at level `alpha`; noise passes much more rarely,
+    since its held-out gain is negative in the mean. If the mean gain over all joints passes, every joint is kept whose own gain is
+    more than its standard error (small gains on many joints are seen together); otherwise the
+    joints that pass alone, after Holm's correction. A joint's weight is the smallest of its
+    factors: what no single unit can talk it into.
 
     Parameters
     ----------
@@ -30,12 +37,13 @@ def learned_weights(
     unit : ndarray of shape (n_samples,)
         Number of the independent unit of every row.
     alpha : float
-        Level of the test, over all joints together.
+        Level of the tests, over all joints together.
 
     Returns
     -------
     weight, gain, p_value : ndarray of shape (n_joints,)
-        The gain is the relative fall of the held-out RMSE; the p-value is corrected.
+        The gain is the relative fall of the held-out RMSE. The p-value is the smaller of the
+        joint's own and the common one, corrected.
 
     References
     ----------
@@ -48,20 +56,28 @@ def learned_weights(
         return np.stack([np.bincount(number, column) for column in values.T], axis=1)
 
     rr, rl, ll = (per_unit(v) for v in (residual**2, residual * learned, learned**2))
-    tiny = np.finfo(np.float64).tiny
     n_joints = rr.shape[1]
     if len(labels) < 3:
         return np.zeros(n_joints), np.zeros(n_joints), np.ones(n_joints)
-    others = np.clip((rl.sum(axis=0) - rl) / np.maximum(ll.sum(axis=0) - ll, tiny), 0.0, 1.0)
+    others = np.clip((rl.sum(axis=0) - rl) / np.maximum(ll.sum(axis=0) - ll, TINY), 0.0, 1.0)
     after = rr - 2 * others * rl + others**2 * ll
-    gain = 1.0 - np.sqrt(after.sum(axis=0) / np.maximum(rr.sum(axis=0), tiny))
-    logs = np.log(np.maximum(after, tiny) / np.maximum(rr, tiny))
-    spread = logs.std(axis=0, ddof=1) / np.sqrt(len(labels))
-    t = logs.mean(axis=0) / np.maximum(spread, tiny)
-    p_value = _holm(np.where(others.max(axis=0) > 0, stats.t.cdf(t, len(labels) - 1), 1.0))
+    gain = 1.0 - np.sqrt(after.sum(axis=0) / np.maximum(rr.sum(axis=0), TINY))
+    logs = np.log(np.maximum(after, TINY) / np.maximum(rr, TINY))
+    tried = others.max(axis=0) > 0
+    alone = np.where(tried, _p_value(logs), 1.0)
+    p_value = _holm(alone)
+    if tried.sum() > 1:
+        common = _p_value(logs[:, tried].mean(axis=1, keepdims=True))[0]
+        p_value = np.minimum(p_value, np.where(alone < ONE_STANDARD_ERROR, common, 1.0))
     # at alpha = 1 the user asks for whatever helps, and a corrected p-value may be exactly 1
     kept = ((p_value < alpha) | (alpha == 1)) & (gain > 0)
     return np.where(kept, others.min(axis=0), 0.0), gain, p_value
+
+
+def _p_value(logs: Array) -> Array:
+    """One-sided paired t-test over units (rows) that the logarithm of the error fell."""
+    spread = logs.std(axis=0, ddof=1) / np.sqrt(len(logs))
+    return stats.t.cdf(logs.mean(axis=0) / np.maximum(spread, TINY), len(logs) - 1)
 
 
 def _holm(p_values: Array) -> Array:

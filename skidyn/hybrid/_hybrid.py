@@ -46,9 +46,9 @@ class HybridRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         Folds: by trajectory, or by blocks of rows of a single trajectory. A cross-validator must
         test every row exactly once; for one recording of a periodic motion use ``PhaseKFold``.
     alpha : float, default=0.05
-        Level of the one-sided paired test over trajectories that a joint's learned part must pass,
-        corrected for the number of joints. 1 keeps every joint whose learned part helped on
-        held-out trajectories, significantly or not.
+        Level of the one-sided paired tests over trajectories that the learned part must pass: for
+        all joints together, or for a joint alone with correction for their number. 1 keeps every
+        joint whose learned part helped on held-out trajectories, significantly or not.
     trajectory, time : int, str or None, default="auto"
         Key columns of X.
 
@@ -64,7 +64,7 @@ class HybridRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         Relative fall of the RMSE on held-out trajectories that the learned part brought, whether
         it was kept or not.
     p_value_ : ndarray of shape (n_joints,)
-        Of that gain, corrected for the number of joints (Holm).
+        Of that gain, or of the mean gain of all joints if that is surer; corrected.
     radius_ : float
         Distance from the training samples that counts as outside, in standard deviations per
         feature (root mean square).
