@@ -13,6 +13,7 @@ pandas = pytest.importorskip("pandas", reason="needs skidyn[io]")
 pytest.importorskip("jinja2", reason="needs skidyn[report]")
 
 from skidyn import cli  # noqa: E402
+from skidyn._commands._identify import ESTIMATORS  # noqa: E402
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log  # noqa: E402
 
 
@@ -98,6 +99,15 @@ def test_identify_writes_parameters(work, capsys):
     assert content == json.loads(out.read_text("utf-8"))
     assert np.shape(content["inertial_parameters"]) == (2, 10)
     assert {e["kind"] for e in content["effects"]} == {"viscous", "coulomb"}
+    assert content["condition_number"] > 1 and content["open_combinations"] == []
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_identify_by_any_estimator_and_only_what_is_essential(work, capsys, estimator):
+    words = ["identify", *arguments(work), "--estimator", estimator, "--consistent"]
+    assert cli.main([*words, "--essential"]) == cli.DONE
+    out = capsys.readouterr().out
+    assert "condition number of the excitation" in out and "others left out" in out
 
 
 @pytest.mark.parametrize("suffix", ["csv", "parquet"])

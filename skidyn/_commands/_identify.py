@@ -10,12 +10,16 @@ from skidyn._commands._arguments import command, with_log
 from skidyn._commands._input import read_model_and_log
 from skidyn._commands._output import parameters, print_json, working, write_json
 
+#: Those that need nothing but a log.
+ESTIMATORS = ("weighted", "ordinary", "robust", "ridge", "entropic")
 DESCRIPTION = """\
 Identify inertial parameters and effects together and print them with standard errors that survive
-autocorrelation. Masses themselves are rarely visible; printed are the combinations that are.
+autocorrelation. Masses themselves are rarely visible; printed are the combinations that are, how
+well the motion excites them, and what the data leaves open.
 
   skidyn identify run*.csv --urdf robot.urdf --out parameters.json
   skidyn identify run*.csv --urdf robot.urdf --consistent     only bodies that can exist
+  skidyn identify run*.csv --urdf robot.urdf --estimator robust
 """
 
 
@@ -24,11 +28,31 @@ def add_parser(commands: Any) -> None:
     with_log(parser)
     parser.add_argument("--out", metavar="JSON", help="write the parameters as JSON")
     parser.add_argument("--consistent", action="store_true", help="only bodies that can exist")
+    parser.add_argument(
+        "--estimator",
+        default="weighted",
+        choices=ESTIMATORS,
+        help="how coefficients are found (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--prior-std",
+        type=float,
+        metavar="SHARE",
+        help="relative uncertainty of the bodies of the URDF, for ridge and entropic; by default "
+        "what predicts best",
+    )
+    parser.add_argument(
+        "--essential",
+        action="store_true",
+        help="print only the parameters that the data determines well",
+    )
 
 
 def run(options: argparse.Namespace) -> None:
     model, frame, tau = read_model_and_log(options)
-    model.set_params(consistent=options.consistent)
+    model.set_params(
+        consistent=options.consistent, estimator=options.estimator, prior_std=options.prior_std
+    )
     with working("Identifying", options):
         model.fit(frame, tau)
     content = parameters(model)
@@ -37,5 +61,14 @@ def run(options: argparse.Namespace) -> None:
     if options.json:
         print_json(content)
         return
-    for row in model.parameter_table():
+    essential = content["essential_parameters"]
+    for row in essential["parameters"] if options.essential else content["coefficients"]:
         print(f"{row['value']:12.5g} ± {row['std']:9.2g}   {row['name']}")
+    if options.essential:
+        print(
+            f"{len(essential['eliminated'])} others left out; the error grows by "
+            f"{100 * (essential['error_ratio'] - 1):.2g} %"
+        )
+    print(f"condition number of the excitation: {model.condition_number_:.3g}")
+    for combination in content["open_combinations"]:
+        print(f"  {combination['sentence']}")

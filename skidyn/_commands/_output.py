@@ -146,6 +146,9 @@ def parameters(model: RBDRegressor) -> dict[str, Any]:
             for term in model.effect_terms_
         ],
         "noise_std": model.noise_std_.tolist(),
+        "condition_number": model.condition_number_,
+        "open_combinations": model.open_combinations(),
+        "essential_parameters": model.essential_parameters(),
     }
 
 

@@ -25,6 +25,8 @@ from skidyn.rigid_body._log_det import Linear
 from skidyn.rigid_body._log_det import from_pseudo_inertia as from_pseudo_inertia
 from skidyn.rigid_body._log_det import pseudo_inertia as pseudo_inertia
 
+#: Least second moment of mass of a body about its centre, relative to its largest moment.
+THICKNESS = 1e-9
 #: Start of coefficients that must not be negative, in units in which the torque has unit size.
 ABOVE_ZERO = 1e-3
 
@@ -145,4 +147,17 @@ def make_consistent(
     else:
         x = solve_interior_point(columns, torque, x, bodies, scaled)
     x /= scale
-    return x[:n].reshape(-1, 10), x[n:]
+    return _thickened(x[:n].reshape(-1, 10)), x[n:]
+
+
+def _thickened(parameters: Array) -> Array:
+    """Bodies that are flat but for rounding, with a trace of moment of inertia about their centre.
+
+    Mass, centre of mass and symmetry stay, so that nothing that is known is lost; the trace
+    outlives the digits that a URDF is written with, and is far below what torque shows.
+    """
+    values = np.linalg.eigvalsh(pseudo_inertia(parameters))
+    flat = values[:, 0] < THICKNESS * values[:, -1]
+    # A second moment s in all directions is a moment of inertia 2 s.
+    added = np.where(flat, 2 * THICKNESS * values[:, -1], 0.0)
+    return np.asarray(parameters + np.outer(added, [0, 0, 0, 0, 1, 0, 0, 1, 0, 1]))

@@ -16,11 +16,14 @@ identification, IEEE ICRA, 2956-2961.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.stats import t as student_t
 
-from skidyn._signals import Array
+from skidyn._signals import Array, Signals
 from skidyn.evidence._folded import left_out_coefficients
+from skidyn.evidence._problem import Fit, Problem, read_motion, regressor_rows
 from skidyn.rigid_body._regression import PASSES, Regression, Solution
 
 
@@ -42,6 +45,44 @@ def instrumental(regression: Regression, prior_std: float | None = None) -> Solu
     )
     test = durbin_wu_hausman(coefficients - plain, left - plain_left)
     return Solution(coefficients, left, noise, attributes={"hausman_": test})
+
+
+def instrument_rows(problem: Problem, fit: Fit, signals: Signals, smooth: bool) -> list[Array]:
+    """The columns of a fit along another motion, averaged like those of the problem.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows of the log.
+    fit : Fit
+        Terms, and the model whose torque some of them see.
+    signals : Signals
+        The motion of the instruments.
+    smooth : bool
+        Derive velocity and acceleration from the positions.
+
+    Returns
+    -------
+    list of ndarray of shape (n_rows_j, n_coefficients)
+
+    Raises
+    ------
+    ValueError
+        The motion has not the rows of the log.
+    """
+    own = problem.motion.signals
+    same = signals.n_samples == own.n_samples
+    if not (same and np.array_equal(signals.trajectory, own.trajectory)):
+        raise ValueError(
+            "instruments must have the rows of X, in its trajectories: "
+            f"{signals.n_samples} rows for {own.n_samples}"
+        )
+    motion = read_motion(signals, smooth, problem.torque)
+    moved = motion.signals.with_(robot=problem.robot)
+    other = replace(problem, motion=motion, signals=moved, _cache={})
+    other.with_fit(fit)
+    other.rigid_rows = regressor_rows(other, problem.rigid_index)
+    return other.design([other.term_rows(t) for t in fit.terms])
 
 
 def durbin_wu_hausman(difference: Array, left_out: Array) -> dict[str, Array]:

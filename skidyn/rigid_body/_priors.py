@@ -27,6 +27,8 @@ from skidyn.rigid_body._regression import Regression, Solution
 
 #: Relative uncertainties of the URDF that are tried.
 CANDIDATES = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
+#: Noise below which a joint counts as this noisy: relative to the noisiest, and in N m.
+LEAST_NOISE, LEAST_TORQUE = 1e-7, 1e-9
 
 
 @dataclass(frozen=True)
@@ -96,6 +98,8 @@ def _whole(regression: Regression) -> _Whole:
     regrouping = base.regrouping if regression.n_rigid else np.zeros((0, nominal.size))
     joined = block_diag(regrouping, np.eye(p - regression.n_rigid))
     noise = weighted(regression).noise
+    # Without any noise the prior would not be heard, nor the numbers be finite.
+    noise = np.maximum(noise, LEAST_NOISE * noise.max() + LEAST_TORQUE)
     grams, cross = regression.products(noise)
     units, _ = local_units(nominal, nominal)
     inverse = np.linalg.inv(block_diag(*units))

@@ -5,18 +5,15 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
-from scipy.linalg import block_diag
-from scipy.optimize import lsq_linear
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from skidyn._checks import warn_about_log
 from skidyn._columns import Columns, ColumnSpec, resolve_columns
-from skidyn._exceptions import ColumnError, SkidynError
+from skidyn._exceptions import ColumnError
 from skidyn._signals import Array, Signals, signals_from
 from skidyn.effects import Term, get_effect, make_terms
 from skidyn.evidence._broken import broken_notes
@@ -27,17 +24,17 @@ from skidyn.evidence._problem import (
     Problem,
     hysteresis_joints,
     make_problem,
-    read_motion,
-    regressor_rows,
     term_columns,
 )
 from skidyn.evidence._shapes import Gain, best_on_grid, refine_term
 from skidyn.evidence._streaming import evidence_of_signals, linear_terms
 from skidyn.rigid_body._base_parameters import find_base_parameters
-from skidyn.rigid_body._consistency import make_consistent
 from skidyn.rigid_body._constraints import BodyConstraints
 from skidyn.rigid_body._estimators import Estimator, find_estimator
+from skidyn.rigid_body._identifiability import condition_number
+from skidyn.rigid_body._instrumental import instrument_rows
 from skidyn.rigid_body._regression import Regression, Solution
+from skidyn.rigid_body._results import Results
 from skidyn.rigid_body._uncertainty import PredictionBands, find_bands
 from skidyn.robots import Robot
 
@@ -47,7 +44,7 @@ ROUNDS = 3
 GROUPS = 20
 
 
-class RBDRegressor(RegressorMixin, BaseEstimator):
+class RBDRegressor(Results, RegressorMixin, BaseEstimator):
     """Inverse dynamics of a robot: rigid body plus effects, identified together.
 
     Parameters
@@ -105,6 +102,10 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
         Weight of every averaged row by joint, 1.25 at most; the robust estimator only.
     bands_ : PredictionBands
         What :meth:`predict_interval` knows about the errors of left-out folds.
+    condition_number_ : float
+        Condition number of the weighted columns of ``coef_``, scaled to equal length: how well the
+        motion excites the model. Below 100 is good, beyond 1,000 a part of the coefficients is
+        chance.
     noise_std_ : ndarray of shape (n_joints,)
         Standard deviation of one averaged residual row, N m or N.
     robot_ : Robot
@@ -239,7 +240,8 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
         whole = problem.with_base_columns()
         others = None
         if instruments is not None:
-            others = self._instrument_rows(problem, fit, instruments)
+            Z = validate_data(self, instruments, reset=False, dtype=np.float64)
+            others = instrument_rows(problem, fit, self._read(Z), self._smooths())
         regression = Regression.from_problem(whole if method.whole else problem, fit, others)
         self.evidence_ = Evidence.from_problem(whole, fit.terms)
         self.n_parts_ = 0
@@ -418,53 +420,6 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
         parameters = self.get_params(deep=False) | {"effects": [*self.effects, *more]}
         return type(self)(**parameters)
 
-    def parameter_table(self) -> list[dict[str, Any]]:
-        """Every coefficient with its standard error.
-
-        Returns
-        -------
-        list of dict
-            ``name``, ``value``, ``std`` and ``relative_std`` (std over value).
-        """
-        check_is_fitted(self)
-        rows = zip(self.coef_names_, self.coef_, self.coef_std_, strict=True)
-        return [
-            {
-                "name": name,
-                "value": float(value),
-                "std": float(std),
-                "relative_std": float(std / abs(value)) if value else float("inf"),
-            }
-            for name, value, std in rows
-        ]
-
-    def durbin_wu_hausman(self) -> list[dict[str, Any]]:
-        """Whether least squares would have been biased by noise in the motion.
-
-        Compares the instrumental-variable estimate with least squares, coefficient by coefficient
-        (Durbin-Wu-Hausman). A small ``p_value`` speaks against least squares; with many
-        coefficients, compare it with the level divided by their number.
-
-        Returns
-        -------
-        list of dict
-            ``name``, ``difference`` (instrumental variables less least squares), ``std`` and
-            ``p_value``.
-
-        Raises
-        ------
-        SkidynError
-            The model was not fitted with ``estimator="instrumental"``.
-        """
-        check_is_fitted(self)
-        if self.estimator != "instrumental":
-            raise SkidynError("the test compares with estimator='instrumental': fit with it first")
-        columns = (self.hausman_[key] for key in ("difference", "std", "p_value"))
-        return [
-            {"name": n, "difference": float(d), "std": float(s), "p_value": float(p)}
-            for n, d, s, p in zip(self.coef_names_, *columns, strict=True)
-        ]
-
     # ------------------------------------------------------------------ hooks for tests
     def _resolve(self, n_features: int) -> Columns:
         names = getattr(self, "feature_names_in_", None)
@@ -565,24 +520,6 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
             open_.append(i)
         return shaped
 
-    def _instrument_rows(self, problem: Problem, fit: Fit, instruments: Any) -> list[Array]:
-        """The columns of the fit along the motion of the instruments, averaged like its rows."""
-        Z = validate_data(self, instruments, reset=False, dtype=np.float64)
-        signals = self._read(Z)
-        own = problem.motion.signals
-        same = len(Z) == own.n_samples and np.array_equal(signals.trajectory, own.trajectory)
-        if not same:
-            raise ValueError(
-                f"instruments must have the rows of X, in its trajectories: {len(Z)} rows for "
-                f"{own.n_samples}"
-            )
-        motion = read_motion(signals, self._smooths(), problem.torque)
-        moved = motion.signals.with_(robot=self.robot_)
-        other = replace(problem, motion=motion, signals=moved, _cache={})
-        other.with_fit(fit)
-        other.rigid_rows = regressor_rows(problem=other, index=problem.rigid_index)
-        return other.design([other.term_rows(t) for t in fit.terms])
-
     def _store_evidence(self, evidence: Evidence, terms: Sequence[Term]) -> None:
         """Identify from evidence alone."""
         method = self._method()
@@ -619,36 +556,12 @@ class RBDRegressor(RegressorMixin, BaseEstimator):
         self.coef_ = np.r_[values[where], effects]
         self.coef_std_ = solution.std
         self.noise_std_ = solution.noise
+        shown = np.r_[where, np.arange(len(base.index), len(self.evidence_.columns))]
+        if self.parameters == "nominal":
+            shown = np.arange(len(self.evidence_.columns))
+        self.condition_number_ = condition_number(self._weighted_rows()[:, shown])
         for name, value in solution.attributes.items():
             setattr(self, name, value)
-
-    def _consistent(
-        self, parameters: Array, effects: Array, solution: Solution
-    ) -> tuple[Array, Array]:
-        """Bodies that can exist and coefficients of the right sign, closest in the data's eyes."""
-        known = self.consistent if isinstance(self.consistent, BodyConstraints) else None
-        rows = self.evidence_.stacked(dict(enumerate(solution.noise)))[:, :-1]
-        signs = np.array(
-            [c.sign for t in self.effect_terms_ for c in get_effect(t.kind).coefficients]
-        )
-        if self.parameters == "nominal":
-            low = np.where(signs > 0, 0.0, -np.inf)
-            return parameters, lsq_linear(rows, rows @ effects, (low, np.inf)).x
-        regrouping = find_base_parameters(self.robot_).regrouping
-        factor = rows @ block_diag(regrouping, np.eye(len(effects)))
-        if solution.prior is not None:
-            factor = np.vstack([factor, solution.prior])
-        factor = np.asarray(np.linalg.qr(factor, mode="r"))
-        target = factor @ np.r_[parameters.ravel(), effects]
-        return make_consistent(
-            self.robot_.inertial_parameters,
-            factor,
-            target,
-            signs,
-            effects,
-            known=known,
-            body_names=self.robot_.body_names,
-        )
 
     def _in_order(self) -> list[Term]:
         """Terms, those that look at the model's torque last."""
