@@ -74,8 +74,8 @@ def read_log(
     rate : float, Hz, optional
         Sampling rate of logs without a time column.
     resample_rate : float, Hz, optional
-        Rate of the common clock where signals of one file have several; that of the positions if
-        None.
+        Rate of a regular clock; None takes the recorded one, that of the positions where signals of
+        one file have several.
     missing : {"error", "drop"}, default="error"
         Rows with NaN or infinite values: refuse the log, or leave them out with a warning.
     split_gaps : float, s, "auto" or None, default="auto"

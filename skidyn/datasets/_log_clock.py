@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from skidyn._exceptions import LogError
 from skidyn._optional import import_optional
@@ -94,16 +95,27 @@ def align_channels(
     Returns
     -------
     DataFrame
-        One table; values that a channel does not cover are NaN.
+        One table with the rows that all channels cover.
 
     Raises
     ------
     LogError
-        A signal occurs in two channels, or the channels do not overlap in time.
+        A signal occurs in two channels, a clock starts anew in one of several channels, or the
+        channels do not overlap in time.
     """
     pd = import_optional("pandas", extra="io")
     if len(tables) == 1 and rate is None:
         return tables[0]
+    for table, name in zip(tables, names, strict=True):
+        unread = np.flatnonzero(~np.isfinite(table["time"].to_numpy()))
+        if len(unread):
+            raise LogError(
+                f"the clock of {name} is no number in row {unread[0]} ({len(unread)} such rows); "
+                "remove these rows before signals are interpolated."
+            )
+    if len(tables) == 1:
+        assert rate is not None
+        return _resampled(tables[0], rate, notes)
     owner: dict[str, str] = {}
     for table, name in zip(tables, names, strict=True):
         for column in table.columns:
@@ -111,6 +123,12 @@ def align_channels(
                 raise LogError(
                     f"{column} is in {owner[column]} and in {name}; choose one with topics=[...]."
                 )
+        restarts = np.flatnonzero(np.diff(table["time"].to_numpy()) < 0)
+        if len(restarts):
+            raise LogError(
+                f"the clock of {name} goes back in row {restarts[0] + 1}: which rows of the other "
+                "channels belong to it cannot be told. Store every run in a file of its own."
+            )
     begin = max(table["time"].min() for table in tables)
     end = min(table["time"].max() for table in tables)
     if not end > begin:
@@ -120,45 +138,75 @@ def align_channels(
         )
         raise LogError(f"the channels do not overlap in time ({spans}).")
     base = next((k for k, table in enumerate(tables) if "q1" in table.columns), 0)
-    clock = tables[base]["time"].to_numpy()
-    if rate is not None:
-        clock = np.arange(begin, end, 1 / rate)
-    inside = (clock >= begin) & (clock <= end)
-    outside = int((~inside).sum())
-    clock = clock[inside]
-    parts = [pd.DataFrame({"time": clock})]
+    clock = tables[base]["time"].to_numpy() if rate is None else np.arange(begin, end, 1 / rate)
+    common = (clock >= begin) & (clock <= end)
+    covered = common.copy()
+    for table in tables:
+        covered &= ~_in_gap(table["time"].to_numpy(), clock)
+    rows = clock[covered]
+    parts = [pd.DataFrame({"time": rows})]
     for k, table in enumerate(tables):
         if k == base and rate is None:
-            parts.append(table.loc[inside].drop(columns="time").reset_index(drop=True))
+            parts.append(table.loc[covered].drop(columns="time").reset_index(drop=True))
         else:
-            parts.append(_interpolate(table, clock))
-    if len(tables) > 1:
-        grid = f"{rate:g} Hz" if rate is not None else names[base]
-        told = f"channels {', '.join(names)} interpolated to the clock of {grid}"
-        notes.append(f"{told}; {outside} row(s) outside their common time left out")
+            parts.append(_interpolate(table, rows))
+    grid = f"{rate:g} Hz" if rate is not None else names[base]
+    notes.append(
+        f"channels {', '.join(names)} interpolated to the clock of {grid}; {int((~common).sum())} "
+        f"row(s) outside their common time and {int((common & ~covered).sum())} in gaps left out"
+    )
     return pd.concat(parts, axis=1)
 
 
-def _interpolate(table: pd.DataFrame, clock: np.ndarray) -> pd.DataFrame:
-    """Columns of a channel at other times; NaN where the channel has a gap."""
+def _resampled(table: pd.DataFrame, rate: float, notes: list[str]) -> pd.DataFrame:
+    """One table on a regular clock within each of its runs."""
     pd = import_optional("pandas", extra="io")
     time = table["time"].to_numpy()
-    order = np.argsort(time, kind="stable")
-    time = time[order]
+    run = np.zeros(len(time), dtype=np.int64)
+    run[1:] = np.cumsum(np.diff(time) < 0)
+    if "trajectory" in table.columns:
+        number = table["trajectory"].to_numpy()
+        run[1:] += np.cumsum(number[1:] != number[:-1])
+    parts, lonely = [], 0
+    for rows in find_segments(run, time):
+        part = table.iloc[rows]
+        first, last = time[rows][0], time[rows][-1]
+        if not last > first:
+            lonely += len(part)
+            continue
+        # a last sample that is a rounding error short of the grid is on the grid
+        clock = first + np.arange(int((last - first) * rate + 1e-6) + 1) / rate
+        parts.append(_interpolate(part, np.minimum(clock, last)).assign(time=clock))
+    if not parts:
+        raise LogError("no two samples of the log belong together, so it cannot be resampled.")
+    alone = f"; {lonely} row(s) that stand alone left out" if lonely else ""
+    notes.append(f"interpolated to {rate:g} Hz within {len(parts)} run(s) without a gap{alone}")
+    return pd.concat(parts, ignore_index=True)
+
+
+def _in_gap(time: np.ndarray, clock: np.ndarray) -> np.ndarray:
+    """Which times of a clock lie in a gap of a channel."""
     steps = np.diff(time)
-    right = np.clip(np.searchsorted(time, clock), 1, max(len(time) - 1, 1))
-    hole = np.zeros(len(clock), dtype=bool)
-    if len(steps):
-        moving = steps[steps > 0]
-        longest = GAP_STEPS * float(np.median(moving)) if len(moving) else np.inf
-        near = np.minimum(np.abs(clock - time[right]), np.abs(clock - time[right - 1]))
-        hole = (steps[right - 1] > longest) & (near > 1e-6 * longest)
+    moving = steps[steps > 0]
+    if not len(moving):
+        return np.zeros(len(clock), dtype=bool)
+    longest = GAP_STEPS * float(np.median(moving))
+    right = np.clip(np.searchsorted(time, clock), 1, len(time) - 1)
+    near = np.minimum(np.abs(clock - time[right]), np.abs(clock - time[right - 1]))
+    return np.asarray((steps[right - 1] > longest) & (near > 1e-6 * longest))
+
+
+def _interpolate(table: pd.DataFrame, clock: np.ndarray) -> pd.DataFrame:
+    """Columns of a channel at other times; numbers of trajectories are not mixed."""
+    pd = import_optional("pandas", extra="io")
+    time = table["time"].to_numpy()
+    before = np.clip(np.searchsorted(time, clock, side="right") - 1, 0, len(time) - 1)
     columns = {}
     for name in table.columns:
-        if name == "time":
-            continue
-        values = np.interp(clock, time, table[name].to_numpy(dtype=float)[order])
-        columns[name] = np.where(hole, np.nan, values)
+        if name == "trajectory":
+            columns[name] = table[name].to_numpy()[before]
+        elif name != "time":
+            columns[name] = np.interp(clock, time, table[name].to_numpy(dtype=float))
     return pd.DataFrame(columns)
 
 
@@ -225,20 +273,52 @@ def split_trajectories(
     return np.cumsum(cut)
 
 
+#: A rest: all positions stay within this share of their range for as long as a rest is long.
+STILL = 2e-3
+
+
 def _rest_middles(
     time: np.ndarray, trajectory: np.ndarray, position: np.ndarray, dwell: float
 ) -> list[int]:
-    """Rows in the middle of rests: no joint moves by more than 1e-4 of its range per step."""
-    span = np.ptp(position, axis=0)
-    still = np.all(np.abs(np.diff(position, axis=0)) <= 1e-4 * span + 1e-12, axis=1)
-    still &= trajectory[1:] == trajectory[:-1]
-    edges = np.flatnonzero(np.diff(np.r_[0, still.astype(int), 0]))
+    """Rows in the middle of rests: for at least ``dwell`` s no joint leaves its band of noise.
+
+    The band, and not the step from row to row, tells a rest with a noisy encoder from slow motion.
+    """
+    if len(time) < 3:
+        return []
+    # second differences are nearly all noise: their median size is 1.65 of its deviation
+    noise = np.median(np.abs(np.diff(position, n=2, axis=0)), axis=0) / 1.65
+    band = STILL * np.ptp(position, axis=0) + 8 * noise + 1e-12
     middles = []
-    for first, last in zip(edges[::2], edges[1::2], strict=True):
-        touches_border = first == 0 or last == len(time) - 1
-        if time[last] - time[first] >= dwell and not touches_border:
-            middles.append(int(first + last + 1) // 2)
+    borders = np.flatnonzero(np.diff(trajectory)) + 1
+    for first, last in zip(np.r_[0, borders], np.r_[borders, len(time)], strict=True):
+        t, q = time[first:last], position[first:last]
+        ends = np.searchsorted(t, t + dwell - 1e-9)  # first row that is a rest away from each
+        still = np.zeros(len(t) + 1, dtype=np.int64)
+        for begin in np.flatnonzero(_stays(q, ends, band)):
+            still[begin] += 1
+            still[ends[begin] + 1] -= 1
+        resting = np.cumsum(still)[:-1] > 0
+        edges = np.flatnonzero(np.diff(np.r_[0, resting.astype(int), 0]))
+        middles += [
+            int(first + (begin + end) // 2)
+            for begin, end in zip(edges[::2], edges[1::2], strict=True)
+            if begin > 0 and end < len(t)  # a rest at the border cuts nothing
+        ]
     return middles
+
+
+def _stays(q: np.ndarray, ends: np.ndarray, band: np.ndarray) -> np.ndarray:
+    """Whether all joints stay in their bands from each row to the row where its rest would end."""
+    stays = ends < len(q)
+    length = np.minimum(ends, len(q) - 1) - np.arange(len(q)) + 1
+    size = int(np.median(length)) if len(length) else 1
+    for j in range(q.shape[1]):
+        # windows of the usual length; uneven clocks make a rest a little shorter or longer
+        high = maximum_filter1d(q[:, j], size, origin=-((size - 1) // 2))
+        low = minimum_filter1d(q[:, j], size, origin=-((size - 1) // 2))
+        stays &= high - low <= band[j]
+    return stays
 
 
 def derive_velocity(position: np.ndarray, time: np.ndarray, trajectory: np.ndarray) -> np.ndarray:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
@@ -11,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from skidyn._checks import warn_about_log
 from skidyn._exceptions import LogError
 from skidyn._optional import import_optional
 from skidyn.datasets._log_files import Channel, check_size, of_one_length, table_from_arrays
@@ -18,13 +20,12 @@ from skidyn.datasets._log_names import SPELLINGS
 
 
 def read_hdf5_channels(path: Path, max_bytes: int, topics: Sequence[str] | None) -> list[Channel]:
-    """Read an HDF5 file: each group with numeric datasets is a channel.
+    """Read an HDF5 file: each group with numeric datasets, and each table, is a channel.
 
-    A group without a clock uses the one of the root when lengths agree.
+    A group without a clock uses that of a group within, or of the root, when lengths agree. Groups
+    that all hold the same columns, and the elements of a struct array of MATLAB, are trajectories.
     """
     h5py = import_optional("h5py", extra="io")
-    groups: dict[str, dict[str, np.ndarray]] = {}
-    names: list[str] = []
     try:
         file = h5py.File(path, "r")
     except OSError as error:
@@ -33,33 +34,31 @@ def read_hdf5_channels(path: Path, max_bytes: int, topics: Sequence[str] | None)
         datasets: list[Any] = []
         file.visititems(lambda _, item: datasets.append(item) if hasattr(item, "shape") else None)
         check_size(path, sum(item.nbytes for item in datasets), max_bytes)
-        for item in datasets:
-            group, _, name = item.name.strip("/").rpartition("/")
-            if name == "joint_names":
-                names = [n.decode() if isinstance(n, bytes) else str(n) for n in item[()]]
-            elif item.ndim in (1, 2) and item.dtype.kind in "fiub":
-                groups.setdefault(group, {})[name] = _samples_first(item[()])
-    root = groups.get("", {})
-    clock = next((root[name] for name in root if name.lower() in SPELLINGS["time"]), None)
+        groups, names = _numeric_groups(file, datasets)
+    clocks = {g: arrays[n] for g, arrays in groups.items() for n in arrays if _is_clock(n)}
     channels = []
     for group, arrays in groups.items():
         if topics is not None and group not in topics and f"/{group}" not in topics:
             continue
         columns = of_one_length(arrays, f"{path}/{group}")
-        if clock is not None and not any(name.lower() in SPELLINGS["time"] for name in columns):
-            if len(clock) == len(next(iter(columns.values()))):
-                columns["time"] = clock.reshape(-1)
-        if group == "" and len(groups) > 1 and set(columns) <= set(SPELLINGS["time"]):
-            continue  # nothing but the clock that the groups share
+        if not any(map(_is_clock, columns)):
+            # that of a group within, such as "header", or that of the root
+            length = len(next(iter(columns.values())))
+            near = [c for g, c in clocks.items() if g == "" or g.startswith(f"{group}/")]
+            if fitting := [c for c in near if len(c) == length]:
+                columns["time"] = fitting[-1].reshape(-1)
         attributes = {"joint_names": names} if names else {}
         channels.append(Channel(group or path.name, table_from_arrays(columns), attributes))
     if not channels:
         raise LogError(f"{path}: no numeric datasets{_asked(topics, list(groups))}.")
-    return channels
+    return _runs(_with_clock(channels, path), path)
 
 
 def read_matlab_channels(path: Path, max_bytes: int, topics: Sequence[str] | None) -> list[Channel]:
-    """Read a MATLAB file: variables of one length, also inside one level of structs."""
+    """Read a MATLAB file: variables of one length, also inside one level of structs.
+
+    The elements of a struct array, or of a cell array of structs, are trajectories.
+    """
     check_size(path, path.stat().st_size, max_bytes)
     with path.open("rb") as file:
         head = file.read(128)
@@ -73,21 +72,119 @@ def read_matlab_channels(path: Path, max_bytes: int, topics: Sequence[str] | Non
         variables = loadmat(path, simplify_cells=True)
     except (MatReadError, ValueError, TypeError) as error:
         raise LogError(f"{path}: not a MATLAB file: {error}") from error
-    arrays: dict[str, np.ndarray] = {}
+    own: dict[str, np.ndarray] = {}
+    groups: dict[str, dict[str, np.ndarray]] = {"": own}
     names: list[str] = []
     for name, value in variables.items():
         if name.startswith("__"):
             continue
-        fields = value if isinstance(value, Mapping) else {name: value}
-        for key, item in fields.items():
-            array = np.asarray(item)
-            if key == "joint_names":
-                names = [str(n).strip() for n in np.atleast_1d(array)]
-            elif array.ndim in (1, 2) and array.dtype.kind in "fiub":
-                arrays[key] = _samples_first(array)
-    columns = of_one_length(arrays, str(path))
+        for k, fields in enumerate(_structs(value) or [{name: value}]):
+            runs = len(_structs(value)) > 1
+            arrays = groups.setdefault(f"{name}({k + 1})", {}) if runs else own
+            for key, item in fields.items():
+                array = np.asarray(item)
+                if key == "joint_names":
+                    names = [str(n).strip() for n in np.atleast_1d(array)]
+                elif array.ndim in (1, 2) and array.dtype.kind in "fiub":
+                    arrays[key] = _samples_first(array)
+    filled = {name: arrays for name, arrays in groups.items() if arrays}
+    if not filled:
+        raise LogError(
+            f"{path}: holds no numeric columns. Variables, structs of one level and arrays of such "
+            "structs are read; tables and objects of MATLAB are not (use table2struct)."
+        )
     attributes = {"joint_names": names} if names else {}
-    return [Channel(path.name, table_from_arrays(columns), attributes)]
+    channels = [
+        Channel(name or path.name, table_from_arrays(of_one_length(arrays, str(path))), attributes)
+        for name, arrays in filled.items()
+    ]
+    return _runs(_with_clock(channels, path), path)
+
+
+def _structs(value: Any) -> list[Mapping[str, Any]]:
+    """Structs of a variable of MATLAB: itself, or its elements; none for numbers."""
+    if isinstance(value, Mapping):
+        return [value]
+    if isinstance(value, np.ndarray) and value.dtype == object:
+        value = list(value.reshape(-1))
+    if isinstance(value, list) and value and all(isinstance(v, Mapping) for v in value):
+        return value
+    return []
+
+
+def _numeric_groups(
+    file: Any, datasets: Sequence[Any]
+) -> tuple[dict[str, dict[str, np.ndarray]], list[str]]:
+    """Numeric arrays of an HDF5 file by group, and the names of joints."""
+    groups: dict[str, dict[str, np.ndarray]] = {}
+    names: list[str] = []
+    for item in datasets:
+        group, _, name = item.name.strip("/").rpartition("/")
+        if group.startswith("#") or item.attrs.get("MATLAB_class", b"") == b"char":
+            continue  # where MATLAB keeps the contents of cells; text
+        if name == "joint_names":
+            names = [_text(file, n) for n in np.ravel(item[()])]
+        elif item.dtype.names is not None and item.ndim == 1:
+            table = item[()]
+            fields = {field: table[field] for field in table.dtype.names}
+            groups[item.name.strip("/")] = {
+                k: a for k, a in fields.items() if a.dtype.kind in "fiub"
+            }
+        elif item.dtype.kind == "O" and "MATLAB_class" not in item.attrs:
+            for k, reference in enumerate(np.ravel(item[()])):  # a field of a struct array
+                part = file[reference] if reference else None
+                if part is not None and hasattr(part, "dtype") and part.dtype.kind in "fiub":
+                    run = groups.setdefault(f"{group}({k + 1})", {})
+                    run[name] = _samples_first(part[()])
+        elif item.ndim in (1, 2) and item.dtype.kind in "fiub":
+            groups.setdefault(group, {})[name] = _samples_first(item[()])
+    return {name: arrays for name, arrays in groups.items() if arrays}, names
+
+
+def _text(file: Any, value: Any) -> str:
+    """Text of an element: bytes, text, or what a cell of MATLAB refers to."""
+    if isinstance(value, bytes):
+        return value.decode()
+    if hasattr(value, "typecode") or type(value).__name__ == "Reference":
+        return "".join(chr(int(c)) for c in np.ravel(file[value][()]))
+    return str(value)
+
+
+def _is_clock(name: str) -> bool:
+    return name.lower() in SPELLINGS["time"]
+
+
+def _with_clock(channels: list[Channel], path: Path) -> list[Channel]:
+    """Channels with a clock, where there are such: constants and settings have none."""
+    timed = [c for c in channels if any(_is_clock(str(name)) for name in c.table.columns)]
+    # a clock alone tells nothing
+    timed = [c for c in timed if len(c.table.columns) > 1] or timed
+    left = [c.name for c in channels if c not in timed]
+    if not timed or not left:
+        return channels
+    signals = [
+        c.name
+        for c in channels
+        if c.name in left and len(c.table) > 1 and not all(map(_is_clock, c.table.columns))
+    ]
+    if signals:
+        warn_about_log(f"{path}: without a clock and left out: {', '.join(signals)}")
+    return timed
+
+
+def _runs(channels: list[Channel], path: Path) -> list[Channel]:
+    """Channels that hold the same columns as one, each a trajectory."""
+    columns = {frozenset(c.table.columns) for c in channels}
+    if len(channels) == 1 or len(columns) > 1 or "trajectory" in next(iter(columns)):
+        return channels
+    pd = import_optional("pandas", extra="io")
+    ordered = sorted(channels, key=lambda c: [int(n) for n in re.findall(r"\d+", c.name)])
+    tables = [c.table.assign(trajectory=k) for k, c in enumerate(ordered)]
+    warn_about_log(
+        f"{path}: {', '.join(c.name for c in ordered)} hold the same columns; each is a trajectory"
+    )
+    table = pd.concat(tables, ignore_index=True)
+    return [Channel(path.name, table, ordered[0].attributes)]
 
 
 def _refuse_crash(path: Path) -> None:

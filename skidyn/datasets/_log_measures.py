@@ -32,6 +32,9 @@ def position_step(position: np.ndarray) -> float:
     step = float(np.median(smallest))
     if step < 0.8 * smallest[-1] or smallest[0] < 0.8 * step:
         return np.nan
+    largest = float(np.abs(position).max())
+    if step < 8 * np.finfo(np.float32).eps * largest and np.all(position == np.float32(position)):
+        return np.nan  # the step of the numbers in the file, not of the sensor
     multiples = gaps[gaps < 20 * step] / step
     whole = np.abs(multiples - np.round(multiples)) < 0.1
     return step if whole.mean() > 0.9 else np.nan

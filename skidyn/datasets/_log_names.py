@@ -9,19 +9,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from skidyn._exceptions import LogError
+from skidyn.datasets._units import split_unit
 
 #: Spellings of each quantity in recordings, compared in lower case without separators.
 SPELLINGS: dict[str, tuple[str, ...]] = {
     "q": ("q", "pos", "position", "positions", "jointposition", "jointpositions", "angle")
-    + ("actualq", "qactual", "qmeas", "jointangle"),
+    + ("actualq", "qactual", "qmeas", "qmeasured", "measuredq", "jointangle", "theta"),
     "dq": ("dq", "qd", "qdot", "vel", "velocity", "velocities", "jointvelocity", "jointvelocities")
-    + ("speed", "actualqd", "dqactual", "qdmeas"),
+    + ("speed", "actualqd", "dqactual", "qdmeas", "dqmeas", "dqmeasured", "omega"),
     "ddq": ("ddq", "qdd", "qddot", "acc", "acceleration", "accelerations", "jointacceleration"),
     "tau": ("tau", "torque", "torques", "effort", "efforts", "jointtorque", "jointtorques", "trq")
-    + ("tauj", "jointeffort", "actualtorque"),
+    + ("tauj", "jointeffort", "actualtorque", "taumeas", "taumeasured", "measuredtorque"),
     "i": ("i", "current", "currents", "motorcurrent", "actualcurrent", "jointcurrent"),
     "temp": ("temp", "temperature", "temperatures", "jointtemperature", "motortemperature"),
-    "time": ("time", "t", "timestamp", "stamp", "times", "timesec", "timeseconds"),
+    "time": ("time", "t", "timestamp", "stamp", "times", "timesec", "timeseconds")
+    + ("elapsed", "elapsedtime", "timefromstart"),
     "trajectory": ("trajectory", "traj", "run", "episode", "trajectoryid"),
 }
 #: Quantities with one column per joint, in the order of the columns of a log.
@@ -42,11 +44,14 @@ class NameMatch:
         Joints in column order.
     notes : list of str
         What was decided on the way and deserves telling.
+    units : dict of str to (str, str)
+        Column of the source and the unit that its header states, per name in the log.
     """
 
     columns: dict[str, str] = field(default_factory=dict)
     joint_names: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    units: dict[str, tuple[str, str]] = field(default_factory=dict)
 
 
 def match_names(
@@ -107,6 +112,10 @@ def match_names(
         )
     if not match.joint_names:
         match.joint_names = list(robot_joints or [str(k + 1) for k in range(n)])
+    for target, name in match.columns.items():
+        unit = split_unit(str(name))[1]
+        if unit is not None:
+            match.units[target] = (str(name), unit)
     return match
 
 
@@ -200,7 +209,7 @@ def _parse(name: str) -> tuple[str | None, int | None, str | None]:
     >>> _parse("panda_joint1/position"), _parse("volts")
     (('q', None, 'panda_joint1'), (None, None, None))
     """
-    parts = [part for part in re.split(r"[/.]", name.strip()) if part]
+    parts = [part for part in re.split(r"[/.]", split_unit(name.strip())[0]) if part]
     tail = parts[-1] if parts else ""
     words = tail.strip("[]")
     if _plain(words) in _QUANTITY_OF and not words[-1:].isdigit():

@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+import json
 import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -19,14 +21,15 @@ Message = tuple[str, str, int, Any]
 
 
 def read_mcap_channels(path: Path, max_bytes: int, topics: Sequence[str] | None) -> list[Channel]:
-    """Read the joint states of an MCAP file with ROS 2 messages."""
+    """Read the joint states of an MCAP file with messages of ROS 2 or in JSON."""
     reader = import_optional("mcap.reader", extra="io")
     decoder = import_optional("mcap_ros2.decoder", extra="io")
     exceptions = import_optional("mcap.exceptions", extra="io")
     check_size(path, path.stat().st_size, max_bytes)
     try:
         with path.open("rb") as file:
-            source = reader.make_reader(file, decoder_factories=[decoder.DecoderFactory()])
+            decoders = [decoder.DecoderFactory(), _JsonDecoderFactory()]
+            source = reader.make_reader(file, decoder_factories=decoders)
             summary = source.get_summary()
             held = {}
             if summary is not None:  # an unfinished file has none; then every message is decoded
@@ -38,8 +41,18 @@ def read_mcap_channels(path: Path, max_bytes: int, topics: Sequence[str] | None)
                 for schema, channel, message, decoded in source.iter_decoded_messages(topics=wanted)
             )
             return _channels(messages, path, topics)
-    except exceptions.McapError as error:
+    except (exceptions.McapError, json.JSONDecodeError) as error:
         raise LogError(f"{path}: cannot be read as MCAP: {error}") from error
+
+
+class _JsonDecoderFactory:
+    """Messages in JSON as objects with attributes, like those of ROS."""
+
+    def decoder_for(self, encoding: str, schema: Any) -> Any:
+        """Decoder of an encoding, None for others than JSON."""
+        if encoding != "json":
+            return None
+        return lambda data: json.loads(data, object_hook=lambda fields: SimpleNamespace(**fields))
 
 
 def read_bag_channels(path: Path, max_bytes: int, topics: Sequence[str] | None) -> list[Channel]:
@@ -110,7 +123,7 @@ def _channels(
     messages: Iterator[Message], path: Path, topics: Sequence[str] | None
 ) -> list[Channel]:
     """One channel per topic and set of joints; times in s from the first message."""
-    rows: dict[tuple[str, tuple[str, ...]], list[tuple[int, dict[str, float]]]] = {}
+    rows: dict[tuple[str, frozenset[str]], list[tuple[int, dict[str, float]]]] = {}
     for topic, kind, recorded, message in messages:
         if topics is not None and topic not in topics:
             continue
@@ -120,13 +133,14 @@ def _channels(
             values = dict(_numbers(message, ""))
         else:
             continue
-        key = topic, tuple(values)
+        key = topic, frozenset(values)  # joints may come in another order with every message
         rows.setdefault(key, []).append((_stamp(message, recorded), values))
     if not rows:
         raise LogError(f"{path} holds no messages to read.")
     start = min(stamps[0][0] for stamps in rows.values())
     channels = []
-    for (topic, names), samples in rows.items():
+    for (topic, _), samples in rows.items():
+        names = list(samples[0][1])
         samples.sort(key=lambda sample: sample[0])
         columns = {name: np.array([values[name] for _, values in samples]) for name in names}
         columns["time"] = np.array([stamp - start for stamp, _ in samples]) * 1e-9
@@ -163,7 +177,8 @@ def _numbers(message: Any, prefix: str) -> Iterator[tuple[str, float]]:
         for k, item in enumerate(message):
             yield from _numbers(item, f"{prefix}[{k}]")
     elif not isinstance(message, (str, bytes)):
-        fields = getattr(message, "__dataclass_fields__", getattr(message, "__slots__", ()))
+        own = vars(message) if isinstance(message, SimpleNamespace) else ()
+        fields = getattr(message, "__dataclass_fields__", getattr(message, "__slots__", own))
         for name in tuple(fields):
             if not name.startswith("_") and name not in ("header", "layout"):
                 dotted = f"{prefix}.{name}" if prefix else name

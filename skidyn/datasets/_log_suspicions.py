@@ -26,9 +26,12 @@ def clock_suspicions(
     """Gaps, jitter, slow sampling, repeated rows, a single trajectory."""
     messages = []
     if clock["rate"] < 2:
+        # the unit in which a robot would have been sampled at a usual rate
+        usual = [unit for factor, unit in CLOCKS.items() if 20 <= clock["rate"] * factor <= 2e4]
+        unit = usual[0] if usual else "ms"
         messages.append(
-            f"the median time step is {1 / clock['rate']:.4g} s: time may be in milliseconds "
-            "(units={'time': 'ms'})."
+            f"the median time step is {1 / clock['rate']:.4g} s: time may be in {unit} "
+            f"(units={{'time': '{unit}'}})."
         )
     elif clock["rate"] < 20:
         messages.append(

@@ -29,7 +29,7 @@ from skidyn.datasets._log_clock import (
 )
 from skidyn.datasets._log_files import Channel
 from skidyn.datasets._log_names import NameMatch, match_names
-from skidyn.datasets._units import convert_units
+from skidyn.datasets._units import convert_units, refuse_stated_units
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -87,6 +87,7 @@ def build_table(
         columns=options.columns,
         source=source,
     )
+    refuse_stated_units(match.units, options.units or {}, source)
     tables = [_renamed(channel, match, source, options) for channel in channels]
     _refuse_unused_units(tables, options.units or {}, source)
     table = align_channels(tables, [c.name for c in channels], options.resample_rate, match.notes)

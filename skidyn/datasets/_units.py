@@ -30,7 +30,68 @@ FACTORS: dict[str, dict[str, float]] = {
     "time": _TIME,
     "temp": {"C": 1.0, "K": 1.0, "F": 5 / 9},
 }
+#: Other spellings of units in the headers of tables, compared in lower case without blanks.
+_SPELLED = {
+    **{"°": "deg", "degree": "deg", "degrees": "deg", "radian": "rad", "radians": "rad"},
+    **{"°/s": "deg/s", "rad/sec": "rad/s", "deg/sec": "deg/s"},
+    **{"rad/s2": "rad/s^2", "rad/s²": "rad/s^2", "deg/s2": "deg/s^2", "m/s2": "m/s^2"},
+    **{"n·m": "Nm", "n.m": "Nm", "sec": "s", "secs": "s", "second": "s", "seconds": "s"},
+    **{"msec": "ms", "millisecond": "ms", "milliseconds": "ms", "µs": "us", "usec": "us"},
+    **{"amp": "A", "amps": "A", "ampere": "A", "°c": "C", "celsius": "C", "kelvin": "K"},
+}
+_KNOWN = {unit.lower().replace(" ", ""): unit for units in FACTORS.values() for unit in units}
 _TEMPERATURE_ZERO = {"C": 0.0, "K": 273.15, "F": 32.0}
+
+
+def split_unit(name: str) -> tuple[str, str | None]:
+    """Name of a column without the unit that stands behind it in brackets, and that unit.
+
+    >>> split_unit("q1 [deg]"), split_unit("Time (ms)"), split_unit("q[1]"), split_unit("q (raw)")
+    (('q1', 'deg'), ('Time', 'ms'), ('q[1]', None), ('q (raw)', None))
+    """
+    hit = re.fullmatch(r"(.*?)[ _]*[\[(]([^\[\]()]*)[\])] *", name)
+    if hit is None or not hit[1]:
+        return name, None
+    plain = hit[2].strip()
+    word = plain.lower().replace(" ", "")
+    # mNm and MNm differ by case alone, so the unit as it is written goes first
+    exact = next((u for units in FACTORS.values() for u in units if u == plain), None)
+    unit = exact or _SPELLED.get(word) or _KNOWN.get(word)
+    return (hit[1], unit) if unit else (name, None)
+
+
+def refuse_stated_units(
+    stated: Mapping[str, tuple[str, str]], units: Mapping[str, str], source: str
+) -> None:
+    """Refuse columns whose header states a unit that is not SI, until it is asked to convert them.
+
+    Parameters
+    ----------
+    stated : mapping
+        Column of the source and its unit, per column of the log.
+    units : mapping of str to str
+        What is to be converted.
+    source : str
+        Name of the file for messages.
+
+    Raises
+    ------
+    LogError
+        With the ``units`` to pass.
+    """
+    wanted: dict[str, str] = {}
+    example = ""
+    for target, (name, unit) in stated.items():
+        quantity = re.sub(r"\d+$", "", target)
+        factor = FACTORS.get(quantity, {}).get(unit)
+        if factor is None or (factor == 1 and unit != "K") or {target, quantity} & set(units):
+            continue
+        wanted[quantity if wanted.get(quantity, unit) == unit else target] = unit
+        example = example or f"column {name!r} states {unit}"
+    if wanted:
+        raise LogError(
+            f"{source}: {example}; a log is in SI units. To convert it, pass units={wanted}."
+        )
 
 
 def convert_units(frame: pd.DataFrame, units: Mapping[str, str]) -> pd.DataFrame:

@@ -243,6 +243,19 @@ def test_units_are_converted_on_request(tmp_path):
         read_log(tmp_path / "log.csv", units={"q": "grad"})
 
 
+def test_units_that_a_header_states_must_be_asked_for(tmp_path):
+    source = table()
+    stated = source.rename(columns={"time": "Time [ms]", "q1": "q1 (deg)", "q2": "q2 (deg)"})
+    stated["Time [ms]"] *= 1000
+    stated[["q1 (deg)", "q2 (deg)"]] = np.rad2deg(source[["q1", "q2"]])
+    stated.to_csv(tmp_path / "log.csv", index=False)
+    wanted = r"'Time \[ms\]' states ms.* pass units={'time': 'ms', 'q': 'deg'}"
+    with pytest.raises(LogError, match=wanted):
+        read_log(tmp_path / "log.csv")
+    frame = quiet_read(tmp_path / "log.csv", units={"time": "ms", "q": "deg"})
+    assert_same(frame, source)
+
+
 @pytest.mark.parametrize(
     "names",
     [

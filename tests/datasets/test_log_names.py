@@ -43,6 +43,22 @@ def test_actual_and_indexed_names():
     assert matched(["Actual Torque 1"]) == {"tau1": "Actual Torque 1"}
 
 
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["time [s]", "q1 [rad]", "dq1 [rad/s]", "tau1 [Nm]"],
+        ["Time (sec)", "Pos 1 (rad)", "Vel 1 (rad/s)", "Torque 1 (N m)"],
+        ["time_from_start", "theta1", "omega1", "tau_meas_1"],
+    ],
+)
+def test_headers_with_units_and_other_words(names):
+    assert matched(names) == dict(zip(["time", "q1", "dq1", "tau1"], names, strict=True))
+
+
+def test_a_clock_in_two_columns_is_not_taken_for_one():
+    assert "time" not in matched(["sec", "nanosec", "q1"])
+
+
 def test_said_goes_before_guessed():
     columns = {"q1": "alpha", "time": "clock"}
     assert matched(["time", "clock", "alpha", "q1"], columns=columns) == {
