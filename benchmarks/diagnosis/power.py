@@ -151,7 +151,8 @@ def draw(table: Table, path: str) -> None:
         axis.set_xticks([0.05, 0.1, 0.2, 0.5, 1, 2], ["0.05", "0.1", "0.2", "0.5", "1", "2"])
         axis.minorticks_off()
         axis.grid(alpha=0.3)
-    axes[1, 0].legend(title="length of the log", loc="lower right")
+    lines = axes[0, 0].get_legend_handles_labels()
+    figure.legend(*lines, loc="lower right", ncols=2, frameon=False)  # clear of every curve
     figure.supxlabel("size of the effect over the noise (root mean squares)")
     figure.supylabel("share of right answers")
     figure.tight_layout()
