@@ -113,6 +113,15 @@ def _forget_own_effects(gallery_conf: dict, file_name: str) -> None:
         unregister_effect(kind)
 
 
+def _colours_for_all(gallery_conf: dict, file_name: str) -> None:
+    """The colours of Okabe and Ito, which every common form of colour-blindness tells apart."""
+    from cycler import cycler
+    from matplotlib import rcParams
+
+    okabe_ito = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#17202a"]
+    rcParams["axes.prop_cycle"] = cycler(color=okabe_ito)
+
+
 _EFFECTS = set(list_effects())
-sphinx_gallery_conf["reset_modules"] = ("matplotlib", _forget_own_effects)
+sphinx_gallery_conf["reset_modules"] = ("matplotlib", _colours_for_all, _forget_own_effects)
 suppress_warnings = ["config.cache"]

@@ -81,7 +81,7 @@ def without_broken(motion: SmoothedMotion, logged: Signals, torque: Array) -> Sm
     """
     wrong = leaps(torque, logged, TORQUE_SHARE)
     # The torque of every joint depends on all positions.
-    position = leaps(logged.q, logged, POSITION_SHARE).any(1)
+    position = np.asarray(leaps(logged.q, logged, POSITION_SHARE).any(1))
     if position.any():
         position = binary_dilation(position, iterations=max(1, motion.half_width))
     valid = motion.valid & ~wrong & ~position[:, None]

@@ -92,7 +92,7 @@ class LSTMNetwork(nn.Module):
                 nn.init.xavier_uniform_(parameter, generator=generator)
         size = self.lstm.hidden_size
         with torch.no_grad():
-            self.lstm.bias_ih_l0[size : 2 * size] = 1.0
+            self.lstm.get_parameter("bias_ih_l0")[size : 2 * size] = 1.0
         self.dropout.generator = torch.Generator(device).manual_seed(seed)
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:

@@ -52,7 +52,7 @@ class _JointNetwork(nn.Module):
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         sizes = [self.n_features, self.n_joints, x.shape[-1] - self.n_features - self.n_joints]
-        features, torque, regressor = x.split(sizes, dim=-1)
+        features, torque, regressor = torch.split(x, sizes, dim=-1)
         regressor = regressor.reshape(*torque.shape, len(self.rigid_body))
         torque = torque + regressor @ self.rigid_body
         output = self.core(torch.cat([features, torque], dim=-1))

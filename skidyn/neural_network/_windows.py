@@ -43,7 +43,7 @@ def window_rows(
     return np.clip(wanted, first, last), (targets >= first) & (targets <= last)
 
 
-class WindowSet(torch.utils.data.Dataset):
+class WindowSet(torch.utils.data.Dataset[Any]):
     """Inputs, targets and weights of a log for every member of an ensemble, cut into windows.
 
     Parameters

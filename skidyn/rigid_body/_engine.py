@@ -274,7 +274,7 @@ class Engine:
         """The canonical model with its parameter maps as tensors."""
         import torch
 
-        maps = {
+        maps: dict[str, Any] = {
             name: torch.tensor(getattr(self.canonical, name), dtype=like.dtype, device=like.device)
             for name in ("kept", "moved", "reframed")
         }

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from skidyn.rigid_body._recursion import Program
 from skidyn.rigid_body._tape import operands
@@ -30,7 +30,7 @@ def evaluate(program: Program, inputs: dict[str, torch.Tensor]) -> torch.Tensor:
 
     columns = {name: tensor.unbind(-1) for name, tensor in inputs.items()}
     reference = inputs["q"]
-    functions = {
+    functions: dict[str, Any] = {
         "add": torch.add,
         "sub": torch.sub,
         "mul": torch.mul,
