@@ -27,6 +27,8 @@ from skidyn.rigid_body._log_det import pseudo_inertia as pseudo_inertia
 
 #: Least second moment of mass of a body about its centre, relative to its largest moment.
 THICKNESS = 1e-9
+#: Torque below this share of the torque of the bodies to start from counts as zero.
+ZERO = 1e-12
 #: Start of coefficients that must not be negative, in units in which the torque has unit size.
 ABOVE_ZERO = 1e-3
 
@@ -131,7 +133,9 @@ def make_consistent(
     linear = body_constraints(known, names, signs)
     n = bodies.size
     # In units in which target and columns of coefficients have unit size.
-    size = float(np.linalg.norm(target)) / np.sqrt(max(len(target), 1)) + 1e-300
+    # Zero torque has no size: a share of that of the bodies to start from takes its place.
+    own = [target, ZERO * (factor[:, :n] @ bodies.ravel())]
+    size = max(float(np.linalg.norm(t)) for t in own) / np.sqrt(max(len(target), 1)) or 1.0
     scale = np.ones(factor.shape[1])
     length = np.linalg.norm(factor[:, n:], axis=0) / size
     scale[n:] = np.where(length > 0, length, 1.0)

@@ -2,6 +2,7 @@
 import numpy as np
 
 from skidyn.datasets import load_panda, load_planar_arm
+from skidyn.rigid_body import find_base_parameters
 from skidyn.rigid_body._consistency import is_consistent, make_consistent
 from skidyn.rigid_body._log_det import from_pseudo_inertia, pseudo_inertia
 
@@ -46,3 +47,17 @@ def test_negative_friction_ends_at_zero():
         nominal, np.eye(21), target, np.array([1.0]), np.array([-1.0])
     )
     assert 0 <= coefficients[0] < 1e-3
+
+
+def test_zero_torque_has_bodies_too():
+    """One joint moves about a vertical axis, and nothing is measured: any bodies will do."""
+    robot = load_planar_arm()
+    base = find_base_parameters(robot)
+    factor = np.zeros((20, 22))
+    factor[:3, :20] = base.regrouping[:3]
+    factor[3, 20], factor[4, 21] = 1.0, 1.0
+    for size in (0.0, 1e-200):
+        parameters, friction = make_consistent(
+            robot.inertial_parameters, factor, np.full(20, size), np.ones(2), np.zeros(2)
+        )
+        assert is_consistent(parameters) and np.all(friction >= 0)
