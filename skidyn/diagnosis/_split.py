@@ -124,8 +124,17 @@ def _splits(kind: str, own: Array, names: NDArray[Any]) -> list[list[Any]]:
     away = own - np.median(own, axis=0)
     moved = away @ np.linalg.svd(away, full_matrices=False)[2][0]
     groups = _beyond_gaps(moved, names, sides=2)
-    # A payload adds mass, be it to most of the trajectories; a force acts in the smaller group.
-    return _beyond_gaps(own[:, 0], names, sides=1) + groups if kind == "payload" else groups
+    if kind != "payload":
+        return groups  # a force acts in the smaller group
+    # A payload adds mass, be it to most of the trajectories.
+    mass = own[:, 0]
+    lighter = [mass[inside].mean() < mass[~inside].mean() for inside in _members(groups, names)]
+    groups = [g for g, light in zip(groups, lighter, strict=True) if not light]
+    return _beyond_gaps(mass, names, sides=1) + groups
+
+
+def _members(groups: list[list[Any]], names: NDArray[Any]) -> list[NDArray[np.bool_]]:
+    return [np.isin(names, group) for group in groups]
 
 
 def _beyond_gaps(score: Array, names: NDArray[Any], sides: int) -> list[list[Any]]:
