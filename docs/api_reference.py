@@ -57,6 +57,7 @@ PAGES: tuple[Page, ...] = (
                     "is_consistent",
                     "make_consistent",
                     "regressor_from_evidence",
+                    "repetition_instruments",
                 ),
             ),
         ),

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from skidyn.rigid_body._consistency import is_consistent, make_consistent
     from skidyn.rigid_body._constraints import BodyConstraints
     from skidyn.rigid_body._from_evidence import regressor_from_evidence
+    from skidyn.rigid_body._instrumental import repetition_instruments
     from skidyn.rigid_body._rbd_regressor import RBDRegressor
     from skidyn.rigid_body._uncertainty import bootstrap_coefficients
 
@@ -23,6 +24,7 @@ __all__ = [
     "is_consistent",
     "make_consistent",
     "regressor_from_evidence",
+    "repetition_instruments",
 ]
 
 # The engine under a Robot lives in this package, and RBDRegressor stands on Robot: names are loaded
@@ -36,6 +38,7 @@ _HOMES = {
     "is_consistent": "skidyn.rigid_body._consistency",
     "make_consistent": "skidyn.rigid_body._consistency",
     "regressor_from_evidence": "skidyn.rigid_body._from_evidence",
+    "repetition_instruments": "skidyn.rigid_body._instrumental",
 }
 
 

@@ -16,15 +16,21 @@ identification, IEEE ICRA, 2956-2961.
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from scipy.stats import t as student_t
 
+from skidyn._exceptions import SkidynError
 from skidyn._signals import Array, Signals
 from skidyn.evidence._folded import left_out_coefficients
 from skidyn.evidence._problem import Fit, Problem, read_motion, regressor_rows
 from skidyn.rigid_body._regression import PASSES, Regression, Solution
+
+#: Names of the columns that hold motion.
+_MOTION = re.compile(r"d{0,2}q(\d+$|_)")
 
 
 def instrumental(regression: Regression, prior_std: float | None = None) -> Solution:
@@ -112,3 +118,69 @@ def durbin_wu_hausman(difference: Array, left_out: Array) -> dict[str, Array]:
         "std": std,
         "p_value": 2 * student_t.sf(statistic, max(1, n - 1)),
     }
+
+
+def repetition_instruments(X: Any, trajectory: str = "trajectory") -> Any:
+    """Instruments from a motion that was run several times.
+
+    The errors of the sensors differ from run to run, the motion does not: the mean of the other
+    runs is an instrument for each.
+
+    Parameters
+    ----------
+    X : DataFrame
+        Runs of one motion, each a trajectory with the same number of rows; pandas or polars.
+    trajectory : str, default="trajectory"
+        Column of the number of the run.
+
+    Returns
+    -------
+    DataFrame
+        Like X; positions, velocities and accelerations of every run are those of the mean of the
+        other runs.
+
+    Raises
+    ------
+    SkidynError
+        Fewer than two runs, or runs of different length.
+
+    See Also
+    --------
+    RBDRegressor : ``fit(X, y, instruments=...)`` with ``estimator="instrumental"``.
+
+    Notes
+    -----
+    A controller repeats a motion, and its own noise, only so far; what differs between runs beside
+    the noise of the sensors makes the instruments weaker, not wrong.
+
+    References
+    ----------
+    A. Janot, P.-O. Vandanjon, M. Gautier (2014), A generic instrumental variable approach for
+    industrial robot identification, IEEE Trans. Control Systems Technology 22(1), 132-145.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> X = pd.DataFrame({"trajectory": [0, 0, 1, 1], "q1": [1.0, 2.0, 3.0, 4.0]})
+    >>> repetition_instruments(X)["q1"].tolist()
+    [3.0, 4.0, 1.0, 2.0]
+    """
+    number = np.asarray(X[trajectory])
+    runs = [np.flatnonzero(number == name) for name in np.unique(number)]
+    lengths = sorted({len(rows) for rows in runs})
+    if len(runs) < 2 or len(lengths) > 1:
+        raise SkidynError(
+            f"{len(runs)} run(s) of {' and '.join(map(str, lengths))} rows; at least two of one "
+            "length are expected, cut to the same part of the motion"
+        )
+    names = [str(name) for name in X.columns if _MOTION.match(str(name))]
+    values = np.column_stack([np.asarray(X[name], dtype=float) for name in names])
+    stacked = np.array([values[rows] for rows in runs])
+    others = (stacked.sum(0) - stacked) / (len(runs) - 1)
+    for rows, mean in zip(runs, others, strict=True):
+        values[rows] = mean
+    columns = dict(zip(names, values.T, strict=True))
+    if hasattr(X, "assign"):
+        return X.assign(**columns)
+    frame = type(X)(columns)
+    return X.with_columns([frame[name] for name in names])

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.utils.metaestimators import available_if
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from skidyn._checks import warn_about_log
@@ -30,7 +31,7 @@ from skidyn.evidence._shapes import Gain, best_on_grid, refine_term
 from skidyn.evidence._streaming import evidence_of_signals, linear_terms
 from skidyn.rigid_body._base_parameters import find_base_parameters
 from skidyn.rigid_body._constraints import BodyConstraints
-from skidyn.rigid_body._estimators import Estimator, find_estimator
+from skidyn.rigid_body._estimators import ESTIMATORS, Estimator, find_estimator
 from skidyn.rigid_body._identifiability import condition_number
 from skidyn.rigid_body._instrumental import instrument_rows
 from skidyn.rigid_body._regression import Regression, Solution
@@ -42,6 +43,16 @@ from skidyn.robots import Robot
 ROUNDS = 3
 #: Groups of trajectories whose evidence partial_fit keeps apart, for standard errors.
 GROUPS = 20
+
+
+def _keeps_no_rows(model: RBDRegressor) -> bool:
+    """Whether evidence is enough for the estimator of a model."""
+    if getattr(ESTIMATORS.get(model.estimator), "rows", False):
+        raise AttributeError(
+            f"estimator={model.estimator!r} looks at single rows, which partial_fit does not keep; "
+            "use fit, or another estimator"
+        )
+    return True
 
 
 class RBDRegressor(Results, RegressorMixin, BaseEstimator):
@@ -249,6 +260,7 @@ class RBDRegressor(Results, RegressorMixin, BaseEstimator):
         self.bands_ = PredictionBands.calibrate(self, problem, fit, torque)
         return self
 
+    @available_if(_keeps_no_rows)
     def partial_fit(self, X: Any, y: Any) -> RBDRegressor:
         """Add a part of the data, and identify the model from all parts so far.
 
@@ -277,14 +289,11 @@ class RBDRegressor(Results, RegressorMixin, BaseEstimator):
             An effect with open shape parameters, or one whose columns depend on the fitted model.
             After a ``fit`` its shape parameters are kept.
         ValueError
-            A parameter has no meaning, or an estimator that needs all rows at once.
+            A parameter has no meaning.
+        AttributeError
+            The estimator, such as the robust one, looks at single rows, which are not kept.
         """
-        method = self._method()
-        if method.rows:
-            raise ValueError(
-                f"estimator={self.estimator!r} looks at single rows, which partial_fit does not "
-                "keep; use fit, or another estimator"
-            )
+        self._method()
         first = not hasattr(self, "evidence_")
         signals, torque = self._begin(X, y, first=first)
         given = self.effects if first else self.effect_terms_

@@ -2,12 +2,14 @@
 """What each estimator is for: broken rows, poor logs, noisy motion, data in parts."""
 
 import numpy as np
+import pandas as pd
+import polars
 import pytest
 
 from skidyn._exceptions import SkidynError
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.effects import Term
-from skidyn.rigid_body import RBDRegressor, is_consistent
+from skidyn.rigid_body import RBDRegressor, is_consistent, repetition_instruments
 from skidyn.rigid_body._estimators import ESTIMATORS
 
 ROBOT = load_planar_arm()
@@ -131,7 +133,7 @@ def test_parameters_without_meaning_are_refused():
             RBDRegressor(ROBOT, **wrong).fit(X, y)
     with pytest.raises(ValueError, match="takes no instruments"):
         RBDRegressor(ROBOT).fit(X, y, instruments=X)
-    with pytest.raises(ValueError, match="single rows"):
+    with pytest.raises(AttributeError):
         RBDRegressor(ROBOT, estimator="robust").partial_fit(X, y)
 
 
@@ -207,6 +209,26 @@ def test_clean_motion_needs_no_instruments():
         table = model.fit(X, y, instruments=other).durbin_wu_hausman()
         least.append(min(row["p_value"] for row in table) * len(table))
     assert np.median(least) > 0.05
+
+
+def test_runs_of_one_motion_are_instruments_of_each_other():
+    truth = np.random.default_rng(0).uniform(-2, 2, (400, 6))
+    y = ROBOT.inverse_dynamics(truth[:, :2], truth[:, 2:4], truth[:, 4:]) + 0.5 * truth[:, 2:4]
+    names = [f"{s}{j}" for s in ("q", "dq", "ddq") for j in (1, 2)]
+    rng = np.random.default_rng(1)
+    runs = [pd.DataFrame(truth + rng.normal(0, 0.4, truth.shape), columns=names) for _ in range(8)]
+    X = pd.concat([run.assign(trajectory=k) for k, run in enumerate(runs)], ignore_index=True)
+    torque = np.vstack([y] * 8)
+    torque += rng.normal(0, 0.1, torque.shape)
+    model = RBDRegressor(ROBOT, ("viscous",), estimator="instrumental")
+    model.fit(X, torque, instruments=repetition_instruments(X))
+    plain = RBDRegressor(ROBOT, ("viscous",)).fit(X, torque)
+    at = model.coef_names_.index("viscous.Fv[1]")
+    assert abs(model.coef_[at] - 0.5) < 0.02 < 0.04 < abs(plain.coef_[at] - 0.5)
+    same = repetition_instruments(polars.DataFrame(dict(X.items())))
+    np.testing.assert_allclose(same["dq2"].to_numpy(), repetition_instruments(X)["dq2"])
+    with pytest.raises(SkidynError, match="400 and 399 rows|399 and 400 rows"):
+        repetition_instruments(X.iloc[:-1])
 
 
 def test_instruments_of_other_rows_are_refused():

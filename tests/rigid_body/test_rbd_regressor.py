@@ -47,7 +47,11 @@ EXPECTED = {
 
 
 @parametrize_with_checks(
-    [AnyColumns(Robot.from_urdf(ONE_JOINT))], expected_failed_checks=lambda estimator: EXPECTED
+    [
+        AnyColumns(Robot.from_urdf(ONE_JOINT), estimator=name, consistent=name == "weighted")
+        for name in ("weighted", "robust", "entropic")
+    ],
+    expected_failed_checks=lambda estimator: EXPECTED,
 )
 def test_scikit_learn_contract(estimator, check):
     check(estimator)
