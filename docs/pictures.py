@@ -75,9 +75,15 @@ def opened(browser: Browser, address: str, height: int, scheme: str = "light") -
     return page
 
 
-def save(page: Page, name: str) -> None:
-    """Write what is seen as a PNG of 256 colours; the page is done with."""
-    picture = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+def save(page: Page, name: str, selector: str | None = None) -> None:
+    """Write what is seen, or a part of it, as a PNG of 256 colours; the page is done with."""
+    clip = None
+    if selector:
+        box = page.locator(selector).first.bounding_box()
+        assert box is not None
+        clip = {"x": box["x"] - 14, "y": box["y"] - 8, "width": box["width"] + 28,
+                "height": box["height"] + 20}  # fmt: skip
+    picture = Image.open(io.BytesIO(page.screenshot(clip=clip))).convert("RGB")
     picture.quantize(256, dither=Image.Dither.NONE).save(OUT / name, optimize=True)
     print(f"{name}: {(OUT / name).stat().st_size // 1024} kB")
     page.close()
@@ -91,7 +97,8 @@ def of_the_report(browser: Browser, path: Path) -> None:
     for scheme in ("light", "dark"):
         page = opened(browser, path.as_uri(), 900, scheme)
         page.wait_for_selector("#plots[data-view]")
-        bring(page, "#plots")
+        page.locator("fieldset label", has_text="panda_joint2").locator("input").uncheck()
+        bring(page, ".panel")
         box = page.locator("#panels .u-over").first.bounding_box()
         assert box is not None
         page.mouse.move(box["x"] + 0.26 * box["width"], box["y"] + 80)
@@ -99,7 +106,8 @@ def of_the_report(browser: Browser, path: Path) -> None:
         page.mouse.move(box["x"] + 0.42 * box["width"], box["y"] + 80)
         page.mouse.up()
         page.mouse.move(box["x"] + 0.62 * box["width"], box["y"] + 60)
-        save(page, f"report-{scheme}.png")
+        page.wait_for_timeout(300)
+        save(page, f"report-{scheme}.png", ".panel")
     page = opened(browser, path.as_uri(), 700)
     bring(page, "article.finding")
     save(page, "report-finding.png")
@@ -109,7 +117,7 @@ def bring(page: Page, selector: str) -> None:
     """Scroll something to the top, without the list of contents over it."""
     page.evaluate("document.querySelector('nav').remove()")
     page.evaluate("s => document.querySelector(s).scrollIntoView({behavior: 'instant'})", selector)
-    page.evaluate("scrollBy(0, 40)")
+    page.evaluate("scrollBy(0, 20)")
     page.wait_for_timeout(300)
 
 

@@ -80,8 +80,7 @@ class _Search:
         self.ripple = np.zeros_like(problem.torque)
         self.chosen: list[Candidate] = []
         self.findings: list[Hypothesis] = []
-        base = problem.fit(problem.terms, passes=3)
-        problem.with_fit(base)
+        base = problem.fit_own()
         self.fit = base
         self.pool = catalogue_candidates(problem, self.kinds)
         if nameless:

@@ -33,6 +33,8 @@ FEW_TRAJECTORIES, FEWEST_BLOCKS, MOST_FOLDS = 6, 8, 20
 #: Share of the smoother's half width that is left out around rest and reversals, and the samples
 #: left out where a model of hysteresis says what happens between the two.
 MARGIN, SHORT_MARGIN = 0.75, 1
+#: What effects may need that is known after a first fit only.
+_FED = {"load", "model_torque", "robot"}
 
 
 @dataclass(frozen=True)
@@ -174,6 +176,25 @@ class Problem:
             fit = _weighted(terms, design, target, fit.noise)
         return fit
 
+    def fit_own(self, passes: int = 3) -> Fit:
+        """Fit of the model as given, whose load and torque its own terms and others then know.
+
+        Parameters
+        ----------
+        passes : int, default=3
+            As in :meth:`fit`.
+
+        Returns
+        -------
+        Fit
+        """
+        free = [t for t in self.terms if not _FED & set(get_effect(t.kind).needs)]
+        if len(free) < len(self.terms):  # the others begin with the load of a model without them
+            self.with_fit(self.fit(free, passes=passes))
+        fit = self.fit(self.terms, passes=passes)
+        self.with_fit(fit)
+        return fit
+
     def inertial_parameters(self, fit: Fit) -> Array | None:
         """Rigid-body parameters of a fit: the URDF's with the base parameters corrected."""
         if self.robot is None:
@@ -235,7 +256,7 @@ class Problem:
         self._cache = {
             term: rows
             for term, rows in self._cache.items()
-            if not {"load", "model_torque", "robot"} & set(get_effect(term.kind).needs)
+            if not _FED & set(get_effect(term.kind).needs)
         }
 
 

@@ -107,8 +107,7 @@ class Session:
         self.problem = make_problem(
             signals, torque, robot=robot, rigid_body=identified, terms=terms
         )
-        base = self.problem.fit(terms, passes=3)
-        self.problem.with_fit(base)
+        base = self.problem.fit_own()
         self._target = self.problem.target
         self._pool = catalogue_candidates(self.problem, list_effects())
         self._ranking = Ranking(self.problem, self._pool, self._target)
