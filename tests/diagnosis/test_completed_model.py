@@ -3,19 +3,21 @@
 
 import pytest
 
-from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.datasets import load_planar_arm, load_ur5, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
 from skidyn.explorer import Session
 from skidyn.rigid_body import RBDRegressor
 
 
-@pytest.mark.parametrize("kind", ["load_dependent_friction", "torque_gain"])
-def test_a_completed_model_is_complete(kind):
+@pytest.mark.parametrize(
+    ("load", "kind"), [(load_planar_arm, "load_dependent_friction"), (load_ur5, "torque_gain")]
+)
+def test_a_completed_model_is_complete(load, kind):
     """Also where the effect's columns need the load or the torque of the model itself."""
-    log = make_hidden_effect_log(load_planar_arm(), kind, joints=[1])
+    log = make_hidden_effect_log(load(), kind, joints=[2])
     model = RBDRegressor(log.robot, ("viscous", "coulomb"))
     first = diagnose(model, log.X, log.y)
-    assert [(f.kind, f.joints) for f in first.findings] == [(kind, (1,))]
+    assert [(f.kind, f.joints) for f in first.findings] == [(kind, (2,))]
     completed = model.with_effects(first.findings[0].terms)
     second = diagnose(completed, log.X, log.y)
     assert second.verdict == "complete"
