@@ -21,5 +21,5 @@ def test_a_completed_model_is_complete(load, kind):
     completed = model.with_effects(first.findings[0].terms)
     second = diagnose(completed, log.X, log.y)
     assert second.verdict == "complete"
-    assert second.rmse_before == pytest.approx(first.rmse_after, rel=0.02)
+    assert second.rmse_before == pytest.approx(first.rmse_after, rel=0.1)
     assert Session(completed, log.X, log.y).history[0]["rmse"] is not None
