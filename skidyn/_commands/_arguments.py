@@ -26,6 +26,11 @@ def with_log_only(parser: Any, urdf_required: bool = True) -> None:
     parser.add_argument(
         "--urdf", required=urdf_required, metavar="URDF", help="description of the robot"
     )
+    with_reading(parser)
+
+
+def with_reading(parser: Any) -> None:
+    """How the columns of logs are to be read."""
     parser.add_argument(
         "--columns", metavar="JSON", help="which columns hold which signals (see Data in the guide)"
     )

@@ -7,17 +7,22 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from skidyn._commands._arguments import command
-from skidyn._commands._input import read_robot
+from skidyn._commands._arguments import command, with_reading
+from skidyn._commands._input import json_option, read_model_and_log, read_robot
 from skidyn._commands._output import print_json, working
+from skidyn._exceptions import SkidynError
 
 DESCRIPTION = """\
 Design a motion from which the parameters of a robot can be told, within its limits.
 
   skidyn excite --urdf robot.urdf --out motion.csv --duration 20
+  skidyn excite --urdf robot.urdf --recorded run1.csv --out next.csv
+  skidyn excite --urdf robot.urdf --limits '{"workspace": [[-1, 1], [-1, 1], [0.1, 2]]}' ...
 
-The motion is a Fourier series on every joint that starts and ends at rest. Positions, velocities
-and torques keep the limits of the URDF. Play it on the robot, log it, then: skidyn diagnose.
+Every joint starts and ends at rest. Positions, velocities and torques keep the limits of the URDF,
+or those of --limits. With --recorded, the motion adds to what these logs tell, and the torque
+limits hold for the model that is fitted to them, friction included. Collisions are not looked at:
+try the motion slowly. Play it on the robot, log it, then: skidyn diagnose.
 """
 
 
@@ -25,10 +30,21 @@ def add_parser(commands: Any) -> None:
     """Add the command to the parser."""
     parser = command(commands, "excite", run, "design a motion for identification", DESCRIPTION)
     parser.add_argument("--urdf", required=True, help="description of the robot")
-    parser.add_argument("--joints", help="joints that move, separated by commas (default: all)")
     parser.add_argument("--out", required=True, metavar="CSV", help="motion to write")
     parser.add_argument("--duration", type=float, default=20.0, help="s (default: %(default)s)")
-    parser.add_argument("--rate", type=float, default=100.0, help="Hz (default: %(default)s)")
+    parser.add_argument(
+        "--sampling",
+        type=float,
+        default=100.0,
+        metavar="HZ",
+        help="samples of the motion per second (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--motion",
+        choices=("fourier", "quintic"),
+        default="fourier",
+        help="Fourier series, or quintics between points (default: %(default)s)",
+    )
     parser.add_argument(
         "--frequency", type=float, default=0.1, help="first harmonic, Hz (default: %(default)s)"
     )
@@ -38,26 +54,54 @@ def add_parser(commands: Any) -> None:
         default="determinant",
         help="what is made best (default: %(default)s)",
     )
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument(
+        "--limits",
+        metavar="JSON",
+        help="position, velocity, acceleration, torque by joint; workspace, a box in m",
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of the random starts")
+    parser.add_argument(
+        "--recorded", nargs="+", metavar="LOG", help="recordings already made, one or more files"
+    )
+    parser.add_argument(
+        "--model",
+        default="rigid_body,viscous,coulomb",
+        help="what is fitted to the recordings (default: %(default)s)",
+    )
+    with_reading(parser)
 
 
 def run(options: argparse.Namespace) -> None:
     """Run the command."""
-    from skidyn.excitation import design_excitation
+    from skidyn.excitation import MotionLimits, design_excitation
 
-    robot = read_robot(options)
+    given = json_option("limits", options.limits) or {}
+    known = tuple(MotionLimits.__dataclass_fields__)
+    if not isinstance(given, dict) or not set(given) <= set(known):
+        raise SkidynError(f"--limits is {options.limits}; expected an object of {', '.join(known)}")
+    model: Any = read_robot(options)
+    recorded: Any = ()
+    if options.recorded:
+        options.logs, options.nominal = options.recorded, False
+        model, recorded, tau = read_model_and_log(options)
+        with working("Identifying", options):
+            model.fit(recorded, tau)
     with working("Designing the motion", options):
         excitation = design_excitation(
-            robot,
+            model,
             duration=options.duration,
+            motion=options.motion,
             base_frequency=options.frequency,
             criterion=options.criterion,
+            limits=MotionLimits(**given),
+            recorded=recorded,
             random_state=options.seed,
         )
-    excitation.to_csv(options.out, options.rate)
+    excitation.to_csv(options.out, options.sampling)
     path = str(Path(options.out).resolve())
     if options.json:
         print_json({"condition_number": excitation.condition_number, "csv": path})
         return
-    print(f"condition number of the base regressor: {excitation.condition_number:.3g}")
+    together = ", recordings included" if options.recorded else ""
+    print(f"condition number of the base regressor{together}: {excitation.condition_number:.3g}")
     print(f"written: {path}")

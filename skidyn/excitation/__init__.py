@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Excitation: motions from which the parameters of a robot can be told."""
 
-from skidyn.excitation._design import Excitation, MotionLimits, design_excitation
+from skidyn.excitation._design import design_excitation
+from skidyn.excitation._excitation import Excitation
+from skidyn.excitation._limits import MotionLimits
 
 __all__ = [
     "Excitation",

@@ -12,8 +12,8 @@ import numpy as np
 
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Signals
+from skidyn._symbols import Instant, SymbolicRobot, symbols
 from skidyn.effects import Term, get_effect
-from skidyn.export._symbols import Instant, SymbolicRobot, symbols
 from skidyn.rigid_body import RBDRegressor
 from skidyn.rigid_body._numpy import BoundProgram, evaluate_rows
 from skidyn.rigid_body._recursion import Program

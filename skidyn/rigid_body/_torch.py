@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import operator
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from skidyn.rigid_body._recursion import Program
@@ -18,7 +20,6 @@ def evaluate(program: Program, inputs: dict[str, torch.Tensor]) -> torch.Tensor:
     Parameters
     ----------
     program : Program
-        Of a rigid body; the operations that only effects need are not among its functions.
     inputs : dict of str to Tensor
         Signals of shape (N, n); ``"parameter"`` has shape (n,).
 
@@ -37,6 +38,14 @@ def evaluate(program: Program, inputs: dict[str, torch.Tensor]) -> torch.Tensor:
         "neg": torch.neg,
         "sin": torch.sin,
         "cos": torch.cos,
+        "tanh": torch.tanh,
+        "exp": torch.exp,
+        "sqrt": torch.sqrt,
+        "abs": torch.abs,
+        "sign": torch.sign,
+        "div": torch.div,
+        "pow": torch.pow,
+        "max": _maximum,
     }
     values: dict[int, torch.Tensor | float] = {}
     for index in program.tape.live(program.outputs.values()):
@@ -45,10 +54,10 @@ def evaluate(program: Program, inputs: dict[str, torch.Tensor]) -> torch.Tensor:
             values[index] = node[1]
         elif node[0] == "input":
             values[index] = columns[node[1]][node[2]]
-        elif node[0] == "sub" and isinstance(values[node[1]], float):
-            values[index] = values[node[1]] - values[node[2]]
+        elif node[0] in _ORDERED and isinstance(values[node[1]], float):
+            values[index] = _ORDERED[node[0]](values[node[1]], values[node[2]])
         else:
-            # torch.add and torch.mul want their tensor first; both are commutative.
+            # torch's functions want their tensor first; what is left is commutative.
             arguments = [values[i] for i in operands(node)]
             if isinstance(arguments[0], float):
                 arguments.reverse()
@@ -60,6 +69,14 @@ def evaluate(program: Program, inputs: dict[str, torch.Tensor]) -> torch.Tensor:
         value = values[scalar.index]
         entries[position] = zero + value  # a constant or a parameter fills the whole batch
     return torch.stack(entries, dim=-1).reshape(*reference.shape[:-1], *program.shape)
+
+
+#: Operations of a number and a tensor that are not commutative.
+_ORDERED: dict[str, Callable[[Any, Any], Any]] = {"sub": operator.sub, "div": operator.truediv}
+
+
+def _maximum(a: torch.Tensor, b: torch.Tensor | float) -> torch.Tensor:
+    return a.clamp_min(b) if isinstance(b, float) else a.maximum(b)
 
 
 def _position(key: tuple[int, ...], shape: tuple[int, ...]) -> int:

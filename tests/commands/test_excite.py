@@ -13,7 +13,7 @@ def test_a_motion_within_the_limits_is_written(work, run, tmp_path):
     out = tmp_path / "motion.csv"
 
     code, answer = run(
-        "excite", "--urdf", work / "arm.urdf", "--duration", 4, "--rate", 50, "--out", out
+        "excite", "--urdf", work / "arm.urdf", "--duration", 4, "--sampling", 50, "--out", out
     )
 
     table = pd.read_csv(out)
@@ -31,3 +31,25 @@ def test_a_motion_too_short_to_start_and_stop_is_refused(work, tmp_path, capsys)
     assert cli.main(words) == cli.BAD_INPUT
     assert "leaves no time" in capsys.readouterr().err
     assert not out.exists()
+
+
+def test_the_next_motion_adds_to_the_recordings(work, run, tmp_path):
+    words = ["excite", "--urdf", work / "arm.urdf", "--duration", 4, "--motion", "quintic"]
+    limits = ("--limits", '{"torque": [14, 3]}')
+
+    _, first = run(*words, *limits, "--out", tmp_path / "first.csv")
+    code, after = run(
+        *words, *limits, "--recorded", work / "log.csv", "--out", tmp_path / "next.csv"
+    )
+
+    assert code == cli.DONE
+    assert after["condition_number"] != first["condition_number"]
+    motion = pd.read_csv(tmp_path / "next.csv")
+    assert not motion.equals(pd.read_csv(tmp_path / "first.csv"))
+
+
+def test_unknown_limits_are_refused_by_name(work, tmp_path, capsys):
+    words = ["excite", "--urdf", str(work / "arm.urdf"), "--out", str(tmp_path / "m.csv")]
+
+    assert cli.main([*words, "--limits", '{"speed": [1, 1]}']) == cli.BAD_INPUT
+    assert "position, velocity, acceleration, torque, workspace" in capsys.readouterr().err

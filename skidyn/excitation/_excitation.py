@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A designed motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from skidyn._signals import Array
+from skidyn.excitation._basis import FourierBasis, QuinticBasis
+from skidyn.robots import Robot
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """A motion for identification.
+
+    Parameters
+    ----------
+    robot : Robot
+        Robot it is made for.
+    basis : callable
+        Functions of time that the motion is a sum of.
+    middle : ndarray of shape (n_joints,), rad or m
+        Pose at start and end.
+    weights : ndarray of shape (n_joints, n_functions)
+        Weights of the functions, rad or m.
+    condition_number : float
+        Of the base regressor, columns scaled to equal length; recordings already made included.
+    log_determinant : float
+        Of the information matrix of base parameters and effects, recordings included: torques in
+        units of the noise of a fitted model, else of the effort limits of the URDF; per second of
+        recording.
+
+    Examples
+    --------
+    >>> from skidyn.datasets import load_planar_arm
+    >>> from skidyn.excitation import design_excitation
+    >>> excitation = design_excitation(load_planar_arm(), duration=5.0, iterations=2)
+    >>> time, q, dq, ddq = excitation.sample(rate=100.0)
+    >>> q.shape
+    (501, 2)
+    """
+
+    robot: Robot = field(repr=False)
+    basis: FourierBasis | QuinticBasis
+    middle: Array = field(repr=False)
+    weights: Array = field(repr=False)
+    condition_number: float = np.nan
+    log_determinant: float = np.nan
+
+    @property
+    def duration(self) -> float:
+        """Length in s."""
+        return self.basis.duration
+
+    def sample(self, rate: float) -> tuple[Array, Array, Array, Array]:
+        """The motion at even times.
+
+        Parameters
+        ----------
+        rate : float, Hz
+            Samples per second.
+
+        Returns
+        -------
+        time : ndarray of shape (n_samples,), s
+        q, dq, ddq : ndarray of shape (n_samples, n_joints)
+            Position, velocity and acceleration, SI units.
+        """
+        time = np.arange(0.0, self.duration - 1e-6 / rate, 1 / rate)
+        time = np.append(time, self.duration)  # the motion ends at rest, whatever the rate
+        q, dq, ddq = self.basis(time) @ self.weights.T
+        return time, q + self.middle, dq, ddq
+
+    def to_frame(self, rate: float) -> pd.DataFrame:
+        """Table of the motion.
+
+        Parameters
+        ----------
+        rate : float, Hz
+            Samples per second.
+
+        Returns
+        -------
+        DataFrame
+            Columns ``time, q1.., dq1.., ddq1..``.
+        """
+        from skidyn._optional import import_optional
+
+        pandas = import_optional("pandas", extra="io")
+        time, *states = self.sample(rate)
+        n = self.robot.n_joints
+        names = [f"{s}{j + 1}" for s in ("q", "dq", "ddq") for j in range(n)]
+        table = pandas.DataFrame(np.hstack(states), columns=names)
+        table.insert(0, "time", time)
+        return table
+
+    def to_csv(self, path: str | Path, rate: float = 100.0) -> None:
+        """Write the motion as CSV, in one step.
+
+        With the measured torques as columns ``tau1 ..`` it is a log that
+        :func:`~skidyn.datasets.read_log` reads.
+
+        Parameters
+        ----------
+        path : path
+            File to write.
+        rate : float, Hz, default=100
+            Samples per second.
+        """
+        from skidyn.report._write import write_text
+
+        write_text(path, self.to_frame(rate).to_csv(index=False))
