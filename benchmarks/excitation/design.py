@@ -2,10 +2,10 @@
 """What designed motions are worth, beside random Fourier motions within the same limits.
 
 For each robot: CPU time of the design, condition number of the base regressor, logarithm of the
-determinant of the information matrix, and the relative standard error of the base parameters that a
-fit to a simulated log of the motion has (root mean square of error over size, for parameters that
-are not small; torque noise of 1 % of the effort limits, correlated over 0.1 s). The random motion is
-the best of 40 for the criterion.
+determinant of the information matrix, and the relative standard error of the base parameters that
+a fit to a simulated log of the motion has (root mean square of error over size, for parameters that
+are not small; torque noise of 1 % of the effort limits, correlated over 0.1 s). The random motion
+is the best of 40 for the criterion.
 
 python benchmarks/excitation/design.py
 """
