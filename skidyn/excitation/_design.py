@@ -220,9 +220,8 @@ class _Search:
         def value(flat: Array, penalty: float) -> tuple[float, Array]:
             unknown = torch.from_numpy(flat.reshape(x.shape)).requires_grad_()
             loss = self.loss(unknown, penalty)
-            loss.backward()
-            assert unknown.grad is not None
-            return float(loss.detach()), unknown.grad.numpy().ravel()
+            (slope,) = torch.autograd.grad(loss, unknown)
+            return float(loss.detach()), slope.numpy().ravel()
 
         options = {"maxiter": iterations, "ftol": 1e-8}
         for penalty in PENALTIES if self._is_bound() else PENALTIES[-1:]:
