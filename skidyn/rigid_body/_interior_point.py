@@ -119,7 +119,7 @@ def solve_interior_point(
     rest = start.copy()
     rest[:n] = nominal.ravel()
     data = _Data(*_triangular(np.vstack([factor, pull]), np.r_[target, pull @ rest]), np.zeros(p))
-    point = _start(data, start, nominal, linear)
+    point = _start(data, start, nominal, linear, GAP)
     for _ in range(MOST_STEPS):
         if point.gap < GAP or not point.exists:
             break
@@ -158,24 +158,24 @@ def minimise_with_divergence(
     cost[:n] = weight * np.einsum("nij,aji->na", inverse, BASIS).ravel()
     data = _Data(*_triangular(np.vstack([factor, held]), np.r_[target, held @ start]), cost)
     linear = Linear.none(p)
-    point = _start(data, start, nominal, linear)
+    point = _start(data, start, nominal, linear, weight)
     settled = 0
     for _ in range(MOST_STEPS):
         point, length = _step(point, data, linear, weight)
-        settled = settled + 1 if length == 1.0 and point.gap < 1.01 * weight else 0
+        settled = settled + 1 if length == 1.0 and abs(point.gap / weight - 1) < 0.01 else 0
         if settled == SETTLED or length < SHORTEST or not point.exists:
             break
     return taken_inside(point.x, start, n, linear)
 
 
-def _start(data: _Data, start: Array, nominal: Array, linear: Linear) -> _Point:
+def _start(data: _Data, start: Array, nominal: Array, linear: Linear, least: float) -> _Point:
     """Duals large enough to answer the gradient: else the steps crawl along the border."""
     n = nominal.size
     bodies = pseudo_inertia(start[:n].reshape(-1, 10))
     slack = linear.b - linear.C @ start
     own, _ = local_units(start[:n].reshape(-1, 10), nominal)
     gradient = data.factor.T @ (data.target - data.factor @ start) - data.cost
-    mu = float(np.linalg.norm(block_diag(*own).T @ gradient[:n])) + GAP
+    mu = max(least, float(np.linalg.norm(block_diag(*own).T @ gradient[:n])))
     duals = np.asarray(mu * np.linalg.inv(bodies))
     return _Point(start.copy(), bodies, slack, duals, mu / slack)
 
@@ -228,7 +228,7 @@ def _step(point: _Point, data: _Data, linear: Linear, least: float) -> tuple[_Po
         worst = min(float(np.min(rate, initial=0.0)) for rate in rates)
         return -1 / min(worst, -1e-6)
 
-    ahead = direction(0.0, np.zeros_like(point.bodies), np.zeros_like(point.slack))
+    ahead = direction(least, np.zeros_like(point.bodies), np.zeros_like(point.slack))
     share = max((1 - min(1.0, reach(ahead))) ** 3, LEAST_CENTRING)
     mu = max(least, share * point.gap)
     bent = ahead.change @ ahead.answer

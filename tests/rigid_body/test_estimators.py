@@ -183,7 +183,7 @@ def noisy_motion(seed, noise):
     """Torque of a reference motion, and the motion as noisy sensors see it."""
     rng = np.random.default_rng(seed)
     reference = rng.uniform(-2, 2, (2000, 6))
-    X = reference + rng.normal(0, noise, reference.shape)
+    X = reference + rng.normal(0, noise, reference.shape) * [0, 0, 1, 1, 1, 1]
     y = ROBOT.inverse_dynamics(reference[:, :2], reference[:, 2:4], reference[:, 4:])
     return X, y + 0.5 * reference[:, 2:4] + rng.normal(0, 0.1, y.shape), reference
 
@@ -194,8 +194,8 @@ def test_instruments_undo_the_bias_of_noisy_motion():
     model = RBDRegressor(ROBOT, ("viscous",), estimator="instrumental")
     model.fit(X, y, instruments=reference)
     at = model.coef_names_.index("viscous.Fv[1]")
-    assert plain.coef_[at] < 0.9 * 0.5
-    assert abs(model.coef_[at] - 0.5) < 3 * model.coef_std_[at] < 0.3
+    assert plain.coef_[at] < 0.95 * 0.5
+    assert abs(model.coef_[at] - 0.5) < 3 * model.coef_std_[at] < 0.1
     table = model.durbin_wu_hausman()
     assert min(row["p_value"] for row in table) * len(table) < 0.01
 
