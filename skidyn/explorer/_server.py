@@ -17,13 +17,15 @@ from typing import Any
 from skidyn._bundled import bundled
 from skidyn._exceptions import SkidynError
 from skidyn._optional import import_optional
+from skidyn._progress import listening
 from skidyn.explorer._session import Session
+from skidyn.rigid_body import RBDRegressor
 
 HOST = "127.0.0.1"
 
 
 class Explorer:
-    """Answers of the page, one at a time.
+    """Answers of the page, one at a time; the report and its progress beside them.
 
     Parameters
     ----------
@@ -54,13 +56,16 @@ class Explorer:
         self.logs, self.urdf = list(logs) or ["log.csv"], urdf
         self.joints, self.reading = joints, reading
         self.token = secrets.token_urlsafe(24)
+        self._saved: RBDRegressor | None = None
+        self._told: dict[str, Any] = {"text": "", "share": None}
 
     def answer(self, question: str, words: dict[str, Any]) -> dict[str, Any]:
         """Answer a question of the page.
 
         Parameters
         ----------
-        question : {"state", "curves", "ranked", "add", "refine", "undo", "save"}
+        question : {"state", "curves", "ranked", "add", "refine", "undo", "save", "report", \
+                "progress"}
             What is asked.
         words : dict
             Its arguments.
@@ -78,6 +83,8 @@ class Explorer:
             "refine": self._refine,
             "undo": self._undo,
             "save": self._save,
+            "report": self._report,
+            "progress": self._progress,
         }
         if question not in known:
             raise SkidynError(f"the explorer does not know {question!r}")
@@ -126,21 +133,37 @@ class Explorer:
         return {**self._state(), "curves": self._curves(joint, trajectory)}
 
     def _save(self) -> dict[str, Any]:
-        """Model, report and script, under fixed names in the folder chosen at the start."""
+        """Model and script, under fixed names in the folder chosen at the start."""
         from skidyn import save_model
-        from skidyn.diagnosis import diagnose
-        from skidyn.report import summarize, write_html
         from skidyn.report._write import write_text
 
         self.session.refine()
         self.folder.mkdir(parents=True, exist_ok=True)
-        model = self.session.fitted_model()
-        saved = [str(save_model(self.folder / "model.skops", model))]
-        diagnosis = diagnose(model, *self.session.data)  # says what is missing still
-        saved.append(str(write_html(self.folder / "report.html", summarize(diagnosis))))
+        self._saved = self.session.fitted_model()
         text = self.session.script(self.logs, self.urdf, joints=self.joints, reading=self.reading)
-        saved.append(str(write_text(self.folder / "explored.py", text)))
-        return {"saved": saved}
+        files = [
+            save_model(self.folder / "model.skops", self._saved),
+            write_text(self.folder / "explored.py", text),
+        ]
+        return {"saved": [str(file) for file in files]}
+
+    def _report(self) -> dict[str, Any]:
+        """Report on the model saved last; it says what is missing still."""
+        from skidyn.diagnosis import diagnose
+        from skidyn.report import summarize, write_html
+
+        if self._saved is None:
+            raise SkidynError("no model is saved yet")
+        with listening(self._hear):
+            diagnosis = diagnose(self._saved, *self.session.data)
+        return {"saved": [str(write_html(self.folder / "report.html", summarize(diagnosis)))]}
+
+    def _hear(self, text: str, share: float | None) -> None:
+        self._told = {"text": text, "share": share}
+
+    def _progress(self) -> dict[str, Any]:
+        """How far the report is."""
+        return self._told
 
 
 def page() -> str:
@@ -182,6 +205,11 @@ def make_app(explorer: Explorer, port: int) -> Any:
 
     # one thread: one answer at a time, and the rigid body's buffers, kept per thread, stay warm
     worker = ThreadPoolExecutor(1, "skidyn-explore")
+    # the report takes long, and the loop goes on meanwhile
+    beside = {
+        "report": ThreadPoolExecutor(1, "skidyn-report"),
+        "progress": ThreadPoolExecutor(1, "skidyn-progress"),
+    }
     hosts = {f"{HOST}:{port}", f"localhost:{port}"}
     headers = {
         "Cache-Control": "no-store",
@@ -208,7 +236,8 @@ def make_app(explorer: Explorer, port: int) -> Any:
                 raise SkidynError("an object is expected")
             question = request.path_params["question"]
             loop = asyncio.get_running_loop()
-            content = await loop.run_in_executor(worker, explorer.answer, question, words)
+            thread = beside.get(question, worker)
+            content = await loop.run_in_executor(thread, explorer.answer, question, words)
         except (SkidynError, LookupError, OSError, TypeError, ValueError) as error:
             return JSONResponse({"error": str(error)}, 400, headers=headers)
         return JSONResponse(content, headers=headers)

@@ -190,8 +190,20 @@
   }
   async function save() {
     el("save").disabled = true;
-    say("saving: the report is diagnosed in full, which takes a while ...");
-    try { say("saved: " + (await ask("save")).saved.join(", ")); } finally { el("save").disabled = false; }
+    say("saving ...");
+    try {
+      const { saved } = await ask("save");
+      // the report diagnoses in full; the loop goes on meanwhile
+      const report = ask("report");
+      let done = false;
+      const timer = setInterval(async () => {
+        const { text, share } = await ask("progress");
+        if (!done) el("saved").textContent = `saved: ${saved.join(", ")}; report: ${text}${share === null ? "" : " " + percent(share)}`;
+      }, 1000);
+      try { saved.push(...(await report).saved); } finally { done = true; clearInterval(timer); }
+      el("saved").textContent = "saved: " + saved.join(", ");
+      say("");
+    } finally { el("save").disabled = false; }
   }
   async function choose(time) {
     chosen = moment = time; span = null; asked += 1;
