@@ -15,6 +15,7 @@ from skidyn._exceptions import SkidynError
 from skidyn._signals import Array, Signals
 from skidyn.effects import Term, get_effect
 from skidyn.evidence._evidence import Evidence, Key
+from skidyn.evidence._problem import FEW_TRAJECTORIES, FEWEST_BLOCKS, MOST_FOLDS
 from skidyn.evidence._streaming import linear_terms
 from skidyn.rigid_body._base_parameters import BaseParameters, find_base_parameters
 from skidyn.robots import Robot
@@ -99,16 +100,49 @@ def evidence_from_motion(
     if method not in ("auto", "gram", "qr"):
         raise SkidynError(f"method is {method!r}; expected 'auto', 'gram' or 'qr'")
     signals, torque = _checked(robot, q, dq, ddq, torque, trajectory)
+    terms = linear_terms(effects, robot.n_joints)
+    return evidence_of_rows(signals, torque, robot, terms, signals.trajectory, method)
+
+
+def evidence_of_rows(
+    signals: Signals,
+    torque: Array,
+    robot: Robot,
+    terms: Sequence[Term],
+    group: NDArray[np.int64],
+    method: Method = "auto",
+) -> Evidence:
+    """Evidence with every sample as a row.
+
+    Parameters
+    ----------
+    signals : Signals
+        Motion as it is to be used; states of hysteresis run along its trajectories.
+    torque : ndarray of shape (n_samples, n_joints), N m or N
+        Measured torque.
+    robot : Robot
+        Robot.
+    terms : sequence of Term
+        Effects with their shape parameters.
+    group : ndarray of shape (n_samples,) of int
+        Number under which the factors of a sample are kept, in the place of its trajectory.
+    method : {"auto", "gram", "qr"}, default="auto"
+        Gram matrices or triangular factors.
+
+    Returns
+    -------
+    Evidence
+        By group and joint.
+    """
     base = find_base_parameters(robot)
-    layout = _Layout.of(robot, base, linear_terms(effects, robot.n_joints), signals)
-    counts = _counts(signals.trajectory, robot.n_joints)
+    layout = _Layout.of(robot, base, terms, signals)
     factors: dict[Key, Array] = {}
     if method != "qr":
-        grams = _accumulate(robot, layout, signals, torque, _add_gram)
+        grams = _accumulate(robot, layout, signals, torque, group, _add_gram)
         if method == "gram" or _condition(grams, layout) <= LARGEST_CONDITION:
             factors = {key: _root(gram) for key, gram in grams.items()}
     if not factors:
-        factors = _accumulate(robot, layout, signals, torque, _add_triangle)
+        factors = _accumulate(robot, layout, signals, torque, group, _add_triangle)
     widened = {key: layout.widen(factor, key[1]) for key, factor in factors.items()}
     # The torque of the URDF's rigid body is a combination of the columns: it is taken off here.
     nominal = np.zeros(len(layout.names) + 1)
@@ -116,7 +150,51 @@ def evidence_from_motion(
     nominal[-1] = 1.0
     for factor in widened.values():
         factor[:, -1] = factor @ nominal
-    return Evidence(tuple(layout.names), widened, counts)
+    return Evidence(tuple(layout.names), widened, _counts(group, robot.n_joints))
+
+
+def sample_blocks(
+    trajectory: NDArray[np.int64],
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Blocks of samples: whole trajectories, or parts of them where there are few.
+
+    Parameters
+    ----------
+    trajectory : ndarray of shape (n_samples,)
+        Trajectory of every sample.
+
+    Returns
+    -------
+    block : ndarray of shape (n_samples,) of int
+        Block of every sample, from 0.
+    owner : ndarray of shape (n_blocks,) of int
+        Trajectory of every block.
+    fold : ndarray of shape (n_blocks,) of int
+        Fold of every block, from 0.
+    """
+    names, index, counts = np.unique(trajectory, return_inverse=True, return_counts=True)
+    blocks = 1
+    if len(names) <= FEW_TRAJECTORIES:
+        blocks = max(2, -(-FEWEST_BLOCKS // len(names)))
+    order = np.argsort(index, kind="stable")
+    within = np.empty(len(index), dtype=np.int64)
+    within[order] = np.arange(len(index)) - np.repeat(np.cumsum(counts) - counts, counts)
+    block = index * blocks + within * blocks // counts[index]
+    used, block = np.unique(block, return_inverse=True)
+    fold = np.arange(len(used)) * min(len(used), MOST_FOLDS) // len(used)
+    return block, names[used // blocks].astype(np.int64), fold
+
+
+def renumbered(evidence: Evidence, number: NDArray[np.int64]) -> Evidence:
+    """The same evidence under other numbers, ``number[k]`` for k; what becomes equal is merged."""
+    parts: dict[Key, list[Array]] = {}
+    counts: dict[Key, float] = {}
+    for (old, joint), factor in evidence.factors.items():
+        key = int(number[old]), joint
+        parts.setdefault(key, []).append(factor)
+        counts[key] = counts.get(key, 0) + evidence.counts[old, joint]
+    factors = {k: own[0] if len(own) == 1 else _qr(np.vstack(own)) for k, own in parts.items()}
+    return Evidence(evidence.columns, factors, counts)
 
 
 def _checked(
@@ -150,8 +228,8 @@ def _checked(
     return Signals(**arrays, trajectory=number, prismatic=prismatic, robot=robot), torque
 
 
-def _counts(trajectory: NDArray[np.int64], n_joints: int) -> dict[Key, int]:
-    names, counts = np.unique(trajectory, return_counts=True)
+def _counts(group: NDArray[np.int64], n_joints: int) -> dict[Key, int]:
+    names, counts = np.unique(group, return_counts=True)
     pairs = zip(names, counts, strict=True)
     return {(int(name), j): int(count) for name, count in pairs for j in range(n_joints)}
 
@@ -222,15 +300,20 @@ Update = Callable[[Array | None, Array], Array]
 
 
 def _accumulate(
-    robot: Robot, layout: _Layout, signals: Signals, torque: Array, update: Update
+    robot: Robot,
+    layout: _Layout,
+    signals: Signals,
+    torque: Array,
+    group: NDArray[np.int64],
+    update: Update,
 ) -> dict[Key, Array]:
-    """What ``update`` makes of the rows of every trajectory and joint, part after part."""
+    """What ``update`` makes of the rows of every group and joint, part after part."""
     found: dict[Key, Array] = {}
     n_rigid = len(layout.columns)
     arrays = {"q": signals.q, "dq": signals.dq, "ddq": signals.ddq}
     chunks = robot._engine.iter_regressor_columns(arrays, layout.columns, layout.spare, CHUNK)
     for rows, block in chunks:
-        parts = list(_parts(signals.trajectory[rows]))
+        parts = list(_parts(group[rows]))
         for j, (slab, first) in enumerate(zip(block, layout.first, strict=True)):
             own = layout.effects[j]
             for k, (_, values) in enumerate(own):
@@ -242,10 +325,10 @@ def _accumulate(
     return found
 
 
-def _parts(trajectory: NDArray[np.int64]) -> Iterator[tuple[int, slice]]:
-    edges = np.r_[0, np.flatnonzero(np.diff(trajectory)) + 1, len(trajectory)].tolist()
+def _parts(group: NDArray[np.int64]) -> Iterator[tuple[int, slice]]:
+    edges = np.r_[0, np.flatnonzero(np.diff(group)) + 1, len(group)].tolist()
     for start, stop in zip(edges[:-1], edges[1:], strict=True):
-        yield int(trajectory[start]), slice(start, stop)
+        yield int(group[start]), slice(start, stop)
 
 
 def _add_gram(gram: Array | None, rows: Array) -> Array:

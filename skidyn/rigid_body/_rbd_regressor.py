@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Sequence
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -19,6 +20,7 @@ from skidyn._signals import Array, Signals, signals_from
 from skidyn.effects import Term, get_effect, make_terms
 from skidyn.evidence._broken import broken_notes
 from skidyn.evidence._evidence import Evidence
+from skidyn.evidence._from_motion import evidence_of_rows, renumbered, sample_blocks
 from skidyn.evidence._kinematics import smooth_motion
 from skidyn.evidence._problem import (
     Fit,
@@ -36,7 +38,7 @@ from skidyn.rigid_body._identifiability import condition_number
 from skidyn.rigid_body._instrumental import instrument_rows
 from skidyn.rigid_body._regression import Regression, Solution
 from skidyn.rigid_body._results import Results
-from skidyn.rigid_body._uncertainty import PredictionBands, find_bands
+from skidyn.rigid_body._uncertainty import PredictionBands, find_bands, sample_folds
 from skidyn.robots import Robot
 
 #: Rounds of weights, loads and shape parameters.
@@ -238,11 +240,15 @@ class RBDRegressor(Results, RegressorMixin, BaseEstimator):
             )
         signals, torque = self._begin(X, y, first=True)
         terms = make_terms(self.effects, self.robot_.n_joints)
+        identified = self.parameters == "identified"
+        plain = identified and instruments is None and not method.rows
+        if signals.time is None and plain and all(map(_is_linear, terms)):
+            return self._fit_samples(signals, torque, terms, method)
         problem = make_problem(
             signals,
             torque,
             robot=self.robot_,
-            rigid_body=self.parameters == "identified",
+            rigid_body=identified,
             terms=terms,
             smooth=self._smooths(),
             reversals=hysteresis_joints(terms),
@@ -256,8 +262,33 @@ class RBDRegressor(Results, RegressorMixin, BaseEstimator):
         regression = Regression.from_problem(whole if method.whole else problem, fit, others)
         self.evidence_ = Evidence.from_problem(whole, fit.terms)
         self.n_parts_ = 0
-        self._store(regression, method.solve(regression, self.prior_std))
-        self.bands_ = PredictionBands.calibrate(self, problem, fit, torque)
+        solution = method.solve(regression, self.prior_std)
+        self._store(regression, solution)
+        self.bands_ = PredictionBands.calibrate(
+            self, problem.signals, torque, regression, solution, partial(sample_folds, problem)
+        )
+        return self
+
+    def _fit_samples(
+        self, signals: Signals, torque: Array, terms: Sequence[Term], method: Estimator
+    ) -> RBDRegressor:
+        """Without a clock every sample is a row: their evidence says all that the rows do."""
+        block, owner, fold = sample_blocks(signals.trajectory)
+        parts = evidence_of_rows(signals, torque, self.robot_, terms, block)
+        folds = renumbered(parts, fold)
+        regression = Regression.from_evidence(folds, self.robot_, terms, whole=method.whole)
+        self.evidence_ = renumbered(parts, owner)
+        self.n_parts_ = 0
+        solution = method.solve(regression, self.prior_std)
+        self._store(regression, solution)
+        self.bands_ = PredictionBands.calibrate(
+            self,
+            signals,
+            torque,
+            regression,
+            solution,
+            lambda rows: np.repeat(fold[block[rows], None], self.robot_.n_joints, axis=1),
+        )
         return self
 
     @available_if(_keeps_no_rows)
@@ -590,6 +621,12 @@ def _to_search(term: Term) -> bool:
     if effect.search != "grid" or term.shape:
         return False
     return bool(effect.shapes) or type(effect).grid is not _plain_grid()
+
+
+def _is_linear(term: Term) -> bool:
+    """Whether the columns of a term are known before any fit."""
+    shapes = get_effect(term.kind).shapes
+    return not (_needs_model(term) or _to_search(term) or (shapes and not term.shape))
 
 
 def _plain_grid() -> Any:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -15,13 +15,13 @@ from sklearn.utils.validation import check_is_fitted
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Array, Signals
 from skidyn.effects import Term, get_effect
-from skidyn.evidence._folded import left_out_coefficients
-from skidyn.evidence._problem import RIDGE, Fit, Problem, term_columns
+from skidyn.evidence._problem import RIDGE, Problem, term_columns
 from skidyn.evidence._rows import REST
 from skidyn.robots import Robot
 
 if TYPE_CHECKING:
     from skidyn.rigid_body._rbd_regressor import RBDRegressor
+    from skidyn.rigid_body._regression import Regression, Solution
 
 #: Fewest trajectories from which a bootstrap can draw.
 FEWEST = 5
@@ -164,7 +164,13 @@ class PredictionBands:
 
     @classmethod
     def calibrate(
-        cls, model: RBDRegressor, problem: Problem, fit: Fit, torque: Array
+        cls,
+        model: RBDRegressor,
+        signals: Signals,
+        torque: Array,
+        regression: Regression,
+        solution: Solution,
+        folds: Callable[[NDArray[np.int64]], NDArray[np.int64]],
     ) -> PredictionBands:
         """Bands from the errors of every fold under the coefficients fitted without it.
 
@@ -172,33 +178,35 @@ class PredictionBands:
         ----------
         model : RBDRegressor
             Whose coefficients are stored already.
-        problem : Problem
-            Rows and folds.
-        fit : Fit
-            The fit with its terms.
+        signals : Signals
+            Motion, smoothed.
         torque : ndarray of shape (n_samples, n_joints), N m or N
             Measured torque.
+        regression : Regression
+            Columns.
+        solution : Solution
+            Coefficients, also those without one fold each.
+        folds : callable
+            Fold of samples, by joint: from (k,) to (k, n_joints).
         """
-        signals = _with_load(model, fit.terms, problem.signals)
-        design = problem.design([problem.term_rows(term) for term in fit.terms])
-        whole, left = left_out_coefficients(problem, design, fit.noise, problem.target)
+        terms = regression.terms
+        signals = _with_load(model, terms, signals.with_(robot=model.robot_))
+        left = solution.left_out
         n = len(left)
         spread = np.sqrt((n - 1) / n) * (left - left.mean(0))
         rows = np.arange(0, signals.n_samples, -(-signals.n_samples // MOST_SAMPLES))
         error = (torque - model._torque(signals))[rows]
         width = np.empty_like(error)
-        assert problem.robot is not None
-        folds = _sample_folds(problem, rows)
+        change, fold = left - solution.coefficients, folds(rows)
         place = 0
-        for part in _columns(problem.robot, signals, problem.rigid_index, fit.terms, rows):
+        for part in _columns(model.robot_, signals, regression.rigid_index, terms, rows):
             for j, block in enumerate(part):
                 here = slice(place, place + block.shape[1])
                 width[here, j] = np.linalg.norm(spread @ block, axis=0)
-                error[here, j] -= _own(block, (left - whole)[folds[here, j]])
+                error[here, j] -= _own(block, change[fold[here, j]])
             place += part[0].shape[1]
-        moving = _moving(signals)[rows]
-        scale, ratios = _distribution(error, width, moving)
-        return cls(problem.rigid_index, fit.terms, spread, scale, ratios)
+        scale, ratios = _distribution(error, width, _moving(signals)[rows])
+        return cls(regression.rigid_index, terms, spread, scale, ratios)
 
     def std(self, model: RBDRegressor, signals: Signals) -> Array:
         """Scale of the error of a prediction, shape (n_samples, n_joints), N m or N."""
@@ -296,7 +304,7 @@ def _columns(
         yield list(found)
 
 
-def _sample_folds(problem: Problem, rows: NDArray[np.int64]) -> NDArray[np.int64]:
+def sample_folds(problem: Problem, rows: NDArray[np.int64]) -> NDArray[np.int64]:
     """Fold of some samples, by joint: that of the nearest averaged row of the trajectory."""
     number, clock = problem.signals.trajectory[rows], problem.signals.clock[rows]
     folds = np.zeros((len(rows), problem.n_joints), dtype=np.int64)

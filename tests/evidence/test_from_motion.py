@@ -11,7 +11,12 @@ import pytest
 from skidyn._exceptions import SkidynError
 from skidyn.datasets import load_panda, load_planar_arm, load_scara
 from skidyn.evidence import _from_motion, evidence_from_motion
-from skidyn.rigid_body import find_base_parameters, is_consistent, regressor_from_evidence
+from skidyn.rigid_body import (
+    RBDRegressor,
+    find_base_parameters,
+    is_consistent,
+    regressor_from_evidence,
+)
 
 FRICTION = ("viscous", "coulomb")
 
@@ -135,3 +140,30 @@ def test_errors_name_what_is_wrong():
         evidence_from_motion(robot, q, dq, ddq, ddq, trajectory=[0.5] * 20)
     with pytest.raises(SkidynError, match="method is 'svd'"):
         evidence_from_motion(robot, q, dq, ddq, ddq, method="svd")
+
+
+def test_blocks_of_samples():
+    block, owner, fold = _from_motion.sample_blocks(np.repeat([7, 3], 100))
+    assert np.bincount(block).tolist() == [25] * 8
+    assert owner.tolist() == [3] * 4 + [7] * 4
+    assert fold.tolist() == list(range(8))
+    block, owner, fold = _from_motion.sample_blocks(np.repeat(np.arange(50), 3))
+    np.testing.assert_array_equal(block, np.repeat(np.arange(50), 3))
+    assert fold.max() == 19 and np.all(np.diff(fold) >= 0)
+
+
+def test_regressor_without_a_clock_takes_this_path():
+    robot = load_panda()
+    q, dq, ddq, torque = motion(robot, 3000)
+    X = np.column_stack([np.arange(3000) // 300, q, dq, ddq])
+    model = RBDRegressor(robot, ("viscous",), trajectory=0).fit(X, torque)
+    expected = regressor_from_evidence(
+        robot,
+        evidence_from_motion(robot, q, dq, ddq, torque, ("viscous",), trajectory=X[:, 0]),
+        ("viscous",),
+    )
+    np.testing.assert_allclose(model.coef_, expected.coef_, rtol=1e-6, atol=1e-8)
+    np.testing.assert_allclose(model.coef_std_, expected.coef_std_, rtol=1e-3)
+    assert model.evidence_.trajectories == list(range(10))
+    low, high = model.predict_interval(X)
+    assert np.mean((low <= torque) & (torque <= high)) == pytest.approx(0.95, abs=0.02)
