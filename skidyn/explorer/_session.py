@@ -45,8 +45,9 @@ class RankedEffect:
     joints : tuple of int
         Joints it acts on, counted from 1.
     drop : float
-        Share of the held-out squared error of the joint asked about that it takes away, the rest of
-        the model fitted beside it.
+        Share of the squared held-out residual of the joint asked about that it takes away, the rest
+        of the model fitted beside it. The residual is averaged over the windows of the fit, which
+        takes most of the noise away.
     drop_here : float
         The same in the chosen stretch of time; as ``drop`` where none is chosen.
 

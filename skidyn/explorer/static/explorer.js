@@ -130,7 +130,7 @@
     button.dataset.kind = e.kind;
     button.append(node("span", e.title), node("span", percent(share)));
     const on = e.joints.length === state.joints.length && e.joints.length > 1 ? "all joints" : `joint ${e.joints.join(", ")}`;
-    button.append(node("small", `on ${on}: takes ${percent(e.drop)} of the squared error of joint ${joint()}`
+    button.append(node("small", `on ${on}: takes ${percent(e.drop)} of the squared residual of joint ${joint()}`
       + (span ? ` in the whole log, ${percent(e.drop_here)} in the chosen time` : "")));
     fill.style.width = 100 * Math.max(0, Math.min(1, share)) + "%";
     bar.append(fill); button.append(bar);
