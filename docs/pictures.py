@@ -71,6 +71,7 @@ def opened(browser: Browser, address: str, height: int, scheme: str = "light") -
     page = browser.new_page(
         viewport={"width": 1120, "height": height}, color_scheme=scheme, device_scale_factor=1.5
     )
+    page.set_default_timeout(120_000)
     page.goto(address)
     return page
 
@@ -141,6 +142,7 @@ def of_the_explorer(browser: Browser, address: str) -> None:
     page.wait_for_selector("body[data-ranked^='4 ']")
     page.locator("#effects button").first.click()
     page.wait_for_selector("body[data-ranked$=' 2']")
+    page.wait_for_timeout(3000)  # shapes are refined after the first answer
     page.evaluate("document.querySelector('#status').textContent = ''")  # a time of this machine
     save(page, "explorer.png")
 
