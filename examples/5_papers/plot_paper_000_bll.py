@@ -30,7 +30,7 @@ small = bool(os.environ.get("SKIDYN_SMALL"))
 rng = np.random.default_rng(0)
 t = np.arange(0, 6, 0.02)
 tables = []
-for k in range(8 if small else 20):
+for k in range(8 if small else 16):
     w, phase = rng.uniform(0.8, 3, 2), rng.uniform(0, 6, 2)
     angle = w * t[:, None] + phase
     q, dq, ddq = 0.3 * np.sin(angle), 0.3 * w * np.cos(angle), -0.3 * w**2 * np.sin(angle)
@@ -55,7 +55,7 @@ print(f"residual of the physics: {residual.std():.3f} N m")
 # belong beside every such number.
 table = forecast_table(residual, X["trajectory"])
 train = table.X[:, 0] < 0.7 * X["trajectory"].max()
-epochs = 5 if small else 30
+epochs = 5 if small else 20
 forecasters = {
     "persistence": PersistenceRegressor(trajectory=0),
     "AR(10)": AutoregressiveRegressor(10, trajectory=0),
@@ -80,7 +80,7 @@ models = {
 }
 for name, model in models.items():
     prediction = np.zeros_like(y)
-    for a, b in TrajectoryKFold(4).split(X):
+    for a, b in TrajectoryKFold(3).split(X):
         prediction[b] = model.fit(X.iloc[a], y[a]).predict(X.iloc[b])
     errors[name] = np.sqrt(((y - prediction) ** 2).mean())
 for name, error in errors.items():
