@@ -29,6 +29,10 @@ FEWEST = 5
 MOST_SAMPLES = 20_000
 #: Fewest samples of a joint at rest, or moving, for quantiles of their own.
 FEWEST_SAMPLES = 100
+#: Effects whose columns at a sample depend on nothing but that sample.
+POINTWISE = frozenset(
+    ("viscous", "coulomb", "offset", "rotor_inertia", "stribeck", "asymmetric_friction")
+)
 #: Probabilities at which the distribution of the left-out errors is kept.
 LEVELS = np.linspace(0.0, 1.0, 401)
 CHUNK = 4096
@@ -190,14 +194,17 @@ class PredictionBands:
             Fold of samples, by joint: from (k,) to (k, n_joints).
         """
         terms = regression.terms
+        rows = np.arange(0, signals.n_samples, -(-signals.n_samples // MOST_SAMPLES))
+        fold = folds(rows)
+        if all(term.kind in POINTWISE for term in terms):
+            signals, torque, rows = signals.take(rows), torque[rows], np.arange(len(rows))
         signals = _with_load(model, terms, signals.with_(robot=model.robot_))
         left = solution.left_out
         n = len(left)
         spread = np.sqrt((n - 1) / n) * (left - left.mean(0))
-        rows = np.arange(0, signals.n_samples, -(-signals.n_samples // MOST_SAMPLES))
         error = (torque - model._torque(signals))[rows]
         width = np.empty_like(error)
-        change, fold = left - solution.coefficients, folds(rows)
+        change = left - solution.coefficients
         place = 0
         for part in _columns(model.robot_, signals, regression.rigid_index, terms, rows):
             for j, block in enumerate(part):
