@@ -90,12 +90,9 @@ def load_panda(
     return Robot.from_urdf(folder / "panda_min.urdf"), X, y
 
 
-def load_ur10e(
-    cutoff: float = 5.0, keep_every: int = 2
-) -> tuple[Robot, pd.DataFrame, Array, NDArray[np.int64]]:
-    """13 unloaded excitation runs of 8 dates; the last value is the fold (a pair of dates)."""
-    folder = data_dir() / "ur10e"
-    z = np.load(folder / "ur10e_excitation.npz")
+def ur10e_runs() -> tuple[list[tuple[Array, ...]], list[str]]:
+    """Recordings (t, q, dq, tau) of the 13 unloaded excitation runs of 8 dates, and their dates."""
+    z = np.load(data_dir() / "ur10e" / "ur10e_excitation.npz")
     runs, dates = [], []
     for k, name in enumerate(z["traj_name"]):
         date = str(name)[3:11]
@@ -105,10 +102,29 @@ def load_ur10e(
         rows = (z["traj"] == k) & z["valid"]
         runs.append((z["t"][rows], z["q"][rows], z["dq"][rows], z["i"][rows] * UR10E_GAIN))
         dates.append(date)
+    return runs, dates
+
+
+def load_ur10e(
+    cutoff: float = 5.0, keep_every: int = 2
+) -> tuple[Robot, pd.DataFrame, Array, NDArray[np.int64]]:
+    """Excitation runs; the last value is the fold of every row (a pair of dates)."""
+    runs, dates = ur10e_runs()
     X, y = make_log(runs, rate=100.0, cutoff=cutoff, torque_cutoff=cutoff, keep_every=keep_every)
     order = {date: i // 2 for i, date in enumerate(sorted(set(dates)))}
     fold = np.array([order[date] for date in dates])[X["trajectory"].to_numpy(int)]
-    return Robot.from_urdf(folder / "ur10e_min.urdf"), X, y, fold
+    return Robot.from_urdf(data_dir() / "ur10e" / "ur10e_min.urdf"), X, y, fold
+
+
+def load_ur10e_point_to_point(
+    cutoff: float = 5.0, keep_every: int = 2
+) -> tuple[pd.DataFrame, Array]:
+    """A run of another kind: ten points, with rests between them."""
+    z = np.load(data_dir() / "ur10e" / "ur10e_validation.npz")
+    number = [k for k, name in enumerate(z["traj_name"]) if "ptp" in str(name)][0]
+    rows = (z["traj"] == number) & z["valid"] if "valid" in z else z["traj"] == number
+    run = (z["t"][rows], z["q"][rows], z["dq"][rows], z["i"][rows] * UR10E_GAIN)
+    return make_log([run], rate=100.0, cutoff=cutoff, torque_cutoff=cutoff, keep_every=keep_every)
 
 
 def load_emps(keep_every: int = 10) -> tuple[Robot, pd.DataFrame, Array]:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from _common import PANDA_PERIOD, UR10E_GAIN, Array, ColumnPhysics, data_dir, uniform
+from _common import PANDA_PERIOD, Array, ColumnPhysics, data_dir, uniform, ur10e_runs
 from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.model_selection import PredefinedSplit
@@ -237,21 +237,12 @@ PLAIN = ("viscous", "coulomb", "offset", "rotor_inertia")
 
 def ur10e() -> RecordedLog:
     """13 unloaded excitation runs of 8 dates; pairs of dates are held out."""
-    folder = data_dir() / "ur10e"
-    z = np.load(folder / "ur10e_excitation.npz")
-    runs, dates = [], []
-    for k, name in enumerate(z["traj_name"]):
-        date = str(name)[3:11]
-        if '"payload_kg": 0.0' not in str(z["traj_label"][k]) or date < "19_10_02":
-            continue
-        rows = (z["traj"] == k) & z["valid"]
-        runs.append((z["t"][rows], z["q"][rows], z["dq"][rows], z["i"][rows] * UR10E_GAIN))
-        dates.append(date)
+    runs, dates = ur10e_runs()
     raw, torque = _table(runs, 100.0)
     order = {date: i // 2 for i, date in enumerate(sorted(set(dates)))}
+    robot = Robot.from_urdf(data_dir() / "ur10e" / "ur10e_min.urdf")
     log = RecordedLog(
-        "UR10e, pairs of dates held out", Robot.from_urdf(folder / "ur10e_min.urdf"), PLAIN,
-        raw, torque, 100.0, 5.0, 4, None, 5,
+        "UR10e, pairs of dates held out", robot, PLAIN, raw, torque, 100.0, 5.0, 4, None, 5,
     )  # fmt: skip
     fold = np.array([order[date] for date in dates])[log.X["trajectory"].to_numpy(int)]
     log.outer = PredefinedSplit(fold)
