@@ -18,7 +18,15 @@ import argparse
 import time
 
 import numpy as np
-from _common import BASE, PANDA_PERIOD, LinearPhysics, load_panda, print_table
+from _common import (
+    BASE,
+    PANDA_PERIOD,
+    ColumnPhysics,
+    LinearPhysics,
+    filtered_physics,
+    load_panda,
+    print_table,
+)
 from numpy.typing import NDArray
 from sklearn.base import clone
 from sklearn.ensemble import HistGradientBoostingRegressor
@@ -155,6 +163,46 @@ def torque_models(epochs: int) -> None:
         print_table(f"Torque below 10 Hz, {protocol}: RMSE, N m", rows, [*JOINTS, "mean"])
 
 
+#: Sets of widths of the pre-sliding states, rad, among which each joint chooses.
+WIDTHS = (
+    (), (0.02, 0.2), (0.003, 0.01, 0.05), (0.01, 0.05, 0.2), (0.05, 0.2, 0.5), (0.003, 0.03, 0.3),
+    (0.01, 0.1, 1.0), (0.01, 0.03, 0.1, 0.3), (0.01, 0.05, 0.2, 0.5), (0.003, 0.01, 0.05, 0.2, 0.5),
+)  # fmt: skip
+
+
+def chosen_physics() -> None:
+    """Pre-sliding states whose widths are chosen for every joint inside every fold."""
+    robot, X, _ = load_panda(rate=1000.0)
+    models = []
+    for widths in WIDTHS:
+        effects = (*BASE, *(("dahl", (("presliding", width),)) for width in widths))
+        models.append(filtered_physics(robot, X, effects, 10.0, 1000.0, 10))
+    _, X, y = load_panda(rate=1000.0)
+    X, y = X[::10].reset_index(drop=True), y[::10]
+
+    def held_out(model: ColumnPhysics, rows: NDArray, cv: PhaseKFold) -> NDArray:
+        prediction = np.zeros_like(y[rows])
+        for a, b in cv.split(X.iloc[rows]):
+            prediction[b] = model.fit(X.iloc[rows[a]], y[rows[a]]).predict(X.iloc[rows[b]])
+        return prediction
+
+    outer = PhaseKFold(4, period=PANDA_PERIOD)
+    table = {
+        f"{widths}": rmse(y, held_out(model, np.arange(len(X)), outer))
+        for widths, model in zip(WIDTHS, models, strict=True)
+    }
+    for n in (5, 10):
+        inner, prediction = PhaseKFold(n, period=PANDA_PERIOD), np.zeros_like(y)
+        for train, test in outer.split(X):
+            errors = [((y[train] - held_out(m, train, inner)) ** 2).mean(axis=0) for m in models]
+            own = [models[k].own[joint] for joint, k in enumerate(np.argmin(errors, axis=0))]
+            model = ColumnPhysics(models[0].regressor, own).fit(X.iloc[train], y[train])
+            prediction[test] = model.predict(X.iloc[test])
+        table[f"chosen inside every fold, {n} inner folds"] = rmse(y, prediction)
+    title = "Torque below 10 Hz, quarters of the path held out, widths in rad: RMSE, N m"
+    print_table(title, table, [*JOINTS, "mean"])
+
+
 def panda_dahl() -> tuple:
     """Widths for the Panda: its gears wind up more than the UR10e's."""
     return tuple(("dahl", (("presliding", width),)) for width in (0.01, 0.05, 0.2))
@@ -164,7 +212,7 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--epochs", type=int, default=60)
     parser.add_argument("--members", type=int, default=5)
-    parser.add_argument("--only", choices=["uncompensated", "forecasting", "torque"])
+    parser.add_argument("--only", choices=["uncompensated", "forecasting", "torque", "chosen"])
     options = parser.parse_args()
     if options.only in (None, "uncompensated"):
         uncompensated()
@@ -172,6 +220,8 @@ def main() -> None:
         forecasting(options.epochs, options.members)
     if options.only in (None, "torque"):
         torque_models(options.epochs)
+    if options.only in (None, "chosen"):
+        chosen_physics()
 
 
 if __name__ == "__main__":
