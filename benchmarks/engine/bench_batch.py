@@ -48,8 +48,8 @@ def measure(name: str, text: str, n_samples: int) -> None:
         for k in range(n_samples):
             pin.computeJointTorqueRegressor(model, data, given[0, k], given[1, k], given[2, k])
 
-    def chunks() -> None:
-        for _ in robot.iter_torque_regressor(q, dq, ddq):
+    def chunks(backend: str) -> None:
+        for _ in robot.iter_torque_regressor(q, dq, ddq, backend=backend):
             pass
 
     functions = {
@@ -59,20 +59,27 @@ def measure(name: str, text: str, n_samples: int) -> None:
         "float32": lambda: robot.inverse_dynamics(q, dq, ddq, dtype=np.float32),
         "compiled": lambda: robot.inverse_dynamics(q, dq, ddq, backend="compiled"),
         "reg loop": regressor_loop,
-        "reg chunk": chunks,
+        "reg chunk": lambda: chunks("numpy"),
+        "reg chunk C": lambda: chunks("compiled"),
     }
-    if warm is not None:
+    if n > 20:  # a body of thousands of lines takes the compiler minutes
+        del functions["reg chunk C"]
+    else:
         functions["reg warm"] = lambda: robot.torque_regressor(q, dq, ddq, out=warm)
+        functions["reg warm C"] = lambda: robot.torque_regressor(
+            q, dq, ddq, out=warm, backend="compiled"
+        )
     pin.rneaInParallel(1, pool, *columns, result)
     error = np.abs(robot.inverse_dynamics(q, dq, ddq) - result.T[:, order]).max()
     t = interleaved(functions, n_samples, rounds=5)
-    warm_ratio = f"{t['reg loop'] / t['reg warm']:5.1f}" if "reg warm" in t else "    -"
+    others = ("reg warm", "reg chunk C", "reg warm C")
+    ratios = "".join(f"{t['reg loop'] / t[x]:6.1f}" if x in t else "     -" for x in others)
     print(
         f"{name:20s}{error:9.1e}{t['loop']:8.3f}{t['numpy']:8.3f}{t['compiled']:8.3f} |"
         f"{t['loop'] / t['numpy']:6.1f}{t['batch'] / t['numpy']:6.1f}"
         f"{t['loop'] / t['float32']:6.1f}{t['loop'] / t['compiled']:7.1f} |"
         f"{t['reg loop']:8.3f}{t['reg chunk']:8.3f} |"
-        f"{t['reg loop'] / t['reg chunk']:6.1f} {warm_ratio}",
+        f"{t['reg loop'] / t['reg chunk']:6.1f}{ratios}",
         flush=True,
     )
 
@@ -81,12 +88,12 @@ def main() -> None:
     """Print the table."""
     n_samples = int(sys.argv[1]) if len(sys.argv) > 1 else 50_000
     print(
-        "                       error    inverse dynamics, us  |  loop  batch  loop   loop    |"
-        "  regressor, us  |  loop  loop"
+        "                       error    inverse dynamics, us  |  loop  batch  loop   loop   |"
+        "  regressor, us |  loop/numpy   loop/compiled"
     )
     print(
-        "                       N m      loop   numpy compiled | /numpy/numpy /f32 /compiled |"
-        "  loop   chunk   | /chunk /warm"
+        "                       N m      loop   numpy compiled | numpy numpy   f32 compiled|"
+        "   loop   chunk | chunk  warm chunk  warm"
     )
     for name, text in CASES.items():
         measure(name, text(), n_samples)

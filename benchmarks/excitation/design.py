@@ -7,11 +7,12 @@ a fit to a simulated log of the motion has (root mean square of error over size,
 are not small; torque noise of 1 % of the effort limits, correlated over 0.1 s). The random motion
 is the best of 40 for the criterion.
 
-python benchmarks/excitation/design.py
+python benchmarks/excitation/design.py [determinant | condition]
 """
 
 from __future__ import annotations
 
+import sys
 import time
 
 import numpy as np
@@ -54,9 +55,10 @@ def main() -> None:
         "   log determinant | parameter error"
     )
     print(f"{'':37s} | random  designed |   random  designed | random  designed")
-    for load in (load_ur5, load_panda, load_srs_arm):
+    criteria = sys.argv[1:] or ("determinant", "condition")
+    for load in (load_srs_arm, load_ur5, load_panda):
         robot = load()
-        for criterion in ("determinant", "condition"):
+        for criterion in criteria:
             for motion in ("fourier", "quintic"):
                 asked = {"criterion": criterion, "motion": motion}
                 random = design_excitation(robot, iterations=0, **asked)

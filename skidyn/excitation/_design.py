@@ -35,6 +35,8 @@ NORM = 60.0
 PENALTIES, LENGTH = (1e3, 1e5), 0.05
 #: Share of the strokes below which a motion is given up.
 SMALLEST = 0.025
+#: Share of the determinant in the criterion of the condition number.
+SIZE = 0.1
 #: Added to the normalised information matrix: what no motion shows must not dominate.
 RIDGE = 1e-9
 
@@ -81,7 +83,8 @@ def design_excitation(
         Time in which a Fourier series is blended from and to rest.
     criterion : {"determinant", "condition"}, default="determinant"
         D-optimality (volume of the confidence ellipsoid), or the condition number of the base
-        regressor with columns of equal length.
+        regressor with columns of equal length (and a small share of the determinant, so that the
+        motion stays large).
     effects : iterable, default=None
         Effects that are to be told too, as for :class:`~skidyn.rigid_body.RBDRegressor`. None:
         those of a fitted model, else viscous and Coulomb friction.
@@ -274,12 +277,13 @@ class _Search:
 
         states = self.states(x)
         matrix = self.information(*states) / self.scale[:, None] / self.scale
+        score = -torch.logdet(matrix + RIDGE * torch.eye(len(matrix), dtype=matrix.dtype))
         if self.criterion == "condition":
             size = matrix.diagonal().clamp_min(RIDGE).sqrt()
             values = torch.linalg.eigvalsh(matrix / size[:, None] / size)
-            score = 0.5 * (values[-1].log() - values[0].clamp_min(1e-14).log())
-        else:
-            score = -torch.logdet(matrix + RIDGE * torch.eye(len(matrix), dtype=matrix.dtype))
+            ratio = 0.5 * (values[-1].log() - values[0].clamp_min(1e-14).log())
+            # It is blind to the size of a motion, which a small share of the other is not.
+            score = ratio + SIZE * score / len(matrix)
         return score + penalty * self._violation(*states)
 
     def _violation(self, q: torch.Tensor, dq: torch.Tensor, ddq: torch.Tensor) -> torch.Tensor:

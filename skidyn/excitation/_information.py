@@ -177,7 +177,7 @@ def _information_of_log(model: Model, frame: Any) -> Array:
     table[:, used] = np.asarray(frame.iloc[:, used], dtype=float)
     signals = signals_from(table, columns, model.robot)
     motion = smooth_motion(signals) if smooths else as_given(signals)
-    s = motion.signals.take(motion.valid.reshape(signals.n_samples, -1).all(axis=1))
+    s = motion.signals.take(np.asarray(motion.valid.all(axis=1)))
     if s.n_samples == 0:
         raise SkidynError("a recording is too short to derive accelerations from it")
     return model.information(s.q, s.dq, s.ddq, s.n_samples / sampling_rate(signals))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Run the inverse dynamics through the system's C compiler, where there is one.
+"""Run a tape through the system's C compiler, where there is one.
 
 The text of a tape is one loop body without branches, which compilers turn into vector instructions
 that work on several samples at once and keep most values in registers.
@@ -39,10 +39,11 @@ __attribute__((simd("notinbranch"))) double cos(double);
 
 void evaluate(long n_samples, const double *restrict q_in, const double *restrict dq_in,
               const double *restrict ddq_in, const double *restrict parameter,
-              double *restrict out)
+              double *restrict out, long stride)
 {{
+    static const int place[{n_outputs}] = {{ {places} }};
     double q[{n}][{block}] = {{{{0}}}}, dq[{n}][{block}] = {{{{0}}}}, ddq[{n}][{block}] = {{{{0}}}};
-    double result[{n}][{block}], wave[{n_waves}][{block}];
+    double result[{n_outputs}][{block}], wave[{n_waves}][{block}];
     for (long start = 0; start < n_samples; start += {block}) {{
         long size = n_samples - start < {block} ? n_samples - start : {block};
         for (int i = 0; i < {n}; i++)
@@ -55,9 +56,9 @@ void evaluate(long n_samples, const double *restrict q_in, const double *restric
         for (int k = 0; k < {block}; k++) {{
 {body}
         }}
-        for (long k = 0; k < size; k++)
-            for (int i = 0; i < {n}; i++)
-                out[(start + k) * {n} + i] = result[i][k];
+        for (int i = 0; i < {n_outputs}; i++)
+            for (long k = 0; k < size; k++)
+                out[place[i] * stride + start + k] = result[i][k];
     }}
 }}
 """
@@ -97,21 +98,39 @@ def compile_library(text: str, flags: tuple[str, ...] = _FLAGS) -> ctypes.CDLL:
 
 
 class CompiledProgram:
-    """Inverse dynamics of one robot as machine code."""
+    """A program of one robot as machine code.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        Of the outputs of one sample.
+    vanishing : ndarray of bool, of that shape
+        Outputs that are zero for every motion; they are not written.
+    """
 
     def __init__(self, program: Program) -> None:
-        (self._n,) = program.shape
+        self.shape = program.shape
+        self.vanishing = np.ones(program.shape, dtype=bool)
+        for key in program.outputs:
+            self.vanishing[key] = False
         self._library = compile_library(_batch_text(program))
         self._function: Callable[..., Any] = self._library.evaluate
         self._function.restype = None
-        self._function.argtypes = (ctypes.c_long, *5 * (ctypes.c_void_p,))
+        self._function.argtypes = (ctypes.c_long, *5 * (ctypes.c_void_p,), ctypes.c_long)
 
-    def __call__(self, signals: dict[str, np.ndarray], parameters: np.ndarray) -> np.ndarray:
-        """Torques, shape (n_samples, n_joints)."""
+    def __call__(
+        self,
+        signals: dict[str, np.ndarray],
+        parameters: np.ndarray | None = None,
+        out: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """Outputs with the samples last; ``out`` may be longer than there are samples."""
         arrays = [np.ascontiguousarray(signals[name]) for name in ("q", "dq", "ddq")]
-        arrays.append(np.ascontiguousarray(parameters))
-        out = np.empty((len(arrays[0]), self._n))
-        self._function(len(out), *(a.ctypes.data for a in arrays), out.ctypes.data)
+        arrays.append(np.ascontiguousarray(np.zeros(1) if parameters is None else parameters))
+        if out is None:
+            out = np.zeros((*self.shape, len(arrays[0])))
+        pointers = [a.ctypes.data for a in (*arrays, out)]
+        self._function(len(arrays[0]), *pointers, out.shape[-1])
         return out
 
 
@@ -128,11 +147,18 @@ def _batch_text(program: Program) -> str:
     given = {index: f"wave[{row}][k]" for row, index in enumerate(waves)}
     return _TEMPLATE.format(
         n=program.shape[0],
+        n_outputs=max(1, len(program.outputs)),
+        places=", ".join(_places(program)) or "0",
         block=_BLOCK,
         n_waves=max(1, len(waves)),
         waves="\n".join(f"        {loop}" for loop in loops),
         body="\n".join(f"            {line}" for line in _lines(program, given, "result")),
     )
+
+
+def _places(program: Program) -> list[str]:
+    """Position of every output in the flattened outputs of a sample."""
+    return [str(np.ravel_multi_index(key, program.shape)) for key in program.outputs]
 
 
 def _lines(program: Program, given: dict[int, str], target: str) -> list[str]:
@@ -144,7 +170,7 @@ def _lines(program: Program, given: dict[int, str], target: str) -> list[str]:
     lines, outputs = statements(
         program, input_name=name, prefix="const double ", suffix=";", language=C, given=given
     )
-    for key, value in outputs.items():
-        where = f"{target}[{key[0]}][k]" if target == "result" else f"{target}[k]"
+    for row, value in enumerate(outputs.values()):
+        where = f"{target}[{row}][k]" if target == "result" else f"{target}[k]"
         lines.append(f"{where} = {value};")
     return renumber(lines)

@@ -15,7 +15,7 @@ import numpy as np
 
 from skidyn.rigid_body._canonical import CanonicalModel, canonicalize
 from skidyn.rigid_body._compiled import CompiledProgram
-from skidyn.rigid_body._numpy import BoundProgram, chunk_size, evaluate_rows
+from skidyn.rigid_body._numpy import BoundProgram, chunk_size, clear_vanishing, evaluate_rows
 from skidyn.rigid_body._recursion import (
     Program,
     trace_inverse_dynamics,
@@ -134,10 +134,20 @@ class Engine:
         return self._scalars[key]
 
     def torque_regressor(
-        self, signals: dict[str, np.ndarray], *, dtype: Any, out: np.ndarray | None
+        self,
+        signals: dict[str, np.ndarray],
+        *,
+        dtype: Any,
+        out: np.ndarray | None,
+        backend: str = "numpy",
     ) -> np.ndarray:
         """Torque per unit of every inertial parameter, samples first."""
         key = "torque_regressor", self.gravity_key()
+        if backend == "compiled":
+            compiled = self._compiled(*key)
+            if out is not None:
+                clear_vanishing(out, compiled.vanishing, np.dtype(float), len(signals["q"]))
+            return np.moveaxis(compiled(signals, out=out), -1, 0)
         if out is None and self._is_small(signals, dtype):
             return self._scalar(*key)(signals)
         return self.evaluate(signals, *key, dtype=dtype, out=out)
@@ -178,6 +188,17 @@ class Engine:
         """
         key = "regressor_columns", self.gravity_key(), columns, spare
         yield from self.iter_chunks(signals, chunk, *key)
+
+    def iter_compiled(
+        self, signals: dict[str, np.ndarray], chunk: int, *key: Any
+    ) -> Iterator[tuple[slice, np.ndarray]]:
+        """The same through the compiler."""
+        n_samples, compiled = len(signals["q"]), self._compiled(*key)
+        buffer = np.zeros((*compiled.shape, self._chunk(n_samples, chunk, *key)))
+        for start in range(0, n_samples, buffer.shape[-1]):
+            rows = slice(start, min(start + buffer.shape[-1], n_samples))
+            compiled({name: values[rows] for name, values in signals.items()}, out=buffer)
+            yield rows, buffer[..., : rows.stop - rows.start]
 
     def fixed_inverse_dynamics(
         self,
@@ -229,7 +250,7 @@ class Engine:
         if parameters is not None:
             own = np.array(self.canonical.parameters(parameters))
         if backend == "compiled":
-            return self._compiled("inverse_dynamics", *key)(signals, own)
+            return self._compiled("inverse_dynamics", *key)(signals, own).T
         return self.evaluate(signals, "inverse_dynamics", *key, parameters=own, dtype=dtype)
 
     def _compiled(self, *key: Any) -> CompiledProgram:

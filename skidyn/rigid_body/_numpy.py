@@ -225,19 +225,11 @@ def evaluate_rows(
     The memory keeps the samples last; what is returned is a view.
     """
     shape = (*bound.outputs.shape[:-1], n_samples)
-    if out is not None and (out.shape != shape or out.dtype != bound.dtype):
-        raise SkidynError(
-            f"out has shape {out.shape} and type {out.dtype}; expected {shape} of {bound.dtype}."
-        )
     if out is None:
         result = np.zeros(shape, bound.dtype)  # untouched zeros cost no memory traffic
     else:
         result = out
-        for key in np.argwhere(bound.vanishing):
-            row = result[tuple(key)]
-            # Memory that held a regressor before has its zeros: reading is cheaper than writing.
-            if n_samples and not row.min() == 0.0 == row.max():
-                row[...] = 0.0
+        clear_vanishing(out, bound.vanishing, bound.dtype, n_samples)
     for start in range(0, n_samples, bound.chunk):
         rows = slice(start, min(start + bound.chunk, n_samples))
         size = rows.stop - rows.start
@@ -247,3 +239,20 @@ def evaluate_rows(
             bound.run(signals, rows)
             result[..., rows] = bound.outputs[..., :size]
     return np.moveaxis(result, -1, 0)
+
+
+def clear_vanishing(
+    out: np.ndarray, vanishing: np.ndarray, dtype: np.dtype, n_samples: int
+) -> None:
+    """Check memory for outputs, samples last, and write the zeros that no program writes."""
+    shape = (*vanishing.shape, n_samples)
+    if out.shape != shape or out.dtype != dtype or not out.flags.c_contiguous:
+        raise SkidynError(
+            f"out has shape {out.shape} and type {out.dtype}; expected {shape} of {dtype}, "
+            "C-contiguous."
+        )
+    for key in np.argwhere(vanishing):
+        row = out[tuple(key)]
+        # Memory that held a regressor before has its zeros: reading is cheaper than writing.
+        if n_samples and not row.min() == 0.0 == row.max():
+            row[...] = 0.0

@@ -264,10 +264,7 @@ class Robot:
         >>> load_scara().inverse_dynamics([[0, 0, 0, 0]], [[0, 0, 0, 0]], [[0, 0, 1, 0]]).round(2)
         array([[ 0.  ,  0.  , 16.22,  0.  ]])
         """
-        if backend not in ("numpy", "compiled"):
-            raise SkidynError(f"backend is {backend!r}; expected 'numpy' or 'compiled'.")
-        if backend == "compiled" and np.dtype(dtype) != np.float64:
-            raise SkidynError("backend='compiled' works in float64 only.")
+        _check_backend(backend, dtype)
         signals = self._signals(q=q, dq=dq, ddq=ddq)
         return self._engine.inverse_dynamics(
             signals,
@@ -371,7 +368,14 @@ class Robot:
         return solved[..., 0]
 
     def torque_regressor(
-        self, q: Any, dq: Any, ddq: Any, *, dtype: Any = np.float64, out: np.ndarray | None = None
+        self,
+        q: Any,
+        dq: Any,
+        ddq: Any,
+        *,
+        dtype: Any = np.float64,
+        out: np.ndarray | None = None,
+        backend: str = "numpy",
     ) -> np.ndarray:
         """Joint torque per unit of every inertial parameter.
 
@@ -386,6 +390,8 @@ class Robot:
         out : ndarray of shape (n_joints, 10 * n_bodies, n_samples), default=None
             Memory to write into, C-contiguous and of type ``dtype``; saves the time that the
             operating system needs to hand out fresh memory.
+        backend : {"numpy", "compiled"}, default="numpy"
+            ``"compiled"`` works as in :meth:`inverse_dynamics`; a few seconds to compile.
 
         Returns
         -------
@@ -393,10 +399,11 @@ class Robot:
             In the memory the samples come last: ``moveaxis(result, 0, -1)`` is contiguous.
         """
         signals = self._signals(q=q, dq=dq, ddq=ddq)
-        return self._engine.torque_regressor(signals, dtype=dtype, out=out)
+        _check_backend(backend, dtype)
+        return self._engine.torque_regressor(signals, dtype=dtype, out=out, backend=backend)
 
     def iter_torque_regressor(
-        self, q: Any, dq: Any, ddq: Any, chunk: int = 4096
+        self, q: Any, dq: Any, ddq: Any, chunk: int | None = None, *, backend: str = "numpy"
     ) -> Iterator[tuple[slice, np.ndarray]]:
         """Yield the regressor chunk by chunk, without ever holding all of it.
 
@@ -404,8 +411,10 @@ class Robot:
         ----------
         q, dq, ddq : array-like of shape (n_samples, n_joints)
             Positions (rad, m), velocities and accelerations.
-        chunk : int, default=4096
-            Largest number of samples at a time.
+        chunk : int, default=None
+            Largest number of samples at a time. None: 4096, or 512 with ``backend="compiled"``.
+        backend : {"numpy", "compiled"}, default="numpy"
+            ``"compiled"`` works as in :meth:`inverse_dynamics`; a few seconds to compile.
 
         Yields
         ------
@@ -414,12 +423,14 @@ class Robot:
         Y : ndarray of shape (n_joints, 10 * n_bodies, rows)
             Their regressor, samples last. The memory is used again for the next chunk.
         """
+        if chunk is None:
+            chunk = 512 if backend == "compiled" else 4096
         if chunk < 1:
             raise SkidynError(f"chunk is {chunk}; expected at least 1.")
         signals = self._signals(q=q, dq=dq, ddq=ddq)
-        yield from self._engine.iter_chunks(
-            signals, chunk, "torque_regressor", self._engine.gravity_key()
-        )
+        _check_backend(backend, np.float64)
+        run = self._engine.iter_compiled if backend == "compiled" else self._engine.iter_chunks
+        yield from run(signals, chunk, "torque_regressor", self._engine.gravity_key())
 
     def forward_kinematics(self, q: Any, body: int | str = -1) -> tuple[np.ndarray, np.ndarray]:
         """Pose of a body or link frame in the base frame.
@@ -555,6 +566,13 @@ class Robot:
         if not -self.n_bodies <= body < self.n_bodies:
             raise SkidynError(f"body is {body}; the robot has {self.n_bodies} moving bodies.")
         return body % self.n_bodies, None
+
+
+def _check_backend(backend: str, dtype: Any) -> None:
+    if backend not in ("numpy", "compiled"):
+        raise SkidynError(f"backend is {backend!r}; expected 'numpy' or 'compiled'.")
+    if backend == "compiled" and np.dtype(dtype) != np.float64:
+        raise SkidynError("backend='compiled' works in float64 only.")
 
 
 def _frozen(values: Any) -> np.ndarray:

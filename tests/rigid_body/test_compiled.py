@@ -46,3 +46,24 @@ def test_unknown_backend_and_precision():
         robot.inverse_dynamics(q, q, q, backend="fortran")
     with pytest.raises(ValueError, match="float64 only"):
         robot.inverse_dynamics(q, q, q, backend="compiled", dtype=np.float32)
+
+
+@pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
+def test_compiled_regressor_equals_numpy_whole_in_chunks_and_into_used_memory():
+    robot = load_scara()
+    q, dq, ddq = np.random.default_rng(0).normal(size=(3, 700, robot.n_joints))
+    expected = robot.torque_regressor(q, dq, ddq)
+
+    whole = robot.torque_regressor(q, dq, ddq, backend="compiled")
+    chunks = robot.iter_torque_regressor(q, dq, ddq, backend="compiled")
+    pieces = np.concatenate([chunk.copy() for _, chunk in chunks], axis=2)
+    used = np.full((robot.n_joints, 10 * robot.n_bodies, 700), 7.0)
+    into = robot.torque_regressor(q, dq, ddq, out=used, backend="compiled")
+
+    for got in (whole, np.moveaxis(pieces, -1, 0), into):
+        np.testing.assert_allclose(got, expected, atol=1e-12)
+    assert np.shares_memory(into, used)
+    with pytest.raises(ValueError, match="out has shape"):
+        robot.torque_regressor(q, dq, ddq, out=used[..., :5], backend="compiled")
+    with pytest.raises(ValueError, match="works in float64 only"):
+        robot.torque_regressor(q, dq, ddq, dtype=np.float32, backend="compiled")
