@@ -6,6 +6,9 @@
 #   make lint   ruff, codespell, mypy and the documentation build with warnings as errors
 #   make docs   build the documentation into docs/_build/html
 #   make wheel  build a wheel into dist/ and check that it holds the whole package
+#   make compatibility
+#               build an archive of the source, install it into an empty environment with the
+#               oldest version of every dependency that pyproject.toml allows, and run the core tests
 #   make clean  remove what these targets made
 #
 # Choose another build of torch with, for example, `make demo TORCH=torch`.
@@ -14,6 +17,10 @@ PYTHON ?= python3
 TORCH ?= torch==2.13.0
 VENV ?= .venv
 PYTEST_ARGS ?=
+# what make compatibility installs into, and runs; "tests" for everything, which takes long
+OLDEST ?= .venv-oldest
+CORE_TESTS ?= $(addprefix tests/,robots rigid_body effects evidence metrics model_selection \
+    preprocessing neural_network committee fleet)
 
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
@@ -24,7 +31,7 @@ export MKL_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export MPLBACKEND ?= Agg
 
-.PHONY: demo test lint format docs wheel clean
+.PHONY: demo test lint format docs wheel compatibility clean
 
 demo: $(VENV)/.demo
 	$(BIN)/python -m skidyn demo
@@ -50,8 +57,13 @@ wheel: $(VENV)/.torch
 	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
 	$(BIN)/python .ci/check_wheel.py dist/skidyn-*.whl
 
+# pytest by its own name: "python -m pytest" would test the folder, and not what is installed
+compatibility: $(OLDEST)/.installed
+	$(OLDEST)/bin/python -c "import skidyn; skidyn.show_versions()"
+	$(OLDEST)/bin/pytest -n 2 -p no:cacheprovider -W default::DeprecationWarning $(CORE_TESTS)
+
 clean:
-	rm -rf $(VENV) build dist docs/_build docs/gallery docs/api
+	rm -rf $(VENV) $(OLDEST) build dist docs/_build docs/gallery docs/api
 
 # torch first and alone, so that the chosen build is the one that stays
 $(VENV)/.torch:
@@ -64,4 +76,16 @@ $(VENV)/.torch:
 $(VENV)/.%: pyproject.toml setup.cfg | $(VENV)/.torch
 	@echo "Installing skidyn[$*] into $(VENV) ..."
 	@$(PIP) --editable ".[$*]"
+	@touch $@
+
+$(OLDEST)/.installed: pyproject.toml setup.cfg .ci/oldest.py $(shell git ls-files skidyn)
+	rm -rf $(OLDEST)
+	$(PYTHON) -m venv $(OLDEST)
+	@echo "Installing $(TORCH) and the oldest dependencies into $(OLDEST) ..."
+	@$(OLDEST)/bin/python -m pip install --quiet --disable-pip-version-check "$(TORCH)" build
+	$(OLDEST)/bin/python -m build --sdist --outdir $(OLDEST)/dist .
+	$(OLDEST)/bin/python .ci/oldest.py test > $(OLDEST)/constraints.txt
+	@$(OLDEST)/bin/python -m pip install --quiet --disable-pip-version-check \
+	    -c $(OLDEST)/constraints.txt pytest pytest-xdist hypothesis polars \
+	    "skidyn[all] @ file://$$(ls $(CURDIR)/$(OLDEST)/dist/skidyn-*.tar.gz)"
 	@touch $@

@@ -2,7 +2,10 @@
 """Damaged and hostile inputs for every reader: each is read, or refused by an error of skidyn.
 
 Usage: python benchmarks/scale/fuzz.py [--inputs 2000] [--seed 0] [--only urdf csv ...]
-       python benchmarks/scale/fuzz.py --atheris --only formula      (coverage-guided, endless)
+       python benchmarks/scale/fuzz.py --atheris --only formula --seconds 300
+
+The second form lets coverage of skidyn's own code guide the damage; it ends at the first crash,
+after the seconds, or never, and libFuzzer prints how many inputs it tried.
 
 An input counts as a crash if anything but a skidyn error is raised, or if it takes over 10 s.
 """
@@ -201,27 +204,49 @@ def try_inputs(name: str, count: int, seed: int = 0) -> tuple[int, list[tuple[by
     return accepted, crashes
 
 
+def guided(name: str, seconds: int) -> None:
+    """Fuzz one reader with atheris; does not return."""
+    import atheris
+
+    folder = Path(tempfile.mkdtemp())
+    corpus = folder / "corpus"
+    corpus.mkdir()
+    for k, data in enumerate(seeds(name)):
+        (corpus / f"{k}").write_bytes(data)
+    for module in [m for m in sys.modules if m.startswith("skidyn")]:
+        del sys.modules[module]  # imported anew, with the counters of coverage
+    with atheris.instrument_imports(include=["skidyn"]):
+        for data in seeds(name):
+            try:
+                TARGETS[name](data, folder)
+            except Exception as error:
+                print(f"seed refused: {error}")
+    from skidyn._exceptions import SkidynError as Refused
+
+    def once(data: bytes) -> None:
+        try:
+            TARGETS[name](data, folder)
+        except Refused:
+            pass
+
+    warnings.simplefilter("ignore")
+    limits = [f"-max_total_time={seconds}", f"-timeout={SECONDS}", "-rss_limit_mb=8192"]
+    atheris.Setup(
+        [sys.argv[0], *limits, "-max_len=65536", "-print_final_stats=1", str(corpus)], once
+    )
+    atheris.Fuzz()
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--inputs", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", nargs="+", default=list(TARGETS), choices=list(TARGETS))
     parser.add_argument("--atheris", action="store_true")
+    parser.add_argument("--seconds", type=int, default=0)
     options = parser.parse_args()
     if options.atheris:
-        import atheris
-
-        folder = Path(tempfile.mkdtemp())
-
-        def once(data: bytes) -> None:
-            try:
-                TARGETS[options.only[0]](data, folder)
-            except SkidynError:
-                pass
-
-        atheris.instrument_all()
-        atheris.Setup([sys.argv[0]], once)
-        atheris.Fuzz()
+        guided(options.only[0], options.seconds)
     total = 0
     print("reader inputs read refused crashes")
     for name in options.only:

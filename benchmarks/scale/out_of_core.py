@@ -1,70 +1,118 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Evidence of Parquet tiles: rows per second and peak memory, alone, with processes, with Dask.
+"""Identification and diagnosis of Parquet tiles: time, processor time and peak memory.
 
-Usage: python benchmarks/scale/out_of_core.py [--rows 100000 1000000] [--robot planar_arm]
-       [--how plain processes dask] [--workers 1 2]
+Usage: python benchmarks/scale/out_of_core.py [--rows 1e5 1e6] [--robot planar_arm]
+       [--how plain processes dask diagnosis] [--workers 1 2]
 
-The tiles (100,000 rows each, ten of them, read again and again) lie in a temporary folder that is
-deleted. Every measurement runs in a process of its own, whose peak memory is that of the
-operating system, of the process that measures; workers of a pool have their own.
+``plain``, ``processes`` and ``dask`` identify rigid body, viscous and Coulomb friction;
+``diagnosis`` asks what a model without Coulomb friction lacks, ``memory`` the same of all rows in
+memory. The tiles (100,000 rows each, ten of them, read again and again) lie in a temporary folder
+that is deleted. Every measurement runs in a process of its own. Processor time is user and system
+time of it and its workers, without their start; it is what to compare on a machine that others
+use. Peak memory is that of the largest process.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import operator
-import resource
+import re
 import subprocess
 import sys
 import tempfile
 import time
-from concurrent.futures import ProcessPoolExecutor
-from functools import reduce
+from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 
+import psutil
+
 TILE, TILES = 100_000, 10
+#: Without Dask's profiler of all workers, and with an allocator that keeps its memory: by default
+#: Dask's workers return every freed array to the operating system, and ask for it again.
+QUIET = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.nanny.pre-spawn-environ": {
+        "MALLOC_TRIM_THRESHOLD_": f"{2**27}",
+        "MALLOC_MMAP_THRESHOLD_": f"{2**27}",
+    },
+}
+
+
+def robot():
+    from skidyn import datasets
+
+    return getattr(datasets, f"load_{ROBOT}")()
 
 
 def evidence_of(files):
-    from skidyn import datasets
     from skidyn.evidence import evidence_from_parquet
 
-    robot = getattr(datasets, f"load_{ROBOT}")()
-    return evidence_from_parquet(files, robot)
+    return evidence_from_parquet(files, robot())
+
+
+def answer(how: str, files: list[Path], client=None, workers: int = 1) -> str:
+    """Do the work; what comes out, in a word."""
+    import pandas as pd
+
+    from skidyn.diagnosis import diagnose, diagnose_parquet
+    from skidyn.evidence import evidence_from_parquet
+    from skidyn.rigid_body import RBDRegressor, regressor_from_evidence
+
+    if how == "diagnosis":
+        result = diagnose_parquet(RBDRegressor(robot(), ("viscous",)), files)
+        found = [(c.finding.kind, c.finding.joints, c.confirmed) for c in result.confirmations]
+        return f"{found}".replace(" ", "")
+    if how == "memory":
+        frame = pd.concat([pd.read_parquet(f).assign(tile=k) for k, f in enumerate(files)])
+        frame["trajectory"] += 1000 * frame.pop("tile")
+        tau = frame.filter(regex="^tau").to_numpy()
+        diagnosis = diagnose(
+            RBDRegressor(robot(), ("viscous",)), frame.drop(columns=frame.filter(regex="^tau")), tau
+        )
+        return f"{[(f.kind, f.joints) for f in diagnosis.findings]}".replace(" ", "")
+    n_jobs = workers if how == "processes" else None
+    evidence = evidence_from_parquet(files, robot(), n_jobs=n_jobs, client=client)
+    model = regressor_from_evidence(robot(), evidence)
+    return f"{model.coef_[-1]:.9f}"
+
+
+def processor_seconds() -> float:
+    """User and system time of this process and its living descendants."""
+    own = psutil.Process()
+    times = [p.cpu_times() for p in [own, *own.children(recursive=True)]]
+    return sum(t.user + t.system for t in times)
+
+
+def peak_mib() -> float:
+    own = psutil.Process()
+    status = [
+        Path(f"/proc/{p.pid}/status").read_text() for p in [own, *own.children(recursive=True)]
+    ]
+    return max(int(hit[1]) for text in status if (hit := re.search(r"VmHWM:\s+(\d+)", text))) / 1024
 
 
 def measure(how: str, workers: int, files: list[Path]) -> dict:
-    from skidyn import datasets
-    from skidyn.evidence import evidence_from_parquet
-    from skidyn.rigid_body import regressor_from_evidence
+    with ExitStack() as stack:
+        client = None
+        prepare: Callable[[], object] = lambda: evidence_of([files[0]])  # noqa: E731
+        if how == "dask":
+            import dask
+            from distributed import Client, LocalCluster
 
-    robot = getattr(datasets, f"load_{ROBOT}")()
-    evidence_from_parquet(files[0], robot)  # compiled and imported before the clock starts
-    if how == "plain":
-        start = time.perf_counter()
-        evidence = evidence_from_parquet(files, robot)
-    elif how == "processes":
-        with ProcessPoolExecutor(workers) as pool:
-            list(pool.map(evidence_of, [[files[0]]] * workers))
-            start = time.perf_counter()
-            evidence = reduce(operator.add, pool.map(evidence_of, [[f] for f in files]))
-    else:
-        from distributed import Client, LocalCluster
-
-        with (
-            LocalCluster(workers, threads_per_worker=1, dashboard_address=None) as cluster,
-            Client(cluster) as client,
-        ):
+            dask.config.set(QUIET)
+            cluster = LocalCluster(workers, threads_per_worker=1, dashboard_address=None)
+            client = stack.enter_context(Client(stack.enter_context(cluster)))
+        prepare()
+        # Every worker has imported and compiled before the clock starts.
+        if how == "processes":
+            answer(how, files[:1] * workers, workers=workers)
+        elif client is not None:
             client.run(evidence_of, [files[0]])
-            start = time.perf_counter()
-            evidence = evidence_from_parquet(files, robot, client=client)
-    seconds = time.perf_counter() - start
-    begin = time.perf_counter()
-    regressor_from_evidence(robot, evidence)
-    solved = time.perf_counter() - begin
-    own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    return {"seconds": seconds, "solve": solved, "peak_mib": own, "workers": workers}
+        begin, used = time.perf_counter(), processor_seconds()
+        said = answer(how, files, client, workers)
+        used, seconds = processor_seconds() - used, time.perf_counter() - begin
+        return {"seconds": seconds, "processor": used, "peak": peak_mib(), "answer": said}
 
 
 def main() -> None:
@@ -79,32 +127,27 @@ def main() -> None:
     ROBOT = options.robot
     if options.measure:
         tiles = sorted(Path(options.measure).glob("*.parquet"))
-        n = int(options.rows[0] / TILE)
-        files = [tiles[k % len(tiles)] for k in range(n)]
+        files = [tiles[k % len(tiles)] for k in range(int(options.rows[0] / TILE))]
         print(json.dumps(measure(options.how[0], options.workers[0], files)))
         return
     from _tiles import write_tile
 
-    from skidyn import datasets
-
     with tempfile.TemporaryDirectory() as folder:
         for k in range(TILES):
-            robot = getattr(datasets, f"load_{ROBOT}")()
-            write_tile(Path(folder, f"{k}.parquet"), robot, TILE, seed=k)
-        print(f"{ROBOT}: how workers rows seconds rows/s solve_s peak_MiB")
+            write_tile(Path(folder, f"{k}.parquet"), robot(), TILE, seed=k)
+        print(f"{ROBOT}: how workers rows wall_s processor_s rows/processor_s peak_MiB answer")
         for how in options.how:
-            for workers in options.workers if how != "plain" else [1]:
+            for workers in options.workers if how in ("processes", "dask") else [1]:
                 for rows in options.rows:
                     arguments = ["--measure", folder, "--rows", str(rows), "--robot", ROBOT]
                     arguments += ["--how", how, "--workers", str(workers)]
                     done = subprocess.run(
-                        [sys.executable, __file__, *arguments],
-                        capture_output=True, text=True, check=True,
-                    )  # fmt: skip
+                        [sys.executable, __file__, *arguments], stdout=subprocess.PIPE, text=True
+                    )
                     r = json.loads(done.stdout.splitlines()[-1])
                     print(
-                        f"{how} {workers} {rows:.0e} {r['seconds']:.1f} "
-                        f"{rows / r['seconds']:.0f} {r['solve']:.3f} {r['peak_mib']:.0f}",
+                        f"{how} {workers} {rows:.0e} {r['seconds']:.1f} {r['processor']:.1f} "
+                        f"{rows / r['processor']:.0f} {r['peak']:.0f} {r['answer']}",
                         flush=True,
                     )
 

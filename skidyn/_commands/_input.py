@@ -9,7 +9,7 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from skidyn._commands._output import hashes, working
+from skidyn._commands._output import RECORDED, hashes, working
 from skidyn._exceptions import LogWarning, SkidynError
 
 if TYPE_CHECKING:
@@ -107,15 +107,27 @@ def recorded_options(options: argparse.Namespace) -> argparse.Namespace:
     """Options of the diagnosis that a report records, with those of this command."""
     try:
         report = json.loads(Path(options.report).read_text(encoding="utf-8"))
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise SkidynError(f"{options.report} is not a report of skidyn diagnose: {error}") from None
     provenance = report.get("provenance") if isinstance(report, dict) else None
     provenance = provenance if isinstance(provenance, dict) else {}
     recorded = provenance.get("options")
     if not isinstance(recorded, dict) or not {"logs", "urdf"} <= set(recorded):
         raise SkidynError(f"{options.report} records no log; it must come from skidyn diagnose")
+    # Nothing else is taken over, least of all where to write.
+    recorded = {"model": "rigid_body", "nominal": False} | recorded
+    recorded = {name: recorded.get(name) for name in RECORDED}
+    for name, value in recorded.items():
+        parts = value if name == "logs" and isinstance(value, list) else []
+        if not isinstance(value, RECORDED[name]) or not all(isinstance(p, str) for p in parts):
+            raise SkidynError(
+                f"{options.report}: option {name} of the diagnosis is {value!r}; it must come from "
+                "skidyn diagnose"
+            )
+    known = provenance.get("sha256")
+    known = known if isinstance(known, dict) else {}
     for name, digest in hashes([*recorded["logs"], recorded["urdf"]]).items():
-        if digest != provenance.get("sha256", {}).get(name):
+        if digest != known.get(name):
             warnings.warn(
                 f"{name} has changed since {options.report} was written", LogWarning, stacklevel=2
             )

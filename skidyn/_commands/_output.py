@@ -103,16 +103,23 @@ def working(text: str, options: argparse.Namespace) -> Iterator[None]:
             yield
 
 
+#: Options that a report records, and what each may be; a report comes from anywhere.
+RECORDED: dict[str, tuple[type, ...]] = {
+    "logs": (list,),
+    "urdf": (str,),
+    "model": (str,),
+    "nominal": (bool,),
+    "rate": (float, int, type(None)),
+    **dict.fromkeys(("columns", "units", "drive_gains", "joints", "effects"), (str, type(None))),
+}
+
+
 def provenance(options: argparse.Namespace) -> dict[str, Any]:
     from skidyn._version import versions
 
     # the path of the interpreter says nothing about the numbers, but much about its user
     used = {name: version for name, version in versions().items() if name != "executable"}
-    keep = (
-        *("logs", "urdf", "model", "nominal", "columns", "units", "drive_gains", "joints"),
-        *("rate", "effects"),
-    )
-    recorded = {k: getattr(options, k, None) for k in keep}
+    recorded = {name: getattr(options, name, None) for name in RECORDED}
     digests = hashes([*options.logs, options.urdf])
     return {"versions": used, "sha256": digests, "options": recorded}
 

@@ -34,6 +34,7 @@ def read_hdf5_channels(path: Path, max_bytes: int, topics: Sequence[str] | None)
         datasets: list[Any] = []
         file.visititems(lambda _, item: datasets.append(item) if hasattr(item, "shape") else None)
         check_size(path, sum(item.nbytes for item in datasets), max_bytes)
+        _refuse_other_files(path, datasets)
         groups, names = _numeric_groups(file, datasets)
     clocks = {g: arrays[n] for g, arrays in groups.items() for n in arrays if _is_clock(n)}
     channels = []
@@ -52,6 +53,17 @@ def read_hdf5_channels(path: Path, max_bytes: int, topics: Sequence[str] | None)
     if not channels:
         raise LogError(f"{path}: no numeric datasets{_asked(topics, list(groups))}.")
     return _runs(_with_clock(channels, path), path)
+
+
+def _refuse_other_files(path: Path, datasets: Sequence[Any]) -> None:
+    """An HDF5 file may name others, anywhere, as the place of its numbers."""
+    for item in datasets:
+        if item.is_virtual or item.external:
+            other = item.virtual_sources()[0].file_name if item.is_virtual else item.external[0][0]
+            raise LogError(
+                f"{path}: the numbers of {item.name} lie in another file, {other}; files that a "
+                "log names are not opened. Copy them into the log."
+            )
 
 
 def read_matlab_channels(path: Path, max_bytes: int, topics: Sequence[str] | None) -> list[Channel]:
