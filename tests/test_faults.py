@@ -2,30 +2,94 @@
 """What breaks around the program; each test is a row of docs/user_guide/faults.rst."""
 
 import os
+import signal
 import subprocess
 import sys
+import tempfile
+from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
+from sklearn.neighbors import KNeighborsRegressor
 
+from skidyn import save_model
 from skidyn.datasets import load_planar_arm
+from skidyn.export import write_urdf
 from skidyn.neural_network import LSTMRegressor
 from skidyn.report import write_json
 from skidyn.rigid_body import RBDRegressor
+from skidyn.robots import Robot
 
 
-def test_a_full_disk_leaves_the_old_report(tmp_path, monkeypatch):
-    file = write_json(tmp_path / "report.json", {"a": 1})
-    before = file.read_text()
-    monkeypatch.setattr(os, "replace", _no_space)
-    with pytest.raises(OSError, match="No space left"):
-        write_json(file, {"a": 2})
-    assert file.read_text() == before
-    assert [f.name for f in tmp_path.iterdir()] == ["report.json"]
+def _chain(n):
+    """A robot whose description is long."""
+    text = "<robot name='r'><link name='l0'/>"
+    for k in range(n):
+        text += (
+            f"<link name='l{k + 1}'><inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' "
+            f"ixy='0' ixz='0' iyz='0'/></inertial></link><joint name='j{k}' type='continuous'>"
+            f"<parent link='l{k}'/><child link='l{k + 1}'/><axis xyz='0 0 1'/></joint>"
+        )
+    return Robot.from_urdf(text + "</robot>")
 
 
-def _no_space(*_):
-    raise OSError(28, "No space left on device")
+_FEW, _MANY = (KNeighborsRegressor().fit(np.eye(n)[:, :5], np.arange(n)) for n in (5, 5000))
+#: Everything that writes a file, with something small to write and something large.
+WRITERS = {
+    "report.json": (write_json, {"a": 1}, {"a": list(range(60_000))}),
+    "model.skops": (save_model, _FEW, _MANY),
+    "robot.urdf": (lambda path, robot: write_urdf(robot, path), _chain(1), _chain(300)),
+}
+
+
+@contextmanager
+def files_of_at_most(size):
+    """What the system refuses beyond it, it refuses like a full disk: amid the writing."""
+    resource = pytest.importorskip("resource")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, handler)
+
+
+@contextmanager
+def nobody():
+    """Root may write anywhere, so the tests of root are done by another user."""
+    if os.geteuid() != 0:
+        yield
+        return
+    os.seteuid(65534)
+    try:
+        yield
+    finally:
+        os.seteuid(0)
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_a_full_disk_leaves_the_old_file(tmp_path, name):
+    write, small, large = WRITERS[name]
+    write(tmp_path / name, small)
+    before = {f.name: f.read_bytes() for f in tmp_path.iterdir()}
+    with files_of_at_most(50_000), pytest.raises(OSError, match="File too large"):
+        write(tmp_path / name, large)
+    assert {f.name: f.read_bytes() for f in tmp_path.iterdir()} == before
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_a_read_only_folder_is_named(name):
+    write, small, _ = WRITERS[name]
+    with tempfile.TemporaryDirectory() as parent:  # others may enter it, unlike tmp_path
+        os.chmod(parent, 0o755)
+        folder = Path(parent, "read_only")
+        folder.mkdir(mode=0o555)
+        with nobody(), pytest.raises(PermissionError, match="read_only"):
+            write(folder / name, small)
+        assert not list(folder.iterdir())
 
 
 def test_a_process_killed_while_writing_leaves_the_old_report(tmp_path):
@@ -40,13 +104,6 @@ def test_a_process_killed_while_writing_leaves_the_old_report(tmp_path):
     done = subprocess.run([sys.executable, "-c", code, str(file)], capture_output=True)
     assert done.returncode == -9
     assert file.read_text() == before
-
-
-@pytest.mark.skipif(hasattr(os, "geteuid") and os.geteuid() == 0, reason="root may write anywhere")
-def test_a_read_only_folder_is_named(tmp_path):
-    tmp_path.chmod(0o500)
-    with pytest.raises(PermissionError, match=tmp_path.name):
-        write_json(tmp_path / "report.json", {})
 
 
 def test_a_diverging_network_is_told():
