@@ -175,7 +175,8 @@ def _start(data: _Data, start: Array, nominal: Array, linear: Linear, least: flo
     slack = linear.b - linear.C @ start
     own, _ = local_units(start[:n].reshape(-1, 10), nominal)
     gradient = data.factor.T @ (data.target - data.factor @ start) - data.cost
-    mu = max(least, float(np.linalg.norm(block_diag(*own).T @ gradient[:n])))
+    gradient[:n] = block_diag(*own).T @ gradient[:n]
+    mu = max(least, float(np.linalg.norm(gradient)))
     duals = np.asarray(mu * np.linalg.inv(bodies))
     return _Point(start.copy(), bodies, slack, duals, mu / slack)
 

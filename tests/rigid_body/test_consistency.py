@@ -46,7 +46,17 @@ def test_negative_friction_ends_at_zero():
     _, coefficients = make_consistent(
         nominal, np.eye(21), target, np.array([1.0]), np.array([-1.0])
     )
-    assert 0 <= coefficients[0] < 1e-3
+    assert 0 <= coefficients[0] < 1e-5
+
+
+def test_a_nominal_model_that_fits_leaves_friction_to_the_data():
+    nominal = load_planar_arm().inertial_parameters
+    target = np.r_[nominal.ravel(), 0.7]
+    found, coefficients = make_consistent(
+        nominal, np.eye(21), target, np.array([1.0]), np.array([0.0])
+    )
+    np.testing.assert_allclose(coefficients, 0.7, rtol=1e-6)
+    np.testing.assert_allclose(found, nominal, atol=1e-6)
 
 
 def test_zero_torque_has_bodies_too():
