@@ -23,13 +23,10 @@ from skidyn.evidence._evidence import Evidence
 from skidyn.evidence._from_motion import evidence_of_rows, renumbered, sample_blocks
 from skidyn.evidence._kinematics import smooth_motion
 from skidyn.evidence._problem import (
-    Fit,
-    Problem,
     hysteresis_joints,
     make_problem,
     term_columns,
 )
-from skidyn.evidence._shapes import Gain, best_on_grid, refine_term
 from skidyn.evidence._streaming import evidence_of_signals, linear_terms
 from skidyn.rigid_body._base_parameters import find_base_parameters
 from skidyn.rigid_body._constraints import BodyConstraints
@@ -38,11 +35,10 @@ from skidyn.rigid_body._identifiability import condition_number
 from skidyn.rigid_body._instrumental import instrument_rows
 from skidyn.rigid_body._regression import Regression, Solution
 from skidyn.rigid_body._results import Results
+from skidyn.rigid_body._terms import find_terms, is_linear, needs_model
 from skidyn.rigid_body._uncertainty import PredictionBands, find_bands, sample_folds
 from skidyn.robots import Robot
 
-#: Rounds of weights, loads and shape parameters.
-ROUNDS = 3
 #: Groups of trajectories whose evidence partial_fit keeps apart, for standard errors.
 GROUPS = 20
 
@@ -242,7 +238,7 @@ class RBDRegressor(Results, RegressorMixin, BaseEstimator):
         terms = make_terms(self.effects, self.robot_.n_joints)
         identified = self.parameters == "identified"
         plain = identified and instruments is None and not method.rows
-        if signals.time is None and plain and all(map(_is_linear, terms)):
+        if signals.time is None and plain and all(map(is_linear, terms)):
             return self._fit_samples(signals, torque, terms, method)
         problem = make_problem(
             signals,
@@ -253,7 +249,7 @@ class RBDRegressor(Results, RegressorMixin, BaseEstimator):
             smooth=self._smooths(),
             reversals=hysteresis_joints(terms),
         )
-        fit = self._identify(problem)
+        fit = find_terms(problem)
         whole = problem.with_base_columns()
         others = None
         if instruments is not None:
@@ -291,7 +287,7 @@ class RBDRegressor(Results, RegressorMixin, BaseEstimator):
         )
         return self
 
-    @available_if(_keeps_no_rows)
+    @available_if(_keeps_no_rows)  # type: ignore[untyped-decorator]
     def partial_fit(self, X: Any, y: Any) -> RBDRegressor:
         """Add a part of the data, and identify the model from all parts so far.
 
@@ -532,34 +528,6 @@ class RBDRegressor(Results, RegressorMixin, BaseEstimator):
         return signals_from(X, columns, self.robot_)
 
     # ------------------------------------------------------------------ fitting
-    def _identify(self, problem: Problem) -> Fit:
-        """Weights, loads and shape parameters in turn, from simple to whole."""
-        given = list(problem.terms)
-        early = [t for t in given if not _needs_model(t) and not _to_search(t)]
-        fit = problem.fit(early, passes=2)
-        terms = early
-        for round_ in range(ROUNDS):
-            problem.with_fit(fit)
-            terms = self._shaped(problem, given if round_ == 0 else terms, fit)
-            fit = problem.fit(terms, sigma=fit.noise, passes=2)
-            if not any(_needs_model(t) or get_effect(t.kind).shapes for t in terms):
-                break
-        return fit
-
-    def _shaped(self, problem: Problem, terms: Sequence[Term], fit: Fit) -> list[Term]:
-        """Terms with the shape parameters that were left open found and refined."""
-        shaped = list(terms)
-        open_ = [i for i, t in enumerate(terms) if t in fit.terms or not _to_search(t)]
-        for i, term in enumerate(terms):
-            if not _to_search(term):
-                continue
-            others = [problem.term_rows(shaped[k]) for k in open_ if k != i]
-            gain = Gain(problem, others, fit.noise, problem.target)
-            start = best_on_grid(problem, term.kind, term.joints, gain)
-            shaped[i] = refine_term(problem, start, gain)
-            open_.append(i)
-        return shaped
-
     def _store_evidence(self, evidence: Evidence, terms: Sequence[Term]) -> None:
         """Identify from evidence alone."""
         method = self._method()
@@ -605,31 +573,7 @@ class RBDRegressor(Results, RegressorMixin, BaseEstimator):
 
     def _in_order(self) -> list[Term]:
         """Terms, those that look at the model's torque last."""
-        return sorted(self.effect_terms_, key=_needs_model)
+        return sorted(self.effect_terms_, key=needs_model)
 
 
 _DRY = ("coulomb", "stribeck", "offset")
-
-
-def _needs_model(term: Term) -> bool:
-    return bool({"load", "model_torque"} & set(get_effect(term.kind).needs))
-
-
-def _to_search(term: Term) -> bool:
-    """Whether shape parameters of a term were left open."""
-    effect = get_effect(term.kind)
-    if effect.search != "grid" or term.shape:
-        return False
-    return bool(effect.shapes) or type(effect).grid is not _plain_grid()
-
-
-def _is_linear(term: Term) -> bool:
-    """Whether the columns of a term are known before any fit."""
-    shapes = get_effect(term.kind).shapes
-    return not (_needs_model(term) or _to_search(term) or (shapes and not term.shape))
-
-
-def _plain_grid() -> Any:
-    from skidyn.effects import Effect
-
-    return Effect.grid
