@@ -91,7 +91,8 @@ def open_combinations(rows: Array, names: Sequence[str]) -> list[dict[str, Any]]
         # Where rounding decides, shares mean nothing: the direction itself tells who is in it.
         lost = index[i] >= NOTHING
         involved = np.abs(right[i]) > 0.1 * np.abs(right[i]).max() if lost else share[i] > INVOLVED
-        order = np.argsort(-np.abs(right[i]))
+        # Equal entries keep the order of the columns, whatever rounding says.
+        order = np.argsort(-np.round(np.abs(right[i]) / np.abs(right[i]).max(), 6), kind="stable")
         chosen = [k for k in order if involved[k] or k in order[:2]]
         factors = right[i] / size[shown]
         lead = chosen[0]
