@@ -149,6 +149,12 @@ class Ranking:
             ]
         )
 
+    def noise(self, model: FoldedModel) -> Array:
+        """Root mean square of the residual rows of every joint under the fit to all folds."""
+        pairs = zip(self.target, model.design, strict=True)
+        residuals = [y - a @ model.whole.solution for y, a in pairs]
+        return np.array([np.sqrt(np.mean(r**2)) + 1e-100 if len(r) else 1.0 for r in residuals])
+
     def held_out(self, model: FoldedModel, joint: int) -> HeldOutRows:
         """Held-out residual of a joint's rows, now and with every candidate.
 

@@ -28,6 +28,7 @@ class Samples:
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         fold = sample_folds(problem)
+        self._fold = fold
         self._of_fold = [np.flatnonzero(fold == f) for f in range(problem.n_folds)]
         self._columns: dict[Term, dict[int, Array]] = {}
 
@@ -52,10 +53,11 @@ class Samples:
         at = len(self.problem.rigid_index)
         for term in terms:
             k = len(get_effect(term.kind).coefficients)
-            alone = "trajectory" in term.shape
+            own = np.array([left[at : at + k] for left in coefficients])[self._fold]
+            if "trajectory" in term.shape:
+                own = whole[None, at : at + k]
             for j, block in self._term_columns(term).items():
-                for here, left in zip(self._of_fold, coefficients, strict=True):
-                    residual[here, j] -= block[here] @ (whole if alone else left)[at : at + k]
+                residual[:, j] -= np.sum(block * own, axis=1)
             at += k
         return residual
 

@@ -17,7 +17,7 @@ from skidyn.diagnosis._diagnosis import _own_terms
 from skidyn.diagnosis._profile import refine
 from skidyn.diagnosis._reading import read_signals
 from skidyn.effects import Term, get_effect, list_effects
-from skidyn.evidence._problem import Fit, make_problem
+from skidyn.evidence._problem import make_problem
 from skidyn.explorer._ranking import FoldedModel, HeldOutRows, Ranking
 from skidyn.explorer._samples import Samples
 from skidyn.explorer._script import script
@@ -113,7 +113,7 @@ class Session:
         self._pool = catalogue_candidates(self.problem, list_effects())
         self._ranking = Ranking(self.problem, self._pool, self._target)
         self._samples = Samples(self.problem)
-        self._steps = [self._step((), base, None)]
+        self._steps = [self._step((), base.terms, base.sigma, None)]
 
     # ------------------------------------------------------------------ what is seen
     @property
@@ -356,7 +356,7 @@ class Session:
         if last.coarse is not None:
             self._steps.pop()
             blocks = [self.problem.term_rows(t) for t in self.terms]
-            noise = self._steps[-1].fit.noise
+            noise = self._steps[-1].noise
             better = refine(self.problem, blocks, [last.coarse], noise, self._target)[0]
             self._push(better, last.entry["joint"])
             self._steps[-1].coarse = None
@@ -434,26 +434,27 @@ class Session:
         return step.rows[joint]
 
     def _push(self, candidate: Candidate, joint: int) -> None:
-        terms = (candidate.term,)
-        noise = self._steps[-1].fit.noise
-        fit = self.problem.fit([*self.terms, *terms], sigma=noise)
-        self._steps.append(self._step(terms, fit, joint))
+        new = (candidate.term,)
+        noise = self._steps[-1].noise
+        self._steps.append(self._step(new, (*self.terms, *new), noise, joint))
         self._steps[-1].coarse = candidate if candidate.n_shapes else None
 
-    def _step(self, terms: tuple[Term, ...], fit: Fit, joint: int | None) -> _Step:
-        model = self._ranking.model([self.problem.term_rows(t) for t in fit.terms], fit.sigma)
+    def _step(
+        self, new: tuple[Term, ...], terms: tuple[Term, ...], sigma: Array, joint: int | None
+    ) -> _Step:
+        model = self._ranking.model([self.problem.term_rows(t) for t in terms], sigma)
         left = [f.solution for f in model.fits]
-        residual = self._samples.residual(fit.terms, left, model.whole.solution)
+        residual = self._samples.residual(terms, left, model.whole.solution)
         sliding = self.problem.rows.sliding
         squares = np.sum(residual**2 * sliding, axis=0)
         rmse = np.sqrt(squares / np.maximum(sliding.sum(axis=0), 1))
         entry = {
-            "added": terms[0].kind if terms else None,
+            "added": new[0].kind if new else None,
             "joint": joint,
-            "joints": [j + 1 for j in terms[0].joints] if terms else [],
+            "joints": [j + 1 for j in new[0].joints] if new else [],
             "rmse": [float(x) for x in rmse],
         }
-        return _Step(terms, fit, model, residual, entry)
+        return _Step(new, model, self._ranking.noise(model), residual, entry)
 
     def _rows_in(
         self, joint: int, trajectory: int | None, span: tuple[float, float] | None
@@ -472,8 +473,8 @@ class _Step:
     """The model after one click, with what was worked out about it."""
 
     terms: tuple[Term, ...]
-    fit: Fit
     model: FoldedModel
+    noise: Array  # of one row of every joint, N m or N
     residual: Array  # held out, at every sample, N m or N
     entry: dict[str, Any]
     coarse: Candidate | None = None
