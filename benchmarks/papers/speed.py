@@ -33,7 +33,7 @@ from skidyn.committee import ELMCommittee
 from skidyn.neural_network import BLLRegressor, LSTMRegressor
 
 HIDDEN = 32
-#: Rows that the naive nets read; ours read 8 to 11 rows of history.
+#: Rows that the naive nets read; ours read 4 to 7 rows of history.
 WINDOW = 32
 
 
@@ -95,7 +95,7 @@ def main() -> None:
     train, test = slice(0, options.rows), slice(options.rows, None)
 
     member = LSTMRegressor(
-        window=8,
+        window=4,
         stride=4,
         hidden_size=HIDDEN,
         max_epochs=options.epochs,

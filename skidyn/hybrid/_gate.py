@@ -24,11 +24,11 @@ def learned_weights(
 
     The least-squares factor of the cross-fitted learned part, between 0 and 1, is taken from all
     units (recordings, or blocks of the only one) but one, and its gain is measured on that one.
-    Two one-sided paired t-tests over units are made at level `alpha`; noise passes much more rarely,
-    since its held-out gain is negative in the mean. If the mean gain over all joints passes, every joint is kept whose own gain is
-    more than its standard error (small gains on many joints are seen together); otherwise the
-    joints that pass alone, after Holm's correction. A joint's weight is the smallest of its
-    factors: what no single unit can talk it into.
+    Two one-sided paired t-tests over units are made at level `alpha`; noise passes much more
+    rarely, since its held-out gain is negative in the mean. If the mean gain over all joints
+    passes, every joint is kept whose own gain is more than its standard error (small gains on many
+    joints are seen together); otherwise the joints that pass alone, after Holm's correction. A
+    joint's weight is the smallest of its factors: what no single unit can talk it into.
 
     Parameters
     ----------

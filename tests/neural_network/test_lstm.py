@@ -71,10 +71,10 @@ def test_prediction_depends_on_the_past_of_the_segment_alone(log):
     np.testing.assert_allclose(model.predict(gap)[60:], model.predict(gap[60:]), atol=1e-6)
 
 
-@pytest.mark.parametrize("step", [1, 5, 8, 37])
-def test_stream_gives_the_numbers_of_the_whole_log(log, step):
+@pytest.mark.parametrize(("step", "stride"), [(1, 8), (5, 3), (8, 8), (37, 20)])
+def test_stream_gives_the_numbers_of_the_whole_log(log, step, stride):
     X, y = log
-    model = LSTMRegressor(**SMALL | {"max_epochs": 2}).fit(X, y)
+    model = LSTMRegressor(**SMALL | {"max_epochs": 2, "stride": stride}).fit(X, y)
     X = X[:260]
     stream = model.stream()
     parts = [stream.predict(X[i : i + step]) for i in range(0, len(X), step)]
