@@ -153,7 +153,8 @@ def _torque_from_current(
     if gains is None:
         if has_current and "tau1" not in table.columns:
             raise LogError(
-                f"{source} holds motor currents (i1..i{n}) and no torques. Pass drive_gains=[...], "
+                f"{source} holds motor currents (i1..i{n}) and no torques. Pass drive_gains=[...] "
+                "(--drive-gains on the command line), "
                 "the torque per ampere of each joint at the joint (N m/A: torque constant times "
                 "gear ratio)."
             )
