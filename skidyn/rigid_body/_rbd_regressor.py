@@ -287,7 +287,7 @@ class RBDRegressor(Results, RegressorMixin, BaseEstimator):
         )
         return self
 
-    @available_if(_keeps_no_rows)  # type: ignore[untyped-decorator]
+    @available_if(_keeps_no_rows)
     def partial_fit(self, X: Any, y: Any) -> RBDRegressor:
         """Add a part of the data, and identify the model from all parts so far.
 
