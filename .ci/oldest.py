@@ -15,6 +15,7 @@ NAME_AND_FLOOR = re.compile(r"([A-Za-z0-9._-]+)\s*>=\s*([0-9.]+)")
 
 
 def main(extras: list[str]) -> None:
+    """Print the oldest version of every package that the extras allow."""
     project = tomllib.loads(Path("pyproject.toml").read_text())["project"]
     wanted, seen = list(project["dependencies"]), set()
     while extras:

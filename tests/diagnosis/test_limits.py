@@ -73,7 +73,7 @@ def test_motion_at_one_speed_cannot_tell_the_shape_of_friction():
     rng = np.random.default_rng(0)
     log = make_hidden_effect_log(robot, None, noise="high", random_state=2)
     X = log.X.copy()
-    for name in np.unique(X["trajectory"]):  # joint 2 sweeps to and fro at 1 rad/s
+    for name in np.unique(X["trajectory"]):  # joint 2 sweeps back and forth at 1 rad/s
         rows = X["trajectory"] == name
         t = X.loc[rows, "time"].to_numpy() - X.loc[rows, "time"].min()
         X.loc[rows, "q2"] = np.abs((t + name / 7) % 4 - 2) - 1
