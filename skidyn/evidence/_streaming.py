@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 import os
+import pickle
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import partial, reduce
+from functools import lru_cache, partial, reduce
 from pathlib import Path
 from typing import Any
 
@@ -298,9 +299,9 @@ def _on_cluster(
 ) -> _Part:
     threads = sum(client.nthreads().values())
     chunks = _chunks(files, TASKS_PER_THREAD * threads if threads else len(files))
-    # A task of its own, so that each worker unpacks the robot, and compiles its equations, only
-    # once. Scattered data would do the same, but is lost with the worker that holds it.
-    known = client.submit(_together, robot, terms, options, pure=False)
+    # Bytes, so that a worker unpacks the robot and compiles its equations once and not for each
+    # task. A result on the cluster would do the same, but is lost with the worker that holds it.
+    known = pickle.dumps((robot, terms, options))
     parts = [client.submit(_task, chunk, known, pure=False) for chunk in chunks]
     join = partial(_joined, groups=options.groups)
     while len(parts) > 1:
@@ -311,9 +312,11 @@ def _on_cluster(
     return result
 
 
-def _together(*known: Any) -> tuple[Any, ...]:
-    return known
+def _task(sources: list[Source], known: bytes) -> _Part:
+    return _of_files(sources, *_unpacked(known))
 
 
-def _task(sources: list[Source], known: tuple[Robot, Sequence[Term], Options]) -> _Part:
-    return _of_files(sources, *known)
+@lru_cache(maxsize=4)
+def _unpacked(known: bytes) -> tuple[Robot, Sequence[Term], Options]:
+    result: tuple[Robot, Sequence[Term], Options] = pickle.loads(known)
+    return result
