@@ -272,7 +272,7 @@ def _sentence(
 
 def _value(name: str, row: dict[str, Any]) -> str:
     """The first parameter of a finding in words; of a few joints or axes, all values."""
-    value, unit = row["value"], f" {row['unit']}".rstrip()
+    value, unit = row["value"], "" if row["unit"] == "1" else f" {row['unit']}".rstrip()
     if isinstance(value, float) and row["low"] is not None:
         return f": {name} = {value:.3g} ± {(row['high'] - row['low']) / 2:.2g}{unit}"
     if isinstance(value, list) and 1 < len(value) <= 7 and all(isinstance(v, float) for v in value):

@@ -106,8 +106,11 @@ def parameter_rows(finding: dict[str, Any]) -> list[dict[str, Any]]:
     """
     rows = []
     for name, p in finding["parameters"].items():
-        several = isinstance(p["value"], list)
-        values, lows, highs = (p[k] if several else [p[k]] for k in ("value", "low", "high"))
+        values = p["value"] if isinstance(p["value"], list) else [p["value"]]
+        # Directions and numbers of trajectories have no interval.
+        lows, highs = (
+            p[k] if isinstance(p[k], list) else [p[k]] * len(values) for k in ("low", "high")
+        )
         for i, (value, low, high) in enumerate(zip(values, lows, highs, strict=True)):
             own = len(values) == len(finding["joints"])
             joint = finding["joints"][i] if own else "–"

@@ -4,6 +4,7 @@ import re
 import pytest
 
 from skidyn.report import render_html, summarize
+from skidyn.report._html import parameter_rows
 
 
 def test_markup_in_names_is_escaped(fakes):
@@ -60,3 +61,19 @@ def test_non_finite_numbers_do_not_break_the_page(fakes):
     diagnosis.findings[0].curves[0]["measured"][:3] = float("nan")
     page = render_html(summarize(diagnosis))
     assert "nan" not in page.partition("<script")[0].lower().replace("provenance", "")
+
+
+def test_directions_and_trajectories_have_a_row_each_without_interval():
+    finding = {
+        "joints": [1, 2],
+        "parameters": {
+            "force": {"value": [3.0, 0.0, -4.0], "low": None, "high": None, "unit": "N"},
+            "Fv": {"value": [0.3, 0.4], "low": [0.2, 0.3], "high": [0.4, 0.5], "unit": "N m s/rad"},
+        },
+    }
+
+    rows = parameter_rows(finding)
+
+    assert [row["value"] for row in rows] == [3.0, 0.0, -4.0, 0.3, 0.4]
+    assert [row["low"] for row in rows] == [None, None, None, 0.2, 0.3]
+    assert [row["joint"] for row in rows] == ["–", "–", "–", 1, 2]
