@@ -26,7 +26,9 @@ FAR, TAILS = 3.0, (0.01, 0.99)
 TORQUE_SHARE, POSITION_SHARE = 0.25, 0.05
 
 
-def leaps(values: Array, signals: Signals, share: float) -> NDArray[np.bool_]:
+def leaps(
+    values: Array, signals: Signals, share: float, turns: NDArray[np.bool_] | None = None
+) -> NDArray[np.bool_]:
     """Samples that leap away from their neighbours and back.
 
     Parameters
@@ -37,13 +39,15 @@ def leaps(values: Array, signals: Signals, share: float) -> NDArray[np.bool_]:
         Motion, which tells where trajectories and gaps are.
     share : float
         Least size of a leap as a share of the range of the signal in its trajectory.
+    turns : ndarray of shape (n_samples, n_joints) of bool, optional
+        Where the signal may well leap by as much as its range: at reversals.
 
     Returns
     -------
     ndarray of shape (n_samples, n_joints) of bool
     """
     away = np.zeros(values.shape)
-    least = np.full((len(values), 1), share)
+    least = np.where(np.zeros(values.shape, dtype=bool) if turns is None else turns, 1.0, share)
     for rows in signals.segments:
         if rows.stop - rows.start >= 2 * WIDTH:
             block = values[rows]
@@ -63,6 +67,23 @@ def leaps(values: Array, signals: Signals, share: float) -> NDArray[np.bool_]:
     return broken
 
 
+def reversals(signals: Signals) -> NDArray[np.bool_]:
+    """Samples near a change of direction, at which dry friction may leap and leap back.
+
+    Parameters
+    ----------
+    signals : Signals
+        Logged motion.
+
+    Returns
+    -------
+    ndarray of shape (n_samples, n_joints) of bool
+    """
+    turns = np.zeros(signals.dq.shape, dtype=bool)
+    turns[1:] = np.diff(np.sign(signals.dq), axis=0) != 0
+    return np.asarray(binary_dilation(turns, np.ones((WIDTH, 1), dtype=bool)))
+
+
 def without_broken(motion: SmoothedMotion, logged: Signals, torque: Array) -> SmoothedMotion:
     """Trust no sample whose torque is broken, nor those that a broken position reaches.
 
@@ -79,7 +100,7 @@ def without_broken(motion: SmoothedMotion, logged: Signals, torque: Array) -> Sm
     -------
     SmoothedMotion
     """
-    wrong = leaps(torque, logged, TORQUE_SHARE)
+    wrong = leaps(torque, logged, TORQUE_SHARE, reversals(logged))
     # The torque of every joint depends on all positions.
     position = np.asarray(leaps(logged.q, logged, POSITION_SHARE).any(1))
     if position.any():
@@ -108,11 +129,10 @@ def broken_notes(signals: Signals, torque: Array, joint_names: tuple[str, ...]) 
     if signals.time is None:
         return []
     notes = []
-    for what, values, share in (
-        ("torque", torque, TORQUE_SHARE),
-        ("position", signals.q, POSITION_SHARE),
+    for what, values, broken in (
+        ("torque", torque, leaps(torque, signals, TORQUE_SHARE, reversals(signals))),
+        ("position", signals.q, leaps(signals.q, signals, POSITION_SHARE)),
     ):
-        broken = leaps(values, signals, share)
         for j in np.flatnonzero(broken.any(0)):
             rows = np.flatnonzero(broken[:, j])
             first = rows[0]

@@ -9,7 +9,7 @@ import pytest
 from skidyn._exceptions import LogWarning
 from skidyn._signals import Signals
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
-from skidyn.evidence._broken import TORQUE_SHARE, broken_notes, leaps
+from skidyn.evidence._broken import TORQUE_SHARE, broken_notes, leaps, reversals
 from skidyn.rigid_body import RBDRegressor
 
 
@@ -80,3 +80,16 @@ def test_a_broken_position_spoils_no_more_than_its_surroundings():
         model = RBDRegressor(log.robot).fit(X, log.y)
 
     assert np.allclose(model.coef_, clean.coef_, rtol=0.02, atol=0.02 * np.abs(clean.coef_).max())
+
+
+def test_a_moment_of_motion_the_other_way_is_no_leap():
+    signals = swing()
+    dq = signals.dq.copy()
+    dq[500:502] *= -1.0
+    signals = signals.with_(dq=dq)
+    torque = friction(signals)
+
+    assert not leaps(torque, signals, TORQUE_SHARE, reversals(signals)).any()
+    torque[501] = 60.0
+    found = leaps(torque, signals, TORQUE_SHARE, reversals(signals))
+    assert np.flatnonzero(found).tolist() == [501]

@@ -75,7 +75,7 @@ def served(explorer):
 
 def ask(port, path, body=None, token="", host=None):
     """Status and content of an answer."""
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
     headers = {"X-Token": token} | ({"Host": host} if host else {})
     method = "GET" if body is None else "POST"
     connection.request(
@@ -141,7 +141,7 @@ def opened(explorer, **look):
     with served(explorer) as port, sync_api.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=list(ARGUMENTS))
         tab = browser.new_page(**{"viewport": {"width": 1280, "height": 860}, **look})
-        tab.set_default_timeout(20_000)
+        tab.set_default_timeout(60_000)
         tab.on("console", lambda message: complaints.append(message.text))
         tab.on("pageerror", lambda error: complaints.append(str(error)))
         tab.goto(f"http://127.0.0.1:{port}/?token={explorer.token}")

@@ -45,7 +45,7 @@ def open_file(browser):
 
     def open_it(path, **options):
         page = browser.new_page(viewport={"width": 1200, "height": 900}, **options)
-        page.set_default_timeout(10_000)
+        page.set_default_timeout(60_000)
         page.complaints = []
         page.on("console", lambda message: page.complaints.append(message.text))
         page.on("pageerror", lambda error: page.complaints.append(str(error)))
