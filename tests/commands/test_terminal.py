@@ -36,7 +36,7 @@ def short(work, tmp_path_factory):
     return [str(folder / "log.csv"), "--urdf", str(work / "arm.urdf")]
 
 
-def in_terminal(*words, columns=80, stop_at=None, **environment):
+def in_terminal(*words, columns=80, stop_at=None, before="", **environment):
     """Exit code and what a terminal of some width shows; Ctrl-C once it shows ``stop_at``."""
     import fcntl
     import termios
@@ -46,7 +46,7 @@ def in_terminal(*words, columns=80, stop_at=None, **environment):
     # The terminal tells its size, whatever some runner of tests has set.
     own = {k: v for k, v in os.environ.items() if k not in ("COLUMNS", "LINES")}
     process = subprocess.Popen(
-        [sys.executable, "-c", CONTROLLED, *map(str, words)],
+        [sys.executable, "-c", CONTROLLED.format(before=before), *map(str, words)],
         stdin=theirs, stdout=theirs, stderr=theirs, start_new_session=True,
         env={**own, "TERM": "xterm", **environment},
     )  # fmt: skip
@@ -75,14 +75,23 @@ CONTROLLED = """
 import fcntl, sys, termios
 fcntl.ioctl(0, termios.TIOCSCTTY, 0)
 from skidyn.cli import main
+{before}
 sys.exit(main(sys.argv[1:]))
+"""
+
+#: A search that waits for Ctrl-C, however fast the machine.
+ENDLESS_SEARCH = """
+import time
+from skidyn.diagnosis import _search
+_search._Search.pick = lambda *_: time.sleep(3600)
 """
 
 
 def test_ctrl_c_in_the_search_leaves_no_file_and_no_traceback(short, tmp_path):
     out, page = tmp_path / "report.json", tmp_path / "report.html"
 
-    code, shown = in_terminal("diagnose", *short, "--out", out, "--html", page, stop_at="screening")
+    words = ["diagnose", *short, "--out", out, "--html", page]
+    code, shown = in_terminal(*words, stop_at="screening", before=ENDLESS_SEARCH)
 
     assert code == cli.STOPPED
     assert "Traceback" not in shown
