@@ -72,7 +72,8 @@ def in_terminal(*words, columns=80, stop_at=None, before="", **environment):
 
 #: The process takes the terminal, so that Ctrl-C reaches it as from a keyboard.
 CONTROLLED = """
-import fcntl, sys, termios
+import fcntl, signal, sys, termios
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a background shell ignores it
 fcntl.ioctl(0, termios.TIOCSCTTY, 0)
 from skidyn.cli import main
 {before}
