@@ -212,7 +212,8 @@ def handle_missing(
     if bad.all():
         raise LogError(f"{message} No row is left.")
     warn_about_log(f"{message} They are left out.")
-    return frame[~bad].reset_index(drop=True)
+    kept: pd.DataFrame = frame[~bad].reset_index(drop=True)
+    return kept
 
 
 def check_time_order(
@@ -250,4 +251,5 @@ def check_time_order(
             "new recording begins there, give the rows a trajectory column; if rows are in "
             "disorder, sort them by time."
         )
-    return np.r_[True, ~(same & (steps == 0))]
+    advances: np.ndarray = np.r_[True, ~(same & (steps == 0))]
+    return advances

@@ -107,12 +107,12 @@ class Signals:
     @property
     def n_samples(self) -> int:
         """Number of rows."""
-        return self.q.shape[0]
+        return len(self.q)
 
     @property
     def n_joints(self) -> int:
         """Number of joints."""
-        return self.q.shape[1]
+        return int(self.q.shape[1])
 
     @cached_property
     def unit(self) -> Array:

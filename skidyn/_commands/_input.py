@@ -82,7 +82,8 @@ def embedded_robot(name: str) -> Robot:
             if n.startswith("load_") and n not in ("load_recording", "load_demo_log")
         )
         raise SkidynError(f"no embedded robot {name!r}; there are {', '.join(known)}")
-    return loader()
+    robot: Robot = loader()
+    return robot
 
 
 def json_option(name: str, text: str | None) -> Any:

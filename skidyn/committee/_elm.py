@@ -269,10 +269,11 @@ class ELMCommittee(RegressorMixin, BaseEstimator):
         parts = [
             self._hidden(k, scaled[i : i + CHUNK]) @ coef for i in range(0, len(scaled), CHUNK)
         ]
-        return np.concatenate(parts).astype(np.float64) + self.intercept_[k]
+        output: Array = np.concatenate(parts).astype(np.float64) + self.intercept_[k]
+        return output
 
     def _hidden(self, k: int, scaled: Array) -> Array:
-        h = scaled @ self.hidden_weights_[k].astype(scaled.dtype)
+        h: Array = scaled @ self.hidden_weights_[k].astype(scaled.dtype)
         h += self.hidden_bias_[k].astype(scaled.dtype)
         return np.maximum(h, 0, out=h)
 

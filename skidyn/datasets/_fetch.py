@@ -393,7 +393,8 @@ def _drive_run(path: Path) -> pd.DataFrame:
     time, dq = values[:, 0] / 1000, values[:, 1] * np.pi / 30
     q = np.concatenate([[0.0], np.cumsum(np.diff(time) * (dq[1:] + dq[:-1]) / 2)])
     columns = {"time": time, "q1": q, "dq1": dq, "tau1": values[:, 2] / 100 * SCREW_TORQUE}
-    return pandas.DataFrame(columns)
+    run: pd.DataFrame = pandas.DataFrame(columns)
+    return run
 
 
 def _servo_run(path: Path) -> pd.DataFrame:
@@ -413,7 +414,8 @@ def _servo_run(path: Path) -> pd.DataFrame:
         }
     except (KeyError, TypeError, ValueError) as error:
         raise LogError(f"{path} is not a recording of this kind: {error}") from None
-    return pandas.DataFrame(columns)
+    run: pd.DataFrame = pandas.DataFrame(columns)
+    return run
 
 
 def _retrieve(

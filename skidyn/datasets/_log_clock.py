@@ -39,7 +39,7 @@ def seconds(table: pd.DataFrame, rate: float | None, source: str) -> np.ndarray:
     LogError
         No clock at all, or one that cannot be read.
     """
-    pd = import_optional("pandas", extra="io")
+    pandas = import_optional("pandas", extra="io")
     if "time" not in table.columns:
         if rate is None:
             raise LogError(
@@ -50,20 +50,23 @@ def seconds(table: pd.DataFrame, rate: float | None, source: str) -> np.ndarray:
     column = table["time"]
     if column.dtype.kind in "iu" and len(column) and abs(int(column.iloc[0])) > 2**53:
         # nanoseconds since 1970 do not fit a float64 to the nanosecond; differences do
-        return (column.to_numpy() - column.iloc[0]).astype(np.float64)
+        since: np.ndarray = column.to_numpy() - column.iloc[0]
+        return since.astype(np.float64)
     if column.dtype.kind in "fiu":
-        return column.to_numpy(dtype=np.float64)
+        return np.asarray(column, dtype=np.float64)
     try:
-        return pd.to_numeric(column).to_numpy(dtype=np.float64)
+        return np.asarray(pandas.to_numeric(column), dtype=np.float64)
     except (TypeError, ValueError):
         pass
     try:
-        stamps = pd.to_datetime(column, utc=True, format=None if _is_date(column) else "ISO8601")
+        stamps = pandas.to_datetime(
+            column, utc=True, format=None if _is_date(column) else "ISO8601"
+        )
     except (TypeError, ValueError) as error:
         raise LogError(
             f"{source}: the time column holds neither numbers nor dates: {error}"
         ) from None
-    return (stamps - stamps.iloc[0]).dt.total_seconds().to_numpy(dtype=np.float64)
+    return np.asarray((stamps - stamps.iloc[0]).dt.total_seconds(), dtype=np.float64)
 
 
 def _is_date(column: pd.Series) -> bool:
@@ -103,7 +106,7 @@ def align_channels(
         A signal occurs in two channels, a clock starts anew in one of several channels, or the
         channels do not overlap in time.
     """
-    pd = import_optional("pandas", extra="io")
+    pandas = import_optional("pandas", extra="io")
     if len(tables) == 1 and rate is None:
         return tables[0]
     for table, name in zip(tables, names, strict=True):
@@ -144,7 +147,7 @@ def align_channels(
     for table in tables:
         covered &= ~_in_gap(table["time"].to_numpy(), clock)
     rows = clock[covered]
-    parts = [pd.DataFrame({"time": rows})]
+    parts = [pandas.DataFrame({"time": rows})]
     for k, table in enumerate(tables):
         if k == base and rate is None:
             parts.append(table.loc[covered].drop(columns="time").reset_index(drop=True))
@@ -155,12 +158,13 @@ def align_channels(
         f"channels {', '.join(names)} interpolated to the clock of {grid}; {int((~common).sum())} "
         f"row(s) outside their common time and {int((common & ~covered).sum())} in gaps left out"
     )
-    return pd.concat(parts, axis=1)
+    joined: pd.DataFrame = pandas.concat(parts, axis=1)
+    return joined
 
 
 def _resampled(table: pd.DataFrame, rate: float, notes: list[str]) -> pd.DataFrame:
     """One table on a regular clock within each of its runs."""
-    pd = import_optional("pandas", extra="io")
+    pandas = import_optional("pandas", extra="io")
     time = table["time"].to_numpy()
     run = np.zeros(len(time), dtype=np.int64)
     run[1:] = np.cumsum(np.diff(time) < 0)
@@ -181,7 +185,8 @@ def _resampled(table: pd.DataFrame, rate: float, notes: list[str]) -> pd.DataFra
         raise LogError("no two samples of the log belong together, so it cannot be resampled.")
     alone = f"; {lonely} row(s) that stand alone left out" if lonely else ""
     notes.append(f"interpolated to {rate:g} Hz within {len(parts)} run(s) without a gap{alone}")
-    return pd.concat(parts, ignore_index=True)
+    regular: pd.DataFrame = pandas.concat(parts, ignore_index=True)
+    return regular
 
 
 def _in_gap(time: np.ndarray, clock: np.ndarray) -> np.ndarray:
@@ -198,7 +203,7 @@ def _in_gap(time: np.ndarray, clock: np.ndarray) -> np.ndarray:
 
 def _interpolate(table: pd.DataFrame, clock: np.ndarray) -> pd.DataFrame:
     """Columns of a channel at other times; numbers of trajectories are not mixed."""
-    pd = import_optional("pandas", extra="io")
+    pandas = import_optional("pandas", extra="io")
     time = table["time"].to_numpy()
     before = np.clip(np.searchsorted(time, clock, side="right") - 1, 0, len(time) - 1)
     columns = {}
@@ -207,7 +212,8 @@ def _interpolate(table: pd.DataFrame, clock: np.ndarray) -> pd.DataFrame:
             columns[name] = table[name].to_numpy()[before]
         elif name != "time":
             columns[name] = np.interp(clock, time, table[name].to_numpy(dtype=float))
-    return pd.DataFrame(columns)
+    then: pd.DataFrame = pandas.DataFrame(columns)
+    return then
 
 
 def split_at_restarts(time: np.ndarray) -> tuple[np.ndarray, int]:

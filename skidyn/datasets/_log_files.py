@@ -46,7 +46,7 @@ class Channel:
 
 def read_csv_channels(path: Path, max_bytes: int) -> list[Channel]:
     """Read a text table; the separator, a decimal comma and a missing header are recognised."""
-    pd = import_optional("pandas", extra="io")
+    pandas = import_optional("pandas", extra="io")
     check_size(path, path.stat().st_size, max_bytes)
     with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
         lines = [line for _, line in zip(range(200), file, strict=False)]
@@ -62,7 +62,7 @@ def read_csv_channels(path: Path, max_bytes: int) -> list[Channel]:
     headless = all(_is_number(cell.replace(decimal, ".")) for cell in cells if cell)
     if not headless:
         refuse_duplicates(cells, str(path))
-    table = pd.read_csv(
+    table = pandas.read_csv(
         path,
         sep=separator or r"\s+",
         decimal=decimal,
@@ -187,7 +187,7 @@ def table_from_arrays(columns: Mapping[str, np.ndarray]) -> pd.DataFrame:
 
     A single column ``q`` is the position of the only joint and becomes ``q1``.
     """
-    pd = import_optional("pandas", extra="io")
+    pandas = import_optional("pandas", extra="io")
     flat: dict[str, np.ndarray] = {}
     for name, values in columns.items():
         single = values.ndim == 1 or values.shape[1] == 1
@@ -197,7 +197,8 @@ def table_from_arrays(columns: Mapping[str, np.ndarray]) -> pd.DataFrame:
             block = values.reshape(len(values), -1)
             for k in range(block.shape[1]):
                 flat[f"{name}{k + 1}"] = block[:, k]
-    return pd.DataFrame(flat)
+    table: pd.DataFrame = pandas.DataFrame(flat)
+    return table
 
 
 def stack_rows(rows: Sequence[Any], name: str, source: str) -> np.ndarray:

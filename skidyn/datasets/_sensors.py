@@ -37,7 +37,9 @@ def sensor_noise(
     start = rng.standard_normal((shape[0], 1, shape[2]))
     coloured, _ = lfilter([np.sqrt(1 - pole**2)], [1, -pole], drive, axis=1, zi=pole * start)
     white = rng.standard_normal(shape)
-    return std * (np.sqrt(1 - COLOURED_SHARE) * white + np.sqrt(COLOURED_SHARE) * coloured)
+    mixed = np.sqrt(1 - COLOURED_SHARE) * white + np.sqrt(COLOURED_SHARE) * coloured
+    noise: Array = std * mixed
+    return noise
 
 
 def quantise(values: Array, resolution: Array | float) -> Array:

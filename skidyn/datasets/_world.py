@@ -101,7 +101,7 @@ class World:
     @property
     def n_samples(self) -> int:
         """Samples per trajectory."""
-        return self.time.shape[1]
+        return int(self.time.shape[1])
 
     def torque(self, **changes: Any) -> Array:
         """Rigid-body torque with other ``parameters``, ``gravity`` or accelerations."""

@@ -42,7 +42,7 @@ class Candidate:
     @property
     def width(self) -> int:
         """Number of coefficients."""
-        return next(iter(self.rows.values())).shape[1]
+        return int(next(iter(self.rows.values())).shape[1])
 
     @property
     def signs(self) -> Array:

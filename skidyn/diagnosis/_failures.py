@@ -119,7 +119,8 @@ class Comparison:
         chosen = self.sliding if self.judged is None else self.judged
         use = chosen if judged else np.ones_like(chosen)
         square = np.where(use, self.residual**2, 0.0).sum(0)
-        return np.sqrt(square / np.maximum(use.sum(0), 1))
+        error: Array = np.sqrt(square / np.maximum(use.sum(0), 1))
+        return error
 
     def table(self) -> list[dict[str, Any]]:
         """Errors of every joint and trajectory.

@@ -65,7 +65,8 @@ def _inputs(problem: Problem, joint: int) -> Array:
     x = problem.rows.average(raw, joint) / weight
     scale = x.std(0)
     keep = scale > 1e-9
-    return (x[:, keep] - x[:, keep].mean(0)) / scale[keep]
+    scaled: Array = (x[:, keep] - x[:, keep].mean(0)) / scale[keep]
+    return scaled
 
 
 def _held_out_share(features: Array, r: Array, fold: NDArray[np.int64], n_folds: int) -> float:

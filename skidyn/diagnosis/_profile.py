@@ -79,7 +79,8 @@ def _joint_grams(
 def log_likelihood_gain(before: Array, after: Array, counts: NDArray[np.int64]) -> Array:
     """Twice the gain of held-out log-likelihood per joint, noise profiled out, (n_joints,)."""
     old, new = (np.maximum(errors.sum(0), 1e-300) for errors in (before, after))
-    return counts * np.log(old / new)
+    gain: Array = counts * np.log(old / new)
+    return gain
 
 
 def refine(

@@ -163,7 +163,8 @@ class _Train:
     def solve(self, right: Array) -> Array:
         """Solve the normal equations for a matrix of right-hand sides."""
         scale = self.scale[:, None]
-        return cho_solve(self.factor, right / scale, check_finite=False) / scale
+        solution: Array = cho_solve(self.factor, right / scale, check_finite=False) / scale
+        return solution
 
 
 @dataclass(frozen=True)
@@ -246,4 +247,6 @@ def _swept_error(
         + np.einsum("pck,pcl->ckl", mimic, bent, optimize=True)
     )
     linear = np.einsum("ck,ck->c", gain, slope)
-    return base - 2 * linear + np.einsum("ck,ckl,cl->c", gain, curve, gain, optimize=True)
+    quadratic = np.einsum("ck,ckl,cl->c", gain, curve, gain, optimize=True)
+    error: Array = base - 2 * linear + quadratic
+    return error

@@ -149,9 +149,8 @@ class _Search:
             return True
         rows = sorted({j for c in best.candidates for j in c.rows} | set(best.joints))
         same, anywhere = first[rows].sum(), first.sum()
-        return best.score >= max(
-            self.settings.second_same * same, self.settings.second_any * anywhere
-        )
+        least = max(self.settings.second_same * same, self.settings.second_any * anywhere)
+        return bool(best.score >= least)
 
     def stands(self, best: Hypothesis) -> bool:
         """Whether an explanation holds when folds are left out."""

@@ -115,8 +115,9 @@ def _own_estimates(
     scale[scale == 0] = 1.0
     # A payload in all trajectories is part of the arm: only differences can be estimated.
     ridge = np.r_[np.full(p, 1e-9), np.full(size - p, 1e-4)]
-    solution = np.linalg.solve(gram / scale[:, None] / scale + np.diag(ridge), cross / scale)
-    return (solution / scale)[p:].reshape(len(names), leading)
+    scaled = np.linalg.solve(gram / scale[:, None] / scale + np.diag(ridge), cross / scale)
+    solution: Array = scaled / scale
+    return solution[p:].reshape(len(names), leading)
 
 
 def _splits(kind: str, own: Array, names: NDArray[Any]) -> list[list[Any]]:

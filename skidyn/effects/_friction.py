@@ -66,7 +66,8 @@ class Stribeck(Effect):
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         speed = np.abs(signals.dq[:, joint]) / shape["vs"]
-        return (np.exp(-(speed ** shape["delta"])) * signals.sign[:, joint])[:, None]
+        friction: Array = np.exp(-(speed ** shape["delta"])) * signals.sign[:, joint]
+        return friction[:, None]
 
 
 class AsymmetricFriction(Effect):
@@ -102,4 +103,5 @@ class NonlinearViscous(Effect):
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         speed = np.abs(signals.dq[:, joint])
-        return (speed ** shape["power"] * signals.sign[:, joint])[:, None]
+        friction: Array = speed ** shape["power"] * signals.sign[:, joint]
+        return friction[:, None]

@@ -73,7 +73,8 @@ class _Spline(NamelessEffect):
         knots = np.r_[[low] * degree, inner, [high] * degree]
         inside = np.clip(x, low, high - 1e-9 * (high - low))
         # The first spline is left out: together they add up to a constant.
-        return BSpline.design_matrix(inside, knots, degree).toarray()[:, 1:]
+        splines: Array = BSpline.design_matrix(inside, knots, degree).toarray()
+        return splines[:, 1:]
 
 
 class FunctionOfPosition(_Spline):

@@ -95,7 +95,8 @@ class Saturation(Effect):
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         assert signals.model_torque is not None
         torque = signals.model_torque[:, joint]
-        return (-np.sign(torque) * np.maximum(0.0, np.abs(torque) - shape["limit"]))[:, None]
+        missing: Array = -np.sign(torque) * np.maximum(0.0, np.abs(torque) - shape["limit"])
+        return missing[:, None]
 
     def parameters(
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None

@@ -29,7 +29,8 @@ class Offset(Effect):
         if recording is None:
             return np.ones((signals.n_samples, 1))
         # The sensor was zeroed anew: this offset belongs to one recording.
-        return (signals.trajectory == recording).astype(float)[:, None]
+        here: Array = (signals.trajectory == recording).astype(float)
+        return here[:, None]
 
 
 class Spring(Effect):
@@ -138,4 +139,5 @@ class EndStop(Effect):
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         beyond = shape["side"] * (signals.q[:, joint] - shape["q_lim"])
-        return (shape["side"] * np.maximum(0.0, beyond))[:, None]
+        depth: Array = shape["side"] * np.maximum(0.0, beyond)
+        return depth[:, None]

@@ -160,7 +160,7 @@ class Backlash(_LinkSideEffect):
         # Identified parameters need not be consistent; an inertia that vanishes would fly at once.
         inertia = np.maximum(inertia, 0.05 * np.abs(np.median(inertia)) + 1e-12)
         free = signals.load[:, joint] / inertia
-        position = np.zeros_like(free)
+        position: Array = np.zeros_like(free)
         for rows in signals.segments:
             step = float(np.median(np.diff(signals.clock[rows]))) if len(free[rows]) > 1 else 1.0
             position[rows] = _flight(free[rows], step, shape["gap"] / 2)

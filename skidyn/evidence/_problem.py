@@ -273,7 +273,7 @@ def term_columns(signals: Signals, term: Term) -> dict[int, Array]:
 
 def width(block: dict[int, Array]) -> int:
     """Number of columns of a block."""
-    return next(iter(block.values())).shape[1]
+    return int(next(iter(block.values())).shape[1])
 
 
 def make_problem(

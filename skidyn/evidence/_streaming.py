@@ -160,7 +160,8 @@ def evidence_of_sources(
         delayed(_of_files)(chunk, robot, terms, options)
         for chunk in _chunks(sources, effective_n_jobs(n_jobs))
     )
-    return reduce(partial(_joined, groups=options.groups), parts).evidence
+    whole: _Part = reduce(partial(_joined, groups=options.groups), parts)
+    return whole.evidence
 
 
 def evidence_of_signals(

@@ -98,7 +98,7 @@ class Excitation:
         time, *states = self.sample(rate)
         n = self.robot.n_joints
         names = [f"{s}{j + 1}" for s in ("q", "dq", "ddq") for j in range(n)]
-        table = pandas.DataFrame(np.hstack(states), columns=names)
+        table: pd.DataFrame = pandas.DataFrame(np.hstack(states), columns=names)
         table.insert(0, "time", time)
         return table
 

@@ -46,7 +46,8 @@ class HeldOutRows:
     def drops(self, rows: NDArray[np.bool_] | slice = slice(None)) -> Array:
         """Share of the squared error in some rows that each candidate takes away."""
         before = float(np.sum(self.residual[rows] ** 2))
-        return 1 - self.then[rows].sum(0) / max(before, 1e-300)
+        left: Array = self.then[rows].sum(0) / max(before, 1e-300)
+        return 1 - left
 
 
 @dataclass(frozen=True)

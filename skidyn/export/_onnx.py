@@ -71,7 +71,8 @@ def to_onnx(model: RBDRegressor | Robot) -> onnx.ModelProto:
     >>> [x.name for x in graph.input], [x.name for x in graph.output]  # doctest: +SKIP
     (['q', 'dq', 'ddq'], ['tau'])
     """
-    return _proto(static_model(model))
+    proto: onnx.ModelProto = _proto(static_model(model))
+    return proto
 
 
 def write_onnx(model: RBDRegressor | Robot, path: PathLike) -> tuple[str, ...]:

@@ -77,7 +77,9 @@ def learned_weights(
 def _p_value(logs: Array) -> Array:
     """One-sided paired t-test over units (rows) that the logarithm of the error fell."""
     spread = logs.std(axis=0, ddof=1) / np.sqrt(len(logs))
-    return stats.t.cdf(logs.mean(axis=0) / np.maximum(spread, TINY), len(logs) - 1)
+    statistic = logs.mean(axis=0) / np.maximum(spread, TINY)
+    p_value: Array = stats.t.cdf(statistic, len(logs) - 1)
+    return p_value
 
 
 def _holm(p_values: Array) -> Array:

@@ -22,7 +22,8 @@ CHUNK = 4096
 def references(features: Array, scale: Array) -> Array:
     """Evenly spaced rows of the training features, scaled."""
     rows = np.unique(np.linspace(0, len(features) - 1, REFERENCES).astype(int))
-    return features[rows] / scale
+    scaled: Array = features[rows] / scale
+    return scaled
 
 
 def distances(features: Array, scale: Array, reference: Array) -> Array:
@@ -31,7 +32,8 @@ def distances(features: Array, scale: Array, reference: Array) -> Array:
     parts = [
         cdist(scaled[i : i + CHUNK], reference).min(axis=1) for i in range(0, len(scaled), CHUNK)
     ]
-    return np.concatenate(parts) / np.sqrt(features.shape[1])
+    nearest: Array = np.concatenate(parts) / np.sqrt(features.shape[1])
+    return nearest
 
 
 class TrainingRange:

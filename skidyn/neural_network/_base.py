@@ -273,7 +273,8 @@ class PendingFit:
     def unseen(self, trajectories: NDArray[Any]) -> NDArray[np.bool_]:
         """Rows of trajectories of which no row counts in the training."""
         _, number = np.unique(trajectories, return_inverse=True)
-        return (np.bincount(number, self.weight) == 0)[number]
+        unused: NDArray[np.bool_] = np.bincount(number, self.weight) == 0
+        return unused[number]
 
     def tasks(self) -> list[Task]:
         """Networks to be trained; scales the data."""

@@ -340,7 +340,8 @@ def _fit(estimator: Any, X: Any, y: Any, sample_weight: Array | None) -> Any:
 
 def _member_mean(bagging: BaggingRegressor, X: Array) -> Array:
     members = [member.predict(X).reshape(len(X), -1) for member in bagging.estimators_]
-    return np.mean(members, axis=0)
+    mean: Array = np.mean(members, axis=0)
+    return mean
 
 
 def _unseen_means(bagging: BaggingRegressor, X: Array, unseen: NDArray[np.bool_]) -> Array:

@@ -100,7 +100,8 @@ class LSTMNetwork(nn.Module):
         hidden = self.lstm(x)[0][:, self.window :]
         if self.dense is not None:
             hidden = self.dropout(torch.relu(self.dense(hidden)))
-        return self.output(hidden)
+        outputs: torch.Tensor = self.output(hidden)
+        return outputs
 
 
 class Members(nn.ModuleList):

@@ -55,7 +55,7 @@ class _JointNetwork(nn.Module):
         features, torque, regressor = torch.split(x, sizes, dim=-1)
         regressor = regressor.reshape(*torque.shape, len(self.rigid_body))
         torque = torque + regressor @ self.rigid_body
-        output = self.core(torch.cat([features, torque], dim=-1))
+        output: torch.Tensor = self.core(torch.cat([features, torque], dim=-1))
         return output + torque[:, self.core.window :] if self.residual else output
 
 

@@ -304,7 +304,8 @@ class _System:
         if np.any(gains <= 0):
             # Noise drowns what ties some joint to the load: begin with gains that fit in size.
             gains = np.where(gains > 0, gains, np.median(np.abs(gains)) + 1e-300)
-        return np.r_[found[: width - 1], 1 / gains]
+        start: Array = np.r_[found[: width - 1], 1 / gains]
+        return start
 
     def linearised(self, whole: list[Array], noise: Array, solution: Array) -> tuple[Array, Array]:
         """Residual and its derivative by the unknowns."""
@@ -337,7 +338,9 @@ class _System:
         residual, _ = self.linearised(whole, np.ones(self.n), solution)
         edges = np.cumsum([0, *(len(factor) for factor in whole)])
         sums = [np.sum(residual[a:b] ** 2) for a, b in zip(edges[:-1], edges[1:], strict=True)]
-        return np.sqrt(np.array(sums) / np.array([len(y) for y in runs.target])) + 1e-100
+        rows = np.array([len(y) for y in runs.target])
+        size: Array = np.sqrt(np.array(sums) / rows)
+        return size + 1e-100
 
 
 def _merged(factors: list[list[Array]]) -> list[Array]:

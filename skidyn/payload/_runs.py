@@ -148,7 +148,7 @@ def open_columns(design: Array, columns: Sequence[int]) -> NDArray[np.bool_]:
     """Which columns are, nearly, combinations of all others of a design or triangular factor."""
     size = np.linalg.norm(design, axis=0)
     used = size > 0
-    is_open = ~used
+    is_open: NDArray[np.bool_] = ~used
     _, values, directions = np.linalg.svd(design[:, used] / size[used], full_matrices=True)
     null = np.ones(used.sum(), dtype=bool)
     null[: len(values)] = values < LEAST_SHARE * values[0]

@@ -89,7 +89,8 @@ class CurrentToTorque(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
             Joint torques.
         """
         check_is_fitted(self)
-        return validate_data(self, X, reset=False, dtype=np.float64) * self.gain_
+        torque: Array = validate_data(self, X, reset=False, dtype=np.float64) * self.gain_
+        return torque
 
     def inverse_transform(self, X: Any) -> Array:
         """Current of every sample.
@@ -105,4 +106,5 @@ class CurrentToTorque(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
             Motor currents.
         """
         check_is_fitted(self)
-        return np.asarray(X, dtype=np.float64) / self.gain_
+        current: Array = np.asarray(X, dtype=np.float64) / self.gain_
+        return current

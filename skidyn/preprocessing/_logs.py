@@ -83,7 +83,7 @@ def _average_periods(frame: pd.DataFrame, period: float) -> pd.DataFrame:
         raise ValueError(
             f"the last {span - n_periods * period:.4g} s are no whole period; cut them."
         )
-    average = frame[time < start + period].reset_index(drop=True).copy()
+    average: pd.DataFrame = frame[time < start + period].reset_index(drop=True).copy()
     own = average["time"].to_numpy(float)
     for name in frame.columns:
         if name not in ("time", "trajectory"):
@@ -131,7 +131,7 @@ def cross_fitted_residual(physics: Any, X: Any, y: Any, *, cv: Any = 5) -> Array
     else:
         table = np.asarray(X, dtype=np.float64)
         folds = held_out_folds(keys_of(X).trajectories(table), cv)
-    residual = np.full_like(y, np.nan)
+    residual: Array = np.full_like(y, np.nan)
     for train, test in folds:
         fitted = clone(physics).fit(_safe_indexing(X, train), y[train])
         residual[test] = y[test] - np.reshape(

@@ -37,7 +37,8 @@ class _SignalTransformer(TransformerMixin, BaseEstimator):
 
     def _checked(self, X: Any) -> Array:
         check_is_fitted(self)
-        return validate_data(self, X, reset=False, dtype=np.float64)
+        checked: Array = validate_data(self, X, reset=False, dtype=np.float64)
+        return checked
 
 
 def _sampling_rate(X: Array, keys: Keys, rate: float | None) -> float:
@@ -61,7 +62,9 @@ def _low_pass(values: Array, cutoff: float, order: int, rate: float) -> Array:
         )
     sections = signal.butter(order, cutoff, fs=rate, output="sos")
     longest = 3 * (2 * len(sections) + 1)
-    return signal.sosfiltfilt(sections, values, axis=0, padlen=min(longest, len(values) - 1))
+    padding = min(longest, len(values) - 1)
+    filtered: Array = signal.sosfiltfilt(sections, values, axis=0, padlen=padding)
+    return filtered
 
 
 class ButterworthFilter(OneToOneFeatureMixin, _SignalTransformer):
@@ -156,7 +159,8 @@ class ButterworthFilter(OneToOneFeatureMixin, _SignalTransformer):
             Smoothed signals, key columns as they were.
         """
         X = self._checked(X)
-        keys, filtered = self._keys(), X.copy()
+        keys = self._keys()
+        filtered: Array = X.copy()
         features = list(keys.features)
         for segment in keys.segments(X):
             filtered[segment, features] = _low_pass(
@@ -293,7 +297,8 @@ class TimeDerivative(_SignalTransformer):
             derivative[segment] = np.gradient(
                 values, times, axis=0, edge_order=2 if len(values) > 2 else 1
             )
-        return np.c_[X, derivative]
+        extended: Array = np.c_[X, derivative]
+        return extended
 
     def get_feature_names_out(self, input_features: Any = None) -> NDArray[Any]:
         """Return the names of the columns: those of X, then each derivative's with a ``d`` before.

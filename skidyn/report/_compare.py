@@ -91,7 +91,7 @@ def summarize_comparison(
         "coefficients": _coefficients(both, same),
         "versions": {k: v for k, v in versions().items() if k != "executable"},
     }
-    return plain(
+    document: dict[str, Any] = plain(
         {
             "report": report,
             "title": title or getattr(signals.robot, "name", "") or "Robot inverse dynamics",
@@ -100,6 +100,7 @@ def summarize_comparison(
             "times": time_tables(both, same),
         }
     )
+    return document
 
 
 def _same_log(first: Diagnosis, second: Diagnosis) -> bool:

@@ -50,4 +50,5 @@ def _segment_rows(
         if whole < length:
             rest = values[whole:]
             keep.append(whole + np.array([rest.argmin(), rest.argmax()]))
-    return segment.start + np.unique(np.concatenate(keep))
+    rows: NDArray[np.intp] = segment.start + np.unique(np.concatenate(keep))
+    return rows

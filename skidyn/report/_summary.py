@@ -62,7 +62,7 @@ def summarize(
     report["provenance"] = {"versions": versions(), **(provenance or {})}
     report["provenance"]["versions"].pop("executable", None)  # a path of this machine
     units = ["N" if slides else "N m" for slides in signals.prismatic]
-    return plain(
+    document: dict[str, Any] = plain(
         {
             "report": report,
             "title": title or getattr(signals.robot, "name", "") or "Robot inverse dynamics",
@@ -85,6 +85,7 @@ def summarize(
             "traces": _traces(diagnosis),
         }
     )  # fmt: skip
+    return document
 
 
 def predictable_left(diagnosis: Diagnosis) -> list[dict[str, Any]]:

@@ -160,7 +160,8 @@ class _Frames:
     def base(self) -> np.ndarray:
         """Orientation of the base frame: aligned with the first body."""
         first = int(np.flatnonzero(self._tree.parents < 0)[0])
-        return self._tree.rotations[first] @ self.turns[first]
+        orientation: np.ndarray = self._tree.rotations[first] @ self.turns[first]
+        return orientation
 
     def relative(self, body: int, base: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Pose of a new body frame in the new frame of its parent, at joint coordinate zero."""

@@ -225,7 +225,8 @@ class Engine:
     @cached_property
     def _structure(self) -> np.ndarray:
         """Canonical parameters that may differ from zero, for some inertial parameters."""
-        return np.abs(self.canonical.kept).sum(axis=2) > 0
+        present: np.ndarray = np.abs(self.canonical.kept).sum(axis=2) > 0
+        return present
 
     @cached_property
     def _own_parameters(self) -> np.ndarray:

@@ -66,7 +66,8 @@ def _scale(factor: Scalar | float, a: Vector) -> Vector:
 
 
 def _dot(a: Vector, b: Vector) -> Scalar:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    total: Scalar = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    return total
 
 
 def _cross(a: Vector, b: Vector) -> Vector:

@@ -226,14 +226,17 @@ class PredictionBands:
                 here = slice(place, place + block.shape[1])
                 width[here, j] = np.linalg.norm(self.spread @ block, axis=0)
             place += part[0].shape[1]
-        return np.hypot(width, np.where(_moving(signals), self.scale[1], self.scale[0]))
+        own: Array = np.where(_moving(signals), self.scale[1], self.scale[0])
+        std: Array = np.hypot(width, own)
+        return std
 
     def half_width(self, model: RBDRegressor, signals: Signals, level: float) -> Array:
         """Half width of the band that holds a share of the measurements, N m or N."""
         if not 0 < level < 1:
             raise ValueError(f"level={level}; expected a share between 0 and 1, such as 0.95")
         ratio = np.array([[np.interp(level, LEVELS, own) for own in kind] for kind in self.ratios])
-        return self.std(model, signals) * np.where(_moving(signals), ratio[1], ratio[0])
+        wide: Array = np.where(_moving(signals), ratio[1], ratio[0])
+        return self.std(model, signals) * wide
 
 
 def find_bands(model: RBDRegressor) -> PredictionBands:
