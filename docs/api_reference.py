@@ -140,6 +140,11 @@ PAGES: tuple[Page, ...] = (
         ),
     ),
     Page(
+        "skidyn.simulation",
+        "A fitted model in a control loop: motions without the noise of sensors.",
+        (Section("Functions", ("simulate_closed_loop",)),),
+    ),
+    Page(
         "skidyn.excitation",
         "Motions from which the parameters of a robot can be told.",
         (

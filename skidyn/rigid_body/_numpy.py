@@ -124,11 +124,13 @@ class BoundProgram:
         return uniform
 
     def _leaf(self, node: Node) -> np.ndarray:
+        # Uniform values have no axes: a ufunc stretches an axis of length one at twice the cost.
         if node[0] == "constant":
-            return np.array([node[1]], self.dtype)
+            return np.array(node[1], self.dtype)
         if node[0] == "input":
-            return self.inputs[node[1]][node[2]]
-        value = np.empty(1, self.dtype)
+            row = self.inputs[node[1]][node[2]]
+            return row.reshape(()) if node[1] == "parameter" else row
+        value = np.empty((), self.dtype)
         arguments = tuple(self._values[i] for i in operands(node))
         self._uniform_calls.append((_UFUNCS[node[0]], (*arguments, value)))
         return value

@@ -35,6 +35,9 @@ import numpy as np
 from skidyn.rigid_body._tape import Scalar, Tape
 from skidyn.rigid_body._tree import KinematicTree, transform_inertial
 
+#: What is so much smaller than the largest term of a sum does not change it.
+_BELOW_ROUNDING = 1e-18
+
 Vector = list[Any]  # of three Scalars, or floats
 Matrix = list[Any]  # of three Vectors, the rows
 
@@ -336,16 +339,20 @@ def trace_torque_regressor(tree: KinematicTree, gravity: Sequence[float]) -> Pro
     columns: list[dict[int, list[Scalar]]] = []
     outputs: dict[tuple[int, ...], Scalar] = {}
     for body, (joint, motion) in enumerate(zip(joints, motions, strict=True)):
-        seen = {}
-        for mover, (s, v) in axes[joint.parent].items() if joint.parent >= 0 else ():
-            v = _add(v, _cross(s, joint.position))
-            seen[mover] = joint.rotation.to_body(s), joint.rotation.to_body(v)
-        seen[body] = joint.motion
-        axes.append(seen)
+        inherited = axes[joint.parent] if joint.parent >= 0 else {}
+        seen: dict[int, tuple[Vector, Vector]] = {}
         moment_map = _moment_map(motion)
         shared = _shared_columns(tree, body)
+        axes.append(seen)
         columns.append({})
-        for mover, (s, v) in seen.items():
+        for mover in (*inherited, body):
+            if mover == body:
+                s, v = joint.motion
+            else:
+                s, v = inherited[mover]
+                v = _add(v, _cross(s, joint.position))
+                s, v = joint.rotation.to_body(s), joint.rotation.to_body(v)
+            seen[mover] = s, v
             entries = _power(motion, moment_map, s, v)
             if mover != body:
                 _take_from_parent(entries, columns[joint.parent][mover], shared)
@@ -384,8 +391,11 @@ def _shared_columns(tree: KinematicTree, body: int) -> list[tuple[int, int, np.n
         unit = np.zeros(10)
         unit[list(columns)] = 1.0
         seen = transform_inertial(unit, tree.rotations[body], tree.translations[body])
-        cost = 2 * np.count_nonzero(seen) - np.count_nonzero(np.abs(seen) == 1.0) - 1
-        if cost < own_cost:
+        # A joint axis 1e-11 rad off a right angle leaves squares of that: below any rounding.
+        seen[np.abs(seen) < _BELOW_ROUNDING * np.abs(seen).max()] = 0.0
+        # One product for all columns with the same coefficient.
+        n_products = len(set(np.abs(seen)) - {0.0, 1.0})
+        if np.count_nonzero(seen) + n_products - 1 < own_cost:
             shared.append((columns[0], columns[1] if len(columns) > 1 else -1, seen))
     return shared
 
@@ -398,8 +408,11 @@ def _take_from_parent(
     """Replace the entries of shared columns by combinations of the parent's."""
     for column, partner, coefficients in shared:
         total = entries[column].tape.constant(0.0)
-        for coefficient, entry in zip(coefficients, parent, strict=True):
-            total = total + float(coefficient) * entry
+        for size in np.unique(np.abs(coefficients[coefficients != 0.0])):
+            part = entries[column].tape.constant(0.0)
+            for k in np.flatnonzero(np.abs(coefficients) == size):
+                part = part + parent[k] if coefficients[k] > 0 else part - parent[k]
+            total = total + float(size) * part
         entries[column] = total if partner < 0 else total - entries[partner]
 
 

@@ -17,12 +17,28 @@ from skidyn.rigid_body._recursion import Program
 from skidyn.rigid_body._source import renumber, statements
 
 
+#: Depth of expressions; Python's compiler gives up far above.
+NESTED = 8
+
+
+_FUNCTIONS: dict[str, Callable[..., Any]] = {
+    "abs": abs,
+    "cos": math.cos,
+    "exp": math.exp,
+    "maximum": max,
+    "sign": lambda x: (x > 0.0) - (x < 0.0),
+    "sin": math.sin,
+    "sqrt": math.sqrt,
+    "tanh": math.tanh,
+}
+
+
 class ScalarFunction:
     """A program compiled to Python bytecode."""
 
     def __init__(self, program: Program) -> None:
-        text = python_function(program, "evaluate")
-        namespace: dict[str, Callable[..., Any]] = {"sin": math.sin, "cos": math.cos}
+        text = python_function(program, "evaluate", nested=NESTED)
+        namespace = dict(_FUNCTIONS)
         exec(compile(text, "<skidyn program>", "exec"), namespace)  # text is made of numbers only
         self._function = namespace["evaluate"]
         self._shape = program.shape
@@ -41,13 +57,13 @@ class ScalarFunction:
         return result.reshape(n_samples, *self._shape)
 
 
-def python_function(program: Program, name: str) -> str:
+def python_function(program: Program, name: str, *, nested: int = 0) -> str:
     """Text of ``name(q, dq, ddq)``, which returns the outputs as a tuple.
 
     Functions ``sin`` and ``cos`` must be in scope. Arguments may be sequences of numbers or of
     arrays.
     """
-    lines, outputs = statements(program)
+    lines, outputs = statements(program, nested=nested)
     result = f"return ({', '.join(outputs.values())},)"
     body = renumber([*lines, result])
     return "\n".join([f"def {name}(q, dq, ddq):", *(f"    {line}" for line in body), ""])

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
@@ -44,6 +45,7 @@ def statements(
     suffix: str = "",
     language: Mapping[str, str] = MappingProxyType(PYTHON),
     given: Mapping[int, str] = MappingProxyType({}),
+    nested: int = 0,
 ) -> tuple[list[str], dict[tuple[int, ...], str]]:
     """Assignments that compute the outputs, and the expression of every output.
 
@@ -58,6 +60,9 @@ def statements(
         How operations are written.
     given : mapping of int to str, default={}
         Expressions of nodes of the tape that are computed elsewhere.
+    nested : int, default=0
+        What is used once is written where it is used, up to this depth: faster to interpret,
+        slower to read.
 
     Returns
     -------
@@ -68,7 +73,11 @@ def statements(
     nodes = program.tape.nodes
     names: dict[int, str] = {}
     lines = []
-    for index in program.tape.live(program.outputs.values(), given):
+    live = program.tape.live(program.outputs.values(), given)
+    uses = Counter(i for index in live if index not in given for i in operands(nodes[index]))
+    uses.update(scalar.index for scalar in program.outputs.values())
+    depths: Counter[int] = Counter()
+    for index in live:
         node = nodes[index]
         if index in given:
             names[index] = given[index]
@@ -82,6 +91,10 @@ def statements(
             continue
         terms = [names[i] for i in operands(node)]
         text = language.get(node[0], f"{node[0]}({{0}})").format(*terms)
+        depth = 1 + max(depths[i] for i in operands(node))
+        if uses[index] == 1 and depth <= nested:
+            names[index], depths[index] = f"({text})", depth
+            continue
         names[index] = f"v{index}"
         lines.append(f"{prefix}{names[index]} = {text}{suffix}")
     return lines, {key: names[scalar.index] for key, scalar in program.outputs.items()}

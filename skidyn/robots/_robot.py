@@ -412,7 +412,7 @@ class Robot:
         q, dq, ddq : array-like of shape (n_samples, n_joints)
             Positions (rad, m), velocities and accelerations.
         chunk : int, default=None
-            Largest number of samples at a time. None: 4096, or 512 with ``backend="compiled"``.
+            Largest number of samples at a time. None: 3072, or 512 with ``backend="compiled"``.
         backend : {"numpy", "compiled"}, default="numpy"
             ``"compiled"`` works as in :meth:`inverse_dynamics`; a few seconds to compile.
 
@@ -424,7 +424,7 @@ class Robot:
             Their regressor, samples last. The memory is used again for the next chunk.
         """
         if chunk is None:
-            chunk = 512 if backend == "compiled" else 4096
+            chunk = 512 if backend == "compiled" else 3072
         if chunk < 1:
             raise SkidynError(f"chunk is {chunk}; expected at least 1.")
         signals = self._signals(q=q, dq=dq, ddq=ddq)
