@@ -87,6 +87,8 @@ def _compare_with_log(options: argparse.Namespace) -> None:
     if options.json:
         print_json({"table": comparison.table(), "failures": [vars(f) for f in diagnosis.failures]})
         return
+    for note in diagnosis.warnings:
+        print(f"note: {note}")
     print_comparison(comparison)
     print_regimes(diagnosis)
 
@@ -129,8 +131,9 @@ def _print_pair(summary: dict[str, Any]) -> None:
     report = summary["report"]
     (a, b), (first, second) = report["sides"], report["names"]
     print(summary["sentence"])
-    print("held-out error on sliding samples (N m, N for sliders), as given and with the findings")
+    print("held-out error on sliding samples (N m, N for sliders)")
     print(f"  A = {first}, B = {second}")
+    print(f"  {'':24s} {'as given':>19s} {'with findings':>19s}")
     print(f"  {'':24s} {'A':>9s} {'B':>9s} {'A':>9s} {'B':>9s}")
     for j, name in enumerate(report["joints"]):
         row = (a["rmse_before"][j], b["rmse_before"][j], a["rmse_after"][j], b["rmse_after"][j])

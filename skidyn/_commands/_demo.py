@@ -29,8 +29,8 @@ def run(options: argparse.Namespace) -> None:
     from skidyn.rigid_body import RBDRegressor
 
     say = (lambda *words: None) if options.json else print
-    say("1. A Panda arm is simulated with two effects that no model below knows of. Two of its")
-    say("   trajectories are put aside: nothing is fitted to them.")
+    say("1. A Panda arm is simulated with two effects that no model below knows of.")
+    say("   Two of its trajectories are put aside: nothing is fitted to them.")
     log = load_demo_log()
     aside = log.X["trajectory"] >= log.X["trajectory"].max() - 1
     X, y, X_new, y_new = log.X[~aside], log.y[~aside], log.X[aside], log.y[aside]
@@ -43,7 +43,7 @@ def run(options: argparse.Namespace) -> None:
     say("3. What is missing?")
     for finding in diagnosis.findings:
         say(f"   {finding.sentence}")
-    say("4. Added and fitted again; error on the trajectories put aside (N m, whole motion):")
+    say("4. Added and fitted again; error on the trajectories put aside, in N m:")
     before = rmse_per_joint(model.fit(X, y), X_new, y_new)
     after = rmse_per_joint(diagnosis.model, X_new, y_new)
     for name, a, b in zip(log.robot.joint_names, before, after, strict=True):

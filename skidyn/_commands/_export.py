@@ -51,7 +51,8 @@ def run(options: argparse.Namespace) -> None:
     with working("Identifying", options):
         model.fit(frame, tau)
     left = {}
-    for form, path in files.items():
+    # Descriptions of robots refuse bodies that cannot exist: first, before any file is there.
+    for form, path in sorted(files.items(), key=lambda item: item[0] not in ("urdf", "mjcf")):
         left[str(path.resolve())] = getattr(export, f"write_{form}")(model, path)
     if options.json:
         print_json(left)

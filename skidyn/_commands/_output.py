@@ -211,9 +211,12 @@ def print_regimes(diagnosis: Diagnosis) -> None:
 
     print("by joint and regime (N m, N for sliders)")
     width = max(len(name) for name in diagnosis.joint_names)
-    print(f"  {'':{width}s}" + "".join(f"{name:>9s}" for name in diagnosis.regimes))
+    widths = [max(8, len(name) + 1) for name in diagnosis.regimes]  # 80 columns hold seven
+    heads = zip(diagnosis.regimes, widths, strict=True)
+    print(f"  {'':{width}s}" + "".join(f"{head:>{w}s}" for head, w in heads))
     for name, errors in zip(diagnosis.joint_names, diagnosis.error_map(), strict=True):
-        cells = "".join("        -" if np.isnan(e) else f"{e:9.3g}" for e in errors)
-        print(f"  {name:{width}s}{cells}")
+        cells = ("-" if np.isnan(e) else f"{e:.3g}" for e in errors)
+        row = "".join(f"{cell:>{w}s}" for cell, w in zip(cells, widths, strict=True))
+        print(f"  {name:{width}s}{row}")
     for failure in diagnosis.failures:
         print(f"  {failure.sentence}")

@@ -4,12 +4,18 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from skidyn._checks import warn_about_log
 from skidyn._commands._arguments import command, with_log_only
 from skidyn._commands._input import json_option, read_frame, read_robot
 from skidyn._commands._output import print_json, working, write_json
 from skidyn._exceptions import SkidynError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from skidyn.robots import Robot
 
 DESCRIPTION = """\
 Identify a payload from runs with it (LOG) and without it (--unloaded): mass, centre of mass and
@@ -58,9 +64,9 @@ def run(options: argparse.Namespace) -> None:
     gains = options.drive_gains
     if options.known_mass is not None and gains is None:
         options.drive_gains = str([1.0] * robot.n_joints)  # torques that are the currents
-    loaded = read_frame(options, robot)
+    loaded = _read(options, robot)
     options.logs = options.unloaded
-    unloaded = read_frame(options, robot)
+    unloaded = _read(options, robot)
     kinds = [kind.strip() for kind in options.model.split(",") if kind.strip()]
     if "rigid_body" not in kinds:
         raise SkidynError("--model must contain rigid_body; it may add kinds of the catalogue")
@@ -81,3 +87,14 @@ def run(options: argparse.Namespace) -> None:
         print_json(found.to_dict())
     else:
         print(found.text)
+
+
+def _read(options: argparse.Namespace, robot: Robot) -> pd.DataFrame:
+    """A log that is checked as torques, or without the robot where currents are expected."""
+    from skidyn.datasets import check_log
+
+    currents = options.known_mass is not None
+    frame = read_frame(options, robot, check=not currents)
+    for message in check_log(frame).warnings if currents else ():
+        warn_about_log(message)
+    return frame

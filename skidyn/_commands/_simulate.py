@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -52,4 +53,17 @@ def run(options: argparse.Namespace) -> None:
         print_json(truth)
     else:
         print(f"{len(log.frame)} samples written: {Path(options.out).resolve()}")
-        print(f"hidden: {truth}")
+        print(f"hidden: {_told(log.effect, truth['joints'], log.parameters)}")
+
+
+def _told(effect: str | None, joints: list[int], parameters: Mapping[str, Any]) -> str:
+    """What the log hides, in words."""
+    if effect is None:
+        return "nothing"
+    where = f" on joint{'s' if len(joints) > 1 else ''} {', '.join(map(str, joints))}"
+    lines = [f"{effect}{where if joints else ''}"]
+    for name, value in parameters.items():
+        numbers = value if isinstance(value, (list, tuple)) else [value]
+        shown = (f"{x:.4g}" if isinstance(x, float) else str(x) for x in numbers)
+        lines.append(f"  {name:14s}{', '.join(shown)}")
+    return "\n".join(lines)

@@ -43,7 +43,7 @@ class FittingStream:
         self._stream.flush()
 
 
-def fit(line: str, width: int, more: str = "    ", end: str = "") -> str:
+def fit(line: str, width: int, end: str = "") -> str:
     """A line broken between words to fit a width.
 
     Parameters
@@ -52,30 +52,34 @@ def fit(line: str, width: int, more: str = "    ", end: str = "") -> str:
         Without its line break.
     width : int
         Columns.
-    more : str, default=4 spaces
-        What is put before further lines, beside the indentation of the first.
     end : str, default=""
         What ends every line but the last.
 
     Returns
     -------
     str
-        One line or several.
+        One line or several; further ones begin under the last column of a table that is in the
+        left half, or else four spaces further than the first.
 
     Examples
     --------
-    >>> print(fit("  one two three", 10))
-      one two
-          three
+    >>> print(fit("  one two three four five six", 24))
+      one two three four
+          five six
+    >>> print(fit("0.5   one two three four five", 20))
+    0.5   one two three
+          four five
     """
     if len(line) <= width:
         return line
     lead = line[: len(line) - len(line.lstrip())]
+    columns = [m.end() for m in re.finditer(r"(?<=\S) {2,}(?=\S)", line)]
+    hang = columns[-1] if columns and columns[-1] <= width // 2 else len(lead) + 4
     parts = textwrap.wrap(
         line.strip(),
         max(width - len(end), 20),
         initial_indent=lead,
-        subsequent_indent=lead + more,
+        subsequent_indent=" " * hang,
         break_long_words=False,
         break_on_hyphens=False,
     )

@@ -111,12 +111,14 @@ class LogQuality:
         One per joint.
     warnings : tuple of str
         What looks wrong, each with its evidence.
+    notes : tuple of str
+        What the log cannot give although nothing is wrong with it.
 
     Examples
     --------
     >>> from skidyn.datasets import check_log, load_planar_arm, make_hidden_effect_log
     >>> log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=1, duration=2.0)
-    >>> print(check_log(log.frame).warnings[0].partition(":")[0])
+    >>> print(check_log(log.frame).notes[0].partition(":")[0])
     there is a single trajectory
     """
 
@@ -130,6 +132,7 @@ class LogQuality:
     repeated_rows: int
     joints: tuple[JointQuality, ...]
     warnings: tuple[str, ...] = field(default=())
+    notes: tuple[str, ...] = field(default=())
 
     def to_dict(self) -> dict[str, Any]:
         """Contents as plain numbers, lists and text for JSON; NaN becomes None.
@@ -145,7 +148,8 @@ class LogQuality:
 
     def __str__(self) -> str:
         lines = [
-            f"{self.n_samples} samples in {self.n_trajectories} trajectories, "
+            f"{self.n_samples} samples in {self.n_trajectories} "
+            f"{'trajectory' if self.n_trajectories == 1 else 'trajectories'}, "
             f"{self.duration:.1f} s at {self.rate:.4g} Hz (jitter {100 * self.jitter:.2g} %)",
             f"gaps: {self.gaps} (longest step {self.largest_gap:.3g} s), "
             f"repeated rows: {self.repeated_rows}",
@@ -157,7 +161,7 @@ class LogQuality:
         lines += [f"{joint.name:{width}s}{_motion_cells(joint)}" for joint in self.joints]
         lines += ["", f"{'joint':{width}s}{_TORQUE_HEAD}"]
         lines += [f"{joint.name:{width}s}{_torque_cells(joint)}" for joint in self.joints]
-        lines += ["", *(f"! {message}" for message in self.warnings)]
+        lines += ["", *(f"! {message}" for message in self.warnings), *self.notes]
         return "\n".join(lines).rstrip()
 
 
@@ -229,7 +233,7 @@ def check_log(frame: pd.DataFrame, robot: Robot | None = None) -> LogQuality:
     joints = _joints(names, time, q, dq, tau, trajectory, robot)
     repeated = repeated_rows(q, dq, trajectory)
     n_trajectories = len(np.unique(trajectory))
-    messages += clock_suspicions(clock, repeated, len(time), n_trajectories)
+    messages += clock_suspicions(clock, repeated, len(time))
     messages += unit_suspicions(joints, q, dq, tau, time, trajectory, robot)
     messages += joint_suspicions(joints, n)
     return LogQuality(
@@ -238,6 +242,7 @@ def check_log(frame: pd.DataFrame, robot: Robot | None = None) -> LogQuality:
         repeated_rows=repeated,
         joints=tuple(joints),
         warnings=tuple(messages),
+        notes=(_SINGLE,) if n_trajectories == 1 else (),
         **clock,
     )
 
@@ -310,8 +315,12 @@ def _joints(
     return joints
 
 
-_MOTION_HEAD = "  position range  coverage     step   speed reversals  at rest"
-_TORQUE_HEAD = "      torque range  at limit     dq/q'  delay ms"
+_SINGLE = (
+    "there is a single trajectory: errors on held-out trajectories cannot be had, only on held-out "
+    "stretches of it (split_gaps, split_dwells or several files give more)."
+)
+_MOTION_HEAD = "  position range  coverage     step   speed reversals"
+_TORQUE_HEAD = "      torque range  at limit  at rest     dq/q'  delay ms"
 
 
 def _motion_cells(joint: JointQuality) -> str:
@@ -320,16 +329,17 @@ def _motion_cells(joint: JointQuality) -> str:
     step = f"{joint.resolution:8.2g}" if np.isfinite(joint.resolution) else "       -"
     return (
         f" {low:6.3f} ..{high:7.3f} {_percent(joint.position_coverage)} {step} "
-        f"{joint.largest_velocity:7.3f} {joint.reversals:9d} {_percent(joint.rest_share)}"
+        f"{joint.largest_velocity:7.3f} {joint.reversals:9d}"
     )
 
 
 def _torque_cells(joint: JointQuality) -> str:
     """Torque of one joint, as a row of the printed report."""
     weak, strong = joint.torque_range
+    slope, delay = _number(joint.velocity_slope, 9), _number(1e3 * joint.torque_delay, 9, 1)
     return (
-        f" {weak:8.2f} ..{strong:7.2f} {_percent(joint.saturated_share)} "
-        f"{_number(joint.velocity_slope, 9)} {_number(1e3 * joint.torque_delay, 9, 1)}"
+        f" {weak:8.2f} ..{strong:7.2f} {_percent(joint.saturated_share)}"
+        f"{_percent(joint.rest_share)} {slope} {delay}"
     )
 
 

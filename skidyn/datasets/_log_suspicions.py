@@ -20,10 +20,8 @@ DEGREE = np.pi / 180
 CLOCKS = {1e3: "ms", 1e6: "us", 1e9: "ns"}
 
 
-def clock_suspicions(
-    clock: Mapping[str, Any], repeated: int, n_samples: int, n_trajectories: int
-) -> list[str]:
-    """Gaps, jitter, slow sampling, repeated rows, a single trajectory."""
+def clock_suspicions(clock: Mapping[str, Any], repeated: int, n_samples: int) -> list[str]:
+    """Gaps, jitter, slow sampling, repeated rows."""
     messages = []
     if clock["rate"] < 2:
         # the unit in which a robot would have been sampled at a usual rate
@@ -52,11 +50,6 @@ def clock_suspicions(
         messages.append(
             f"in {repeated} of {n_samples} rows no position changes although joints move: the "
             "recorder polled faster than the robot reports, so derivatives are too rough."
-        )
-    if n_trajectories == 1:
-        messages.append(
-            "there is a single trajectory: errors on held-out trajectories cannot be had, only on "
-            "held-out stretches of it (split_gaps, split_dwells or several files give more)."
         )
     return messages
 

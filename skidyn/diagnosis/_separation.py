@@ -16,9 +16,10 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.optimize import differential_evolution
+from scipy.optimize import OptimizeResult, differential_evolution
 
 from skidyn._exceptions import EffectError
+from skidyn._progress import tell
 from skidyn._signals import Array, Signals
 from skidyn.diagnosis._hypothesis import Hypothesis, Settings
 from skidyn.diagnosis._search import search
@@ -252,9 +253,14 @@ def design_separating_motion(
     bounds = [(0.0, 1.0)]
     for _ in duel.joints:
         bounds += [(0.0, 1.0)] + [(-1.0, 1.0)] * (size - 1)
+
+    def told(intermediate_result: OptimizeResult) -> None:
+        tell("Designing the motion", intermediate_result.nit / ROUNDS)
+
     best = differential_evolution(
         loss,
         bounds,
+        callback=told,
         maxiter=ROUNDS,
         popsize=POPULATION,
         init="sobol",

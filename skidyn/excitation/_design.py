@@ -3,14 +3,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from itertools import count
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from scipy.optimize import minimize
 
 from skidyn._exceptions import SkidynError
+from skidyn._progress import tell
 from skidyn._signals import Array
 from skidyn.excitation._basis import FourierBasis, QuinticBasis
 from skidyn.excitation._excitation import Excitation
@@ -203,7 +205,8 @@ class _Search:
         import torch
 
         starts = sorted(self.starts, key=self._worth)
-        found = [self._descended(x, iterations) for x in starts[:FOLLOWED]] if iterations else []
+        followed = starts[:FOLLOWED] if iterations else []
+        found = [self._descended(x, iterations, k / FOLLOWED) for k, x in enumerate(followed)]
         found.sort(key=self._worth)
         with torch.no_grad():
             for x in (*found, *starts):
@@ -217,7 +220,7 @@ class _Search:
         with torch.no_grad():
             return float(self.loss(torch.from_numpy(x), PENALTIES[-1]))
 
-    def _descended(self, x: Array, iterations: int) -> Array:
+    def _descended(self, x: Array, iterations: int, done: float) -> Array:
         import torch
 
         def value(flat: Array, penalty: float) -> tuple[float, Array]:
@@ -227,9 +230,17 @@ class _Search:
             return float(loss.detach()), slope.numpy().ravel()
 
         options = {"maxiter": iterations, "ftol": 1e-8}
-        for penalty in PENALTIES if self._is_bound() else PENALTIES[-1:]:
+        penalties = PENALTIES if self._is_bound() else PENALTIES[-1:]
+        part = 1 / (FOLLOWED * len(penalties))
+        for k, penalty in enumerate(penalties):
             found = minimize(
-                value, x.ravel(), (penalty,), jac=True, method="L-BFGS-B", options=options
+                value,
+                x.ravel(),
+                (penalty,),
+                jac=True,
+                method="L-BFGS-B",
+                callback=_teller(done + k * part, part / iterations),
+                options=options,
             )
             x = found.x.reshape(x.shape)
         return x
@@ -385,3 +396,9 @@ def broken_limits(model: Model, excitation: Excitation, limits: MotionLimits) ->
         "workspace": np.all(limits.clearance(position) >= 0.0),
     }
     return [name for name, holds in kept.items() if not holds]
+
+
+def _teller(done: float, step: float) -> Callable[[Array], None]:
+    """What tells after each step of a descent which share of the design is done."""
+    steps = count(1)
+    return lambda x: tell("Designing the motion", done + next(steps) * step)

@@ -272,8 +272,15 @@ def _estimate(runs: Runs, link: str, notes: list[str]) -> PayloadEstimate:
         names = ", ".join(np.array(SYMBOLS)[is_open])
         notes.append(f"This motion leaves open: {names}. They are those of a small sphere.")
     parameters = _consistent(whole, solution[:10], is_open)
+    about = _about_com(parameters)
     mass, first = parameters[0], parameters[1:4]
     wide = interval_factor(len(factors))
+    least = wide * float(np.max(std[[4, 7, 9]]))  # of Ixx, Iyy, Izz; NaN where one is open
+    if np.trace(about) < least:
+        notes.append(
+            "The inertia about the centre of mass is smaller than this motion can tell "
+            f"({least:.2g} kg m^2 about each axis)."
+        )
     com_std = jackknife(left[:, 1:4] / left[:, :1])
     com_std[is_open[1:4]] = np.inf
     half = wide * com_std[:, None] * [-1.0, 1.0]
@@ -281,7 +288,7 @@ def _estimate(runs: Runs, link: str, notes: list[str]) -> PayloadEstimate:
     return PayloadEstimate(
         mass=float(mass),
         com=first / mass,
-        inertia=_about_com(parameters),
+        inertia=about,
         mass_interval=(float(mass - wide * std[0]), float(mass + wide * std[0])),
         com_interval=(first / mass)[:, None] + half,
         inertial_parameters=parameters,
