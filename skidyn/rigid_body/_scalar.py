@@ -16,7 +16,6 @@ import numpy as np
 from skidyn.rigid_body._recursion import Program
 from skidyn.rigid_body._source import renumber, statements
 
-
 #: Depth of expressions; Python's compiler gives up far above.
 NESTED = 8
 

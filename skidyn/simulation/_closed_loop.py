@@ -101,9 +101,9 @@ def simulate_closed_loop(
     """
     static = static_model(model)
     if static.left:
-        names = ", ".join(name_term(static.robot, term) for term in static.left)
+        left = ", ".join(name_term(static.robot, term) for term in static.left)
         raise SkidynError(
-            f"{names}: depends on more than the present q, dq and ddq and cannot be simulated here;"
+            f"{left}: depends on more than the present q, dq and ddq and cannot be simulated here;"
             " fit a model without it first"
         )
     n = static.robot.n_joints
@@ -221,8 +221,8 @@ def _follow(
     )
     if solution.status != 0:
         raise SkidynError(
-            f"trajectory {trajectory}: the model left its reference by more than {_LOST:g} rad (m), "
-            f"or the solver gave up ({solution.message}). Are stiffness and damping those of the "
+            f"trajectory {trajectory}: the model left its reference by more than {_LOST:g} rad "
+            f"(m), or the solver gave up ({solution.message}). Are stiffness and damping those of the "
             "controller, and is no friction of the model negative?"
         )
     q, dq = solution.y[:n].T, solution.y[n:].T
@@ -232,14 +232,10 @@ def _follow(
 
 def _replaced(reference: Any, names: list[str], columns: Columns, simulated: Array) -> Any:
     """The table with other positions, velocities and accelerations."""
-    new = {}
-    for places, values in zip((columns.q, columns.dq), simulated, strict=False):
-        new |= {names[k]: values[:, j] for j, k in enumerate(places)}
-    if columns.ddq is not None:
-        titles = [names[k] for k in columns.ddq]
-    else:
-        titles = ["d" + names[k] for k in columns.dq]
-    new |= {title: simulated[2][:, j] for j, title in enumerate(titles)}
+    q, dq = ([names[k] for k in places] for places in (columns.q, columns.dq))
+    ddq = ["d" + name for name in dq] if columns.ddq is None else [names[k] for k in columns.ddq]
+    values = np.concatenate(simulated, axis=1).T
+    new = dict(zip([*q, *dq, *ddq], values, strict=True))
     if hasattr(reference, "assign"):
         return reference.assign(**new)
     frame = type(reference)(new)
