@@ -222,8 +222,8 @@ def _follow(
     if solution.status != 0:
         raise SkidynError(
             f"trajectory {trajectory}: the model left its reference by more than {_LOST:g} rad "
-            f"(m), or the solver gave up ({solution.message}). Are stiffness and damping those of the "
-            "controller, and is no friction of the model negative?"
+            f"(m), or the solver gave up ({solution.message}). Are stiffness and damping those of "
+            "the controller, and is no friction of the model negative?"
         )
     q, dq = solution.y[:n].T, solution.y[n:].T
     ddq = [acceleration(*row) for row in zip(q, dq, wanted(time), velocity(time), strict=True)]
