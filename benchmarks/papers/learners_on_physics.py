@@ -24,7 +24,7 @@ from collections import defaultdict
 from typing import Any
 
 import numpy as np
-from _common import Array, LinearPhysics
+from _common import Array, LinearPhysics, print_table
 from _logs import LOGS, RecordedLog
 from sklearn.base import clone
 from sklearn.compose import make_column_transformer
@@ -37,7 +37,7 @@ from sklearn.preprocessing import StandardScaler
 
 from skidyn.committee import ELMCommittee
 from skidyn.hybrid import HybridRegressor
-from skidyn.metrics import paired_comparison, trajectory_errors
+from skidyn.metrics import paired_comparison, rmse_over_range, trajectory_errors
 from skidyn.neural_network import BLLRegressor, LSTMRegressor, SDLRegressor
 
 
@@ -124,6 +124,14 @@ def compare(log: RecordedLog, wanted: list[str], alpha: float, epochs: int) -> N
             f"| {joints} |",
             flush=True,
         )
+    print_table(
+        "RMSE over the range of the torque",
+        {
+            " + ".join(filter(None, key)): rmse_over_range(y, p, multioutput="raw_values")
+            for key, p in predicted.items()
+        },
+        [f"J{j + 1}" for j in range(y.shape[1])],
+    )
 
 
 def main() -> None:

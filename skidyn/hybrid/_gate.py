@@ -11,8 +11,6 @@ from scipy import stats
 
 Array = NDArray[np.float64]
 
-#: One-sided p-value of a gain of one standard error.
-ONE_STANDARD_ERROR = 0.16
 #: Keeps ratios finite.
 TINY = np.finfo(np.float64).tiny
 
@@ -22,32 +20,34 @@ def learned_weights(
 ) -> tuple[Array, Array, Array]:
     """Weight of the learned part for each joint; zero where its gain may be chance.
 
-    The least-squares factor of the cross-fitted learned part, between 0 and 1, is taken from all
-    units (recordings, or blocks of the only one) but one, and its gain is measured on that one.
-    Two one-sided paired t-tests over units are made at level `alpha`; noise passes much more
-    rarely, since its held-out gain is negative in the mean. If the mean gain over all joints
-    passes, every joint is kept whose own gain is more than its standard error (small gains on many
-    joints are seen together); otherwise the joints that pass alone, after Holm's correction. A
-    joint's weight is the smallest of its factors: what no single unit can talk it into.
+    The least-squares factor of the cross-fitted learned part has a standard error over units
+    (recordings), from the jackknife. The weight is the factor less one standard error, between 0
+    and 1: a learned part of little worth comes in small. Nothing comes in unless residual and
+    learned part agree beyond chance, by a one-sided t-test over units of their products: of their
+    mean correlation over all joints, which sees small gains on many joints, or of a joint alone
+    after Holm's correction. The smaller of the two p-values counts, doubled. Under noise the
+    products are zero in the mean, so that the level is kept.
 
     Parameters
     ----------
     residual, learned : ndarray of shape (n_samples, n_joints), N m
         Cross-fitted residual of the physics, and the learner's cross-fitted prediction of it.
     unit : ndarray of shape (n_samples,)
-        Number of the independent unit of every row.
+        Number of the independent unit of every row; at least three.
     alpha : float
         Level of the tests, over all joints together.
 
     Returns
     -------
     weight, gain, p_value : ndarray of shape (n_joints,)
-        The gain is the relative fall of the held-out RMSE. The p-value is the smaller of the
-        joint's own and the common one, corrected.
+        The gain is the relative fall of the RMSE on units whose weight the others gave. The p-value
+        is 1 where the weight would be zero.
 
     References
     ----------
-    .. [1] S. Holm, "A simple sequentially rejective multiple test procedure", Scandinavian
+    .. [1] L. Breiman, "Stacked regressions", Machine Learning 24, 1996.
+    .. [2] B. Efron, "The Jackknife, the Bootstrap and Other Resampling Plans", SIAM, 1982.
+    .. [3] S. Holm, "A simple sequentially rejective multiple test procedure", Scandinavian
        Journal of Statistics 6, 1979.
     """
     labels, number = np.unique(unit, return_inverse=True)
@@ -59,26 +59,33 @@ def learned_weights(
     n_joints = rr.shape[1]
     if len(labels) < 3:
         return np.zeros(n_joints), np.zeros(n_joints), np.ones(n_joints)
-    others = np.clip((rl.sum(axis=0) - rl) / np.maximum(ll.sum(axis=0) - ll, TINY), 0.0, 1.0)
+    each = range(len(labels))
+    others = np.stack([_cautious_factor(np.delete(rl, k, 0), np.delete(ll, k, 0)) for k in each])
     after = rr - 2 * others * rl + others**2 * ll
     gain = 1.0 - np.sqrt(after.sum(axis=0) / np.maximum(rr.sum(axis=0), TINY))
-    logs = np.log(np.maximum(after, TINY) / np.maximum(rr, TINY))
-    tried = others.max(axis=0) > 0
-    alone = np.where(tried, _p_value(logs), 1.0)
-    p_value = _holm(alone)
-    if tried.sum() > 1:
-        common = _p_value(logs[:, tried].mean(axis=1, keepdims=True))[0]
-        p_value = np.minimum(p_value, np.where(alone < ONE_STANDARD_ERROR, common, 1.0))
-    # at alpha = 1 the user asks for whatever helps, and a corrected p-value may be exactly 1
-    kept = ((p_value < alpha) | (alpha == 1)) & (gain > 0)
-    return np.where(kept, others.min(axis=0), 0.0), gain, p_value
+    correlation = rl / np.maximum(np.sqrt(rr.sum(axis=0) * ll.sum(axis=0)), TINY)
+    common = _p_value(correlation.mean(axis=1, keepdims=True))
+    p_value = np.minimum(2 * np.minimum(_holm(_p_value(correlation)), common), 1.0)
+    weight = np.where(gain > 0, _cautious_factor(rl, ll), 0.0)
+    p_value[weight == 0] = 1.0
+    return np.where((p_value < alpha) | (alpha == 1), weight, 0.0), gain, p_value
 
 
-def _p_value(logs: Array) -> Array:
-    """One-sided paired t-test over units (rows) that the logarithm of the error fell."""
-    spread = logs.std(axis=0, ddof=1) / np.sqrt(len(logs))
-    statistic = logs.mean(axis=0) / np.maximum(spread, TINY)
-    p_value: Array = stats.t.cdf(statistic, len(logs) - 1)
+def _cautious_factor(products: Array, squares: Array) -> Array:
+    """Least-squares factor from the sums of each unit, less its standard error, in 0 to 1."""
+    n = len(products)
+    without = (products.sum(axis=0) - products) / np.maximum(squares.sum(axis=0) - squares, TINY)
+    error = np.sqrt((n - 1) / n * ((without - without.mean(axis=0)) ** 2).sum(axis=0))
+    factor = products.sum(axis=0) / np.maximum(squares.sum(axis=0), TINY)
+    cautious: Array = np.clip(factor - error, 0.0, 1.0)
+    return cautious
+
+
+def _p_value(values: Array) -> Array:
+    """One-sided t-test over units (rows) that the mean is positive."""
+    spread = values.std(axis=0, ddof=1) / np.sqrt(len(values))
+    statistic = values.mean(axis=0) / np.maximum(spread, TINY)
+    p_value: Array = stats.t.sf(statistic, len(values) - 1)
     return p_value
 
 

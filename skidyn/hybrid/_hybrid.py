@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import warnings
 from numbers import Integral, Real
 from typing import Any, ClassVar
 
@@ -27,14 +28,21 @@ from skidyn.preprocessing._keys import Keys, resolve_keys
 
 Array = NDArray[np.float64]
 
+NOT_TESTED = (
+    "the learned part is left off: with fewer than three trajectories its gain cannot be told from "
+    "chance. Record more, cut a long recording of a motion that does not repeat into trajectories, "
+    "or set alpha=1 to keep whatever helps on held-out parts."
+)
+
 
 class HybridRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     """Physical model plus a learner on its residual, which is kept only where it helps.
 
     The physics is cross-fitted, so that the learner sees the residual on trajectories that the
-    physics has not seen; the learner is cross-fitted in turn. A joint keeps its learned part only
-    if the gain on held-out trajectories is significant, weighted by how well it held; otherwise the
-    hybrid is the physics. Far from the training samples the learned part fades out.
+    physics has not seen; the learner is cross-fitted in turn. A learned part is kept only if it
+    agrees with the residual of held-out trajectories beyond chance, with the weight that is certain
+    to one standard error; otherwise the hybrid is the physics. Far from the training samples the
+    learned part fades out.
 
     Parameters
     ----------
@@ -46,9 +54,12 @@ class HybridRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         Folds: by trajectory, or by blocks of rows of a single trajectory. A cross-validator must
         test every row exactly once; for one recording of a periodic motion use ``PhaseKFold``.
     alpha : float, default=0.05
-        Level of the one-sided paired tests over trajectories that the learned part must pass: for
-        all joints together, or for a joint alone with correction for their number. 1 keeps every
-        joint whose learned part helped on held-out trajectories, significantly or not.
+        Level of the one-sided tests over trajectories that the learned part must pass: for all
+        joints together, or for a joint alone with correction for their number. 1 keeps every joint
+        whose learned part helped on held-out data, significantly or not. Fewer than three
+        trajectories test nothing, since parts of one recording share its peculiarities: then the
+        hybrid is the physics, with a warning, unless `alpha` is 1. A long recording of a motion
+        that does not repeat may be cut into trajectories.
     trajectory, time : int, str or None, default="auto"
         Key columns of X.
 
@@ -59,12 +70,14 @@ class HybridRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     learner_ : estimator or None
         Learner fitted to all honest residuals; None where no joint kept it.
     learned_weight_ : ndarray of shape (n_joints,)
-        Factor of the learned part; 0 where it is off.
+        Factor of the learned part: its least-squares factor on held-out trajectories less one
+        standard error, between 0 and 1; 0 where it is off.
     gain_ : ndarray of shape (n_joints,)
-        Relative fall of the RMSE on held-out trajectories that the learned part brought, whether
-        it was kept or not.
+        Relative fall of the RMSE on held-out trajectories that the learned part brought with the
+        weight that the other trajectories give it, whether it was kept or not.
     p_value_ : ndarray of shape (n_joints,)
-        Of that gain, or of the mean gain of all joints if that is surer; corrected.
+        That residual and learned part agree on the joint, or over all joints if that is surer;
+        corrected. 1 where nothing is gained, and with fewer than three trajectories.
     radius_ : float
         Distance from the training samples that counts as outside, in standard deviations per
         feature (root mean square).
@@ -75,9 +88,8 @@ class HybridRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
 
     Notes
     -----
-    When a fold's residual is predicted, the learner was trained on residuals of physics that saw
-    the fold. A physical model has few parameters, so this is a small leak; nesting would remove it
-    at the cost of another round of fits per fold.
+    Physics is fitted once for every pair of folds: a learner that is judged on a fold is trained on
+    residuals of physics that saw neither the fold nor the row's own.
 
     Examples
     --------
@@ -158,8 +170,14 @@ class HybridRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         learner = OwnJointRegressor() if self.learner is None else self.learner
         if self.learner is None:
             learner.set_params(trajectory=self.trajectory, time=self.time)
-        residual = torque - _cross_fitted(self.physics, table, torque, weight, folds)
-        learned = _cross_fitted(learner, table, residual, weight, folds)
+        residuals = _honest_residuals(self.physics, table, torque, weight, folds)
+        residual, learned = np.zeros(torque.shape), np.zeros(torque.shape)
+        for (train, test), seen in zip(folds, residuals, strict=True):
+            residual[test] = seen[test]
+            part = None if weight is None else weight[train]
+            fitted = _fit(clone(learner), _safe_indexing(table, train), seen[train], part)
+            predicted = fitted.predict(_safe_indexing(table, test))
+            learned[test] = np.reshape(predicted, residual[test].shape)
 
         training_range = TrainingRange(array[:, list(keys.features)], folds)
         self.radius_ = training_range.radius
@@ -167,9 +185,18 @@ class HybridRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         learned *= _column(fade(training_range.held_out_novelty), learned)
 
         shape = (len(array), -1)
+        unit = keys.trajectories(array)
+        tested = len(np.unique(unit)) > 2
         self.learned_weight_, self.gain_, self.p_value_ = learned_weights(
-            residual.reshape(shape), learned.reshape(shape), _units(keys, array, folds), self.alpha
+            residual.reshape(shape),
+            learned.reshape(shape),
+            unit if tested else _fold_numbers(len(array), folds),
+            self.alpha if tested else float(self.alpha == 1),
         )
+        if not tested:
+            self.p_value_[:] = 1.0
+            if self.alpha < 1:
+                warnings.warn(NOT_TESTED, UserWarning, stacklevel=3)
         self.physics_ = _fit(clone(self.physics), table, torque, weight)
         self.learner_ = None
         if self.learned_weight_.any():
@@ -279,24 +306,35 @@ def _fit(estimator: Any, X: Any, y: Array, weight: Array | None) -> Any:
     return estimator.fit(X, y, sample_weight=weight)
 
 
-def _cross_fitted(
-    estimator: Any, X: Any, y: Array, weight: Array | None, folds: list[Any]
+def _honest_residuals(
+    physics: Any, X: Any, y: Array, weight: Array | None, folds: list[Any]
 ) -> Array:
-    """Prediction of every row by a clone that has not seen its fold."""
-    predicted = np.zeros_like(y, dtype=np.float64)
-    for train, test in folds:
-        part = None if weight is None else weight[train]
-        fitted = _fit(clone(estimator), _safe_indexing(X, train), y[train], part)
-        predicted[test] = np.reshape(fitted.predict(_safe_indexing(X, test)), y[test].shape)
-    return predicted
+    """For every fold the residual of all rows by physics that saw neither it nor their own fold.
+
+    Physics that saw a fold leaves a residual elsewhere that holds the fold's own deviation with the
+    opposite sign; a learner of it looks worse on the fold than it is. Physics fitted without two
+    folds serves both. Where no rows are left without two folds, the physics saw the rows' own.
+    """
+
+    def fitted(rows: NDArray[Any]) -> Any:
+        part = None if weight is None else weight[rows]
+        return _fit(clone(physics), _safe_indexing(X, rows), y[rows], part)
+
+    residuals = np.repeat(y[None].astype(np.float64), len(folds), axis=0)
+    for k, (train, test) in enumerate(folds):
+        residuals[k] -= np.reshape(fitted(train).predict(X), y.shape)
+        for c, (others, tested) in enumerate(folds[:k]):
+            both = np.intersect1d(train, others)
+            if len(both):
+                model = fitted(both)
+                for number, rows in ((k, tested), (c, test)):
+                    predicted = model.predict(_safe_indexing(X, rows))
+                    residuals[number][rows] = y[rows] - np.reshape(predicted, y[rows].shape)
+    return residuals
 
 
-def _units(keys: Keys, array: Array, folds: list[Any]) -> NDArray[Any]:
-    """What the test of the gain counts as independent: trajectories, or folds of a single one."""
-    trajectories = keys.trajectories(array)
-    if len(np.unique(trajectories)) > 2:
-        return trajectories
-    unit = np.zeros(len(array), dtype=int)
+def _fold_numbers(n_rows: int, folds: list[Any]) -> NDArray[Any]:
+    number = np.zeros(n_rows, dtype=int)
     for k, (_, test) in enumerate(folds):
-        unit[test] = k
-    return unit
+        number[test] = k
+    return number

@@ -16,6 +16,7 @@ from sklearn.utils.estimator_checks import parametrize_with_checks
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.hybrid import HybridRegressor
 from skidyn.hybrid._gate import learned_weights
+from skidyn.hybrid._hybrid import _honest_residuals
 from skidyn.model_selection import PhaseKFold, TrajectoryKFold
 from skidyn.neural_network import LSTMRegressor
 from skidyn.rigid_body import RBDRegressor
@@ -91,14 +92,14 @@ def test_p_values_are_corrected_for_the_number_of_joints():
         np.c_[residual, rng.normal(size=(600, 3))], np.c_[learned, noise], unit, 0.05
     )
     assert alone[0] < together[2][0] <= 4 * alone[0]
-    assert 0 < weight[0] < (residual * learned).sum() / (learned**2).sum()  # the smallest factor
+    assert 0 < weight[0] < (residual * learned).sum() / (learned**2).sum()  # less its error
     assert together[0][0] == weight[0] and not together[0][1:].any() and 0.05 < gain[0] < 0.2
 
 
 def test_small_gains_on_many_joints_are_seen_together():
     rng = np.random.default_rng(1)
     learned = rng.normal(size=(600, 6))
-    residual = 0.15 * learned + rng.normal(size=(600, 6))
+    residual = 0.1 * learned + rng.normal(size=(600, 6))
     unit = np.repeat(np.arange(6), 100)
     alone = [learned_weights(residual[:, [j]], learned[:, [j]], unit, 0.05)[2] for j in range(6)]
     assert 6 * min(alone) > 0.05  # none would pass after correction
@@ -115,12 +116,50 @@ def test_fades_out_of_range_and_says_so():
     np.testing.assert_array_equal(hybrid.predict(far), hybrid.physics_.predict(far))
 
 
-def test_single_periodic_recording_takes_its_folds_from_the_phase():
+def test_one_recording_proves_nothing():
     X, y = make_log(1, 1000)
     hybrid = HybridRegressor(LinearRegression(), TREES, cv=PhaseKFold(5, period=20.0))
-    assert hybrid.fit(X, y).predict(X).shape == y.shape
+    with pytest.warns(UserWarning, match="fewer than three trajectories"):
+        hybrid.fit(X, y)
+    assert not hybrid.learned_weight_.any() and (hybrid.p_value_ == 1).all()
+    np.testing.assert_array_equal(hybrid.predict(X), hybrid.physics_.predict(X))
+    assert hybrid.set_params(alpha=1.0).fit(X, y).learned_weight_[0] > 0.5  # as the user asks
     with pytest.raises(ValueError, match="exactly once"):
         hybrid.set_params(cv=ShuffleSplit(2)).fit(X, y)
+
+
+class RowsSeen(LinearRegression):
+    """Physics that predicts which trajectories it was fitted to, as the digits of a number."""
+
+    def fit(self, X, y):
+        self.seen_ = sum(10.0**k for k in np.unique(X[:, 0]))
+        return self
+
+    def predict(self, X):
+        return np.full(len(X), -self.seen_)
+
+
+def test_no_residual_betrays_the_fold_that_is_held_out():
+    trajectory = np.repeat(np.arange(4), 3)
+    folds = [(np.flatnonzero(trajectory != k), np.flatnonzero(trajectory == k)) for k in range(4)]
+    residuals = _honest_residuals(RowsSeen(), trajectory[:, None], np.zeros(12), None, folds)
+    for k, residual in enumerate(residuals):
+        for own, seen in zip(trajectory, residual, strict=True):
+            assert seen == sum(10.0**other for other in range(4) if other not in (k, own))
+    two = [(np.arange(3, 6), np.arange(3)), (np.arange(3), np.arange(3, 6))]
+    residuals = _honest_residuals(RowsSeen(), trajectory[:6, None], np.zeros(6), None, two)
+    np.testing.assert_array_equal(residuals, [[10.0] * 6, [1.0] * 6])
+
+
+def test_drift_between_recordings_is_not_taken_for_something_learned():
+    kept = 0
+    for seed in range(10):
+        X, y = make_log(8, 60, seed=seed, hidden=(0.0, 0.0))
+        level = np.random.default_rng(seed).normal(size=(8, 2))
+        y += level[X["trajectory"].to_numpy()]
+        hybrid = HybridRegressor(LinearRegression(), KNeighborsRegressor(5), cv=4).fit(X, y)
+        kept += (hybrid.learned_weight_ > 0).any()
+    assert kept <= 1
 
 
 def test_tables_searches_and_storage():
@@ -142,7 +181,7 @@ def test_one_search_over_physics_effects_and_network():
         load_planar_arm(), "spring", n_trajectories=8, duration=4.0, rate=25.0
     )
     hybrid = HybridRegressor(
-        RBDRegressor(log.robot), LSTMRegressor(max_epochs=1, random_state=0), cv=3
+        RBDRegressor(log.robot), LSTMRegressor(max_epochs=1, random_state=0), cv=2
     )
     scale = FunctionTransformer(feature_names_out="one-to-one").set_output(transform="pandas")
     pipeline = Pipeline([("units", scale), ("hybrid", hybrid)])
