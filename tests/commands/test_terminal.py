@@ -92,7 +92,7 @@ def test_ctrl_c_in_the_search_leaves_no_file_and_no_traceback(short, tmp_path):
     out, page = tmp_path / "report.json", tmp_path / "report.html"
 
     words = ["diagnose", *short, "--out", out, "--html", page]
-    code, shown = in_terminal(*words, stop_at="screening", before=ENDLESS_SEARCH)
+    code, shown = in_terminal(*words, stop_at="Round 1", before=ENDLESS_SEARCH)
 
     assert code == cli.STOPPED
     assert "Traceback" not in shown
