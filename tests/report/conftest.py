@@ -58,6 +58,7 @@ def open_file(browser):
         )
         page.goto(path.as_uri())
         page.wait_for_selector("#plots[data-view]")
+        page.wait_for_selector("html[data-drawn]")
         opened.append(page)
         return page
 

@@ -61,6 +61,23 @@ const common = (() => {
     new ResizeObserver(u.fit).observe(place);
     return u;
   }
+
+  // What the window shows is drawn at once; the rest once the page is there, one plot whenever the
+  // browser is idle, or all of it when it is wanted, as on paper.
+  const waiting = [];
+  const idle = window.requestIdleCallback || ((act) => setTimeout(act, 20));
+  const later = (place, draw) => { if (root.dataset.drawn) draw(); else waiting.push({ place, draw }); };
+  const drawAll = () => { while (waiting.length) waiting.shift().draw(); root.dataset.drawn = "all"; };
+  function drawShown() {
+    const seen = ({ place }) => { const box = place.getBoundingClientRect(); return box.bottom >= 0 && box.top <= window.innerHeight; };
+    for (const item of waiting.filter(seen)) { waiting.splice(waiting.indexOf(item), 1); item.draw(); }
+  }
+  function drawRest() {
+    if (waiting.length > 1) { waiting.shift().draw(); idle(drawRest); } else drawAll();
+  }
+  window.addEventListener("load", () => { drawShown(); idle(drawRest); });
+  window.addEventListener("beforeprint", drawAll);
+
   const redraw = () => plots.forEach((u) => u.redraw(false));
 
   document.getElementById("theme").addEventListener("click", () => {
@@ -73,5 +90,5 @@ const common = (() => {
   const paper = window.matchMedia("print");
   paper.addEventListener("change", () => { plots.forEach((u) => u.fit()); redraw(); });
 
-  return { numbers, colour, faint, digits, unpack, xAxis, yAxis, legend, plot };
+  return { numbers, colour, faint, digits, unpack, xAxis, yAxis, legend, plot, later, drawShown, drawAll };
 })();

@@ -2,7 +2,7 @@
 // Still pictures: curves with bands, errors that fall, residuals over two variables.
 "use strict";
 (() => {
-  const { numbers, colour, faint, digits, xAxis, yAxis, legend, plot } = common;
+  const { numbers, colour, faint, digits, xAxis, yAxis, legend, plot, later } = common;
   const HEIGHT = 240, PADDING = [12, 14, 0, 0];
   const still = { x: false, y: false, setScale: false };
 
@@ -114,6 +114,6 @@
   const draw = { lines, bars, map };
   for (const place of document.querySelectorAll("[data-figure]")) {
     const figure = numbers.figures[Number(place.dataset.figure)];
-    draw[figure.type](place, figure);
+    later(place, () => draw[figure.type](place, figure));
   }
 })();

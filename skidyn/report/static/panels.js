@@ -2,14 +2,14 @@
 // Torque and residual over time: one panel per joint, zoom and cursor linked over all of them.
 "use strict";
 (() => {
-  const { numbers, colour, digits, unpack, xAxis, yAxis, legend, plot } = common;
+  const { numbers, colour, digits, unpack, xAxis, yAxis, legend, plot, later, drawShown, drawAll } = common;
   const host = document.getElementById("plots"), place = document.getElementById("panels");
   if (!host) return;
   const { joints, starts, end: last, shown: first } = numbers.panels;
   const end = Math.max(last, 1e-9), shown = new Set(first), reading = host.querySelector("[role=status]");
   let view = [0, end];
 
-  const all = () => joints.flatMap((joint) => (joint.box ? joint.drawn : []));
+  const all = () => joints.flatMap((joint) => joint.drawn || []);
 
   function setView(low, high) {
     const span = Math.min(end, Math.max(Math.min(end, 0.02), high - low));
@@ -125,6 +125,7 @@
         : { ArrowLeft: () => setView(view[0] - width, view[1] - width), ArrowRight: () => setView(view[0] + width, view[1] + width),
             "+": acts.in, "=": acts.in, "-": acts.out, 0: acts.all };
       if (event.ctrlKey || event.metaKey || !keys[event.key]) return;
+      drawAll();
       event.preventDefault(); keys[event.key]();
     });
   }
@@ -133,7 +134,9 @@
     const chosen = joints.filter((_, i) => shown.has(i)), fresh = chosen.filter((joint) => !joint.box);
     fresh.forEach(build);
     place.replaceChildren(...chosen.map((joint) => joint.box));
-    fresh.forEach(draw);  // a plot is as wide as its place, so that comes first
+    // a plot is as wide as its place, so that comes first
+    fresh.forEach((joint) => later(joint.box, () => draw(joint)));
+    drawShown();
     setView(...view);
   }
 
