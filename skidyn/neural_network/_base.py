@@ -47,6 +47,8 @@ class SequenceRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
     hidden_size: int
     max_epochs: int
     learning_rate: float
+    weight_decay: float
+    betas: tuple[float, float]
     batch_size: int
     scaling: str
     early_stopping: bool
@@ -67,6 +69,8 @@ class SequenceRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         "dropout": [Interval(Real, 0, 1, closed="left")],
         "max_epochs": [Interval(Integral, 1, None, closed="left")],
         "learning_rate": [Interval(Real, 0, None, closed="neither")],
+        "weight_decay": [Interval(Real, 0, None, closed="left")],
+        "betas": [tuple],
         "batch_size": [Interval(Integral, 1, None, closed="left")],
         "scaling": [StrOptions({"standard", "minmax"})],
         "early_stopping": ["boolean"],
@@ -173,6 +177,8 @@ class SequenceRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
             max_epochs=self.max_epochs,
             batch_size=self.batch_size,
             learning_rate=self.learning_rate,
+            weight_decay=self.weight_decay,
+            betas=self.betas,
             patience=self.n_iter_no_change,
             device=self.device,
         )

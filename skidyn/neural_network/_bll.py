@@ -35,7 +35,7 @@ from skidyn.preprocessing._keys import Keys, resolve_keys
 Array = NDArray[np.float64]
 
 #: Folds of the trajectories that members leave out in turn.
-FOLDS = 10
+FOLDS = 20
 #: Folds of the stacking where members are trained again for it.
 BLOCKS = 3
 
@@ -66,8 +66,8 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     cv : int, cross-validator or None, default=None
         How the meta-regressor gets honest inputs. None takes each trajectory's mean over the
         members that have not seen it, which costs no training: with ``resample="trajectory"``
-        those whose bootstrap left it out; with ``"window"`` every member leaves out one of ten
-        folds of the trajectories in turn. A number (or a cross-validator) trains the members
+        those whose bootstrap left it out; with ``"window"`` every member leaves out one of
+        twenty folds of the trajectories in turn. A number (or a cross-validator) trains the members
         again without each fold; so does None with fewer than three trajectories or members that
         are no networks of this package (3 folds, by trajectory or, of a single one, by blocks of
         rows).

@@ -15,7 +15,8 @@ from skorch.helper import predefined_split
 from torch import nn
 
 from skidyn._compat import FitProgress
-from skidyn.neural_network._network import Members, Weights, single_thread, to_arrays
+from skidyn.neural_network._network import LSTMNetwork, Members, Weights, single_thread
+from skidyn.neural_network._stacked import StackedNetwork
 from skidyn.neural_network._windows import WindowLoader, WindowSet, window_rows, window_starts
 
 Array = NDArray[np.float64]
@@ -33,13 +34,18 @@ class TrainingPlan:
     window, stride, max_epochs, batch_size : int
         Rows of history and targets per window, passes over the log, windows per step.
     learning_rate : float
-        Step size of Adam.
+        First step size of Adam.
+    weight_decay : float
+        Share of the learning rate by which every step shrinks the weights.
+    betas : tuple of float
+        How long Adam remembers gradients and their squares.
     patience : int
         Epochs without improvement on the validation rows after which training ends.
     device : str
         Where the networks are trained.
     slow_parameters : str
-        Name of a parameter that moves at a tenth of the learning rate; empty for none.
+        Name of a parameter that moves at a tenth of the learning rate and does not shrink; empty
+        for none.
     """
 
     window: int
@@ -47,6 +53,8 @@ class TrainingPlan:
     max_epochs: int
     batch_size: int
     learning_rate: float
+    weight_decay: float
+    betas: tuple[float, float]
     patience: int
     device: str
     slow_parameters: str = ""
@@ -99,6 +107,15 @@ class _WeightedNet(NeuralNet):
     The members' errors are added up, so each member's gradient is that of its own error.
     """
 
+    def train_step(self, batch: Any, **fit_params: Any) -> dict[str, Any]:
+        """One step, without the detours by which skorch serves any optimiser and data."""
+        inputs, targets = batch
+        self.optimizer_.zero_grad()
+        loss = self.get_loss(self.module_(inputs), targets, training=True)
+        loss.backward()
+        self.optimizer_.step()
+        return {"loss": loss.detach()}
+
     def get_loss(self, y_pred: Any, y_true: Any, X: Any = None, training: bool = False) -> Any:
         weight = y_true[..., -1:]
         squares = (weight * (y_pred - y_true[..., :-1]) ** 2).sum(dim=(1, 2, 3))
@@ -117,6 +134,7 @@ class _Progress(Callback):
 
     def on_epoch_begin(self, net: NeuralNet, **kwargs: Any) -> None:
         net.batch_losses_ = []
+        net.module_.train()
         self.progress.begin_step()
 
     def on_epoch_end(self, net: NeuralNet, **kwargs: Any) -> None:
@@ -161,14 +179,16 @@ def train(
     list of Training
     """
     device = torch.device(plan.device)
-    tables = [torch.as_tensor(t.inputs, dtype=torch.float32, device=device) for t in tasks]
+
+    def table(parts: list[NDArray[Any]]) -> torch.Tensor:
+        return torch.as_tensor(np.stack(parts, dtype=np.float32), device=device)
+
+    inputs = table([task.inputs for task in tasks])
 
     def window_set(row_weights: list[Array]) -> WindowSet:
-        targets = [
-            torch.as_tensor(np.c_[task.targets, weight], dtype=torch.float32, device=device)
-            for task, weight in zip(tasks, row_weights, strict=True)
-        ]
-        return WindowSet(tables, targets, segments, plan.window, plan.stride)
+        own = zip(tasks, row_weights, strict=True)
+        targets = table([np.c_[task.targets, weight] for task, weight in own])
+        return WindowSet(inputs, targets, segments, plan.window, plan.stride)
 
     follow = _Progress(progress)
     callbacks: list[Any] = [follow]
@@ -181,11 +201,13 @@ def train(
         callbacks.append(EarlyStopping(patience=plan.patience, load_best=True, sink=_silent))
         split = predefined_split(window_set([np.where(validation, w, 0.0) for w in weights]))
         weights = [np.where(validation, 0.0, w) for w in weights]
-    slow = [(f"*.{plan.slow_parameters}", {"lr": 0.1 * plan.learning_rate})]
+    slow = [(f"*.{plan.slow_parameters}", {"lr": 0.1 * plan.learning_rate, "weight_decay": 0.0})]
     net = _WeightedNet(
-        Members([task.network for task in tasks]),
+        _side_by_side([task.network for task in tasks]),
         criterion=nn.MSELoss,
-        optimizer=torch.optim.Adam,
+        optimizer=torch.optim.AdamW,
+        optimizer__weight_decay=plan.weight_decay,
+        optimizer__betas=plan.betas,
         optimizer__param_groups=slow if plan.slow_parameters else [],
         optimizer__fused=True,
         lr=plan.learning_rate,
@@ -204,9 +226,16 @@ def train(
     curves = np.array(follow.loss_curves).T.tolist()
     judged = net.history[:, "valid_loss"] if validation is not None else []
     return [
-        Training(to_arrays(network), curve, judged)
-        for network, curve in zip(net.module_, curves, strict=True)
+        Training(weights_of, curve, judged)
+        for weights_of, curve in zip(net.module_.arrays(), curves, strict=True)
     ]
+
+
+def _side_by_side(networks: list[nn.Module]) -> nn.Module:
+    """One module of many; torch's own LSTM kernel is the fastest for a single network."""
+    plain = [network for network in networks if isinstance(network, LSTMNetwork)]
+    stacked = 1 < len(networks) == len(plain)
+    return StackedNetwork(plain) if stacked else Members(networks)
 
 
 def _silent(*args: Any, **kwargs: Any) -> None:

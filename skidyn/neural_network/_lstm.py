@@ -31,6 +31,13 @@ class LSTMRegressor(SequenceRegressor):
         Passes over the log.
     learning_rate : float, default=0.01
         First step size of Adam; it falls to zero along a cosine unless `early_stopping` is on.
+    weight_decay : float, default=0.0
+        Every step shrinks the weights by this share of the step size (AdamW). With few
+        trajectories a value near 0.1 keeps a network from learning joints as functions of other
+        joints.
+    betas : tuple of two float, default=(0.9, 0.999)
+        How much Adam keeps of its averages of the gradient and of its square from step to step.
+        Few steps want shorter averages, such as ``(0.8, 0.95)``.
     batch_size : int, default=16
         Pieces per step.
     scaling : {"standard", "minmax"}, default="standard"
@@ -110,6 +117,8 @@ class LSTMRegressor(SequenceRegressor):
         hidden_size: int = 32,
         max_epochs: int = 100,
         learning_rate: float = 0.01,
+        weight_decay: float = 0.0,
+        betas: tuple[float, float] = (0.9, 0.999),
         batch_size: int = 16,
         scaling: str = "standard",
         early_stopping: bool = False,
@@ -127,6 +136,8 @@ class LSTMRegressor(SequenceRegressor):
         self.hidden_size = hidden_size
         self.max_epochs = max_epochs
         self.learning_rate = learning_rate
+        self.weight_decay = weight_decay
+        self.betas = betas
         self.batch_size = batch_size
         self.scaling = scaling
         self.early_stopping = early_stopping
@@ -164,6 +175,13 @@ class NDLRegressor(SequenceRegressor):
         Passes over the log.
     learning_rate : float, default=0.01
         First step size of Adam; it falls to zero along a cosine unless `early_stopping` is on.
+    weight_decay : float, default=0.0
+        Every step shrinks the weights by this share of the step size (AdamW). With few
+        trajectories a value near 0.1 keeps a network from learning joints as functions of other
+        joints.
+    betas : tuple of two float, default=(0.9, 0.999)
+        How much Adam keeps of its averages of the gradient and of its square from step to step.
+        Few steps want shorter averages, such as ``(0.8, 0.95)``.
     batch_size : int, default=16
         Pieces per step.
     scaling : {"standard", "minmax"}, default="standard"
@@ -229,6 +247,8 @@ class NDLRegressor(SequenceRegressor):
         dropout: float = 0.1,
         max_epochs: int = 100,
         learning_rate: float = 0.01,
+        weight_decay: float = 0.0,
+        betas: tuple[float, float] = (0.9, 0.999),
         batch_size: int = 16,
         scaling: str = "standard",
         early_stopping: bool = False,
@@ -248,6 +268,8 @@ class NDLRegressor(SequenceRegressor):
         self.dropout = dropout
         self.max_epochs = max_epochs
         self.learning_rate = learning_rate
+        self.weight_decay = weight_decay
+        self.betas = betas
         self.batch_size = batch_size
         self.scaling = scaling
         self.early_stopping = early_stopping

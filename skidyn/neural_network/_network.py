@@ -105,11 +105,15 @@ class LSTMNetwork(nn.Module):
 
 
 class Members(nn.ModuleList):
-    """Networks of one architecture side by side, each with its own inputs."""
+    """Networks of any kind, each with its own inputs, run one after another."""
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         """Map (n_members, n_windows, n_rows, n_inputs) to outputs, member by member."""
         return torch.stack([network(own) for network, own in zip(self, x, strict=True)])
+
+    def arrays(self) -> list[Weights]:
+        """Weights of each network."""
+        return [to_arrays(network) for network in self]
 
 
 def to_arrays(network: nn.Module) -> Weights:

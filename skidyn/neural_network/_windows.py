@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch.nn.functional import embedding
 
 
 def window_starts(segments: list[slice], stride: int, phase: int = 0) -> NDArray[np.int64]:
@@ -48,9 +49,9 @@ class WindowSet(torch.utils.data.Dataset[Any]):
 
     Parameters
     ----------
-    inputs : list of tensor of shape (n_samples, n_inputs)
-        Scaled inputs, one table a member.
-    targets : list of tensor of shape (n_samples, n_outputs + 1)
+    inputs : tensor of shape (n_members, n_samples, n_inputs)
+        Scaled inputs.
+    targets : tensor of shape (n_members, n_samples, n_outputs + 1)
         Scaled targets, and the weight of the row as the last column.
     segments : list of slice
         Rows that belong together.
@@ -60,18 +61,24 @@ class WindowSet(torch.utils.data.Dataset[Any]):
 
     def __init__(
         self,
-        inputs: list[torch.Tensor],
-        targets: list[torch.Tensor],
+        inputs: torch.Tensor,
+        targets: torch.Tensor,
         segments: list[slice],
         window: int,
         stride: int,
     ) -> None:
-        self.inputs = inputs
-        self.targets = targets
+        self.n_members, self.n_samples = inputs.shape[:2]
+        self.inputs = inputs.flatten(0, 1)
+        self.targets = targets.flatten(0, 1)
         self.segments = segments
         self.window = window
         self.stride = stride
-        self.weighted = [(table[:, -1] > 0).cpu().numpy() for table in targets]
+        self._offsets = torch.arange(-window, stride, device=inputs.device)[:, None, None]
+        first_rows = torch.arange(self.n_members, device=inputs.device) * self.n_samples
+        self._first_rows = first_rows[:, None]
+        weighted = (targets[..., -1] > 0).cpu().numpy()
+        # weighted rows before each row
+        self.n_before = np.cumsum(np.pad(weighted, ((0, 0), (1, 0))), axis=1)
 
     def __len__(self) -> int:
         return len(window_starts(self.segments, self.stride))
@@ -79,32 +86,38 @@ class WindowSet(torch.utils.data.Dataset[Any]):
     def __getitem__(self, index: int) -> Any:
         raise TypeError("windows are gathered in batches")
 
-    def cut(self, member: int, phase: int) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Rows and valid targets of all windows in which some target counts for a member."""
+    def cut(self, member: int, phase: int) -> NDArray[np.int64]:
+        """Those windows (see :func:`window_starts`) in which some target counts for a member."""
         starts = window_starts(self.segments, self.stride, phase)
-        rows, valid = window_rows(starts, self.window, self.stride)
-        valid &= self.weighted[member][rows[:, self.window :]]
-        used = valid.any(axis=1)
-        return rows[used], valid[used]
+        begin, end = starts[:, 0], starts[:, 0] + self.stride
+        n_before = self.n_before[member]
+        within = np.maximum(begin, starts[:, 1]), np.minimum(end, starts[:, 2] + 1)
+        used: NDArray[np.bool_] = n_before[within[1]] > n_before[within[0]]
+        return starts[used]
 
     def gather(
-        self, member: int, rows: NDArray[Any], valid: NDArray[Any]
+        self, starts: torch.Tensor, counts: torch.Tensor
     ) -> tuple[torch.Tensor, torch.Tensor]:
-        """Inputs and targets of one batch of a member."""
-        device = self.inputs[member].device
-        chosen = torch.as_tensor(rows, device=device)
-        targets = self.targets[member][chosen[:, self.window :]]
-        targets[..., -1] *= torch.as_tensor(valid, device=device)
-        return self.inputs[member][chosen], targets
+        """Inputs and targets of windows (n_members, n_windows, 3), some of which may not count."""
+        # times first, as the stacked networks read them
+        start, first, last = starts.unbind(-1)
+        wanted = self._offsets + start
+        rows = wanted.clamp(first, last)
+        valid = (rows == wanted)[self.window :] & counts
+        rows += self._first_rows
+        # an embedding is a table whose rows are looked up; the fastest way torch has
+        targets = embedding(rows[self.window :], self.targets)
+        targets[..., -1] *= valid
+        return embedding(rows, self.inputs).permute(1, 2, 0, 3), targets.permute(1, 2, 0, 3)
 
 
 class WindowLoader:
     """Batches of windows, gathered at once instead of sample by sample.
 
     A batch holds one batch of every member. All members have equally many batches, so that one
-    with fewer windows has smaller ones. For training (``generators`` given, one a member) the
-    windows come in random order, and each pass cuts the log at another phase, so that no alignment
-    of the windows is learned.
+    with fewer windows has smaller ones, filled up with windows that do not count. For training
+    (``generators`` given, one a member) the windows come in random order, and each pass cuts the
+    log at another phase, so that no alignment of the windows is learned.
     """
 
     def __init__(
@@ -118,20 +131,22 @@ class WindowLoader:
         self.generators = generators
 
     def __iter__(self) -> Iterator[tuple[torch.Tensor, torch.Tensor]]:
-        data, cuts, orders = self.dataset, [], []
-        for member in range(len(data.inputs)):
+        data, cuts = self.dataset, []
+        for member in range(data.n_members):
             generator = None if self.generators is None else self.generators[member]
             phase = 0 if generator is None else int(generator.integers(data.stride))
-            cuts.append(data.cut(member, phase))
-            n = len(cuts[-1][0])
-            orders.append(np.arange(n) if generator is None else generator.permutation(n))
-        n_batches = -(-max(len(order) for order in orders) // self.batch_size)
-        for parts in zip(*(np.array_split(order, n_batches) for order in orders), strict=True):
-            size, batches = max(len(part) for part in parts), []
-            for member, (part, (rows, valid)) in enumerate(zip(parts, cuts, strict=True)):
-                # filled up with a window that has no weight
-                full = np.append(part, np.zeros(size - len(part), dtype=int))
-                counts = valid[full] & (np.arange(size) < len(part))[:, None]
-                batches.append(data.gather(member, rows[full], counts))
-            inputs, targets = (torch.stack(tables) for tables in zip(*batches, strict=True))
-            yield inputs, targets
+            cut = data.cut(member, phase)
+            cuts.append(cut if generator is None else generator.permutation(cut))
+        lengths = np.array([len(cut) for cut in cuts])[:, None]
+        n_batches = -(-lengths.max() // self.batch_size)
+        edges = np.arange(n_batches + 1) * lengths // n_batches
+        size = np.diff(edges).max()
+        padded = np.zeros((data.n_members, lengths.max() + size, 3), dtype=np.int64)
+        for own, cut in zip(padded, cuts, strict=True):
+            own[: len(cut)] = cut
+        chosen = edges[:, :-1, None] + np.arange(size)
+        counts = torch.as_tensor(chosen < edges[:, 1:, None], device=data.inputs.device)
+        batches = padded[np.arange(data.n_members)[:, None, None], chosen]
+        starts = torch.as_tensor(batches, device=data.inputs.device)
+        for k in range(n_batches):
+            yield data.gather(starts[:, k], counts[:, k])

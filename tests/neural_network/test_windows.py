@@ -20,8 +20,10 @@ def test_loader_gives_every_member_each_of_its_rows_once_per_pass():
     rows = np.arange(37.0)
     weights = [np.r_[np.zeros(10), np.ones(20), np.full(7, 2.0)], (rows == 36) * 3.0]
     targets = [torch.as_tensor(np.c_[rows, w], dtype=torch.float32) for w in weights]
-    inputs = [targets[0][:, :1]] * 2
-    data = WindowSet(inputs, targets, [slice(0, 15), slice(15, 37)], window=6, stride=4)
+    inputs = torch.stack([targets[0][:, :1]] * 2)
+    data = WindowSet(
+        inputs, torch.stack(targets), [slice(0, 15), slice(15, 37)], window=6, stride=4
+    )
     generators = [np.random.default_rng(k) for k in range(2)]
     for _ in range(3):
         batches = [y for _, y in WindowLoader(data, 2, generators)]
