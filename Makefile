@@ -87,5 +87,5 @@ $(OLDEST)/.installed: pyproject.toml setup.cfg .ci/oldest.py $(shell git ls-file
 	$(OLDEST)/bin/python .ci/oldest.py test > $(OLDEST)/constraints.txt
 	@$(OLDEST)/bin/python -m pip install --quiet --disable-pip-version-check \
 	    -c $(OLDEST)/constraints.txt pytest pytest-xdist hypothesis polars \
-	    "skidyn[all] @ file://$$(ls $(CURDIR)/$(OLDEST)/dist/skidyn-*.tar.gz)"
+	    "skidyn[all] @ file://$$(ls $(abspath $(OLDEST))/dist/skidyn-*.tar.gz)"
 	@touch $@

@@ -11,6 +11,8 @@ import sys
 import tomllib
 from pathlib import Path
 
+#: What our dependencies need and do not say: matplotlib before 3.10.8 makes newer ones warn.
+OTHERS = ["pyparsing<3.3"]
 NAME_AND_FLOOR = re.compile(r"([A-Za-z0-9._-]+)\s*>=\s*([0-9.]+)")
 
 
@@ -31,6 +33,7 @@ def main(extras: list[str]) -> None:
         found = NAME_AND_FLOOR.match(requirement)
         if found and found[1] != "torch":
             print(f"{found[1]}=={found[2]}")
+    print(*OTHERS, sep="\n")
 
 
 if __name__ == "__main__":

@@ -200,7 +200,8 @@ def diagnose_parquet(
     files = parquet_files(paths)
     lengths = [trajectory_lengths(file, robot, columns) for file in files]
     sources = list(zip(files, _draw(lengths, sample_rows, random_state), strict=True))
-    X, tau = _sample(sources, robot, columns, max_rows)
+    n_sampled = sum(of[k] for of, (_, drawn) in zip(lengths, sources, strict=True) for k in drawn)
+    X, tau = _sample(sources, n_sampled, robot, columns, max_rows)
     diagnosis = diagnose(model, X, tau, effects=effects, settings=settings)
     own = _own_terms(model, robot, X, tau)
     tried = [f for f in diagnosis.findings if not any(map(needs_a_fit, f.terms))]
@@ -239,12 +240,15 @@ def _draw(lengths: Sequence[Sequence[int]], rows: int, seed: int) -> list[frozen
 
 
 def _sample(
-    sources: Sequence[Source], robot: Robot, columns: ColumnMap | None, max_rows: int
+    sources: Sequence[Source], n_rows: int, robot: Robot, columns: ColumnMap | None, max_rows: int
 ) -> tuple[Any, Array]:
     """The trajectories that were drawn, as a table, and their torque."""
     pd = import_optional("pandas", extra="io")
-    tables: list[Any] = []
-    torques: list[Array] = []
+    names: list[str] = []
+    # Filled in place: trajectories are views of decoded blocks of many, so that one kept as it is
+    # keeps its block, and memory grows with the number of files that the sample is drawn from.
+    sample = np.empty((0, 0))
+    done = number = 0
     for path, drawn in sources:
         if not drawn:
             continue
@@ -255,14 +259,27 @@ def _sample(
                 continue
             if signals.time is None:
                 raise LogError(f"{path}: lacks time, which a diagnosis needs")
-            table = {"time": signals.time, "trajectory": np.full(len(torque), float(len(tables)))}
-            blocks = {"q": signals.q, "dq": signals.dq, "temp": signals.temperature}
-            for name, block in blocks.items():
-                if block is not None:
-                    table |= {f"{name}{j + 1}": block[:, j] for j in range(robot.n_joints)}
-            tables.append(pd.DataFrame(table))
-            torques.append(torque)
-    return pd.concat(tables, ignore_index=True), np.vstack(torques)
+            blocks = {"q": signals.q, "dq": signals.dq, "temp": signals.temperature, "tau": torque}
+            here = ["time", "trajectory"]
+            here += [
+                f"{name}{j + 1}"
+                for name, block in blocks.items()
+                if block is not None
+                for j in range(robot.n_joints)
+            ]
+            if not names:
+                names, sample = here, np.empty((n_rows, len(here)))
+            elif names != here:
+                raise LogError(
+                    f"{path}: has {', '.join(here)}, other files have {', '.join(names)}; all need "
+                    "the same columns"
+                )
+            end = done + len(torque)
+            sample[done:end, 0], sample[done:end, 1] = signals.time, number
+            sample[done:end, 2:] = np.hstack([b for b in blocks.values() if b is not None])
+            done, number = end, number + 1
+    n_inputs = len(names) - robot.n_joints
+    return pd.DataFrame(sample[:, :n_inputs], columns=names[:n_inputs]), sample[:, n_inputs:]
 
 
 def _confirm(finding: Finding, evidence: Evidence, tried: bool) -> Confirmation:

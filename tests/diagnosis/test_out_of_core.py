@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Effects found in a sample of a recording and put to all the rest of it."""
 
+import tracemalloc
+
+import numpy as np
+import pandas as pd
 import pytest
 
 from skidyn._exceptions import LogError, SkidynError
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import diagnose_parquet
-from skidyn.diagnosis._out_of_core import _confirm
+from skidyn.diagnosis._out_of_core import _confirm, _sample
 from skidyn.evidence import evidence_from_parquet
 from skidyn.rigid_body import RBDRegressor
 
@@ -63,3 +67,33 @@ def test_what_cannot_be_judged_out_of_core_is_refused(folder, tmp_path):
     )
     with pytest.raises(LogError, match="7 trajectories are too few"):
         diagnose_parquet(RBDRegressor(ROBOT), tmp_path)
+
+
+def test_memory_is_that_of_the_sample_whatever_it_is_drawn_from(tmp_path):
+    """Ten trajectories are drawn, from one file or from ten of ten trajectories each."""
+    n = 1000
+    columns = ["time", "q1", "q2", "dq1", "dq2", "tau1", "tau2"]
+    table = pd.DataFrame(np.random.default_rng(0).normal(size=(10 * n, 7)), columns=columns)
+    table["time"], table["trajectory"] = np.arange(10 * n) / 100, np.arange(10 * n) // n
+    table.to_parquet(tmp_path / "log.parquet")
+    held = []
+    for drawn, n_files in ((range(10), 1), ([4], 10)):
+        sources = [(tmp_path / "log.parquet", frozenset(drawn))] * n_files
+        _sample(sources, 10 * n, ROBOT, None, 10 * n)  # imports and caches
+        tracemalloc.start()
+        result = _sample(sources, 10 * n, ROBOT, None, 10 * n)
+        held.append(tracemalloc.get_traced_memory())
+        tracemalloc.stop()
+        assert result[0].shape == (10 * n, 6)
+    (small, small_peak), (large, large_peak) = held
+    assert large < 1.1 * small and large_peak < 1.5 * small_peak
+
+
+def test_files_of_other_columns_are_told_apart(folder, tmp_path):
+    for k in range(3):
+        frame = pd.read_parquet(folder / f"{k}.parquet")
+        if k == 1:
+            frame = frame.assign(temp1=20.0, temp2=20.0)
+        frame.to_parquet(tmp_path / f"{k}.parquet")
+    with pytest.raises(LogError, match=r"temp1, temp2.*all need the same columns"):
+        diagnose_parquet(RBDRegressor(ROBOT), tmp_path, sample_rows=7000)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Evidence from files, trajectory by trajectory, and on a cluster that loses a worker."""
 
+import tracemalloc
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -48,6 +50,16 @@ def test_groups_hold_the_same_and_do_not_grow(folder):
     np.testing.assert_allclose(few.solve(), every.solve(), rtol=1e-8)
 
 
+def test_memory_does_not_grow_with_the_number_of_trajectories(folder):
+    files, peaks = sorted(folder.glob("*.parquet")), []
+    for times in (1, 1, 12):  # the first imports and fills caches
+        tracemalloc.start()
+        evidence_from_parquet(files * times, ROBOT, groups=3)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[2] < 2 * peaks[1]
+
+
 def test_regressor_predicts_like_one_fitted_in_memory(folder):
     effects = ("viscous", "coulomb")
     streamed = regressor_from_evidence(ROBOT, evidence_from_parquet(folder, ROBOT, effects))
@@ -93,6 +105,20 @@ def test_columnar_bomb_is_never_unpacked(tmp_path):
 
 def test_cluster_that_loses_a_worker_gives_the_same(folder):
     distributed = pytest.importorskip("distributed")
+
+    def kill_own_worker(flag):  # within the test, so that workers need not import its module
+        """Ends the worker process hard on the first call, and returns on the second."""
+        import os
+        import signal
+        import time
+
+        if os.path.exists(flag):
+            return "done"
+        with open(flag, "w"):
+            pass
+        time.sleep(0.2)
+        os.kill(os.getpid(), signal.SIGKILL)
+
     with (
         distributed.LocalCluster(
             n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
@@ -100,26 +126,12 @@ def test_cluster_that_loses_a_worker_gives_the_same(folder):
         distributed.Client(cluster) as client,
     ):
         files = sorted(folder.glob("*.parquet")) * 8
-        killer = client.submit(_kill_own_worker, str(folder / "killed"), pure=False)
+        killer = client.submit(kill_own_worker, str(folder / "killed"), pure=False)
         got = evidence_from_parquet(files, ROBOT, client=client)
         assert killer.result() == "done" and (folder / "killed").exists()
     wanted = evidence_from_parquet(files, ROBOT)
     np.testing.assert_allclose(got.solve(), wanted.solve(), rtol=1e-8)
     assert dict(got.counts) == dict(wanted.counts)
-
-
-def _kill_own_worker(flag):
-    """Ends the worker process hard on the first call, and returns on the second."""
-    import os
-    import signal
-    import time
-
-    if os.path.exists(flag):
-        return "done"
-    with open(flag, "w"):
-        pass
-    time.sleep(0.2)
-    os.kill(os.getpid(), signal.SIGKILL)
 
 
 def test_names_of_recorders_and_of_the_user(tmp_path, folder):
