@@ -101,9 +101,7 @@ def measure(how: str, workers: int, files: list[Path]) -> dict:
             from distributed import Client, LocalCluster
 
             dask.config.set(QUIET)
-            cluster = LocalCluster(
-                n_workers=workers, threads_per_worker=1, dashboard_address=None
-            )
+            cluster = LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None)
             client = stack.enter_context(Client(stack.enter_context(cluster)))
         prepare()
         # Every worker has imported and compiled before the clock starts.
