@@ -33,7 +33,8 @@ class ELMCommittee(RegressorMixin, BaseEstimator):
     Each member has a random hidden layer of rectifiers that stays as it is; only the linear output
     layer is learned, by ridge regression on the hidden activations. All that the fit needs of the
     data are their second moments, so ``partial_fit`` on parts of a log gives the machine that
-    ``fit`` on the whole log gives (with the same scaling of the inputs).
+    ``fit`` on the whole log gives, with the same scaling of the inputs (up to rounding: sums are in
+    single precision up to p = 0.99).
 
     Parameters
     ----------

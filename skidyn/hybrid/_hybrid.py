@@ -49,7 +49,8 @@ class HybridRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     physics : estimator
         Any scikit-learn regressor, such as ``RBDRegressor``.
     learner : estimator, default=None
-        Any scikit-learn regressor; :class:`OwnJointRegressor` if None.
+        Any scikit-learn regressor; :class:`OwnJointRegressor` if None, with the joint names of the
+        physics' ``robot``, if it has one.
     cv : int or cross-validator, default=5
         Folds: by trajectory, or by blocks of rows of a single trajectory. A cross-validator must
         test every row exactly once; for one recording of a periodic motion use ``PhaseKFold``.
@@ -167,9 +168,7 @@ class HybridRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             weight = _check_sample_weight(sample_weight, array, dtype=np.float64)
         keys = self._keys()
         folds = self._folds(table, torque, keys.trajectories(array))
-        learner = OwnJointRegressor() if self.learner is None else self.learner
-        if self.learner is None:
-            learner.set_params(trajectory=self.trajectory, time=self.time)
+        learner = self._own_joints() if self.learner is None else self.learner
         residuals = _honest_residuals(self.physics, table, torque, weight, folds)
         residual, learned = np.zeros(torque.shape), np.zeros(torque.shape)
         for (train, test), seen in zip(folds, residuals, strict=True):
@@ -211,6 +210,11 @@ class HybridRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         if not np.array_equal(tested, np.arange(len(torque))):
             raise ValueError("cv must test every row exactly once, as KFold does.")
         return folds
+
+    def _own_joints(self) -> OwnJointRegressor:
+        # columns may be named after the joints that the physics knows
+        names = getattr(getattr(self.physics, "robot", None), "joint_names", None)
+        return OwnJointRegressor(joint_names=names, trajectory=self.trajectory, time=self.time)
 
     def _keys(self) -> Keys:
         names = getattr(self, "feature_names_in_", None)

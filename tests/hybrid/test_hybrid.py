@@ -196,6 +196,16 @@ def test_one_search_over_physics_effects_and_network():
     assert "HybridRegressor" in search._repr_html_()
 
 
+def test_joints_are_known_by_the_names_of_the_robot():
+    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=3, duration=2.0, rate=25.0)
+    named = {f"q{j + 1}": f"q_{name}" for j, name in enumerate(log.robot.joint_names)}
+    named |= {f"d{old}": f"d{new}" for old, new in named.items()}
+    named |= {f"d{old}": f"d{new}" for old, new in named.items()}
+    hybrid = HybridRegressor(RBDRegressor(log.robot), cv=2)
+    by_number = hybrid.fit(log.X, log.y).gain_
+    np.testing.assert_allclose(hybrid.fit(log.X.rename(columns=named), log.y).gain_, by_number)
+
+
 def test_weights_need_learners_that_take_them():
     X, y = make_log(4, 30)
     hybrid = HybridRegressor(LinearRegression(), KNeighborsRegressor(), cv=2)
