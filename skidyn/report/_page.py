@@ -40,7 +40,7 @@ def render_page(template: str, **content: Any) -> str:
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined,
     )  # fmt: skip
     environment.filters.update(
-        number=number, percent=percent, change=change, chance=chance, words=words
+        number=number, percent=percent, change=change, chance=chance, words=words, raised=raised
     )
     return str(
         environment.get_template(template).render(
@@ -78,6 +78,11 @@ def change(ratio: float) -> str:
 def words(kind: str) -> str:
     """Kind of the vocabulary as words."""
     return "effect without a name" if kind == "unknown" else kind.replace("_", " ")
+
+
+def raised(unit: str) -> str:
+    """Unit with its powers as they are printed."""
+    return unit.replace("^2", "²").replace("^3", "³")
 
 
 def chance(q_value: float | None) -> str:
