@@ -40,6 +40,9 @@ from skidyn.hybrid import HybridRegressor
 from skidyn.metrics import paired_comparison, rmse_over_range, trajectory_errors
 from skidyn.neural_network import BLLRegressor, LSTMRegressor, SDLRegressor
 
+#: Slower joints count as resting.
+REST = 0.02
+
 
 class ThinnedGaussianProcess(GaussianProcessRegressor):
     """A Gaussian process of at most 700 evenly spaced rows: its cost grows with their cube."""
@@ -124,14 +127,22 @@ def compare(log: RecordedLog, wanted: list[str], alpha: float, epochs: int) -> N
             f"| {joints} |",
             flush=True,
         )
+    joints = [f"J{j + 1}" for j in range(y.shape[1])]
     print_table(
         "RMSE over the range of the torque",
         {
             " + ".join(filter(None, key)): rmse_over_range(y, p, multioutput="raw_values")
             for key, p in predicted.items()
         },
-        [f"J{j + 1}" for j in range(y.shape[1])],
+        joints,
     )
+    squares = (y - predicted["completed", ""]) ** 2
+    rest = np.abs(X.filter(regex=r"^dq\d+$").to_numpy()) < REST
+    rows = {
+        "share of the time": rest.mean(axis=0),
+        "share of the squared error": (squares * rest).sum(axis=0) / squares.sum(axis=0),
+    }
+    print_table(f"Completed physics below {REST} rad/s (m/s)", rows, joints)
 
 
 def main() -> None:

@@ -219,15 +219,19 @@ WIDTHS = (
     (), (0.02, 0.2), (0.003, 0.01, 0.05), (0.01, 0.05, 0.2), (0.05, 0.2, 0.5), (0.003, 0.03, 0.3),
     (0.01, 0.1, 1.0), (0.01, 0.03, 0.1, 0.3), (0.01, 0.05, 0.2, 0.5), (0.003, 0.01, 0.05, 0.2, 0.5),
 )  # fmt: skip
+#: Those of OwnJointRegressor.
+DEFAULT_WIDTHS = (0.003, 0.01, 0.05, 0.2)
 
 
 def chosen_physics() -> None:
     """Pre-sliding states whose widths are chosen for every joint inside every fold."""
     robot, X, _ = load_panda(rate=1000.0)
-    models = []
-    for widths in WIDTHS:
+
+    def with_states(widths: tuple[float, ...]) -> ColumnPhysics:
         effects = (*BASE, *(("dahl", (("presliding", width),)) for width in widths))
-        models.append(filtered_physics(robot, X, effects, 10.0, 1000.0, 10))
+        return filtered_physics(robot, X, effects, 10.0, 1000.0, 10)
+
+    models, default = [with_states(widths) for widths in WIDTHS], with_states(DEFAULT_WIDTHS)
     _, X, y = load_panda(rate=1000.0)
     X, y = X[::10].reset_index(drop=True), y[::10]
 
@@ -242,6 +246,9 @@ def chosen_physics() -> None:
         f"{widths}": rmse(y, held_out(model, np.arange(len(X)), outer))
         for widths, model in zip(WIDTHS, models, strict=True)
     }
+    table[f"{DEFAULT_WIDTHS}, the package's default"] = rmse(
+        y, held_out(default, np.arange(len(X)), outer)
+    )
     for n in (5, 10):
         inner, prediction = PhaseKFold(n, period=PANDA_PERIOD), np.zeros_like(y)
         for train, test in outer.split(X):
