@@ -256,7 +256,8 @@ def test_ctrl_c_leaves_no_half_written_file(work, tmp_path):
 
 
 STOPPABLE = """
-import os, sys, time
+import os, signal, sys, time
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a background shell ignores it
 from skidyn.cli import main
 
 def slow(*paths):

@@ -240,6 +240,15 @@ def test_ten_thousand_joints_are_read():
     assert robot.n_joints == 10_000
 
 
+def test_a_thousand_joints_move_exactly():
+    """All about one axis: every joint carries the inertia of what follows it."""
+    n = 1000
+    ddq = np.full((1, n), 0.1)
+    torque = Robot.from_urdf(chain([f"j{k}" for k in range(n)])).inverse_dynamics(ddq, ddq, ddq)
+    speed_up = 0.1 * np.arange(1, n + 1)  # of each link, its inertia is 1
+    np.testing.assert_allclose(torque[0], speed_up[::-1].cumsum()[::-1], rtol=1e-10)
+
+
 def test_a_single_sample_is_refused_or_exact():
     robot = load_planar_arm()
     x = np.array([[0.1, 0.2, 0.3, 0.4, 0.5, 0.6]])
