@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -21,14 +22,14 @@ Message = tuple[str, str, int, Any]
 
 
 def read_mcap_channels(path: Path, max_bytes: int, topics: Sequence[str] | None) -> list[Channel]:
-    """Read the joint states of an MCAP file with messages of ROS 2 or in JSON."""
+    """Read the joint states of an MCAP file with messages of ROS 2, in JSON or in protobuf."""
     reader = import_optional("mcap.reader", extra="io")
     decoder = import_optional("mcap_ros2.decoder", extra="io")
     exceptions = import_optional("mcap.exceptions", extra="io")
     check_size(path, path.stat().st_size, max_bytes)
     try:
         with path.open("rb") as file:
-            decoders = [decoder.DecoderFactory(), _JsonDecoderFactory()]
+            decoders = [decoder.DecoderFactory(), _JsonDecoders(), _ProtobufDecoders()]
             source = reader.make_reader(file, decoder_factories=decoders)
             summary = source.get_summary()
             held = {}
@@ -45,7 +46,7 @@ def read_mcap_channels(path: Path, max_bytes: int, topics: Sequence[str] | None)
         raise LogError(f"{path}: cannot be read as MCAP: {error}") from error
 
 
-class _JsonDecoderFactory:
+class _JsonDecoders:
     """Messages in JSON as objects with attributes, like those of ROS."""
 
     def decoder_for(self, encoding: str, schema: Any) -> Any:
@@ -53,6 +54,21 @@ class _JsonDecoderFactory:
         if encoding != "json":
             return None
         return lambda data: json.loads(data, object_hook=lambda fields: SimpleNamespace(**fields))
+
+
+class _ProtobufDecoders:
+    """Messages in protobuf; the library for them is needed only where there are any."""
+
+    def __init__(self) -> None:
+        self._decoders: Any = None
+
+    def decoder_for(self, encoding: str, schema: Any) -> Any:
+        """Decoder of an encoding, None for others than protobuf."""
+        if encoding != "protobuf":
+            return None
+        if self._decoders is None:
+            self._decoders = import_optional("mcap_protobuf.decoder", extra="io").DecoderFactory()
+        return self._decoders.decoder_for(encoding, schema)
 
 
 def read_bag_channels(path: Path, max_bytes: int, topics: Sequence[str] | None) -> list[Channel]:
@@ -116,7 +132,8 @@ def _typestore() -> Any:
 
 
 def _is_joint_state(kind: str) -> bool:
-    return kind.replace("/msg/", "/") == "sensor_msgs/JointState"
+    """Whether a type, by its name in ROS, protobuf or JSON, has the fields of JointState."""
+    return re.split(r"[./]", kind)[-1] == "JointState"
 
 
 def _channels(
@@ -173,13 +190,28 @@ def _numbers(message: Any, prefix: str) -> Iterator[tuple[str, float]]:
     """Numeric fields of any message under names such as ``data[0]`` or ``wrench.force.x``."""
     if isinstance(message, (bool, int, float, np.number)):
         yield prefix, float(message)
-    elif isinstance(message, (list, tuple, np.ndarray)):
+    elif isinstance(message, (str, bytes)):
+        return
+    elif isinstance(message, (Sequence, np.ndarray)):
         for k, item in enumerate(message):
             yield from _numbers(item, f"{prefix}[{k}]")
-    elif not isinstance(message, (str, bytes)):
-        own = vars(message) if isinstance(message, SimpleNamespace) else ()
-        fields = getattr(message, "__dataclass_fields__", getattr(message, "__slots__", own))
-        for name in tuple(fields):
+    else:
+        for name in _fields(message):
             if not name.startswith("_") and name not in ("header", "layout"):
                 dotted = f"{prefix}.{name}" if prefix else name
                 yield from _numbers(getattr(message, name), dotted)
+
+
+def _fields(message: Any) -> tuple[str, ...]:
+    """Names of the fields of a message of ROS, JSON or protobuf."""
+    if isinstance(message, SimpleNamespace):
+        return tuple(vars(message))
+    described = getattr(message, "DESCRIPTOR", None)
+    if described is not None:  # an absent part is left out: types may hold themselves
+        absent = {
+            field.name
+            for field in described.fields
+            if field.message_type and field.has_presence and not message.HasField(field.name)
+        }
+        return tuple(field.name for field in described.fields if field.name not in absent)
+    return tuple(getattr(message, "__dataclass_fields__", getattr(message, "__slots__", ())))

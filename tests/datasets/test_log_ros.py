@@ -83,3 +83,60 @@ def test_the_same_joints_on_two_topics(tmp_path):
     with pytest.raises(LogError, match=r"choose one with topics=\[...\]"):
         read_log(file, robot=load_planar_arm())
     assert len(quiet_read(file, robot=load_planar_arm(), topics=["/filtered"])) == N
+
+
+def protobuf_types():
+    """Schema and class of a JointState, and of a type that holds itself."""
+    descriptor_pb2 = pytest.importorskip("google.protobuf.descriptor_pb2")
+    factory = pytest.importorskip("google.protobuf.message_factory")
+    pytest.importorskip("mcap_protobuf")
+    file = descriptor_pb2.FileDescriptorProto(name="s.proto", package="robot", syntax="proto3")
+    state = file.message_type.add(name="JointState")
+    for number, (name, kind) in enumerate(
+        [("name", 9), ("position", 1), ("velocity", 1), ("effort", 1)], start=1
+    ):
+        state.field.add(name=name, number=number, type=kind, label=3)
+    node = file.message_type.add(name="Node")
+    node.field.add(name="q1", number=1, type=1, label=1)
+    node.field.add(name="child", number=2, type=11, label=1, type_name=".robot.Node")
+    described = descriptor_pb2.FileDescriptorSet(file=[file])
+    return described.SerializeToString(), factory.GetMessages([file])
+
+
+def write_protobuf(path, schema, name, messages):
+    with path.open("wb") as file:
+        target = writer.Writer(file)
+        target.start()
+        kind = target.register_schema(name, "protobuf", schema)
+        channel = target.register_channel("/joints", "protobuf", kind)
+        for k, message in enumerate(messages):
+            at = round(T[k] * 1e9)
+            target.add_message(channel, at, message.SerializeToString(), at)
+        target.finish()
+    return path
+
+
+def test_messages_in_protobuf(tmp_path):
+    schema, classes = protobuf_types()
+    make = classes["robot.JointState"]
+    messages = [
+        make(name=["joint1", "joint2"], position=q, velocity=q, effort=[v + 1 for v in q])
+        for q in Q.tolist()
+    ]
+    file = write_protobuf(tmp_path / "log.mcap", schema, "robot.JointState", messages)
+    frame = quiet_read(file, robot=load_planar_arm())
+    np.testing.assert_allclose(frame[["q1", "q2"]], Q)
+    np.testing.assert_allclose(frame["tau2"], Q[:, 1] + 1)
+    np.testing.assert_allclose(frame["time"], T, atol=1e-9)
+
+
+def test_other_types_in_protobuf_by_their_fields(tmp_path):
+    schema, classes = protobuf_types()
+    make = classes["robot.Node"]
+    messages = [make(q1=q, child=make(q1=q + 1)) for q in Q[:, 0]]
+    file = write_protobuf(tmp_path / "log.mcap", schema, "robot.Node", messages)
+    with pytest.raises(LogError, match=r"It holds /joints \(robot.Node\)"):
+        read_log(file)
+    columns = {"q": ["q1"], "tau": ["child.q1"]}
+    frame = quiet_read(file, topics=["/joints"], columns=columns)
+    np.testing.assert_allclose(frame[["q1", "tau1"]], np.c_[Q[:, 0], Q[:, 0] + 1])
