@@ -43,17 +43,20 @@ class FitProgress:
         The estimator that is being fitted.
     context : object or None
         Its callback context; None where scikit-learn has no callbacks.
+    task_name : str, default="epoch"
+        What a step is.
     """
 
-    def __init__(self, estimator: Any, context: Any) -> None:
+    def __init__(self, estimator: Any, context: Any, task_name: str = "epoch") -> None:
         self._estimator = estimator
         self._context = context
+        self._task_name = task_name
         self._step: Any = None
 
     def begin_step(self) -> None:
-        """Announce the next step, such as an epoch."""
+        """Announce the next step."""
         if self._context is not None:
-            self._step = self._context.subcontext(task_name="epoch")
+            self._step = self._context.subcontext(task_name=self._task_name)
             self._step.call_on_fit_task_begin(estimator=self._estimator)
 
     def end_step(self) -> bool:
@@ -64,7 +67,9 @@ class FitProgress:
 
 
 @contextmanager
-def fit_progress(estimator: Any, n_steps: int, X: Any, y: Any) -> Iterator[FitProgress]:
+def fit_progress(
+    estimator: Any, n_steps: int, X: Any, y: Any, task_name: str = "epoch"
+) -> Iterator[FitProgress]:
     """Progress of one fit; ``fit`` must be decorated with :func:`fit_context`.
 
     Parameters
@@ -75,6 +80,8 @@ def fit_progress(estimator: Any, n_steps: int, X: Any, y: Any) -> Iterator[FitPr
         Steps at most.
     X, y : array-like
         What is fitted, handed to the callbacks.
+    task_name : str, default="epoch"
+        What a step is.
 
     Yields
     ------
@@ -86,5 +93,5 @@ def fit_progress(estimator: Any, n_steps: int, X: Any, y: Any) -> Iterator[FitPr
         return
     context = estimator._init_callback_context(max_subtasks=n_steps)
     context.call_on_fit_task_begin(estimator=estimator, X=X, y=y)
-    yield FitProgress(estimator, context)
+    yield FitProgress(estimator, context, task_name)
     context.call_on_fit_task_end(estimator=estimator, X=X, y=y)

@@ -19,7 +19,14 @@ from sklearn.utils.validation import (
 )
 
 from skidyn._columns import ColumnSpec, column_names
-from skidyn._compat import HasMethods, Interval, fit_context
+from skidyn._compat import (
+    CallbackSupportMixin,
+    FitProgress,
+    HasMethods,
+    Interval,
+    fit_context,
+    fit_progress,
+)
 from skidyn.hybrid._gate import learned_weights
 from skidyn.hybrid._own_joint import OwnJointRegressor
 from skidyn.hybrid._range import TrainingRange, distances, fade
@@ -35,7 +42,7 @@ NOT_TESTED = (
 )
 
 
-class HybridRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
+class HybridRegressor(CallbackSupportMixin, MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     """Physical model plus a learner on its residual, which is kept only where it helps.
 
     The physics is cross-fitted, so that the learner sees the residual on trajectories that the
@@ -168,13 +175,28 @@ class HybridRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             weight = _check_sample_weight(sample_weight, array, dtype=np.float64)
         keys = self._keys()
         folds = self._folds(table, torque, keys.trajectories(array))
+        n_fits = len(folds) * (len(folds) + 3) // 2 + 2  # pairs of folds, folds, and all rows
+        with fit_progress(self, n_fits, X, y, "model") as progress:
+            self._learn(table, array, torque, weight, folds, progress)
+        return self
+
+    def _learn(
+        self,
+        table: Any,
+        array: Array,
+        torque: Array,
+        weight: Array | None,
+        folds: list[Any],
+        progress: FitProgress,
+    ) -> None:
+        keys = self._keys()
         learner = self._own_joints() if self.learner is None else self.learner
-        residuals = _honest_residuals(self.physics, table, torque, weight, folds)
+        residuals = _honest_residuals(self.physics, table, torque, weight, folds, progress)
         residual, learned = np.zeros(torque.shape), np.zeros(torque.shape)
         for (train, test), seen in zip(folds, residuals, strict=True):
             residual[test] = seen[test]
             part = None if weight is None else weight[train]
-            fitted = _fit(clone(learner), _safe_indexing(table, train), seen[train], part)
+            fitted = _fit(clone(learner), _safe_indexing(table, train), seen[train], part, progress)
             predicted = fitted.predict(_safe_indexing(table, test))
             learned[test] = np.reshape(predicted, residual[test].shape)
 
@@ -195,12 +217,11 @@ class HybridRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         if not tested:
             self.p_value_[:] = 1.0
             if self.alpha < 1:
-                warnings.warn(NOT_TESTED, UserWarning, stacklevel=3)
-        self.physics_ = _fit(clone(self.physics), table, torque, weight)
+                warnings.warn(NOT_TESTED, UserWarning, stacklevel=4)
+        self.physics_ = _fit(clone(self.physics), table, torque, weight, progress)
         self.learner_ = None
         if self.learned_weight_.any():
-            self.learner_ = _fit(clone(learner), table, residual, weight)
-        return self
+            self.learner_ = _fit(clone(learner), table, residual, weight, progress)
 
     def _folds(self, table: Any, torque: Array, trajectories: NDArray[Any]) -> list[Any]:
         if not hasattr(self.cv, "split"):
@@ -302,7 +323,14 @@ def _column(factor: Array, values: Array) -> Array:
     return factor[:, None] if values.ndim == 2 else factor
 
 
-def _fit(estimator: Any, X: Any, y: Array, weight: Array | None) -> Any:
+def _fit(estimator: Any, X: Any, y: Array, weight: Array | None, progress: FitProgress) -> Any:
+    progress.begin_step()
+    _fit_weighted(estimator, X, y, weight)
+    progress.end_step()
+    return estimator
+
+
+def _fit_weighted(estimator: Any, X: Any, y: Array, weight: Array | None) -> Any:
     if weight is None:
         return estimator.fit(X, y)
     if not has_fit_parameter(estimator, "sample_weight"):
@@ -311,7 +339,12 @@ def _fit(estimator: Any, X: Any, y: Array, weight: Array | None) -> Any:
 
 
 def _honest_residuals(
-    physics: Any, X: Any, y: Array, weight: Array | None, folds: list[Any]
+    physics: Any,
+    X: Any,
+    y: Array,
+    weight: Array | None,
+    folds: list[Any],
+    progress: FitProgress,
 ) -> Array:
     """For every fold the residual of all rows by physics that saw neither it nor their own fold.
 
@@ -322,7 +355,7 @@ def _honest_residuals(
 
     def fitted(rows: NDArray[Any]) -> Any:
         part = None if weight is None else weight[rows]
-        return _fit(clone(physics), _safe_indexing(X, rows), y[rows], part)
+        return _fit(clone(physics), _safe_indexing(X, rows), y[rows], part, progress)
 
     residuals = np.repeat(y[None].astype(np.float64), len(folds), axis=0)
     for k, (train, test) in enumerate(folds):

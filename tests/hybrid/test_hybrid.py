@@ -13,6 +13,7 @@ from sklearn.pipeline import Pipeline
 from sklearn.preprocessing import FunctionTransformer
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
+from skidyn._compat import CallbackSupportMixin, FitProgress
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.hybrid import HybridRegressor
 from skidyn.hybrid._gate import learned_weights
@@ -21,6 +22,7 @@ from skidyn.model_selection import PhaseKFold, TrajectoryKFold
 from skidyn.neural_network import LSTMRegressor
 from skidyn.rigid_body import RBDRegressor
 
+QUIET = FitProgress(None, None)
 TREES = ExtraTreesRegressor(15, min_samples_leaf=5, random_state=0)
 
 
@@ -142,12 +144,12 @@ class RowsSeen(LinearRegression):
 def test_no_residual_betrays_the_fold_that_is_held_out():
     trajectory = np.repeat(np.arange(4), 3)
     folds = [(np.flatnonzero(trajectory != k), np.flatnonzero(trajectory == k)) for k in range(4)]
-    residuals = _honest_residuals(RowsSeen(), trajectory[:, None], np.zeros(12), None, folds)
+    residuals = _honest_residuals(RowsSeen(), trajectory[:, None], np.zeros(12), None, folds, QUIET)
     for k, residual in enumerate(residuals):
         for own, seen in zip(trajectory, residual, strict=True):
             assert seen == sum(10.0**other for other in range(4) if other not in (k, own))
     two = [(np.arange(3, 6), np.arange(3)), (np.arange(3), np.arange(3, 6))]
-    residuals = _honest_residuals(RowsSeen(), trajectory[:6, None], np.zeros(6), None, two)
+    residuals = _honest_residuals(RowsSeen(), trajectory[:6, None], np.zeros(6), None, two, QUIET)
     np.testing.assert_array_equal(residuals, [[10.0] * 6, [1.0] * 6])
 
 
@@ -204,6 +206,33 @@ def test_joints_are_known_by_the_names_of_the_robot():
     hybrid = HybridRegressor(RBDRegressor(log.robot), cv=2)
     by_number = hybrid.fit(log.X, log.y).gain_
     np.testing.assert_allclose(hybrid.fit(log.X.rename(columns=named), log.y).gain_, by_number)
+
+
+@pytest.mark.skipif(
+    not hasattr(CallbackSupportMixin, "set_callbacks"), reason="scikit-learn has no callbacks"
+)
+def test_progress_counts_every_fit():
+    class Count:
+        def __init__(self):
+            self.ended, self.most = 0, 0
+
+        def setup(self, estimator, context):
+            pass
+
+        def on_fit_task_begin(self, estimator, context, **_):
+            self.most = max(self.most, context.max_subtasks or 0)
+
+        def on_fit_task_end(self, estimator, context, **_):
+            self.ended += context.task_name != "fit"
+
+        def teardown(self, estimator, context):
+            pass
+
+    X, y = make_log(6, 60)
+    count = Count()
+    hybrid = HybridRegressor(LinearRegression(), TREES, cv=3, alpha=1.0)
+    hybrid.set_callbacks(count).fit(X, y)
+    assert count.ended == count.most == 11  # physics 3 + 3 + 1, learner 3 + 1
 
 
 def test_weights_need_learners_that_take_them():
