@@ -248,7 +248,7 @@ GREEN = """(which) => {
 }"""  # noqa: E501
 
 
-def test_load_dependent_friction_of_a_real_robot_is_ticked_and_the_error_falls(ur10e):
+def test_load_dependent_friction_of_a_real_robot_is_ticked_and_the_error_falls(ur10e, tmp_path):
     with opened(ur10e) as tab:
         tab.select_option("#joint", "2")
         tab.wait_for_selector("body[data-ranked='2 all 1']")
@@ -268,6 +268,14 @@ def test_load_dependent_friction_of_a_real_robot_is_ticked_and_the_error_falls(u
             tab.click("#undo")
             tab.wait_for_selector(f"body[data-ranked='5 all {left}']")
         undone = errors_shown(tab, 2)
+        tab.click("#effects button[data-kind=maxwell_slip]")
+        tab.wait_for_selector("body[data-refined='2']")
+        tab.click("#save")
+        tab.wait_for_selector("#save:enabled", timeout=240_000)
+        assert tab.text_content("#saved").startswith("saved: ")
+    assert any(t.kind == "maxwell_slip" for t in load_model(tmp_path / "model.skops").effect_terms_)
+    assert "session.add('maxwell_slip', joint=5)" in (tmp_path / "explored.py").read_text("utf-8")
+    assert "</html>" in (tmp_path / "report.html").read_text("utf-8")
     assert first == "load_dependent_friction"
     assert first_step[1] < 0.9 * first_step[0]
     assert second_step[1] < 0.98 * second_step[0]
