@@ -109,9 +109,10 @@ def of_the_report(browser: Browser, path: Path) -> None:
         page.mouse.move(box["x"] + 0.62 * box["width"], box["y"] + 60)
         page.wait_for_timeout(300)
         save(page, f"report-{scheme}.png", ".panel")
-    page = opened(browser, path.as_uri(), 700)
+    page = opened(browser, path.as_uri(), 900)
     bring(page, "article.finding")
-    save(page, "report-finding.png")
+    page.evaluate("scrollBy(0, -30)")
+    save(page, "report-finding.png", "article.finding")
 
 
 def bring(page: Page, selector: str) -> None:
@@ -144,6 +145,7 @@ def of_the_explorer(browser: Browser, address: str) -> None:
     page.wait_for_selector("body[data-ranked$=' 2']")
     page.wait_for_timeout(3000)  # shapes are refined after the first answer
     page.evaluate("document.querySelector('#status').textContent = ''")  # a time of this machine
+    page.add_style_tag(content=".hint + .hint, #effects li:nth-child(n + 6) { display: none }")
     save(page, "explorer.png")
 
 
