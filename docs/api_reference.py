@@ -279,6 +279,7 @@ PAGES: tuple[Page, ...] = (
                 (
                     "SCORERS",
                     "joint_error_table",
+                    "joint_scores",
                     "max_absolute_error",
                     "min_absolute_error",
                     "paired_comparison",

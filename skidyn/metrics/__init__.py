@@ -4,6 +4,7 @@
 from skidyn.metrics._errors import (
     SCORERS,
     joint_error_table,
+    joint_scores,
     max_absolute_error,
     min_absolute_error,
     percent_improvement,
@@ -15,6 +16,7 @@ __all__ = [
     "SCORERS",
     "PairedComparison",
     "joint_error_table",
+    "joint_scores",
     "max_absolute_error",
     "min_absolute_error",
     "paired_comparison",

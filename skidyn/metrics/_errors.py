@@ -214,6 +214,54 @@ def joint_error_table(
     }
 
 
+def joint_scores(estimator: Any, X: Any, y: ArrayLike) -> dict[str, float]:
+    """Score every joint: a scorer of many metrics for scikit-learn's ``scoring``.
+
+    Parameters
+    ----------
+    estimator : estimator
+        A fitted regressor.
+    X : DataFrame or array-like of shape (n_samples, n_features)
+        Samples.
+    y : array-like of shape (n_samples,) or (n_samples, n_joints), N m (N if prismatic)
+        Measured torque.
+
+    Returns
+    -------
+    scores : dict of float
+        Greater is better: the mean over joints under the names of :data:`SCORERS`, such as
+        ``"neg_mean_absolute_error"``, and each joint under the name with ``"_J1"``, .. behind it.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from sklearn.linear_model import LinearRegression
+    >>> from sklearn.model_selection import cross_validate
+    >>> X = np.random.default_rng(0).normal(size=(30, 2))
+    >>> scores = cross_validate(LinearRegression(), X, X**3, scoring=joint_scores, cv=3)
+    >>> scores["test_neg_mean_absolute_error_J2"].shape
+    (3,)
+    """
+    table = joint_error_table(y, estimator.predict(X))
+    scores = {}
+    for name, row in _ROWS.items():
+        sign = -1.0 if name.startswith("neg_") else 1.0
+        for joint, value in table[row].items():
+            scores[name if joint == "mean" else f"{name}_{joint}"] = sign * value
+    return scores
+
+
+#: Rows of the table behind the names of the scorers.
+_ROWS = {
+    "r2": "R2",
+    "neg_mean_squared_error": "MSE",
+    "neg_root_mean_squared_error": "RMSE",
+    "neg_mean_absolute_error": "MAE",
+    "neg_rmse_over_range": "RMSE/range",
+    "neg_max_absolute_error": "max",
+    "neg_min_absolute_error": "min",
+}
+
 #: Scorers for ``cross_validate(scoring=SCORERS)`` and ``GridSearchCV``: greater is better.
 SCORERS: dict[str, Any] = {
     "r2": "r2",

@@ -1,11 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import numpy as np
 import pytest
-from sklearn.linear_model import LinearRegression
+from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.metrics import mean_absolute_error, mean_squared_error, r2_score
-from sklearn.model_selection import cross_validate
+from sklearn.model_selection import GridSearchCV, cross_validate
 
-from skidyn.metrics import SCORERS, joint_error_table, percent_improvement, rmse_over_range
+from skidyn.metrics import (
+    SCORERS,
+    joint_error_table,
+    joint_scores,
+    percent_improvement,
+    rmse_over_range,
+)
 
 
 @pytest.fixture
@@ -60,3 +66,18 @@ def test_scorers_work_in_cross_validation(torques):
         result[f"test_neg_{name}"] for name in ("max_absolute_error", "mean_absolute_error")
     )
     assert (largest <= mean).all()
+
+
+def test_every_joint_is_scored_and_the_mean_is_that_of_the_scorers(torques):
+    true, pred = torques
+    folds = {"X": pred, "y": true, "cv": 3}
+    scores = cross_validate(LinearRegression(), scoring=joint_scores, **folds)
+    expected = cross_validate(LinearRegression(), scoring=SCORERS, **folds)
+    for name in SCORERS:
+        np.testing.assert_allclose(scores[f"test_{name}"], expected[f"test_{name}"])
+        per_joint = [scores[f"test_{name}_J{j}"] for j in (1, 2, 3)]
+        np.testing.assert_allclose(np.mean(per_joint, axis=0), expected[f"test_{name}"])
+    search = GridSearchCV(
+        Ridge(), {"alpha": [1e-3, 1e3]}, scoring=joint_scores, refit="r2_J2", cv=3
+    ).fit(pred, true)
+    assert search.best_params_ == {"alpha": 1e-3}
