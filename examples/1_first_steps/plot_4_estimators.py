@@ -88,6 +88,8 @@ for axis, (make, values, estimators, label) in zip(axes, cases, strict=True):
     axis.legend()
 axes[0].set_ylabel("relative error on new motion")
 axes[1].set_xscale("log")
+axes[1].set_xticks(cases[1][1], [str(value) for value in cases[1][1]], minor=False)
+axes[1].minorticks_off()
 
 # %%
 # Whether instruments were needed is a question the log itself answers. With noise of 0.4, least
