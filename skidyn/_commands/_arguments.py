@@ -32,7 +32,9 @@ def with_log_only(parser: Any, urdf_required: bool = True) -> None:
 def with_reading(parser: Any) -> None:
     """How the columns of logs are to be read."""
     parser.add_argument(
-        "--columns", metavar="JSON", help="which columns hold which signals (see Data in the guide)"
+        "--columns",
+        metavar="JSON",
+        help='which columns hold which signals: {"q": ["pos_a", "pos_b"], "tau": [...]}',
     )
     parser.add_argument("--units", metavar="JSON", help='units that are not SI: {"q": "deg"}')
     parser.add_argument(

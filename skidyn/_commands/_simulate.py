@@ -27,8 +27,10 @@ def add_parser(commands: Any) -> None:
     parser.add_argument("--robot", default="panda", help="embedded robot (default: %(default)s)")
     parser.add_argument("--effect", default="dahl", help="kind, or none (default: %(default)s)")
     with_joints(parser, "joints that have the effect (default: a suitable choice)")
-    parser.add_argument("--noise", default="low", choices=("low", "high"))
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument(
+        "--noise", default="low", choices=("low", "high"), help="of torques (default: %(default)s)"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of what is random (default: 0)")
     parser.add_argument("--out", required=True, metavar="LOG", help="file.csv or file.parquet")
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, qr
 
+from skidyn._progress import tell
 from skidyn._signals import Array, Signals
 from skidyn.effects import Term, get_effect
 from skidyn.evidence._broken import without_broken
@@ -172,7 +173,8 @@ class Problem:
         if sigma is None:
             sigma = np.array([own_noise(a, y, len(y)) for a, y in zip(design, target, strict=True)])
         fit = _weighted(terms, design, target, sigma)
-        for _ in range(passes - 1):
+        for k in range(1, passes):
+            tell("Fitting", k / passes)
             fit = _weighted(terms, design, target, fit.noise)
         return fit
 
@@ -407,6 +409,7 @@ def regressor_rows(problem: Problem, index: NDArray[np.int64] | None = None) -> 
     for chunk, regressor in robot.iter_torque_regressor(signals.q, signals.dq, signals.ddq):
         for j, block in enumerate(rows):
             block += problem.rows.weights[j][:, chunk] @ regressor[j][index].T
+        tell("Computing the rigid body", chunk.stop / len(signals.q))
     return rows
 
 
