@@ -16,6 +16,7 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 
 from skidyn._columns import Columns, ColumnSpec, resolve_columns
 from skidyn._compat import HasMethods, fit_context
+from skidyn._exceptions import ColumnError
 from skidyn.effects._hysteresis import dahl_state
 from skidyn.preprocessing._keys import resolve_keys
 
@@ -131,13 +132,18 @@ class OwnJointRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         joints = self.joint_names
         if joints is None:
             joints = [str(j + 1) for j in range(n_joints)]
-        return resolve_columns(
-            None if names is None else list(names),
-            self.n_features_in_,
-            list(joints),
-            trajectory=self.trajectory,
-            time=self.time,
-        )
+        try:
+            return resolve_columns(
+                None if names is None else list(names),
+                self.n_features_in_,
+                list(joints),
+                trajectory=self.trajectory,
+                time=self.time,
+            )
+        except ColumnError as error:
+            if self.joint_names is not None or names is None:
+                raise
+            raise ColumnError(f"{error} Columns with other names need joint_names.") from None
 
     def _features(self, X: Array) -> list[Array]:
         columns = self._columns

@@ -49,6 +49,8 @@ def test_missing_columns_are_named(data):
     X, y = data
     with pytest.raises(ValueError, match="ddq_tip"):
         OwnJointRegressor(joint_names=["base", "tip"]).fit(X.drop(columns="ddq_tip"), y)
+    with pytest.raises(ValueError, match="q_1.* need joint_names"):
+        OwnJointRegressor().fit(X, y)
     with pytest.raises(ValueError, match="needs 6 by position"):
         OwnJointRegressor().fit(X.to_numpy()[:, :5], y)
 
