@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext, redirect_stdout
 from shutil import get_terminal_size
-from typing import Any, TextIO, cast
+from typing import Any, NoReturn, TextIO, cast
 
 from skidyn._commands import COMMANDS
 from skidyn._commands._terminal import FittingStream, TeachingFormatter, fit
@@ -81,6 +81,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return DONE
 
 
+class _Parser(argparse.ArgumentParser):
+    """A parser whose complaints fit the terminal."""
+
+    def error(self, message: str) -> NoReturn:
+        self.print_usage(sys.stderr)
+        _complain(f"{self.prog}: {message}")
+        raise SystemExit(BAD_INPUT)
+
+
 def make_parser() -> argparse.ArgumentParser:
     """Parser of the command line.
 
@@ -91,7 +100,7 @@ def make_parser() -> argparse.ArgumentParser:
     """
     from skidyn import __version__
 
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="skidyn",
         description=_DESCRIPTION,
         epilog=_EPILOG,
