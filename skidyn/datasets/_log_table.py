@@ -224,6 +224,11 @@ def _split(
     options: TableOptions,
 ) -> None:
     """Cut at gaps and rests in place, and note how many pieces came of it."""
+    for name in ("split_gaps", "split_dwells"):
+        if isinstance(value := getattr(options, name), bool):
+            raise LogError(
+                f"{name} is {value}; expected the time in s beyond which rows are split."
+            )
     gap = options.split_gaps
     if own_trajectories and gap == "auto":
         gap = None

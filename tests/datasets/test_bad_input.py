@@ -290,3 +290,8 @@ def test_suspicions_are_issued_as_warnings(saved):
     with pytest.warns(LogWarning, match="1 gap") as caught:
         read_log(saved(first.drop(index=range(100, 200))), robot=ROBOT)
     assert caught[0].filename == __file__  # at the caller's line, not inside skidyn
+
+
+def test_a_time_to_split_at_is_no_yes_or_no(saved):
+    with pytest.raises(LogError, match="split_gaps is True; expected the time in s"):
+        read_log(saved(LOG), split_gaps=True)
