@@ -36,7 +36,7 @@ from skidyn.preprocessing._keys import Keys, resolve_keys
 Array = NDArray[np.float64]
 
 #: Fits that are trained side by side in one process.
-SIDE_BY_SIDE = 5
+SIDE_BY_SIDE = 10
 
 
 class SequenceRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):

@@ -72,8 +72,8 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         are no networks of this package (3 folds, by trajectory or, of a single one, by blocks of
         rows).
     n_jobs : int, default=None
-        Processes. Five networks are trained side by side in each, since most of a small network's
-        step is overhead that they can share.
+        Processes. Ten networks are trained side by side in each, since most of a small network's
+        step is overhead that they can share; so more processes serve more than ten members.
     trajectory, time : int, str or None, default="auto"
         Key columns of X.
     random_state : int, RandomState or None, default=None
