@@ -8,8 +8,9 @@
 Prints seconds and accuracy on held-out trajectories of BLLRegressor and of
 BaggingRegressor(NeuralNetRegressor) with skorch's own data handling, batches (128 rows) and
 validation split: same members, epochs, and hidden size. The naive nets are timed on one and on
-two torch threads (on a busy machine two wait for each other at length; then ``--threads 1``). Seconds of the processor count all processes; those on the wall depend on what
-else runs. Then predictions and the ELM committee.
+two torch threads (on a busy machine two wait for each other at length; then ``--threads 1``).
+Seconds of the processor count all processes; those on the wall depend on what else runs. Then
+predictions and the ELM committee.
 
 Settings of both come from ``--tune``, which knows nothing of the held-out trajectories: three
 members learn the first 32 of the 40 training trajectories, the last 8 judge, and the best learning
