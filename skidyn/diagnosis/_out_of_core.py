@@ -200,7 +200,9 @@ def diagnose_parquet(
     files = parquet_files(paths)
     lengths = [trajectory_lengths(file, robot, columns) for file in files]
     sources = list(zip(files, _draw(lengths, sample_rows, random_state), strict=True))
-    n_sampled = sum(of[k] for of, (_, drawn) in zip(lengths, sources, strict=True) for k in drawn)
+    n_sampled = sum(
+        int(n[list(drawn)].sum()) for n, (_, drawn) in zip(lengths, sources, strict=True)
+    )
     X, tau = _sample(sources, n_sampled, robot, columns, max_rows)
     diagnosis = diagnose(model, X, tau, effects=effects, settings=settings)
     own = _own_terms(model, robot, X, tau)
@@ -218,13 +220,13 @@ def diagnose_parquet(
         evidence,
         sum(map(len, lengths)),
         sum(len(drawn) for _, drawn in sources),
-        sum(map(sum, lengths)),
+        sum(int(n.sum()) for n in lengths),
     )
 
 
-def _draw(lengths: Sequence[Sequence[int]], rows: int, seed: int) -> list[frozenset[int]]:
+def _draw(lengths: Sequence[Array], rows: int, seed: int) -> list[frozenset[int]]:
     """Which trajectories of every file are searched."""
-    every = [(f, k) for f, of_file in enumerate(lengths) for k in range(len(of_file))]
+    every = np.concatenate(lengths)
     n = len(every)
     if n < 2 * FEWEST_TRAJECTORIES:
         raise LogError(
@@ -233,10 +235,11 @@ def _draw(lengths: Sequence[Sequence[int]], rows: int, seed: int) -> list[frozen
             "them with read_log and use diagnose."
         )
     order = np.random.default_rng(seed).permutation(n)
-    filled = np.cumsum([lengths[every[k][0]][every[k][1]] for k in order])
-    wanted = int(np.searchsorted(filled, rows, side="right"))
-    drawn = [every[k] for k in order[: int(np.clip(wanted, FEWEST_TRAJECTORIES, n // 2))]]
-    return [frozenset(k for file, k in drawn if file == f) for f in range(len(lengths))]
+    wanted = int(np.searchsorted(np.cumsum(every[order]), rows, side="right"))
+    drawn = np.sort(order[: int(np.clip(wanted, FEWEST_TRAJECTORIES, n // 2))])
+    first = np.cumsum([0, *map(len, lengths)])  # trajectory of every file
+    of_files = np.split(drawn, np.searchsorted(drawn, first[1:-1]))
+    return [frozenset((k - a).tolist()) for k, a in zip(of_files, first[:-1], strict=True)]
 
 
 def _sample(

@@ -85,7 +85,7 @@ def read_trajectories(
     yield _split(parts, layout, robot)
 
 
-def trajectory_lengths(path: Path, robot: Robot, columns: ColumnMap | None = None) -> list[int]:
+def trajectory_lengths(path: Path, robot: Robot, columns: ColumnMap | None = None) -> Array:
     """Rows of every trajectory of a file; only the column of their numbers is decoded.
 
     Parameters
@@ -99,8 +99,8 @@ def trajectory_lengths(path: Path, robot: Robot, columns: ColumnMap | None = Non
 
     Returns
     -------
-    list of int
-        In the order of the rows.
+    ndarray of shape (n_trajectories,)
+        Whole numbers, in the order of the rows.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def trajectory_lengths(path: Path, robot: Robot, columns: ColumnMap | None = Non
     with _decoder_errors(path), parquet.ParquetFile(path) as file:
         layout = _layout(file.schema_arrow.names, robot, columns, path)
         if layout.trajectory is None:
-            return [file.metadata.num_rows]
+            return np.array([file.metadata.num_rows])
         name = layout.names[layout.trajectory]
         lengths: list[int] = []
         last = None
@@ -122,7 +122,7 @@ def trajectory_lengths(path: Path, robot: Robot, columns: ColumnMap | None = Non
                 else:
                     lengths.append(len(piece))
                 last = piece[0, 0]
-        return lengths
+        return np.array(lengths, dtype=np.int64)
 
 
 @contextmanager
