@@ -16,7 +16,7 @@ Settings of both come from ``--tune``, which knows nothing of the held-out traje
 members learn the first 32 of the 40 training trajectories, the last 8 judge, and the best learning
 rate of the same three is taken for each of the same two optimisers. The naive bag is then shown
 with both: Adam as it is, and the optimiser that ours uses. Window, stride and batch size of ours
-were chosen on the same 8 trajectories.
+were chosen by cross-validation over the training trajectories.
 """
 
 from __future__ import annotations
