@@ -78,14 +78,16 @@ $(VENV)/.%: pyproject.toml setup.cfg | $(VENV)/.torch
 	@$(PIP) --editable ".[$*]"
 	@touch $@
 
+# the wheel, which is built from the archive of the source: pip would keep a wheel of the archive, and
+# install that again after the source has changed
 $(OLDEST)/.installed: pyproject.toml setup.cfg .ci/oldest.py $(shell git ls-files skidyn)
 	rm -rf $(OLDEST)
 	$(PYTHON) -m venv $(OLDEST)
 	@echo "Installing $(TORCH) and the oldest dependencies into $(OLDEST) ..."
 	@$(OLDEST)/bin/python -m pip install --quiet --disable-pip-version-check "$(TORCH)" build
-	$(OLDEST)/bin/python -m build --sdist --outdir $(OLDEST)/dist .
+	$(OLDEST)/bin/python -m build --outdir $(OLDEST)/dist .
 	$(OLDEST)/bin/python .ci/oldest.py test > $(OLDEST)/constraints.txt
 	@$(OLDEST)/bin/python -m pip install --quiet --disable-pip-version-check \
 	    -c $(OLDEST)/constraints.txt pytest pytest-xdist hypothesis polars \
-	    "skidyn[all] @ file://$$(ls $(abspath $(OLDEST))/dist/skidyn-*.tar.gz)"
+	    "skidyn[all] @ file://$$(ls $(abspath $(OLDEST))/dist/skidyn-*.whl)"
 	@touch $@
