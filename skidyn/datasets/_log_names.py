@@ -11,6 +11,10 @@ from dataclasses import dataclass, field
 from skidyn._exceptions import LogError
 from skidyn.datasets._units import split_unit
 
+#: A joint beyond, and beyond the number of columns, is a damaged name: a list of as many joints
+#: as it says could fill the memory.
+MANY_JOINTS = 1000
+
 #: Spellings of each quantity in recordings, compared in lower case without separators.
 SPELLINGS: dict[str, tuple[str, ...]] = {
     "q": ("q", "pos", "position", "positions", "jointposition", "jointpositions", "angle")
@@ -109,6 +113,11 @@ def match_names(
             f"{len(robot_joints)} ({_listed(robot_joints)}). If the log covers part of the robot, "
             "load it with Robot.from_urdf(..., joints=[...]); if it has further joints, say which "
             "columns to take with columns={'q': [...], 'dq': [...], 'tau': [...]}."
+        )
+    if n > max(len(names), MANY_JOINTS):
+        raise LogError(
+            f"{source} has a column of joint {n}, but only {len(names)} columns. Is its name "
+            "damaged? Rename it, or say which columns to take with columns={'q': [...]}."
         )
     if not match.joint_names:
         match.joint_names = list(robot_joints or [str(k + 1) for k in range(n)])

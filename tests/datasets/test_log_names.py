@@ -79,3 +79,8 @@ def test_said_goes_before_guessed():
 def test_mappings_that_cannot_be_met(columns, message):
     with pytest.raises(LogError, match=message):
         match_names(["alpha", "beta"], columns=columns)
+
+
+def test_a_damaged_number_makes_no_billions_of_joints():
+    with pytest.raises(LogError, match="a column of joint 99999999991, but only 2 columns"):
+        match_names(["time", "q99999999991"])
