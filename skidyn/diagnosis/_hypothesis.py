@@ -44,6 +44,8 @@ class Settings:
     family_share : float
         Within a family of effects (hysteresis), the simplest one with this share of the best
         one's score is named.
+    ripple_share : float
+        Torque ripple must do this share of what a function of the signals does on averaged rows.
     max_findings : int
         Kinds added at most.
     finalists : int
@@ -69,6 +71,7 @@ class Settings:
     unknown_handicap: float = 0.03
     simpler_share: float = 0.05
     family_share: float = 0.95
+    ripple_share: float = 0.8
     max_findings: int = 4
     finalists: int = 8
     refined: int = 4

@@ -9,7 +9,7 @@ Pati, Rezaiifar, Krishnaprasad 1993), judged by the error of the held-out folds.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +21,8 @@ from skidyn.evidence._problem import Problem
 
 #: Terms of a formula at most, and the share of what the nameless function explains that it needs.
 LONGEST, LEAST_SHARE = 3, 0.9
+#: Of an expression that known terms can replace no more than this share is left.
+_ABSORBED = 1e-4
 #: A further term must bring this share of it.
 WORTH = 0.03
 
@@ -114,7 +116,8 @@ def propose(
     residual: Array,
     explained: Array,
     variables: Sequence[str],
-    waves: Sequence[str] = (),
+    waves: Sequence[str],
+    without: Callable[[Array], Array],
 ) -> Proposal | None:
     """The shortest formula that explains what a nameless function does.
 
@@ -130,8 +133,10 @@ def propose(
         Rows of the nameless torque.
     variables : sequence of str
         Signals on which it depends.
-    waves : sequence of str, default=()
+    waves : sequence of str
         Expressions in time that are tried too.
+    without : callable
+        Takes away from rows what the known terms of the model can do.
 
     Returns
     -------
@@ -142,14 +147,17 @@ def propose(
     if not expressions:
         return None
     terms = [formula(e, joint + 1) for e in expressions]
-    columns = np.hstack([problem.term_rows(t)[joint] for t in terms])
+    whole = np.hstack([problem.term_rows(t)[joint] for t in terms])
+    columns = without(whole)
+    size = [np.einsum("ij,ij->j", c, c) for c in (columns, whole)]
+    columns[:, size[0] < _ABSORBED * size[1]] = 0.0
     fold = problem.fold[joint]
     nothing = float(residual @ residual)
     goal = max(nothing - float(np.sum((residual - explained) ** 2)), 1e-300)
     chosen: list[int] = []
     reached = nothing
     while len(chosen) < LONGEST:
-        errors = _with_each(columns, chosen, residual, fold, problem.n_folds)
+        errors = errors_with_each(columns, chosen, residual, fold, problem.n_folds)
         best = int(np.argmin(errors))
         if reached - errors[best] < WORTH * goal:
             break
@@ -166,10 +174,28 @@ def propose(
     return Proposal(joint + 1, text, words, tuple(map(float, coefficients)), float(share), found)
 
 
-def _with_each(
+def errors_with_each(
     columns: Array, chosen: Sequence[int], residual: Array, fold: NDArray[np.int64], n_folds: int
 ) -> Array:
-    """Held-out squared error with each column added to the chosen ones, (n_columns,)."""
+    """Held-out squared error with each column added to some that are chosen already.
+
+    Parameters
+    ----------
+    columns : ndarray of shape (n_rows, n_columns)
+        Candidates.
+    chosen : sequence of int
+        Those that are fitted in any case.
+    residual : ndarray of shape (n_rows,)
+        What they are to explain.
+    fold : ndarray of shape (n_rows,)
+        Number of the fold of every row.
+    n_folds : int
+        Number of folds.
+
+    Returns
+    -------
+    ndarray of shape (n_columns,)
+    """
     errors = np.zeros(columns.shape[1])
     for f in range(n_folds):
         train, test = fold != f, fold == f

@@ -26,15 +26,19 @@ from skidyn.diagnosis._hypothesis import (
 )
 from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
 from skidyn.diagnosis._screen import Screen
+from skidyn.diagnosis._screened import followed_signals
 from skidyn.diagnosis._spectrum import find_lines
 from skidyn.diagnosis._split import split_effects, trajectory_offsets
 from skidyn.effects import Term, get_effect
 from skidyn.effects._catalogue import nameless_kinds
-from skidyn.effects._nameless import NamelessEffect
+from skidyn.effects._nameless import FunctionOfSignals, NamelessEffect
 from skidyn.evidence._folded import left_out_coefficients
 from skidyn.evidence._problem import Problem
 
 Mask = NDArray[np.bool_]
+
+#: Waves per turn from which a nameless function of position cannot stand for torque ripple.
+RESOLVED = 40.0
 
 
 def search(
@@ -228,7 +232,7 @@ class _Search:
         rough = self._greedy_by_kind() + self._splits()
         rough.sort(key=lambda item: item[1])
         ranking = self._finals([candidates for candidates, _ in rough[: self.settings.finalists]])
-        ranking += self._ripples()
+        ranking += [self._against_functions(h, ranking) for h in self._ripples()]
         ranking += self._offsets_between_recordings()
         return sorted(ranking, key=lambda h: -h.score)
 
@@ -295,9 +299,11 @@ class _Search:
     ) -> tuple[list[Candidate], float]:
         pool, errors, now = wanted.copy(), first, base
         chosen: list[Candidate] = []
-        widths = np.array([c.width for c in self.pool])
+        # Nameless functions have very different widths: the price that they pay in the end.
+        dear = 3 * float(self.inflation.max())
+        prices = np.array([2 * c.width * (dear if c.kind == UNKNOWN else 1.0) for c in self.pool])
         while pool.any():
-            drops = np.where(pool, now.sum() - errors.sum(1) - 2 * widths, -np.inf)
+            drops = np.where(pool, now.sum() - errors.sum(1) - prices, -np.inf)
             i = int(np.argmax(drops))
             candidate, drop = self.pool[i], now - errors[i]
             agree = float((drop > 0).mean())
@@ -391,6 +397,8 @@ class _Search:
             old = [c for c in known if c.joints == (line.joint,)]
             if any(abs(c.term.shape["N"] - line.waves) < 1 for c in old):
                 continue
+            if line.waves < RESOLVED and self._follows_position(line.joint):
+                continue  # what the nameless function left of its own edges
             n_rows = int(problem.rows.counts[line.joint])
             strong = line.gain.sum() > max(40.0, 2 * self.settings.relative_gate * n_rows)
             agree = _chance_of_mean(line.gain) < self.settings.least_chance
@@ -413,6 +421,29 @@ class _Search:
         count = 3 * len(candidates)
         score = float(gain.sum()) - 2 * count
         return [Hypothesis("torque_ripple", tuple(candidates), gain, score, count, None, torque)]
+
+    def _follows_position(self, joint: int) -> bool:
+        """Whether a nameless function of the joint's own position was added."""
+        own = f"q{joint + 1}"
+        return any(
+            h.kind == UNKNOWN and own in h.variables and joint in h.joints for h in self.findings
+        )
+
+    def _against_functions(self, ripple: Hypothesis, ranking: Sequence[Hypothesis]) -> Hypothesis:
+        """A ripple as it is, or judged on rows where a function of the signals says much more.
+
+        Few waves per turn follow any torque that depends on the position, a bump for example.
+        """
+        rivals = [h for h in ranking if h.kind == UNKNOWN and set(h.joints) & set(ripple.joints)]
+        if not rivals:
+            return ripple
+        before = profile_error(self.problem, self.blocks, self.sigma, self.target)
+        blocks = [*self.blocks, *(c.rows for c in ripple.candidates)]
+        after = profile_error(self.problem, blocks, self.sigma, self.target)
+        score = float(log_likelihood_gain(before, after, self.problem.rows.counts).sum())
+        if score > self.settings.ripple_share * max(h.score for h in rivals):
+            return ripple
+        return replace(ripple, score=min(score, ripple.score))
 
     def _offsets_between_recordings(self) -> list[Hypothesis]:
         """A sensor that was zeroed anew before some recording."""
@@ -460,6 +491,8 @@ def _simplicity(hypothesis: Hypothesis) -> int:
 
 def _nameless_candidates(problem: Problem, residual: Array) -> list[Candidate]:
     """Nameless functions of the signals for every joint."""
+    joints = range(problem.n_joints)
+    followed = [followed_signals(problem, j, residual[:, j]) for j in joints]
     candidates = []
     for kind in nameless_kinds():
         effect = get_effect(kind)
@@ -468,6 +501,9 @@ def _nameless_candidates(problem: Problem, residual: Array) -> list[Candidate]:
             if effect.not_shown(problem.signals, joint):
                 continue
             shapes = effect.grid(problem.signals, (joint,))
+            if isinstance(effect, FunctionOfSignals):
+                sets = [names for names in followed[joint] if len(names) == effect.n_signals]
+                shapes = [effect.shape_of(problem.signals, names) for names in sets]
             if effect.search == "clock":
                 line = clock_line(
                     problem.signals,

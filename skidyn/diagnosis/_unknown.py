@@ -121,17 +121,20 @@ def describe_unknowns(
         (joint,) = term.joints
         i = terms.index(term)
         span = slice(starts[i], starts[i + 1])
-        explained = problem.term_rows(term)[joint] @ whole[span]
+        known = np.ones(len(whole), dtype=bool)
+        known[span] = False
+        without = _Remainder([d[:, known] for d in design], sigma, joint)
+        rows = without(problem.term_rows(term)[joint])
+        explained = rows @ whole[span]
         residual = target[joint] - design[joint] @ whole + explained
         effect = get_effect(term.kind)
         assert isinstance(effect, NamelessEffect)
         guessed = effect.variables(joint, dict(term.shape))
-        rows = problem.term_rows(term)[joint]
-        tests = depends_on(problem, joint, residual, guessed, rows)
+        tests = depends_on(problem, joint, residual, guessed, rows, without)
         needed = {t.variable for t in tests if t.needed} or set(guessed)
         variables = tuple(sorted(needed, key=lambda v: (v not in guessed, v)))
         shape = _shape(problem, term, joint, whole[span], left[:, span], variables)
-        proposal = propose(problem, joint, residual, explained, variables, _waves(term))
+        proposal = propose(problem, joint, residual, explained, variables, _waves(term), without)
         found.append(UnknownTorque(joint + 1, variables, tuple(tests), shape, proposal))
     return found
 
@@ -142,6 +145,24 @@ def _waves(term: Term) -> list[str]:
         return []
     omega = 2 * np.pi * float(term.shape["frequency"])
     return [f"{wave}({omega:.9g} * t)" for wave in ("sin", "cos")]
+
+
+class _Remainder:
+    """What the known terms of a model cannot do in place of some torque on one joint.
+
+    A nameless torque that is partly friction of a known kind has no definite share of it: only what
+    is left after the known terms have been fitted to it says what is missing (Frisch, Waugh 1933).
+    """
+
+    def __init__(self, known: Sequence[Array], sigma: Array, joint: int) -> None:
+        self._own = known[joint] / sigma[joint] ** 2
+        self._known = known[joint]
+        gram = sum((d / s).T @ (d / s) for d, s in zip(known, sigma, strict=True) if len(d))
+        self._inverse = np.linalg.pinv(np.asarray(gram), rcond=1e-12, hermitian=True)
+
+    def __call__(self, columns: Array) -> Array:
+        """Columns less what the known terms do of them, shape as given."""
+        return columns - self._known @ (self._inverse @ (self._own.T @ columns))
 
 
 def _shape(

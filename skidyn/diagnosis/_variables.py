@@ -11,7 +11,7 @@ not count twice.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,16 +73,14 @@ def row_signals(problem: Problem, joint: int) -> dict[str, Array]:
     dict of str to ndarray of shape (n_rows, k)
         One column each, two for the joint's own velocity: with its direction.
     """
-    s = problem.signals
-    columns: dict[str, Array] = {}
-    for k in range(problem.n_joints):
-        columns[f"q{k + 1}"] = s.q[:, [k]]
-        columns[f"dq{k + 1}"] = np.column_stack([s.dq[:, k], s.sign[:, k]])
-        columns[f"ddq{k + 1}"] = s.ddq[:, [k]]
-    if s.temperature is not None:
-        columns[f"temp{joint + 1}"] = s.temperature[:, [joint]]
-    weight = problem.rows.average(np.ones(s.n_samples), joint)[:, None]
-    rows = {name: problem.rows.average(x, joint) / weight for name, x in columns.items()}
+    averaged = averaged_signals(problem, joint)
+    direction = problem.signals.sign
+    rows = {}
+    for name, x in averaged.items():
+        rows[name] = x[:, None]
+        if name.startswith("dq"):
+            sign = average_at_rows(problem, joint, direction[:, int(name[2:]) - 1])
+            rows[name] = np.column_stack([x, sign])
     scaled = {}
     for name, x in rows.items():
         spread = x.std(0)
@@ -92,8 +90,49 @@ def row_signals(problem: Problem, joint: int) -> dict[str, Array]:
     return scaled
 
 
+def averaged_signals(problem: Problem, joint: int) -> dict[str, Array]:
+    """Signals averaged at the rows of a joint, by name, in SI units.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows and signals.
+    joint : int
+        Joint, from 0.
+
+    Returns
+    -------
+    dict of str to ndarray of shape (n_rows,)
+        Positions, velocities and accelerations of all joints, and the joint's own temperature.
+    """
+    s = problem.signals
+    columns = {
+        f"{kind}{k + 1}": table[:, k]
+        for k in range(problem.n_joints)
+        for kind, table in (("q", s.q), ("dq", s.dq), ("ddq", s.ddq))
+    }
+    if s.temperature is not None:
+        columns[f"temp{joint + 1}"] = s.temperature[:, joint]
+    return {name: average_at_rows(problem, joint, x) for name, x in columns.items()}
+
+
+def row_weights(problem: Problem, joint: int) -> Array:
+    """Weight of every row of a joint: what it holds of a constant."""
+    return problem.rows.average(np.ones(problem.signals.n_samples), joint)
+
+
+def average_at_rows(problem: Problem, joint: int, values: Array) -> Array:
+    """Weighted mean of a signal at every row of a joint."""
+    return np.asarray(problem.rows.average(values, joint) / row_weights(problem, joint))
+
+
 def depends_on(
-    problem: Problem, joint: int, residual: Array, hypothesis: Sequence[str], columns: Array
+    problem: Problem,
+    joint: int,
+    residual: Array,
+    hypothesis: Sequence[str],
+    columns: Array,
+    without: Callable[[Array], Array],
 ) -> list[VariableTest]:
     """Test on which signals the residual of a joint depends.
 
@@ -109,6 +148,8 @@ def depends_on(
         Signals of the function that was found.
     columns : ndarray of shape (n_rows, k)
         Rows of that function, which stand for ``"time"`` where it is periodic in time.
+    without : callable
+        Takes away from rows what the known terms of the model can do.
 
     Returns
     -------
@@ -117,12 +158,16 @@ def depends_on(
     """
     signals = row_signals(problem, joint)
     fold, n_folds = problem.fold[joint], problem.n_folds
+    weights = row_weights(problem, joint)[:, None]
     if "time" in hypothesis:
         signals["time"] = columns / np.maximum(columns.std(0), 1e-300)
 
     def errors(names: Sequence[str]) -> Array:
-        inputs = [signals[name] for name in names]
-        return _held_out_errors(inputs, residual, fold, n_folds)
+        if not names:
+            return np.asarray(np.bincount(fold, residual**2, minlength=n_folds), dtype=float)
+        x = np.column_stack([signals[name] for name in names])
+        tried = (without(_features(x, length) * weights) for length in LENGTHS)
+        return _held_out_errors(tried, residual, fold, n_folds)
 
     chosen = [v for v in hypothesis if v in signals]
     if not chosen:
@@ -154,7 +199,18 @@ def depends_on(
 
 
 def _p_value(worse: Array, better: Array) -> float:
-    """Chance of such errors, fold by fold, if the second were no better than the first."""
+    """Chance of such errors, fold by fold, if the second were no better than the first.
+
+    Parameters
+    ----------
+    worse, better : ndarray of shape (n_folds,)
+        Squared errors of the folds.
+
+    Returns
+    -------
+    float
+        Of a one-sided paired t-test of the logarithm of their ratio.
+    """
     ratio = np.log(np.maximum(worse, 1e-300) / np.maximum(better, 1e-300))
     if np.ptp(ratio) == 0:
         return 1.0
@@ -162,14 +218,10 @@ def _p_value(worse: Array, better: Array) -> float:
 
 
 def _held_out_errors(
-    inputs: Sequence[Array], residual: Array, fold: NDArray[np.int64], n_folds: int
+    tried: Iterable[Array], residual: Array, fold: NDArray[np.int64], n_folds: int
 ) -> Array:
-    """Squared error of every fold when it is left out, (n_folds,), best length and ridge."""
-    if not inputs:
-        return np.asarray(np.bincount(fold, residual**2, minlength=n_folds), dtype=float)
-    x = np.column_stack(inputs)
-    tried = [_ridge_errors(_features(x, length), residual, fold, n_folds) for length in LENGTHS]
-    table = np.concatenate(tried)
+    """Squared error of every fold when it is left out, (n_folds,), best features and ridge."""
+    table = np.concatenate([_ridge_errors(f, residual, fold, n_folds) for f in tried])
     return np.asarray(table[np.argmin(table.sum(1))])
 
 

@@ -6,17 +6,25 @@ They are terms like any other, so a model that adopts one fits, predicts and is 
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.polynomial.legendre import legvander
 from scipy.interpolate import BSpline
 
 from skidyn._signals import Array, Signals
 from skidyn.effects._base import Coefficient, Effect
 
-#: Share of the samples left outside the knots at either end, where a spline would be unsupported.
+#: Share of the samples of a trajectory left out at either end of its range.
 _OUTSIDE = 0.002
+
+#: Trajectories that must reach a value for a function to follow it there; beyond it stays constant.
+_REACHING = 3
+
+#: Highest order of a function of one signal.
+_ORDER = 12
 
 
 def _coefficients(count: int) -> tuple[Coefficient, ...]:
@@ -62,8 +70,8 @@ class _Spline(NamelessEffect):
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
         x = getattr(signals, self.signal)[:, joints[0]]
-        low, high = np.quantile(x, [_OUTSIDE, 1 - _OUTSIDE])
-        return [{"low": float(low), "high": float(high)}] if high > low else []
+        low, high = _supported_range(signals, x)
+        return [{"low": low, "high": high}] if high > low else []
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         x = getattr(signals, self.signal)[:, joint]
@@ -72,9 +80,9 @@ class _Spline(NamelessEffect):
         inner = np.linspace(low, high, self.n_splines - degree + 1)
         knots = np.r_[[low] * degree, inner, [high] * degree]
         inside = np.clip(x, low, high - 1e-9 * (high - low))
-        # The first spline is left out: together they add up to a constant.
+        # Together they add up to a constant, which the model may lack.
         splines: Array = BSpline.design_matrix(inside, knots, degree).toarray()
-        return splines[:, 1:]
+        return splines
 
 
 class FunctionOfPosition(_Spline):
@@ -83,7 +91,7 @@ class FunctionOfPosition(_Spline):
     kind = "function_of_position"
     title = "Function of position"
     formula = r"f(q_j)"
-    coefficients = _coefficients(29)
+    coefficients = _coefficients(30)
     depends_on = ("q_own",)
     signal, n_splines = "q", 30
 
@@ -95,7 +103,7 @@ class FunctionOfVelocity(_Spline):
     drawn_against = "dq"
     title = "Function of velocity"
     formula = r"f(\dot q_j)"
-    coefficients = _coefficients(9)
+    coefficients = _coefficients(10)
     depends_on = ("dq_own",)
     signal, n_splines = "dq", 10
 
@@ -128,14 +136,22 @@ class FunctionOfTwoPositions(_WithOther):
     kind = "function_of_two_positions"
     title = "Function of two positions"
     formula = r"f(q_j, q_k)"
-    coefficients = _coefficients(6)
+    coefficients = _coefficients(7)
     depends_on = ("q_own", "q_other")
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         k = int(shape["other"])
         x, y = (signals.q[:, i] / signals.unit[i] for i in (joint, k))
         return np.column_stack(
-            [np.cos(x - y), np.sin(x - y), np.cos(x + y), np.sin(x + y), np.sin(y), np.cos(y)]
+            [
+                np.cos(x - y),
+                np.sin(x - y),
+                np.cos(x + y),
+                np.sin(x + y),
+                np.sin(y),
+                np.cos(y),
+                np.ones_like(x),
+            ]
         )
 
 
@@ -182,6 +198,118 @@ class FunctionOfTwoVelocities(_WithOther):
         )
 
 
+class FunctionOfSignals(NamelessEffect):
+    """A smooth function of any few signals, those that the residual was found to follow.
+
+    Products of Legendre polynomials of positions and accelerations, and of powers of velocities
+    with their direction, the lowest orders first.
+    """
+
+    n_signals: ClassVar[int] = 1
+    search = "screened"
+
+    def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
+        return tuple(shape["of"])
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        return []
+
+    def shape_of(self, signals: Signals, names: Sequence[str]) -> dict[str, Any]:
+        """Shape of a function of some signals, over the range that they cover.
+
+        Parameters
+        ----------
+        signals : Signals
+        names : sequence of str
+            Signals, joints counted from 1, such as ``"q2"``.
+
+        Returns
+        -------
+        dict
+        """
+        low, high = zip(
+            *(_supported_range(signals, _named(signals, name)[0]) for name in names), strict=True
+        )
+        return {"of": tuple(names), "low": low, "high": high}
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        n = len(self.coefficients)
+        parts = []
+        for name, low, high in zip(shape["of"], shape["low"], shape["high"], strict=True):
+            x, sign = _named(signals, name)
+            parts.append(_ordered_functions(x, sign, low, high))
+        orders = [range(p.shape[1]) for p in parts]
+        chosen = sorted(itertools.product(*orders), key=lambda powers: (sum(powers), powers))
+        return np.column_stack(
+            [
+                np.prod([p[:, k] for p, k in zip(parts, powers, strict=True)], axis=0)
+                for powers in chosen[:n]
+            ]
+        )
+
+
+def _supported_range(signals: Signals, x: Array) -> tuple[float, float]:
+    """Range of a signal that several trajectories cover: elsewhere one of them would decide."""
+    numbers = np.unique(signals.trajectory)
+    ends = np.array(
+        [np.quantile(x[signals.trajectory == k], [_OUTSIDE, 1 - _OUTSIDE]) for k in numbers]
+    )
+    ends.sort(axis=0)
+    at = min(_REACHING, (len(ends) + 1) // 2) - 1
+    low, high = float(ends[at, 0]), float(ends[-1 - at, 1])
+    return (low, high) if high > low else (float(ends[0, 0]), float(ends[-1, 1]))
+
+
+def _named(signals: Signals, name: str) -> tuple[Array, Array | None]:
+    """A signal by its name, and its direction if it is a velocity."""
+    kind = name.rstrip("0123456789")
+    joint = int(name[len(kind) :]) - 1
+    table: Array = getattr(signals, {"temp": "temperature"}.get(kind, kind))
+    return table[:, joint], signals.sign[:, joint] if kind == "dq" else None
+
+
+def _ordered_functions(x: Array, sign: Array | None, low: float, high: float) -> Array:
+    """Functions of one signal by rising order, the constant first."""
+    if sign is None:
+        inside = np.clip((2 * x - low - high) / max(high - low, 1e-300), -1.0, 1.0)
+        return np.asarray(legvander(inside, _ORDER))
+    v = np.clip(x / max(-low, high, 1e-300), -1.0, 1.0)
+    size = np.abs(v)
+    powers = [np.ones_like(v), v, sign, size, v * v, v * size, v**3, size**3]
+    powers += [sign * size ** (0.5 * k) for k in range(1, _ORDER - len(powers) + 2)]
+    return np.column_stack(powers)
+
+
+class FunctionOfSignal(FunctionOfSignals):
+    """A function of one signal of any joint."""
+
+    kind = "function_of_signal"
+    title = "Function of one signal"
+    formula = r"f(s)"
+    coefficients = _coefficients(_ORDER + 1)
+    n_signals = 1
+
+
+class FunctionOfTwoSignals(FunctionOfSignals):
+    """A function of two signals of any joints."""
+
+    kind = "function_of_two_signals"
+    title = "Function of two signals"
+    formula = r"f(s_1, s_2)"
+    coefficients = _coefficients(28)
+    n_signals = 2
+
+
+class FunctionOfThreeSignals(FunctionOfSignals):
+    """A function of three signals of any joints."""
+
+    kind = "function_of_three_signals"
+    title = "Function of three signals"
+    formula = r"f(s_1, s_2, s_3)"
+    coefficients = _coefficients(35)
+    n_signals = 3
+
+
 class ClockPeriodic(NamelessEffect):
     """A torque periodic in time: a fan, mains hum, a pump."""
 
@@ -206,5 +334,8 @@ NAMELESS: tuple[type[NamelessEffect], ...] = (
     FunctionOfTwoPositions,
     FrictionOverOtherPosition,
     FunctionOfTwoVelocities,
+    FunctionOfSignal,
+    FunctionOfTwoSignals,
+    FunctionOfThreeSignals,
     ClockPeriodic,
 )

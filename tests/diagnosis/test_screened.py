@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Torques of a form that nobody wrote down: the signals they follow are found all the same."""
+
+import numpy as np
+import pytest
+
+from skidyn.datasets import load_ur5, make_hidden_effect_log
+from skidyn.diagnosis import diagnose
+from skidyn.rigid_body import RBDRegressor
+
+#: Torque on a joint (from 1), its size in N m, the signals, and the formula if it is a short one.
+FORMS = {
+    "square of another position": (3, 2.0, lambda x: x["q5"] ** 2, {"q5"}, "q5**2"),
+    "product of two velocities": (
+        4,
+        0.4,
+        lambda x: x["dq1"] * x["dq2"],
+        {"dq1", "dq2"},
+        "dq1 * dq2",
+    ),
+    "step": (1, 0.5, lambda x: np.sign(x["q3"] - x["q3"].median()), {"q3"}, None),
+    "bump": (2, 4.0, lambda x: np.exp(-((x["q2"] / 0.15) ** 2)), {"q2"}, None),
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_form_in_no_catalogue_is_unknown_and_its_signals_are_named(form):
+    joint, size, torque, signals, formula = FORMS[form]
+    log = make_hidden_effect_log(load_ur5(), None, noise="low", random_state=11)
+    y = np.array(log.y, dtype=float)
+    y[:, joint - 1] += size * torque(log.X)
+
+    diagnosis = diagnose(RBDRegressor(log.robot, ("viscous", "coulomb")), log.X, y)
+
+    assert diagnosis.verdict == "unknown"
+    (finding,) = diagnosis.findings
+    assert finding.joints == (joint,)
+    assert set(finding.variables) == signals
+    proposal = diagnosis.unknowns[0].proposal
+    if formula is not None:
+        assert proposal.expressions == (formula,)
+        assert proposal.coefficients[0] == pytest.approx(size, rel=0.1)
