@@ -162,7 +162,8 @@ class _Remainder:
 
     def __call__(self, columns: Array) -> Array:
         """Columns less what the known terms do of them, shape as given."""
-        return columns - self._known @ (self._inverse @ (self._own.T @ columns))
+        mimic: Array = self._known @ (self._inverse @ (self._own.T @ columns))
+        return columns - mimic
 
 
 def _shape(

@@ -138,10 +138,10 @@ class Effect:
         What enters nonlinearly.
     scope : {"joint", "pair", "robot"}
         Where it acts.
-    search : {"grid", "spectrum", "trajectories", "clock", "given"}
+    search : {"grid", "spectrum", "trajectories", "clock", "screened", "given"}
         How its shape is found: on a grid, as a line in the spectrum over joint angle or over time,
-        as a split of the trajectories into those that have it and those that do not, or not at all
-        because it is always given.
+        as a split of the trajectories into those that have it and those that do not, from the
+        signals that the residual follows, or not at all because it is always given.
     nameless : bool
         Whether it stands for something no name of the vocabulary describes (``unknown``).
     drawn_against : {"q", "dq", "ddq", "load", "temperature", "time"}
@@ -182,7 +182,9 @@ class Effect:
     coefficients: ClassVar[tuple[Coefficient, ...]] = ()
     shapes: ClassVar[tuple[Shape, ...]] = ()
     scope: ClassVar[Scope] = "joint"
-    search: ClassVar[Literal["grid", "spectrum", "trajectories", "clock", "given"]] = "grid"
+    search: ClassVar[Literal["grid", "spectrum", "trajectories", "clock", "screened", "given"]] = (
+        "grid"
+    )
     nameless: ClassVar[bool] = False
     drawn_against: ClassVar[str] = "q"
     family: ClassVar[str] = ""
