@@ -256,5 +256,5 @@ def clear_vanishing(
     for key in np.argwhere(vanishing):
         row = out[tuple(key)]
         # Memory that held a regressor before has its zeros: reading is cheaper than writing.
-        if n_samples and not row.min() == 0.0 == row.max():
+        if n_samples and row.view(f"u{dtype.itemsize}").max():
             row[...] = 0.0
