@@ -186,6 +186,14 @@ def column_names(X: Any) -> list[str] | None:
     return None if columns is None or callable(columns) else [str(name) for name in columns]
 
 
+def with_columns(X: Any, columns: dict[str, np.ndarray]) -> Any:
+    """Copy of a pandas or polars table with some columns replaced or added."""
+    if hasattr(X, "assign"):
+        return X.assign(**columns)
+    frame = type(X)(columns)
+    return X.with_columns([frame[name] for name in columns])
+
+
 def trajectory_numbers(X: np.ndarray, columns: Columns) -> np.ndarray:
     """Trajectory number of every row (zeros where X has no such column)."""
     if columns.trajectory is None:

@@ -134,6 +134,15 @@ class Signals:
         """Time in s; the sample number where no time is logged."""
         return np.arange(self.n_samples, dtype=float) if self.time is None else self.time
 
+    def named(self, name: str) -> Array:
+        """A signal by its name, joints counted from 1: ``"dq3"``, ``"temp2"``, ``"time"``, ..."""
+        if name == "time":
+            return self.clock
+        kind = name.rstrip("0123456789")
+        table = self.temperature if kind == "temp" else getattr(self, kind)
+        assert table is not None
+        return np.asarray(table[:, int(name[len(kind) :]) - 1])
+
     def with_(self, **changes: Any) -> Signals:
         """Copy with some fields replaced."""
         return replace(self, **changes)

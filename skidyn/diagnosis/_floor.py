@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from skidyn._signals import Array
+from skidyn.diagnosis._variables import average_at_rows
 from skidyn.evidence._problem import Problem
 
 FEATURES = 200
@@ -61,8 +62,7 @@ def _inputs(problem: Problem, joint: int) -> Array:
     """Averaged signals at the rows of a joint, standardised."""
     s = problem.signals
     raw = np.column_stack([s.q, s.dq, s.sign[:, joint], s.ddq[:, joint]])
-    weight = problem.rows.average(np.ones(s.n_samples), joint)[:, None]
-    x = problem.rows.average(raw, joint) / weight
+    x = average_at_rows(problem, joint, raw)
     scale = x.std(0)
     keep = scale > 1e-9
     scaled: Array = (x[:, keep] - x[:, keep].mean(0)) / scale[keep]

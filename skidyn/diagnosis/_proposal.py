@@ -21,10 +21,10 @@ from skidyn.evidence._problem import Problem
 
 #: Terms of a formula at most, and the share of what the nameless function explains that it needs.
 LONGEST, LEAST_SHARE = 3, 0.9
-#: Of an expression that known terms can replace no more than this share is left.
-_ABSORBED = 1e-4
 #: A further term must bring this share of it.
 WORTH = 0.03
+#: An expression of which known terms leave less than this share (squares) is theirs.
+_ABSORBED = 1e-4
 
 
 @dataclass(frozen=True)
@@ -154,15 +154,7 @@ def propose(
     fold = problem.fold[joint]
     nothing = float(residual @ residual)
     goal = max(nothing - float(np.sum((residual - explained) ** 2)), 1e-300)
-    chosen: list[int] = []
-    reached = nothing
-    while len(chosen) < LONGEST:
-        errors = errors_with_each(columns, chosen, residual, fold, problem.n_folds)
-        best = int(np.argmin(errors))
-        if reached - errors[best] < WORTH * goal:
-            break
-        chosen.append(best)
-        reached = float(errors[best])
+    chosen, reached = pursue(columns, residual, fold, worth=WORTH * goal, longest=LONGEST)
     share = (nothing - reached) / goal
     if not chosen or share < LEAST_SHARE:
         return None
@@ -174,30 +166,58 @@ def propose(
     return Proposal(joint + 1, text, words, tuple(map(float, coefficients)), float(share), found)
 
 
-def errors_with_each(
-    columns: Array, chosen: Sequence[int], residual: Array, fold: NDArray[np.int64], n_folds: int
-) -> Array:
-    """Held-out squared error with each column added to some that are chosen already.
+def pursue(
+    columns: Array,
+    residual: Array,
+    fold: NDArray[np.int64],
+    *,
+    worth: float,
+    longest: int,
+    admissible: Callable[[Sequence[int]], NDArray[np.bool_]] | None = None,
+) -> tuple[list[int], float]:
+    """Orthogonal matching pursuit, judged by the error of the held-out folds.
 
     Parameters
     ----------
     columns : ndarray of shape (n_rows, n_columns)
         Candidates.
-    chosen : sequence of int
-        Those that are fitted in any case.
     residual : ndarray of shape (n_rows,)
         What they are to explain.
     fold : ndarray of shape (n_rows,)
         Number of the fold of every row.
-    n_folds : int
-        Number of folds.
+    worth : float
+        Squared error that a further column must take away.
+    longest : int
+        Columns at most.
+    admissible : callable, optional
+        Which columns may join those that are chosen; all by default.
 
     Returns
     -------
-    ndarray of shape (n_columns,)
+    chosen : list of int
+    reached : float
+        Held-out squared error with them.
     """
+    chosen: list[int] = []
+    reached = float(residual @ residual)
+    while len(chosen) < longest:
+        errors = _errors_with_each(columns, chosen, residual, fold)
+        if admissible is not None:
+            errors[~admissible(chosen)] = np.inf
+        best = int(np.argmin(errors))
+        if reached - errors[best] < worth:
+            break
+        chosen.append(best)
+        reached = float(errors[best])
+    return chosen, reached
+
+
+def _errors_with_each(
+    columns: Array, chosen: Sequence[int], residual: Array, fold: NDArray[np.int64]
+) -> Array:
+    """Held-out squared error with each column added to the chosen ones, (n_columns,)."""
     errors = np.zeros(columns.shape[1])
-    for f in range(n_folds):
+    for f in np.unique(fold):
         train, test = fold != f, fold == f
         a, b = columns[train], columns[test]
         fixed, held = a[:, chosen], b[:, chosen]

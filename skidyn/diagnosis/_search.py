@@ -16,6 +16,7 @@ from skidyn._progress import track
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate, catalogue_candidates
 from skidyn.diagnosis._clock import clock_line
+from skidyn.diagnosis._followed_signals import followed_signals
 from skidyn.diagnosis._hypothesis import (
     UNKNOWN,
     Hypothesis,
@@ -26,7 +27,6 @@ from skidyn.diagnosis._hypothesis import (
 )
 from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
 from skidyn.diagnosis._screen import Screen
-from skidyn.diagnosis._screened import followed_signals
 from skidyn.diagnosis._spectrum import find_lines
 from skidyn.diagnosis._split import split_effects, trajectory_offsets
 from skidyn.effects import Term, get_effect

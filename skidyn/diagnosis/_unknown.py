@@ -182,7 +182,7 @@ def _shape(
     index: NDArray[np.int64] = np.zeros(len(columns), dtype=np.int64)
     edges = []
     for name in drawn:
-        x = _signal(problem, name)[use]
+        x = problem.signals.named(name)[use]
         low, high = np.quantile(x, [0.005, 0.995])
         cuts = np.linspace(low, high, n_bins + 1)
         edges.append(cuts)
@@ -208,13 +208,3 @@ def _shape(
         "low": grid(value - 1.96 * spread),
         "high": grid(value + 1.96 * spread),
     }
-
-
-def _signal(problem: Problem, name: str) -> Array:
-    s = problem.signals
-    if name == "time":
-        return s.clock
-    kind = name.rstrip("0123456789")
-    table = s.temperature if kind == "temp" else getattr(s, kind)
-    assert table is not None
-    return np.asarray(table[:, int(name[len(kind) :]) - 1])

@@ -74,13 +74,10 @@ def row_signals(problem: Problem, joint: int) -> dict[str, Array]:
         One column each, two for the joint's own velocity: with its direction.
     """
     averaged = averaged_signals(problem, joint)
-    direction = problem.signals.sign
-    rows = {}
-    for name, x in averaged.items():
-        rows[name] = x[:, None]
-        if name.startswith("dq"):
-            sign = average_at_rows(problem, joint, direction[:, int(name[2:]) - 1])
-            rows[name] = np.column_stack([x, sign])
+    direction = average_at_rows(problem, joint, problem.signals.sign)
+    rows = {name: x[:, None] for name, x in averaged.items()}
+    for k in range(problem.n_joints):
+        rows[f"dq{k + 1}"] = np.column_stack([averaged[f"dq{k + 1}"], direction[:, k]])
     scaled = {}
     for name, x in rows.items():
         spread = x.std(0)
@@ -113,7 +110,8 @@ def averaged_signals(problem: Problem, joint: int) -> dict[str, Array]:
     }
     if s.temperature is not None:
         columns[f"temp{joint + 1}"] = s.temperature[:, joint]
-    return {name: average_at_rows(problem, joint, x) for name, x in columns.items()}
+    averages = average_at_rows(problem, joint, np.column_stack(list(columns.values())))
+    return dict(zip(columns, averages.T, strict=True))
 
 
 def row_weights(problem: Problem, joint: int) -> Array:
@@ -122,8 +120,9 @@ def row_weights(problem: Problem, joint: int) -> Array:
 
 
 def average_at_rows(problem: Problem, joint: int, values: Array) -> Array:
-    """Weighted mean of a signal at every row of a joint."""
-    return np.asarray(problem.rows.average(values, joint) / row_weights(problem, joint))
+    """Weighted means of signals, (n_samples,) or (n_samples, k), at every row of a joint."""
+    weights = row_weights(problem, joint)
+    return np.asarray((problem.rows.average(values, joint).T / weights).T)
 
 
 def depends_on(
@@ -199,18 +198,7 @@ def depends_on(
 
 
 def _p_value(worse: Array, better: Array) -> float:
-    """Chance of such errors, fold by fold, if the second were no better than the first.
-
-    Parameters
-    ----------
-    worse, better : ndarray of shape (n_folds,)
-        Squared errors of the folds.
-
-    Returns
-    -------
-    float
-        Of a one-sided paired t-test of the logarithm of their ratio.
-    """
+    """Chance of such errors, fold by fold, if the second were no better than the first."""
     ratio = np.log(np.maximum(worse, 1e-300) / np.maximum(better, 1e-300))
     if np.ptp(ratio) == 0:
         return 1.0

@@ -228,7 +228,7 @@ class FunctionOfSignals(NamelessEffect):
         dict
         """
         low, high = zip(
-            *(_supported_range(signals, _named(signals, name)[0]) for name in names), strict=True
+            *(_supported_range(signals, signals.named(name)) for name in names), strict=True
         )
         return {"of": tuple(names), "low": low, "high": high}
 
@@ -236,8 +236,8 @@ class FunctionOfSignals(NamelessEffect):
         n = len(self.coefficients)
         parts = []
         for name, low, high in zip(shape["of"], shape["low"], shape["high"], strict=True):
-            x, sign = _named(signals, name)
-            parts.append(_ordered_functions(x, sign, low, high))
+            sign = signals.sign[:, int(name[2:]) - 1] if name.startswith("dq") else None
+            parts.append(_ordered_functions(signals.named(name), sign, low, high))
         orders = [range(p.shape[1]) for p in parts]
         chosen = sorted(itertools.product(*orders), key=lambda powers: (sum(powers), powers))
         return np.column_stack(
@@ -258,14 +258,6 @@ def _supported_range(signals: Signals, x: Array) -> tuple[float, float]:
     at = min(_REACHING, (len(ends) + 1) // 2) - 1
     low, high = float(ends[at, 0]), float(ends[-1 - at, 1])
     return (low, high) if high > low else (float(ends[0, 0]), float(ends[-1, 1]))
-
-
-def _named(signals: Signals, name: str) -> tuple[Array, Array | None]:
-    """A signal by its name, and its direction if it is a velocity."""
-    kind = name.rstrip("0123456789")
-    joint = int(name[len(kind) :]) - 1
-    table: Array = getattr(signals, {"temp": "temperature"}.get(kind, kind))
-    return table[:, joint], signals.sign[:, joint] if kind == "dq" else None
 
 
 def _ordered_functions(x: Array, sign: Array | None, low: float, high: float) -> Array:

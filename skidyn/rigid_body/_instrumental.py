@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import t as student_t
 
+from skidyn._columns import with_columns
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Array, Signals
 from skidyn.evidence._folded import left_out_coefficients
@@ -179,8 +180,4 @@ def repetition_instruments(X: Any, trajectory: str = "trajectory") -> Any:
     others = (stacked.sum(0) - stacked) / (len(runs) - 1)
     for rows, mean in zip(runs, others, strict=True):
         values[rows] = mean
-    columns = dict(zip(names, values.T, strict=True))
-    if hasattr(X, "assign"):
-        return X.assign(**columns)
-    frame = type(X)(columns)
-    return X.with_columns([frame[name] for name in names])
+    return with_columns(X, dict(zip(names, values.T, strict=True)))

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline
 
-from skidyn._columns import Columns, resolve_columns
+from skidyn._columns import Columns, resolve_columns, with_columns
 from skidyn._exceptions import ColumnError, SkidynError
 from skidyn._signals import Array, find_segments
 from skidyn.export._model import name_term, static_model
@@ -235,8 +235,4 @@ def _replaced(reference: Any, names: list[str], columns: Columns, simulated: Arr
     q, dq = ([names[k] for k in places] for places in (columns.q, columns.dq))
     ddq = ["d" + name for name in dq] if columns.ddq is None else [names[k] for k in columns.ddq]
     values = np.concatenate(simulated, axis=1).T
-    new = dict(zip([*q, *dq, *ddq], values, strict=True))
-    if hasattr(reference, "assign"):
-        return reference.assign(**new)
-    frame = type(reference)(new)
-    return reference.with_columns([frame[name] for name in new])
+    return with_columns(reference, dict(zip([*q, *dq, *ddq], values, strict=True)))

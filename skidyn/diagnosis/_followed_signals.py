@@ -15,6 +15,7 @@ References
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ from scipy.stats import ttest_1samp
 from sklearn.ensemble import HistGradientBoostingRegressor
 
 from skidyn._signals import Array
-from skidyn.diagnosis._proposal import errors_with_each
+from skidyn.diagnosis._proposal import pursue
 from skidyn.diagnosis._variables import average_at_rows, averaged_signals
 from skidyn.evidence._problem import Problem
 
@@ -116,18 +117,16 @@ def _by_products(
     columns = np.column_stack([*simple, *(simple[i] * simple[k] for i, k in pairs)])
     of = [{name} for name in names] + [{names[i], names[k]} for i, k in pairs]
     columns = (columns - columns.mean(0)) / np.maximum(columns.std(0), 1e-300)
-    chosen: list[int] = []
-    used: set[str] = set()
-    reached = float(y @ y)
-    while True:
-        errors = errors_with_each(columns, chosen, y, fold, int(fold.max()) + 1)
-        errors[[len(used | o) > MOST_SIGNALS for o in of]] = np.inf
-        best = int(np.argmin(errors))
-        if reached - errors[best] < WORTH * float(y @ y):
-            break
-        chosen.append(best)
-        used |= of[best]
-        reached = float(errors[best])
+
+    def together(chosen: Sequence[int]) -> set[str]:
+        return set().union(*(of[i] for i in chosen))
+
+    def admissible(chosen: Sequence[int]) -> NDArray[np.bool_]:
+        used = together(chosen)
+        return np.array([len(used | o) <= MOST_SIGNALS for o in of])
+
+    worth = WORTH * float(y @ y)
+    chosen, _ = pursue(columns, y, fold, worth=worth, longest=len(of), admissible=admissible)
     if not chosen:
         return []
     left = np.zeros(len(y))
@@ -137,7 +136,7 @@ def _by_products(
         left[out] = (y[out] - columns[out][:, chosen] @ weights) ** 2
     if not _predictable(y, left, fold):
         return []
-    return [tuple(sorted(of[chosen[0]])), tuple(sorted(used))]
+    return [tuple(sorted(of[chosen[0]])), tuple(sorted(together(chosen)))]
 
 
 def _simple_functions(name: str, x: Array) -> list[Array]:
