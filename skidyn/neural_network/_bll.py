@@ -171,8 +171,11 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         """
         member = LSTMRegressor(
             window=10,
+            stride=8,
             hidden_size=32,
             learning_rate=0.01,
+            weight_decay=0.0,
+            betas=(0.9, 0.999),
             max_epochs=130,
             batch_size=32,
             per_joint=True,

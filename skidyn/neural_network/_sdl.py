@@ -80,9 +80,9 @@ class SDLRegressor(SequenceRegressor):
     residual : bool, default=True
         Add the physical torque to the network's output, so that the network learns what is
         missing. False is the paper's architecture, which only reads it.
-    window : int, default=32
+    window : int, default=4
         Rows of history.
-    stride : int, default=8
+    stride : int, default=4
         Rows predicted at once.
     hidden_size : int, default=32
         Cells of the LSTM.
@@ -92,17 +92,16 @@ class SDLRegressor(SequenceRegressor):
         Share of the fully connected layer's outputs dropped in training.
     max_epochs : int, default=100
         Passes over the log.
-    learning_rate : float, default=0.01
+    learning_rate : float, default=0.03
         First step size of Adam, which falls to zero along a cosine unless `early_stopping` is on; a
         tenth of it for the coefficients of the physics.
-    weight_decay : float, default=0.0
-        Every step shrinks the network's weights by this share of the step size (AdamW). With few
-        trajectories a value near 0.1 keeps a network from learning joints as functions of other
-        joints.
-    betas : tuple of two float, default=(0.9, 0.999)
+    weight_decay : float, default=0.05
+        Every step shrinks the network's weights by this share of the step size (AdamW), which
+        keeps a network from learning joints as functions of other joints. 0 is plain Adam.
+    betas : tuple of two float, default=(0.8, 0.95)
         How much Adam keeps of its averages of the gradient and of its square from step to step.
-        Few steps want shorter averages, such as ``(0.8, 0.95)``.
-    batch_size : int, default=16
+        torch's own ``(0.9, 0.999)`` want more steps than a log of minutes gives.
+    batch_size : int, default=32
         Pieces per step.
     scaling : {"standard", "minmax"}, default="standard"
         Scaling of inputs and outputs; ``"minmax"`` is the paper's and learns far more slowly.
@@ -184,16 +183,16 @@ class SDLRegressor(SequenceRegressor):
         *,
         rigid_body: str = "joint",
         residual: bool = True,
-        window: int = 32,
-        stride: int = 8,
+        window: int = 4,
+        stride: int = 4,
         hidden_size: int = 32,
         dense_size: int = 32,
         dropout: float = 0.1,
         max_epochs: int = 100,
-        learning_rate: float = 0.01,
-        weight_decay: float = 0.0,
-        betas: tuple[float, float] = (0.9, 0.999),
-        batch_size: int = 16,
+        learning_rate: float = 0.03,
+        weight_decay: float = 0.05,
+        betas: tuple[float, float] = (0.8, 0.95),
+        batch_size: int = 32,
         scaling: str = "standard",
         early_stopping: bool = False,
         validation_fraction: float = 0.1,
