@@ -75,7 +75,7 @@ def read_log(
         Sampling rate of logs without a time column.
     resample_rate : float, Hz, optional
         Rate of a regular clock; None takes the recorded one, that of the positions where signals of
-        one file have several.
+        one file have several. Signals that are faster are averaged over one step of it.
     missing : {"error", "drop"}, default="error"
         Rows with NaN or infinite values: refuse the log, or leave them out with a warning.
     split_gaps : float, s, "auto" or None, default="auto"

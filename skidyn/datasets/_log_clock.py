@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+#: A clock whose step is longer than so many of a channel's is slower.
+SLOWER = 1.75
+
+
 def seconds(table: pd.DataFrame, rate: float | None, source: str) -> np.ndarray:
     """Clock of a table as float64: its time column, or row number over rate.
 
@@ -184,36 +188,92 @@ def _resampled(table: pd.DataFrame, rate: float, notes: list[str]) -> pd.DataFra
     if not parts:
         raise LogError("no two samples of the log belong together, so it cannot be resampled.")
     alone = f"; {lonely} row(s) that stand alone left out" if lonely else ""
-    notes.append(f"interpolated to {rate:g} Hz within {len(parts)} run(s) without a gap{alone}")
+    slower = np.median(np.diff(time)) * rate * SLOWER < 1
+    how = "averaged" if slower else "interpolated"
+    notes.append(f"{how} to {rate:g} Hz within {len(parts)} run(s) without a gap{alone}")
     regular: pd.DataFrame = pandas.concat(parts, ignore_index=True)
     return regular
 
 
-def _in_gap(time: np.ndarray, clock: np.ndarray) -> np.ndarray:
-    """Which times of a clock lie in a gap of a channel."""
+def _gaps(time: np.ndarray) -> np.ndarray:
+    """Which steps of a channel's clock are gaps."""
     steps = np.diff(time)
     moving = steps[steps > 0]
     if not len(moving):
+        return np.zeros(len(steps), dtype=bool)
+    return np.asarray(steps > GAP_STEPS * np.median(moving))
+
+
+def _in_gap(time: np.ndarray, clock: np.ndarray) -> np.ndarray:
+    """Which times of a clock lie in a gap of a channel."""
+    gaps = _gaps(time)
+    if not gaps.any():
         return np.zeros(len(clock), dtype=bool)
-    longest = GAP_STEPS * float(np.median(moving))
     right = np.clip(np.searchsorted(time, clock), 1, len(time) - 1)
     near = np.minimum(np.abs(clock - time[right]), np.abs(clock - time[right - 1]))
-    return np.asarray((steps[right - 1] > longest) & (near > 1e-6 * longest))
+    shortest = float(np.diff(time)[gaps].min())
+    return np.asarray(gaps[right - 1] & (near > 1e-6 * shortest))
 
 
 def _interpolate(table: pd.DataFrame, clock: np.ndarray) -> pd.DataFrame:
-    """Columns of a channel at other times; numbers of trajectories are not mixed."""
+    """Columns of a channel at other times; numbers of trajectories are not mixed.
+
+    On a slower clock a value is the mean over one of its steps: single samples would carry noise
+    and vibration that are faster than the clock, and look slow there.
+    """
     pandas = import_optional("pandas", extra="io")
     time = table["time"].to_numpy()
     before = np.clip(np.searchsorted(time, clock, side="right") - 1, 0, len(time) - 1)
+    half = _half_step(time, clock)
     columns = {}
     for name in table.columns:
         if name == "trajectory":
             columns[name] = table[name].to_numpy()[before]
         elif name != "time":
-            columns[name] = np.interp(clock, time, table[name].to_numpy(dtype=float))
+            values = table[name].to_numpy(dtype=float)
+            columns[name] = np.interp(clock, time, values)
+            if half is not None:
+                wide = half > 0
+                columns[name][wide] = _mean_around(time, values, clock[wide], half[wide])
     then: pd.DataFrame = pandas.DataFrame(columns)
     return then
+
+
+def _half_step(time: np.ndarray, clock: np.ndarray) -> np.ndarray | None:
+    """Half the span to average over, short of ends and gaps; None unless the clock is slower."""
+    if len(clock) < 2 or len(time) < 2:
+        return None
+    step = float(np.median(np.diff(clock)))
+    if not step > SLOWER * float(np.median(np.diff(time))):
+        return None
+    edges = np.flatnonzero(_gaps(time))
+    begins, ends = time[np.r_[0, edges + 1]], time[np.r_[edges, len(time) - 1]]
+    part = np.clip(np.searchsorted(begins, clock, side="right") - 1, 0, None)
+    room = np.minimum(clock - begins[part], ends[part] - clock)
+    half: np.ndarray = np.clip(room, 0.0, 0.5 * step)
+    return half
+
+
+def _mean_around(
+    time: np.ndarray, values: np.ndarray, clock: np.ndarray, half: np.ndarray
+) -> np.ndarray:
+    """Mean of the line through the samples over ``clock - half`` to ``clock + half``."""
+    missing = ~np.isfinite(values)
+    line = np.where(missing, 0.0, values)
+    steps = np.diff(time)
+    area = np.r_[0.0, np.cumsum(steps * (line[1:] + line[:-1]) / 2)]
+    slope = np.divide(np.diff(line), steps, out=np.zeros(len(steps)), where=steps > 0)
+
+    def until(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        k = np.clip(np.searchsorted(time, t, side="right") - 1, 0, len(steps) - 1)
+        on = t - time[k]
+        return k, area[k] + on * (line[k] + on * slope[k] / 2)
+
+    (first, low), (last, high) = until(clock - half), until(clock + half)
+    mean = (high - low) / (2 * half)
+    count = np.r_[0, np.cumsum(missing)]
+    touched = count[np.minimum(last + 2, len(values))] > count[first]
+    return np.where(touched, np.nan, mean)
 
 
 def split_at_restarts(time: np.ndarray) -> tuple[np.ndarray, int]:

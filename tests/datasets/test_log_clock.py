@@ -65,6 +65,35 @@ def test_resampling_does_not_fill_a_gap():
     assert notes[0].endswith("1 row(s) that stand alone left out")
 
 
+def test_a_slower_clock_averages_vibration_away():
+    t = np.arange(0, 2, 0.001)
+    vibration = np.sin(2 * np.pi * 260 * t)  # single samples at 50 Hz would show 10 Hz
+    table = pd.DataFrame({"time": t, "q1": t**2 + vibration})
+    notes = []
+    slow = align_channels([table], ["a"], 50.0, notes)
+    inside = slow.iloc[1:-1]
+    np.testing.assert_allclose(inside["q1"], inside["time"] ** 2, atol=0.07)
+    assert notes == ["averaged to 50 Hz within 1 run(s) without a gap"]
+    other = pd.DataFrame({"time": t, "tau1": 3 * t + vibration})
+    positions = pd.DataFrame({"time": np.arange(0.004, 2, 0.02), "q1": 1.0})
+    both = align_channels([positions, other], ["a", "b"], None, []).iloc[1:-1]
+    np.testing.assert_allclose(both["tau1"], 3 * both["time"], atol=0.07)
+
+
+def test_a_mean_reaches_into_no_gap_and_over_no_missing_value():
+    t = np.r_[np.arange(0, 1, 0.01), np.arange(3, 4, 0.01)]
+    tau = np.where(t < 2, 1.0, 5.0)
+    tau[40] = np.nan
+    channel = pd.DataFrame({"time": t, "tau1": tau})
+    positions = pd.DataFrame({"time": np.arange(0, 4, 0.05), "q1": 1.0})
+    both = align_channels([positions, channel], ["a", "b"], None, [])
+    early = both["time"] < 2
+    missing = np.isnan(both["tau1"])
+    np.testing.assert_allclose(both["time"][missing], 0.4)
+    np.testing.assert_allclose(both["tau1"][early & ~missing], 1)
+    np.testing.assert_allclose(both["tau1"][~early], 5)
+
+
 def test_channels_whose_clock_starts_anew_cannot_be_brought_together():
     fast = pd.DataFrame({"time": np.tile(np.arange(5) / 10, 2), "q1": 0.0})
     slow = pd.DataFrame({"time": np.arange(3) / 5, "tau1": 0.0})
