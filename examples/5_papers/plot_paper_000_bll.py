@@ -70,7 +70,7 @@ for name, model in forecasters.items():
 
 # %%
 # **Modelling.** The torque from the motion, trajectories held out.
-member = LSTMRegressor(window=20, max_epochs=epochs)
+member = LSTMRegressor(max_epochs=epochs)
 models = {
     "model: physics": physics,
     "model: physics + BLL": HybridRegressor(

@@ -44,7 +44,7 @@ X, y = record(6 if small else 15, 2.0)
 tests = {"same speeds": record(5, 2.0, 100), "three times as fast": record(5, 6.0, 200)}
 
 # %%
-settings = {"window": 10, "max_epochs": 8 if small else 40, "random_state": 0}
+settings = {"max_epochs": 8 if small else 40, "random_state": 0}
 models = {
     "NDL": NDLRegressor(**settings),
     "SDL as in the paper": SDLRegressor(robot, residual=False, **settings),

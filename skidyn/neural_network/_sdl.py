@@ -344,7 +344,11 @@ class SDLRegressor(SequenceRegressor):
         )
 
     def rigid_body_torque(self, X: Any) -> Array:
-        """Torque of the physics with the learned coefficients.
+        """Torque of the physics, which the prediction falls back on.
+
+        Its coefficients are the learned ones, ``coef_``. With ``residual=False`` nothing but the
+        network reads the learned torque, which may then be far from one: there they are the
+        least-squares ones, ``initial_coef_``.
 
         Parameters
         ----------
@@ -354,11 +358,12 @@ class SDLRegressor(SequenceRegressor):
         Returns
         -------
         torque : ndarray of shape (n_samples,) or (n_samples, n_joints), N m (N if prismatic)
-            What the prediction falls back on far from the training samples.
+            Prediction far from the training samples.
         """
         check_is_fitted(self)
-        torque = self._rigid_body(validate_data(self, X, reset=False, dtype=np.float64))
-        return torque[:, 0] if self._one_dimensional else torque
+        _, torque = self._rigid_body(validate_data(self, X, reset=False, dtype=np.float64))
+        own: Array = torque[:, 0] if self._one_dimensional else torque
+        return own
 
     def outside_range(self, X: Any) -> NDArray[np.bool_]:
         """Which samples lie outside the range of the training samples.
@@ -382,15 +387,17 @@ class SDLRegressor(SequenceRegressor):
         return distances(features, self._scale, self._reference) / self.radius_
 
     def _rigid_body(self, X: Array) -> Array:
+        """Torque that the network reads, and torque that the prediction falls back on."""
         physics = self._read(self.physics_)
-        torque = physics.torque(X)
+        coefficients = np.stack([self.coef_, self.coef_ if self.residual else self.initial_coef_])
+        torque: Array = np.stack([physics.torque(X)] * 2)
         for part, columns in physics.columns(X):
-            torque[part] += np.einsum("jpc,p->cj", columns, self.coef_)
+            torque[:, part] += np.einsum("jpc,kp->kcj", columns, coefficients, optimize=True)
         return torque
 
     def _output(self, X: Array) -> Array:
         keys = self._keys()
-        features, rigid_body = self._inputs(X, keys), self._rigid_body(X)
+        features, (rigid_body, last_resort) = self._inputs(X, keys), self._rigid_body(X)
         scaled = np.c_[
             (features - self.input_offset_) / self.input_scale_,
             (rigid_body - self.output_offset_) / self.output_scale_,
@@ -403,4 +410,5 @@ class SDLRegressor(SequenceRegressor):
         else:
             torque = output * self.output_scale_ + self.output_offset_
         kept = fade(self._novelty(features))[:, None]
-        return kept * torque + (1 - kept) * rigid_body
+        prediction: Array = kept * torque + (1 - kept) * last_resort
+        return prediction
