@@ -182,7 +182,7 @@ class ELMCommittee(RegressorMixin, BaseEstimator):
         inputs = X[:, list(self._keys().features)]
         targets = y.reshape(len(y), -1)
         if first:
-            self._start(inputs, targets.shape[1], y.ndim == 1, weight)
+            self._start(inputs, targets, y.ndim == 1, weight)
         elif targets.shape[1] != self.coef_.shape[2]:
             raise ValueError(
                 f"y has {targets.shape[1]} outputs; the rows learned before had "
@@ -196,9 +196,10 @@ class ELMCommittee(RegressorMixin, BaseEstimator):
         )
         return self
 
-    def _start(self, inputs: Array, n_outputs: int, one_dimensional: bool, weight: Array) -> None:
+    def _start(self, inputs: Array, targets: Array, one_dimensional: bool, weight: Array) -> None:
         rng = check_random_state(self.random_state)
         n_inputs, members, size = inputs.shape[1], self.n_estimators, self.n_hidden
+        n_outputs = targets.shape[1]
         if self.scaling is None:
             self._offset, self._scale = np.zeros(n_inputs), np.ones(n_inputs)
         else:
@@ -209,32 +210,36 @@ class ELMCommittee(RegressorMixin, BaseEstimator):
         self.intercept_ = np.zeros((members, n_outputs))
         self.n_samples_seen_ = 0.0
         self._one_dimensional = one_dimensional
-        # weighted sums of h h', h t', h and t over all rows seen; h: activations, t: targets
-        self._hh = np.zeros((members, size, size))
-        self._ht = np.zeros((members, size, n_outputs))
-        self._h = np.zeros((members, size))
-        self._t = np.zeros((members, n_outputs))
+        # near the targets' mean, so that single precision loses nothing to a large offset
+        self._origin = np.average(targets, axis=0, weights=weight)
+        # weighted sums of products of [h, 1, t] over all rows seen; h: activations, t: targets
+        self._moments = np.zeros((members, *2 * (size + 1 + n_outputs,)))
 
     def _learn_member(self, k: int, scaled: Array, targets: Array, weight: Array) -> None:
         """Add the moments of new rows, then solve for the output layer."""
+        size = self.n_hidden
+        weights = self._hidden_weights(k, scaled.dtype)
+        table = np.ones((min(CHUNK, len(scaled)), len(self._moments[k])), dtype=scaled.dtype)
+        weighted = (weight != 1).any()
         for i in range(0, len(scaled), CHUNK):
             rows = slice(i, i + CHUNK)
-            root = np.sqrt(weight[rows, None]).astype(scaled.dtype)
-            h = self._hidden(k, scaled[rows]) * root
-            t = targets[rows] * root
-            self._hh[k] += h.T @ h
-            self._ht[k] += h.T.astype(np.float64) @ t
-            self._h[k] += (h * root).sum(axis=0, dtype=np.float64)
-            self._t[k] += (t * root).sum(axis=0)
+            part = table[: len(scaled[rows])]
+            np.maximum(scaled[rows] @ weights, 0, out=part[:, :size])
+            part[:, size] = 1
+            part[:, size + 1 :] = targets[rows] - self._origin
+            if weighted:
+                part *= np.sqrt(weight[rows, None])
+            self._moments[k] += part.T @ part
         n = self.n_samples_seen_
-        h_mean, t_mean = self._h[k] / n, self._t[k] / n
-        covariance = self._hh[k] / n - np.outer(h_mean, h_mean)
+        moments = self._moments[k] / n
+        h_mean, t_mean = moments[:size, size], moments[size, size + 1 :]
+        covariance = moments[:size, :size] - np.outer(h_mean, h_mean)
         # the share of the trace only keeps the factorisation possible where p = 1
         ridge = (1 - self.p) / self.p + 1e-10 * np.trace(covariance)
         covariance[np.diag_indices_from(covariance)] += max(ridge, np.finfo(float).tiny)
-        cross = self._ht[k] / n - np.outer(h_mean, t_mean)
+        cross = moments[:size, size + 1 :] - np.outer(h_mean, t_mean)
         self.coef_[k] = linalg.solve(covariance, cross, assume_a="pos")
-        self.intercept_[k] = t_mean - h_mean @ self.coef_[k]
+        self.intercept_[k] = self._origin + t_mean - h_mean @ self.coef_[k]
 
     def predict(self, X: Any, return_std: bool = False) -> Any:
         """Predict the torque as the mean of the members.
@@ -266,21 +271,24 @@ class ELMCommittee(RegressorMixin, BaseEstimator):
         return (members.mean(axis=0), members.std(axis=0)) if return_std else members.mean(axis=0)
 
     def _predict_member(self, k: int, scaled: Array) -> Array:
-        coef = self.coef_[k].astype(scaled.dtype)
+        coef, weights = self.coef_[k].astype(scaled.dtype), self._hidden_weights(k, scaled.dtype)
         parts = [
-            self._hidden(k, scaled[i : i + CHUNK]) @ coef for i in range(0, len(scaled), CHUNK)
+            np.maximum(scaled[i : i + CHUNK] @ weights, 0) @ coef
+            for i in range(0, len(scaled), CHUNK)
         ]
         output: Array = np.concatenate(parts).astype(np.float64) + self.intercept_[k]
         return output
 
-    def _hidden(self, k: int, scaled: Array) -> Array:
-        h: Array = scaled @ self.hidden_weights_[k].astype(scaled.dtype)
-        h += self.hidden_bias_[k].astype(scaled.dtype)
-        return np.maximum(h, 0, out=h)
+    def _hidden_weights(self, k: int, dtype: Any) -> Array:
+        """Weights of the scaled inputs and, last, of the constant."""
+        weights: Array = np.vstack([self.hidden_weights_[k], self.hidden_bias_[k]]).astype(dtype)
+        return weights
 
     def _scaled(self, inputs: Array) -> Array:
+        """Scaled inputs and, last, a constant."""
         dtype = np.float32 if self.p <= LARGEST_SINGLE_PRECISION_P else np.float64
-        return ((inputs - self._offset) / self._scale).astype(dtype)
+        scaled = (inputs - self._offset) / self._scale
+        return np.c_[scaled, np.ones(len(scaled))].astype(dtype)
 
     def _keys(self) -> Keys:
         names = getattr(self, "feature_names_in_", None)
