@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,7 +17,9 @@ from sklearn.model_selection import PredefinedSplit
 
 from skidyn._columns import resolve_columns
 from skidyn._signals import Signals, signals_from
-from skidyn.diagnosis import EffectSearchCV, Settings
+from skidyn.diagnosis import EffectSearchCV
+from skidyn.evidence._problem import hysteresis_joints
+from skidyn.evidence._rows import sliding_samples
 from skidyn.model_selection import PhaseKFold, TrajectoryKFold
 from skidyn.model_selection._split import held_out_folds
 from skidyn.neural_network._physics import effect_columns
@@ -24,10 +27,10 @@ from skidyn.preprocessing import ButterworthFilter, TimeDerivative
 from skidyn.rigid_body import RBDRegressor
 from skidyn.robots import Robot
 
-#: The diagnosis may add so many kinds of effects, one after the other.
-MAX_FINDINGS = 8
 #: Seconds at both ends of a recording that no one is judged on: the filters need them.
 END = 0.2
+#: Seconds around rest and reversals that joints without hysteresis are not fitted to.
+SLIDING_MARGIN = 0.1
 
 
 @dataclass(eq=False)
@@ -126,6 +129,17 @@ class RecordedLog:
         effects = [np.concatenate(blocks, axis=1) for blocks in own]
         return ColumnPhysics(self.cache["rigid", cutoff], effects)
 
+    def sliding(self, model: RBDRegressor, cutoff: float) -> NDArray[np.bool_]:
+        """Rows of X where every joint slides, or all where the model knows its hysteresis."""
+        if ("sliding", cutoff) not in self.cache:
+            s = self.motion(cutoff)
+            margin = round(SLIDING_MARGIN * self.rate)
+            sliding = sliding_samples(s, np.ones(s.q.shape, dtype=bool), margin)
+            self.cache["sliding", cutoff] = sliding[self.kept]
+        used: NDArray[np.bool_] = self.cache["sliding", cutoff].copy()
+        used[:, hysteresis_joints(model.effect_terms_)] = True
+        return used
+
     def inner_folds(self, train: NDArray[np.int64]) -> list[Any]:
         """Folds within training rows, as row numbers of X."""
         X = self.X.iloc[train]
@@ -135,19 +149,33 @@ class RecordedLog:
             folds = held_out_folds(X["trajectory"].to_numpy(), self.inner)
         return [(train[a], train[b]) for a, b in folds]
 
-    def choose_motion(self, train: NDArray[np.int64]) -> float:
-        """Cut-off of the motion, Hz, with which the plain physics predicts inner folds best."""
+    def inner_errors(
+        self, model: RBDRegressor, train: NDArray[np.int64], cutoff: float, rest: bool
+    ) -> Array:
+        """Log of the squared error on every inner fold, mean over the joints."""
+        physics, errors = self.columns(model, cutoff), []
+        physics.used = None if rest else self.sliding(model, cutoff)
+        for a, b in self.inner_folds(train):
+            physics.fit(self.X.iloc[a], self.y[a])
+            squares = (self.y[b] - physics.predict(self.X.iloc[b])) ** 2
+            errors.append(np.log(squares.mean(axis=0)).mean())
+        return np.array(errors)
+
+    def choose(
+        self, unfitted: RBDRegressor, train: NDArray[np.int64], cutoffs: Sequence[float]
+    ) -> tuple[float, bool]:
+        """Cut-off of the motion, Hz, and whether rest is fitted: what predicts inner folds best.
+
+        At rest dry friction takes any value up to that of sliding. A stiff model comes closer to
+        all rows if it saw all; a flexible one reads more into rest than there is. Rest is left out
+        only if that is better by two standard errors.
+        """
         rows = self.raw_rows(self.X.iloc[train])
-        model = RBDRegressor(self.robot, self.effects)
-        model.fit(self.raw.iloc[rows], self.raw_torque[rows])
-        errors = {}
-        for cutoff in (self.cutoff, min(3 * self.cutoff, 30.0, 0.4 * self.rate)):
-            physics, squares = self.columns(model, cutoff), []
-            for a, b in self.inner_folds(train):
-                physics.fit(self.X.iloc[a], self.y[a])
-                squares.append((self.y[b] - physics.predict(self.X.iloc[b])) ** 2)
-            errors[cutoff] = np.log(np.concatenate(squares).mean(axis=0)).mean()
-        return min(errors, key=lambda cutoff: errors[cutoff])
+        model = clone(unfitted).fit(self.raw.iloc[rows], self.raw_torque[rows])
+        errors = {cutoff: self.inner_errors(model, train, cutoff, True) for cutoff in cutoffs}
+        best = min(cutoffs, key=lambda cutoff: errors[cutoff].mean())
+        gain = errors[best] - self.inner_errors(model, train, best, False)
+        return best, bool(gain.mean() <= 2 * gain.std(ddof=1) / np.sqrt(len(gain)))
 
     def units(self) -> NDArray[Any]:
         """What counts as independent: recordings, blocks, or the outer folds of a single path."""
@@ -166,15 +194,20 @@ class RecordedLog:
 
         Cut-off of the motion, effects and their shapes are found on training rows alone.
         """
-        cutoff = self.choose_motion(train)
+        fastest = min(3 * self.cutoff, 30.0, 0.4 * self.rate)
         plain = RBDRegressor(self.robot, self.effects)
+        cutoff, rest = self.choose(plain, train, (self.cutoff, fastest))
         rows = self.raw_rows(self.X.iloc[train])
-        search = EffectSearchCV(plain, settings=Settings(max_findings=MAX_FINDINGS))
-        search.fit(self.raw.iloc[rows], self.raw_torque[rows])
+        search = EffectSearchCV(plain).fit(self.raw.iloc[rows], self.raw_torque[rows])
         added = [f"motion below {cutoff:.3g} Hz"]
         added += [f"{f.kind} {list(f.joints)}" for f in search.diagnosis_.findings]
-        completed = LowPassedPhysics(self, search.best_estimator_, cutoff)
-        return LowPassedPhysics(self, plain, cutoff), completed, added
+        completed = search.best_estimator_
+        _, rest_too = self.choose(completed, train, (cutoff,))
+        return (
+            LowPassedPhysics(self, plain, cutoff, rest),
+            LowPassedPhysics(self, completed, cutoff, rest_too),
+            added,
+        )
 
 
 class LowPassedPhysics(RegressorMixin, BaseEstimator):
@@ -193,23 +226,28 @@ class LowPassedPhysics(RegressorMixin, BaseEstimator):
         Not fitted.
     cutoff : float, Hz
         Low-pass of the motion that the columns see.
+    rest : bool
+        Fit joints without hysteresis to rest and reversals as well.
     """
 
-    def __init__(self, log: RecordedLog, model: RBDRegressor, cutoff: float) -> None:
+    def __init__(self, log: RecordedLog, model: RBDRegressor, cutoff: float, rest: bool) -> None:
         self.log = log
         self.model = model
         self.cutoff = cutoff
+        self.rest = rest
 
     def __sklearn_clone__(self) -> LowPassedPhysics:
-        return LowPassedPhysics(self.log, self.model, self.cutoff)  # the log is not copied
+        return LowPassedPhysics(self.log, self.model, self.cutoff, self.rest)  # no copy of the log
 
     def fit(self, X: pd.DataFrame, y: Array) -> LowPassedPhysics:
         log = self.log
-        key = (id(self.model), self.cutoff, X.index.to_numpy().tobytes())
+        key = (id(self.model), self.cutoff, self.rest, X.index.to_numpy().tobytes())
         if key not in log.cache:  # every learner meets the same physics again
             rows = log.raw_rows(X)
             identified = clone(self.model).fit(log.raw.iloc[rows], log.raw_torque[rows])
-            torque = log.columns(identified, self.cutoff).fit(X, y).predict(log.X)
+            physics = log.columns(identified, self.cutoff)
+            physics.used = None if self.rest else log.sliding(identified, self.cutoff)
+            torque = physics.fit(X, y).predict(log.X)
             log.cache[key] = torque, self.model  # no other model may get its id
         self.torque_ = log.cache[key][0]
         return self

@@ -24,7 +24,7 @@ from collections import defaultdict
 from typing import Any
 
 import numpy as np
-from _common import Array, LinearPhysics, print_table
+from _common import REST, Array, LinearPhysics, print_table
 from _logs import LOGS, RecordedLog
 from sklearn.base import clone
 from sklearn.compose import make_column_transformer
@@ -39,9 +39,6 @@ from skidyn.committee import ELMCommittee
 from skidyn.hybrid import HybridRegressor
 from skidyn.metrics import paired_comparison, rmse_over_range, trajectory_errors
 from skidyn.neural_network import BLLRegressor, LSTMRegressor, SDLRegressor
-
-#: Slower joints count as resting.
-REST = 0.02
 
 
 class ThinnedGaussianProcess(GaussianProcessRegressor):

@@ -91,7 +91,7 @@ def forecasting(epochs: int, members: int) -> None:
     inside = np.flatnonzero((clock >= 9.9) & (clock <= 13.2))
     test = np.sort(np.random.default_rng(0).permutation(inside)[:290])
     train = np.setdiff1d(np.arange(len(table.X)), test)
-    settings = {"window": 10, "max_epochs": epochs, "batch_size": 8, "trajectory": 0}
+    settings = {"window": 10, "max_epochs": epochs, "trajectory": 0}
     lstm = LSTMRegressor(**settings, random_state=0)
     models = {
         "persistence r[t-1]": PersistenceRegressor(trajectory=0),

@@ -12,7 +12,8 @@ two torch threads. Seconds of the processor count all processes; those on the wa
 else runs. Then predictions and the ELM committee.
 
 The naive bag is shown with skorch's default optimiser (SGD, learning rate 0.01), which hardly
-learns in ten epochs, with Adam, and with the weight decay that suits it; ours with its defaults.
+learns in ten epochs, with Adam, and with the weight decay that suits it; ours with its defaults but
+for a row of history less.
 ``--tune`` shows learning rates and weight decays of both sides. It knows nothing of the held-out
 trajectories: each fifth of the training trajectories judges networks that learned the others, in
 three of five folds.
@@ -40,7 +41,7 @@ from skidyn.committee import ELMCommittee
 from skidyn.neural_network import BLLRegressor, LSTMRegressor
 
 HIDDEN = 32
-#: Rows that the naive nets read; ours read 4 to 7 rows of history.
+#: Rows that the naive nets read; ours read 3 to 6 rows of history.
 WINDOW = 32
 #: What --tune finds best for naive nets.
 NAIVE: dict[str, dict[str, Any]] = {
@@ -97,7 +98,7 @@ def lag_matrix(features: NDArray, trajectory: NDArray) -> NDArray:
 
 def ours(members: int, epochs: int, **changes: float) -> BLLRegressor:
     """Our ensemble; what is not named is at its default."""
-    member = LSTMRegressor(hidden_size=HIDDEN, max_epochs=epochs, **changes)
+    member = LSTMRegressor(window=3, hidden_size=HIDDEN, max_epochs=epochs, **changes)
     return BLLRegressor(member, n_estimators=members, trajectory=0, random_state=0)
 
 

@@ -288,7 +288,8 @@ class ELMCommittee(RegressorMixin, BaseEstimator):
         """Scaled inputs and, last, a constant."""
         dtype = np.float32 if self.p <= LARGEST_SINGLE_PRECISION_P else np.float64
         scaled = (inputs - self._offset) / self._scale
-        return np.c_[scaled, np.ones(len(scaled))].astype(dtype)
+        with_constant: Array = np.c_[scaled, np.ones(len(scaled))].astype(dtype)
+        return with_constant
 
     def _keys(self) -> Keys:
         names = getattr(self, "feature_names_in_", None)
