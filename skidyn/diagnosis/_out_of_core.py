@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -248,41 +248,48 @@ def _sample(
     """The trajectories that were drawn, as a table, and their torque."""
     pd = import_optional("pandas", extra="io")
     names: list[str] = []
-    # Filled in place: trajectories are views of decoded blocks of many, so that one kept as it is
-    # keeps its block, and memory grows with the number of files that the sample is drawn from.
     sample = np.empty((0, 0))
     done = number = 0
-    for path, drawn in sources:
-        if not drawn:
-            continue
-        for k, (signals, torque) in enumerate(
-            read_trajectories(path, robot, columns=columns, max_rows=max_rows)
-        ):
-            if k not in drawn:
-                continue
-            if signals.time is None:
-                raise LogError(f"{path}: lacks time, which a diagnosis needs")
-            blocks = {"q": signals.q, "dq": signals.dq, "temp": signals.temperature, "tau": torque}
-            here = ["time", "trajectory"]
-            here += [
-                f"{name}{j + 1}"
-                for name, block in blocks.items()
-                if block is not None
-                for j in range(robot.n_joints)
-            ]
+    for source in sources:
+        for here, values in _drawn_trajectories(source, robot, columns, max_rows):
             if not names:
                 names, sample = here, np.empty((n_rows, len(here)))
             elif names != here:
                 raise LogError(
-                    f"{path}: has {', '.join(here)}, other files have {', '.join(names)}; all need "
-                    "the same columns"
+                    f"{source[0]}: has {', '.join(here)}, other files have {', '.join(names)}; "
+                    "all need the same columns"
                 )
-            end = done + len(torque)
-            sample[done:end, 0], sample[done:end, 1] = signals.time, number
-            sample[done:end, 2:] = np.hstack([b for b in blocks.values() if b is not None])
-            done, number = end, number + 1
+            rows = sample[done : done + len(values)]
+            rows[:], rows[:, 1] = values, number
+            done, number = done + len(values), number + 1
     n_inputs = len(names) - robot.n_joints
     return pd.DataFrame(sample[:, :n_inputs], columns=names[:n_inputs]), sample[:, n_inputs:]
+
+
+def _drawn_trajectories(
+    source: Source, robot: Robot, columns: ColumnMap | None, max_rows: int
+) -> Iterator[tuple[list[str], Array]]:
+    """Columns and values of the trajectories drawn from a file, with their numbers there.
+
+    Trajectories are views of decoded blocks of many. The values are copies: whoever kept a view
+    would keep its block, while the next is decoded or for every file that is drawn from.
+    """
+    path, drawn = source
+    if not drawn:
+        return
+    for k, (signals, torque) in enumerate(
+        read_trajectories(path, robot, columns=columns, max_rows=max_rows)
+    ):
+        if k not in drawn:
+            continue
+        if signals.time is None:
+            raise LogError(f"{path}: lacks time, which a diagnosis needs")
+        tables = {"q": signals.q, "dq": signals.dq, "temp": signals.temperature, "tau": torque}
+        blocks = {name: block for name, block in tables.items() if block is not None}
+        names = [f"{name}{j + 1}" for name in blocks for j in range(robot.n_joints)]
+        number = np.full(len(torque), k)
+        values = np.column_stack([signals.time, number, *blocks.values()])
+        yield ["time", "trajectory", *names], values
 
 
 def _confirm(finding: Finding, evidence: Evidence, tried: bool) -> Confirmation:
