@@ -158,6 +158,10 @@ def align_channels(
         else:
             parts.append(_interpolate(table, rows))
     grid = f"{rate:g} Hz" if rate is not None else names[base]
+    step = float(np.median(np.diff(rows))) if len(rows) > 1 else 0.0
+    faster = [n for t, n in zip(tables, names, strict=True) if _slower(step, t["time"].to_numpy())]
+    if faster:
+        grid += f" ({', '.join(faster)} averaged over its steps)"
     notes.append(
         f"channels {', '.join(names)} interpolated to the clock of {grid}; {int((~common).sum())} "
         f"row(s) outside their common time and {int((common & ~covered).sum())} in gaps left out"
@@ -188,31 +192,22 @@ def _resampled(table: pd.DataFrame, rate: float, notes: list[str]) -> pd.DataFra
     if not parts:
         raise LogError("no two samples of the log belong together, so it cannot be resampled.")
     alone = f"; {lonely} row(s) that stand alone left out" if lonely else ""
-    slower = np.median(np.diff(time)) * rate * SLOWER < 1
-    how = "averaged" if slower else "interpolated"
+    how = "averaged" if _slower(1 / rate, time) else "interpolated"
     notes.append(f"{how} to {rate:g} Hz within {len(parts)} run(s) without a gap{alone}")
     regular: pd.DataFrame = pandas.concat(parts, ignore_index=True)
     return regular
 
 
-def _gaps(time: np.ndarray) -> np.ndarray:
-    """Which steps of a channel's clock are gaps."""
+def _in_gap(time: np.ndarray, clock: np.ndarray) -> np.ndarray:
+    """Which times of a clock lie in a gap of a channel."""
     steps = np.diff(time)
     moving = steps[steps > 0]
     if not len(moving):
-        return np.zeros(len(steps), dtype=bool)
-    return np.asarray(steps > GAP_STEPS * np.median(moving))
-
-
-def _in_gap(time: np.ndarray, clock: np.ndarray) -> np.ndarray:
-    """Which times of a clock lie in a gap of a channel."""
-    gaps = _gaps(time)
-    if not gaps.any():
         return np.zeros(len(clock), dtype=bool)
+    longest = GAP_STEPS * float(np.median(moving))
     right = np.clip(np.searchsorted(time, clock), 1, len(time) - 1)
     near = np.minimum(np.abs(clock - time[right]), np.abs(clock - time[right - 1]))
-    shortest = float(np.diff(time)[gaps].min())
-    return np.asarray(gaps[right - 1] & (near > 1e-6 * shortest))
+    return np.asarray((steps[right - 1] > longest) & (near > 1e-6 * longest))
 
 
 def _interpolate(table: pd.DataFrame, clock: np.ndarray) -> pd.DataFrame:
@@ -239,17 +234,21 @@ def _interpolate(table: pd.DataFrame, clock: np.ndarray) -> pd.DataFrame:
     return then
 
 
+def _slower(step: float, time: np.ndarray) -> bool:
+    """Whether a clock of such steps is slower than that of a channel."""
+    return len(time) > 1 and step > SLOWER * float(np.median(np.diff(time)))
+
+
 def _half_step(time: np.ndarray, clock: np.ndarray) -> np.ndarray | None:
     """Half the span to average over, short of ends and gaps; None unless the clock is slower."""
-    if len(clock) < 2 or len(time) < 2:
+    step = float(np.median(np.diff(clock))) if len(clock) > 1 else 0.0
+    if not _slower(step, time):
         return None
-    step = float(np.median(np.diff(clock)))
-    if not step > SLOWER * float(np.median(np.diff(time))):
-        return None
-    edges = np.flatnonzero(_gaps(time))
-    begins, ends = time[np.r_[0, edges + 1]], time[np.r_[edges, len(time) - 1]]
-    part = np.clip(np.searchsorted(begins, clock, side="right") - 1, 0, None)
-    room = np.minimum(clock - begins[part], ends[part] - clock)
+    parts = find_segments(np.zeros(len(time)), time)
+    begins = np.array([time[part.start] for part in parts])
+    ends = np.array([time[part.stop - 1] for part in parts])
+    own = np.clip(np.searchsorted(begins, clock, side="right") - 1, 0, None)
+    room = np.minimum(clock - begins[own], ends[own] - clock)
     half: np.ndarray = np.clip(room, 0.0, 0.5 * step)
     return half
 

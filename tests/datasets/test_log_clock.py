@@ -76,8 +76,10 @@ def test_a_slower_clock_averages_vibration_away():
     assert notes == ["averaged to 50 Hz within 1 run(s) without a gap"]
     other = pd.DataFrame({"time": t, "tau1": 3 * t + vibration})
     positions = pd.DataFrame({"time": np.arange(0.004, 2, 0.02), "q1": 1.0})
-    both = align_channels([positions, other], ["a", "b"], None, []).iloc[1:-1]
+    notes = []
+    both = align_channels([positions, other], ["a", "b"], None, notes).iloc[1:-1]
     np.testing.assert_allclose(both["tau1"], 3 * both["time"], atol=0.07)
+    assert notes[0].startswith("channels a, b interpolated to the clock of a (b averaged over its")
 
 
 def test_a_mean_reaches_into_no_gap_and_over_no_missing_value():
