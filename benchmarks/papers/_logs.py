@@ -115,7 +115,7 @@ class RecordedLog:
             self.cache["motion", cutoff] = signals_from(table.to_numpy(), columns, self.robot)
         return self.cache["motion", cutoff]
 
-    def columns(self, model: RBDRegressor, cutoff: float) -> ColumnPhysics:
+    def columns(self, model: RBDRegressor, cutoff: float, rest: bool) -> ColumnPhysics:
         """Columns of an identified model, low-passed as the torque, at the rows of X."""
         s = self.motion(cutoff)
         if ("rigid", cutoff) not in self.cache:
@@ -127,7 +127,8 @@ class RecordedLog:
             for joint, values in block.items():
                 own[joint].append(self.low_pass(values)[self.kept])
         effects = [np.concatenate(blocks, axis=1) for blocks in own]
-        return ColumnPhysics(self.cache["rigid", cutoff], effects)
+        used = None if rest else self.sliding(model, cutoff)
+        return ColumnPhysics(self.cache["rigid", cutoff], effects, used)
 
     def sliding(self, model: RBDRegressor, cutoff: float) -> NDArray[np.bool_]:
         """Rows of X where every joint slides, or all where the model knows its hysteresis."""
@@ -153,8 +154,7 @@ class RecordedLog:
         self, model: RBDRegressor, train: NDArray[np.int64], cutoff: float, rest: bool
     ) -> Array:
         """Log of the squared error on every inner fold, mean over the joints."""
-        physics, errors = self.columns(model, cutoff), []
-        physics.used = None if rest else self.sliding(model, cutoff)
+        physics, errors = self.columns(model, cutoff, rest), []
         for a, b in self.inner_folds(train):
             physics.fit(self.X.iloc[a], self.y[a])
             squares = (self.y[b] - physics.predict(self.X.iloc[b])) ** 2
@@ -245,8 +245,7 @@ class LowPassedPhysics(RegressorMixin, BaseEstimator):
         if key not in log.cache:  # every learner meets the same physics again
             rows = log.raw_rows(X)
             identified = clone(self.model).fit(log.raw.iloc[rows], log.raw_torque[rows])
-            physics = log.columns(identified, self.cutoff)
-            physics.used = None if self.rest else log.sliding(identified, self.cutoff)
+            physics = log.columns(identified, self.cutoff, self.rest)
             torque = physics.fit(X, y).predict(log.X)
             log.cache[key] = torque, self.model  # no other model may get its id
         self.torque_ = log.cache[key][0]

@@ -218,8 +218,8 @@ class ELMCommittee(RegressorMixin, BaseEstimator):
     def _learn_member(self, k: int, scaled: Array, targets: Array, weight: Array) -> None:
         """Add the moments of new rows, then solve for the output layer."""
         size = self.n_hidden
-        weights = self._hidden_weights(k, scaled.dtype)
-        table = np.ones((min(CHUNK, len(scaled)), len(self._moments[k])), dtype=scaled.dtype)
+        weights = self._layer(k, scaled.dtype)
+        table = np.empty((min(CHUNK, len(scaled)), len(self._moments[k])), dtype=scaled.dtype)
         weighted = (weight != 1).any()
         for i in range(0, len(scaled), CHUNK):
             rows = slice(i, i + CHUNK)
@@ -271,7 +271,7 @@ class ELMCommittee(RegressorMixin, BaseEstimator):
         return (members.mean(axis=0), members.std(axis=0)) if return_std else members.mean(axis=0)
 
     def _predict_member(self, k: int, scaled: Array) -> Array:
-        coef, weights = self.coef_[k].astype(scaled.dtype), self._hidden_weights(k, scaled.dtype)
+        coef, weights = self.coef_[k].astype(scaled.dtype), self._layer(k, scaled.dtype)
         parts = [
             np.maximum(scaled[i : i + CHUNK] @ weights, 0) @ coef
             for i in range(0, len(scaled), CHUNK)
@@ -279,8 +279,8 @@ class ELMCommittee(RegressorMixin, BaseEstimator):
         output: Array = np.concatenate(parts).astype(np.float64) + self.intercept_[k]
         return output
 
-    def _hidden_weights(self, k: int, dtype: Any) -> Array:
-        """Weights of the scaled inputs and, last, of the constant."""
+    def _layer(self, k: int, dtype: Any) -> Array:
+        """Weights of the hidden layer: of the scaled inputs and, last, of the constant."""
         weights: Array = np.vstack([self.hidden_weights_[k], self.hidden_bias_[k]]).astype(dtype)
         return weights
 

@@ -362,8 +362,7 @@ class SDLRegressor(SequenceRegressor):
         """
         check_is_fitted(self)
         _, torque = self._rigid_body(validate_data(self, X, reset=False, dtype=np.float64))
-        own: Array = torque[:, 0] if self._one_dimensional else torque
-        return own
+        return torque[:, 0] if self._one_dimensional else torque
 
     def outside_range(self, X: Any) -> NDArray[np.bool_]:
         """Which samples lie outside the range of the training samples.
@@ -386,14 +385,15 @@ class SDLRegressor(SequenceRegressor):
     def _novelty(self, features: Array) -> Array:
         return distances(features, self._scale, self._reference) / self.radius_
 
-    def _rigid_body(self, X: Array) -> Array:
+    def _rigid_body(self, X: Array) -> tuple[Array, Array]:
         """Torque that the network reads, and torque that the prediction falls back on."""
         physics = self._read(self.physics_)
-        coefficients = np.stack([self.coef_, self.coef_ if self.residual else self.initial_coef_])
-        torque: Array = np.stack([physics.torque(X)] * 2)
+        last_resort = [] if self.residual else [self.initial_coef_]
+        coefficients = np.stack([self.coef_, *last_resort])
+        torque = np.stack([physics.torque(X)] * len(coefficients))
         for part, columns in physics.columns(X):
             torque[:, part] += np.einsum("jpc,kp->kcj", columns, coefficients, optimize=True)
-        return torque
+        return torque[0], torque[-1]
 
     def _output(self, X: Array) -> Array:
         keys = self._keys()
