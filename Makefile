@@ -19,7 +19,7 @@ VENV ?= .venv
 PYTEST_ARGS ?=
 # what make compatibility installs into, and runs; "tests" for everything, which takes long
 OLDEST ?= .venv-oldest
-CORE_TESTS ?= $(addprefix tests/,robots rigid_body effects evidence metrics model_selection \
+CORE_TESTS ?= $(addprefix tests/,robots dynamics identification effects evidence metrics model_selection \
     preprocessing neural_network committee fleet)
 
 BIN := $(VENV)/bin

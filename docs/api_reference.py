@@ -35,16 +35,18 @@ PAGES: tuple[Page, ...] = (
     Page(
         "skidyn.robots",
         "Robots from URDF files: joints, limits, inertial parameters and dynamics.",
-        (Section("Classes", ("Robot",)),),
+        (
+            Section("Classes", ("BaseParameters", "Robot")),
+            Section("Functions", ("find_base_parameters",)),
+        ),
     ),
     Page(
-        "skidyn.rigid_body",
-        "Identification of rigid bodies together with effects; base parameters; consistency.",
+        "skidyn.identification",
+        "Identification of rigid bodies together with effects; consistency; uncertainty.",
         (
             Section(
                 "Classes",
                 (
-                    "BaseParameters",
                     "BodyConstraints",
                     "RBDRegressor",
                 ),
@@ -53,7 +55,6 @@ PAGES: tuple[Page, ...] = (
                 "Functions",
                 (
                     "bootstrap_coefficients",
-                    "find_base_parameters",
                     "is_consistent",
                     "make_consistent",
                     "regressor_from_evidence",
@@ -74,6 +75,7 @@ PAGES: tuple[Page, ...] = (
                     "FrictionTransformer",
                     "Shape",
                     "Term",
+                    "TermSum",
                 ),
             ),
             Section(
@@ -86,6 +88,7 @@ PAGES: tuple[Page, ...] = (
                     "make_terms",
                     "register_effect",
                     "stop_state",
+                    "unregister_effect",
                 ),
             ),
         ),
@@ -113,7 +116,9 @@ PAGES: tuple[Page, ...] = (
                     "Finding",
                     "Limit",
                     "ParquetDiagnosis",
+                    "Place",
                     "Proposal",
+                    "RestError",
                     "SeparatingMotion",
                     "Settings",
                     "UnknownTorque",
@@ -141,8 +146,23 @@ PAGES: tuple[Page, ...] = (
     ),
     Page(
         "skidyn.simulation",
-        "A fitted model in a control loop: motions without the noise of sensors.",
-        (Section("Functions", ("simulate_closed_loop",)),),
+        "Fitted models run forward: their motion, and how far it is from that of the robot.",
+        (
+            Section("Classes", ("Controller", "SimulationErrors", "SimulationVerdict")),
+            Section(
+                "Functions",
+                (
+                    "fit_controller",
+                    "fit_servo",
+                    "judge_by_simulation",
+                    "neg_simulation_error",
+                    "servo_torque",
+                    "simulate",
+                    "simulate_closed_loop",
+                    "simulation_errors",
+                ),
+            ),
+        ),
     ),
     Page(
         "skidyn.excitation",
@@ -186,20 +206,49 @@ PAGES: tuple[Page, ...] = (
         ),
     ),
     Page(
-        "skidyn.datasets",
-        "Logs from files, simulated logs with a hidden effect, embedded robots.",
+        "skidyn.logs",
+        "Readers of recordings, and the checks of a log.",
+        (
+            Section("Classes", ("Channel", "JointQuality", "LogQuality")),
+            Section("Functions", ("check_log", "load_recording", "read_log", "register_reader")),
+        ),
+    ),
+    Page(
+        "skidyn.exceptions",
+        "Errors, all of them a ValueError that says how to mend the input, and warnings.",
         (
             Section(
-                "Classes",
+                "Errors",
                 (
-                    "JointQuality",
-                    "LogQuality",
+                    "SkidynError",
+                    "ColumnError",
+                    "EffectError",
+                    "LogError",
+                    "RobotDescriptionError",
                 ),
             ),
+            Section("Warnings", ("LogWarning", "RobotDescriptionWarning")),
+        ),
+    ),
+    Page(
+        "skidyn.measurement",
+        "Is a log what its owner thinks it is? Checks before physics is blamed.",
+        (
+            Section("Classes", ("Check", "Measurement", "Remedy", "Suspicion")),
+            Section(
+                "Functions",
+                ("check_measurement", "list_checks", "refuse_certain", "regular_clock"),
+            ),
+        ),
+    ),
+    Page(
+        "skidyn.datasets",
+        "Embedded robots, simulated logs with a hidden effect, public recordings to download.",
+        (
+            Section("Classes", ("SuiteCase",)),
             Section(
                 "Functions",
                 (
-                    "check_log",
                     "fetch_double_pendulum",
                     "fetch_emps",
                     "fetch_panda_exciting",
@@ -207,16 +256,17 @@ PAGES: tuple[Page, ...] = (
                     "fetch_screw_drive",
                     "fetch_xl330",
                     "hidden_effect_kinds",
+                    "hidden_effect_suite",
                     "load_demo_log",
                     "load_panda",
                     "load_planar_arm",
-                    "load_recording",
                     "load_scara",
                     "load_srs_arm",
                     "load_ur10e",
                     "load_ur5",
                     "make_hidden_effect_log",
-                    "read_log",
+                    "score_answers",
+                    "wilson_interval",
                 ),
             ),
         ),
@@ -273,11 +323,12 @@ PAGES: tuple[Page, ...] = (
         "skidyn.metrics",
         "Errors per joint, scorers, paired comparison of two models.",
         (
-            Section("Classes", ("PairedComparison",)),
+            Section("Classes", ("Drift", "PairedComparison")),
             Section(
                 "Functions",
                 (
                     "SCORERS",
+                    "drift",
                     "joint_error_table",
                     "joint_scores",
                     "max_absolute_error",
@@ -354,6 +405,7 @@ PAGES: tuple[Page, ...] = (
                 "Files",
                 ("write_c", "write_mjcf", "write_onnx", "write_python", "write_urdf"),
             ),
+            Section("Your own files", ("merge_mjcf", "merge_urdf")),
             Section("In memory", ("c_source", "python_source", "to_onnx")),
         ),
     ),

@@ -10,8 +10,7 @@ HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE / "_ext"), str(HERE)]
 
 import skidyn  # noqa: E402
-from skidyn.effects import list_effects  # noqa: E402
-from skidyn.effects._catalogue import unregister_effect  # noqa: E402
+from skidyn.effects import list_effects, unregister_effect  # noqa: E402
 
 project = "skidyn"
 author = "The skidyn developers"

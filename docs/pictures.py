@@ -24,8 +24,8 @@ from playwright.sync_api import Browser, Page, sync_playwright
 
 from skidyn.datasets import load_demo_log, load_ur5, make_hidden_effect_log
 from skidyn.diagnosis import Diagnosis, diagnose
+from skidyn.identification import RBDRegressor
 from skidyn.report import summarize, summarize_comparison, write_comparison, write_html
-from skidyn.rigid_body import RBDRegressor
 
 OUT = Path(__file__).parent / "_static" / "pictures"
 
@@ -92,7 +92,7 @@ def save(page: Page, name: str, selector: str | None = None) -> None:
 
 def of_the_report(browser: Browser, path: Path) -> None:
     """Top; torque of two joints in both themes; a finding."""
-    page = opened(browser, path.as_uri(), 680)
+    page = opened(browser, path.as_uri(), 800)
     page.wait_for_selector("#plots[data-view]")
     save(page, "report-top.png")
     for scheme in ("light", "dark"):
@@ -125,7 +125,7 @@ def bring(page: Page, selector: str) -> None:
 
 def of_the_comparison(browser: Browser, path: Path) -> None:
     """Verdict, and the residuals of both."""
-    page = opened(browser, path.as_uri(), 560)
+    page = opened(browser, path.as_uri(), 640)
     page.wait_for_selector("#plots[data-view]")
     save(page, "comparison.png")
     page = opened(browser, path.as_uri(), 460)

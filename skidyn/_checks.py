@@ -6,6 +6,7 @@ from __future__ import annotations
 import inspect
 import re
 import warnings
+from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 #: Columns of a log that hold numbers of one signal.
-SIGNAL_COLUMN = re.compile(r"(q|dq|ddq|tau|temp)(\d+)")
+SIGNAL_COLUMN = re.compile(r"(q|dq|ddq|tau|temp|cmd)(\d+)")
 
 
 def warn_about_log(message: str) -> None:
@@ -112,7 +113,7 @@ def require_columns(
 
 def refuse_duplicates(names: Sequence[str], source: str) -> None:
     """Raise if a column name occurs twice."""
-    twice = sorted({name for name in names if names.count(name) > 1 and name})
+    twice = sorted(name for name, count in Counter(names).items() if count > 1 and name)
     if twice:
         raise LogError(
             f"{source}: the column(s) {', '.join(twice)} occur more than once. Rename or remove "

@@ -56,6 +56,11 @@ class Columns:
         """Positions of q, dq and ddq, in this order, for learners that want only the state."""
         return [*self.q, *self.dq, *(self.ddq or ())]
 
+    def used(self) -> list[int]:
+        """Positions of all columns that mean something, the key columns last."""
+        keys = (self.trajectory, self.time)
+        return [*self.state(), *(self.temperature or ()), *(k for k in keys if k is not None)]
+
 
 def resolve_columns(
     names: Sequence[str] | None,

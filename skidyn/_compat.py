@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from sklearn.base import _fit_context as fit_context
+from sklearn.model_selection._search import BaseSearchCV as BaseSearchCV
 from sklearn.utils._param_validation import HasMethods, Interval, StrOptions
 
 try:

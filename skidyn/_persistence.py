@@ -1,24 +1,99 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Models on disk without pickle: whole files or none, and no foreign code on loading."""
+"""Models on disk without pickle: whole files or none, and no foreign code on loading.
+
+A skops file is a tree of nodes, each of which says how something is put together (its loader) and
+of which type. skops checks the types against one list, whatever is done with them; here every pair
+of loader and type has to be known, so that nothing that a file names is ever called with arguments
+of the file's choosing.
+"""
 
 from __future__ import annotations
 
+import importlib
+import inspect
+import io
+import json
 import os
-import tempfile
 import zipfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 from skidyn._exceptions import SkidynError
 from skidyn._optional import import_optional
+from skidyn._writing import write_bytes
 
-#: Largest model file once unpacked, in bytes.
-MAX_BYTES = 4 * 2**30
+#: Largest model file once unpacked, in bytes: its arrays, counted each time they are named, and
+#: the description of how they belong together, which takes some 20 times as much when it is read.
+MAX_BYTES, MAX_DESCRIPTION = 4 * 2**30, 128 * 2**20
+
+#: Protocol of the skops files that are read; older ones hold nodes of other forms.
+PROTOCOL = 2
+
+#: Classes of skidyn that a stored model may hold. No function is among them, and none is trusted.
+CLASSES = frozenset(
+    f"skidyn.{name}"
+    for name in (
+        "_columns.Columns",
+        "committee._elm.ELMCommittee",
+        "diagnosis._effect_search.EffectSearchCV",
+        "dynamics._tree.KinematicTree",
+        "effects._term.Term",
+        "effects._transformer.FrictionTransformer",
+        "forecasting._forecast.AutoregressiveRegressor",
+        "forecasting._forecast.PersistenceRegressor",
+        "hybrid._hybrid.HybridRegressor",
+        "hybrid._own_joint.OwnJointRegressor",
+        "identification._constraints.BodyConstraints",
+        "identification._rbd_regressor.RBDRegressor",
+        "identification._uncertainty.PredictionBands",
+        "model_selection._split.PhaseKFold",
+        "model_selection._split.TrajectoryKFold",
+        "neural_network._bll.BLLRegressor",
+        "neural_network._lstm.LSTMRegressor",
+        "neural_network._lstm.NDLRegressor",
+        "neural_network._sdl.SDLRegressor",
+        "preprocessing._current.CurrentToTorque",
+        "preprocessing._derivatives.SmoothDerivatives",
+        "preprocessing._signals.ButterworthFilter",
+        "preprocessing._signals.SignalScaler",
+        "preprocessing._signals.TimeDerivative",
+        "robots._assembly.LinkPlacement",
+        "robots._robot.Robot",
+    )
+)
+
+_NUMBERS = frozenset(
+    f"numpy.{kind}{bits}"
+    for kind, sizes in {"float": (32, 64), "int": (8, 16, 32, 64), "uint": (8, 16, 32, 64)}.items()
+    for bits in sizes
+)
+#: Loaders of skops that only put data together, and the types that each may make.
+_DATA = {
+    "BytesNode": frozenset({"builtins.bytes"}),
+    "DictNode": frozenset({"builtins.dict", "collections.OrderedDict"}),
+    "JsonNode": frozenset({"builtins.str"}),
+    "ListNode": frozenset({"builtins.list"}),
+    "NdArrayNode": _NUMBERS | {"numpy.ndarray", "numpy.bool", "numpy.str_"},
+    "SetNode": frozenset({"builtins.set"}),
+    "SliceNode": frozenset({"builtins.slice"}),
+    "TupleNode": frozenset({"builtins.tuple"}),
+    "TypeNode": frozenset(f"builtins.{name}" for name in ("bool", "float", "int", "str"))
+    | _NUMBERS,
+}
+#: Loaders that make what they name from a state or from arguments. They are for classes only:
+#: those of skidyn and scikit-learn through their state, and the user's own, which may want
+#: arguments.
+_FROM_STATE = "ObjectNode"
+_FROM_ARGUMENTS = frozenset(
+    {"ConstructorFromReduceNode", "LossNode", "RandomStateNode", "SparseMatrixNode", "TreeNode"}
+)
 
 
-def save_model(path: str | os.PathLike[str], model: Any) -> Path:
+def save_model(path: Any, model: Any) -> Path:
     """Store a fitted model with skops, in one step.
+
+    The order of ``joblib.dump`` and ``skops.io.dump``, ``save_model(model, path)``, means the same.
 
     Parameters
     ----------
@@ -33,6 +108,11 @@ def save_model(path: str | os.PathLike[str], model: Any) -> Path:
     path : Path
         The file.
 
+    Raises
+    ------
+    SkidynError
+        The model holds a function, or something else that :func:`load_model` never creates.
+
     Examples
     --------
     >>> import pathlib, tempfile
@@ -42,31 +122,39 @@ def save_model(path: str | os.PathLike[str], model: Any) -> Path:
     ...     load_model(save_model(pathlib.Path(folder, "model.skops"), Ridge(alpha=2.0)))
     Ridge(alpha=2.0)
     """
+    if isinstance(model, str | os.PathLike) and not isinstance(path, str | os.PathLike):
+        path, model = model, path
     skops = import_optional("skops.io", extra="share")
     target = Path(path)
-    data = skops.dumps(model)
-    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
     try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        os.replace(temporary, target)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
-    return target
+        data = skops.dumps(model)
+    except Exception as error:  # whatever an object answers that cannot tell its state
+        raise SkidynError(f"{type(model).__name__} cannot be stored: {error}") from error
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        nodes = list(_nodes(_description(archive, target)))
+    lost = {name for loader, name in nodes if loader not in _LOADERS}
+    if lost:
+        raise SkidynError(
+            f"{type(model).__name__} cannot be stored: it holds {', '.join(sorted(lost))}, and "
+            "only data and classes are loaded again. Put a class with this method in its place"
+        )
+    return write_bytes(target, data)
 
 
 def load_model(path: str | os.PathLike[str], *, trusted: Iterable[str] = ()) -> Any:
     """Load a model that :func:`save_model` stored.
+
+    Nothing that the file names is called, and no module is imported for it, unless its name is on
+    a list: the estimators of skidyn and the classes that they are made of, the estimators of
+    scikit-learn that skops knows to be harmless, and what ``trusted`` adds.
 
     Parameters
     ----------
     path : path
         File.
     trusted : iterable of str, default=()
-        Further types that may be created, by their full names, such as
-        ``"my_package.MyRegressor"``. Types of skidyn are, and those that skops knows to be
-        harmless.
+        Further classes that may be created, by their full names, such as
+        ``"my_package.MyRegressor"``. They run their own code, so name only those that you know.
 
     Returns
     -------
@@ -76,7 +164,8 @@ def load_model(path: str | os.PathLike[str], *, trusted: Iterable[str] = ()) -> 
     Raises
     ------
     SkidynError
-        The file is a pickle or damaged, unpacks to more than 4 GiB, or holds other types.
+        The file is a pickle or damaged, unpacks to more than 4 GiB, or holds anything else than
+        data and the classes of the list; ``trusted`` names something that is no class.
 
     Examples
     --------
@@ -84,26 +173,94 @@ def load_model(path: str | os.PathLike[str], *, trusted: Iterable[str] = ()) -> 
     >>> load_model("model.skops").predict(X)  # doctest: +SKIP
     """
     skops = import_optional("skops.io", extra="share")
-    source = Path(path)
+    source, own = Path(path), frozenset(trusted)
+    for name in own:
+        _check_class(name)
     try:
         with zipfile.ZipFile(source) as archive:
-            size = sum(member.file_size for member in archive.infolist())
+            nodes = set(_nodes(_description(archive, source)))
     except zipfile.BadZipFile as error:
         raise SkidynError(
             f"{source}: not a skops file. Pickles and joblib files are refused, since loading one "
             "can run any code; store models with skidyn.save_model"
         ) from error
-    if size > MAX_BYTES:
-        raise SkidynError(f"{source}: unpacks to {size} bytes, more than {MAX_BYTES}")
-    allowed = set(trusted)
-    try:
-        named = skops.get_untrusted_types(file=source)
-        foreign = [n for n in named if n.partition(".")[0] != "skidyn" and n not in allowed]
-        if not foreign:
-            return skops.load(source, trusted=named)
-    except Exception as error:  # damaged files raise whatever their content leads to
+    except (KeyError, TypeError, AttributeError, RecursionError, ValueError) as error:
+        if isinstance(error, SkidynError):
+            raise
         raise SkidynError(f"{source}: cannot be loaded: {error}") from error
+    foreign = sorted({name for loader, name in nodes if not _is_known(loader, name, own)})
+    if not foreign:
+        named = sorted({name for _, name in nodes if name in CLASSES} | own)
+        try:
+            foreign = sorted(set(skops.get_untrusted_types(file=source)) - set(named))
+            if not foreign:
+                return skops.load(source, trusted=named)
+        except Exception as error:  # damaged files raise whatever their content leads to
+            raise SkidynError(f"{source}: cannot be loaded: {error}") from error
     raise SkidynError(
-        f"{source}: holds types that are not trusted: {', '.join(sorted(foreign))}. If you know "
-        "where the file comes from, name them in trusted="
+        f"{source}: holds what is not trusted: {', '.join(foreign)}. Functions are never loaded; "
+        "if these are classes and you know where the file comes from, name them in trusted="
     )
+
+
+_LOADERS = frozenset(_DATA) | _FROM_ARGUMENTS | {_FROM_STATE}
+
+
+def _is_known(loader: str, name: str, trusted: frozenset[str]) -> bool:
+    """Whether a node may be created; what skops thinks of scikit-learn's classes is asked later."""
+    if loader in _DATA:
+        return name in _DATA[loader] or (loader == "TypeNode" and name in CLASSES | trusted)
+    if loader == _FROM_STATE:
+        return name in CLASSES or name in trusted or name.startswith("sklearn.")
+    return loader in _FROM_ARGUMENTS and name in trusted
+
+
+def _description(archive: zipfile.ZipFile, source: Path) -> dict[str, Any]:
+    """How the parts of a model belong together; bounded before anything is unpacked."""
+    sizes = {member.filename: member.file_size for member in archive.infolist()}
+    if max(sum(sizes.values()), sizes["schema.json"] * MAX_BYTES // MAX_DESCRIPTION) > MAX_BYTES:
+        raise SkidynError(
+            f"{source}: unpacks to {sum(sizes.values())} bytes, more than {MAX_BYTES}, or has a "
+            f"description of more than {MAX_DESCRIPTION}"
+        )
+    description: dict[str, Any] = json.loads(archive.read("schema.json"))
+    if description.get("protocol") != PROTOCOL:
+        raise SkidynError(
+            f"{source}: cannot be loaded: it has protocol {description.get('protocol')!r} of "
+            f"skops, not {PROTOCOL}; store the model again with skidyn.save_model"
+        )
+    # Each node that names a file reads it anew.
+    named = sum(sizes.get(node["file"], 0) for node in _dictionaries(description) if "file" in node)
+    if named > MAX_BYTES:
+        raise SkidynError(f"{source}: unpacks to {named} bytes, more than {MAX_BYTES}")
+    return description
+
+
+def _nodes(description: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """Loader and full name of everything that a file would create."""
+    for node in _dictionaries(description):
+        if "__loader__" in node:
+            yield str(node["__loader__"]), f"{node['__module__']}.{node['__class__']}"
+
+
+def _dictionaries(content: Any) -> Iterator[dict[str, Any]]:
+    """Every dictionary of a description, without recursion: files may be nested without end."""
+    stack = [content]
+    while stack:
+        part = stack.pop()
+        if isinstance(part, dict):
+            yield part
+            stack.extend(part.values())
+        elif isinstance(part, list):
+            stack.extend(part)
+
+
+def _check_class(name: str) -> None:
+    """That a name the user trusts is a class."""
+    module, _, last = name.rpartition(".")
+    try:
+        found = getattr(importlib.import_module(module), last)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise SkidynError(f"trusted names {name!r}, which cannot be imported: {error}") from error
+    if not inspect.isclass(found):
+        raise SkidynError(f"trusted names {name!r}, which is no class; functions are never loaded")

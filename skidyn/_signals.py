@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -10,7 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn._columns import Columns, trajectory_numbers
+from skidyn._columns import (
+    Columns,
+    ColumnSpec,
+    column_names,
+    resolve_columns,
+    trajectory_numbers,
+)
+from skidyn._exceptions import ColumnError, LogError
 
 if TYPE_CHECKING:
     from skidyn.robots import Robot
@@ -134,6 +142,31 @@ class Signals:
         """Time in s; the sample number where no time is logged."""
         return np.arange(self.n_samples, dtype=float) if self.time is None else self.time
 
+    def once(self, name: Hashable, make: Callable[[], Any]) -> Any:
+        """What ``make`` derives from these signals, computed when it is first asked for.
+
+        Effects are tried at many shapes; what does not depend on the shape is derived once.
+
+        Parameters
+        ----------
+        name : hashable
+            What it is; it must say everything that ``make`` depends on beside the signals.
+        make : callable
+            Without arguments.
+
+        Returns
+        -------
+        object
+            The same one at every call; it must not be changed.
+        """
+        kept = self.__dict__.setdefault("_kept", {})
+        if name not in kept:
+            kept[name] = make()
+        return kept[name]
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "_kept"}
+
     def named(self, name: str) -> Array:
         """A signal by its name, joints counted from 1: ``"dq3"``, ``"temp2"``, ``"time"``, ..."""
         if name == "time":
@@ -158,33 +191,117 @@ class Signals:
         return replace(self, **taken)
 
 
-def signals_from(X: Array, columns: Columns, robot: Robot | None = None) -> Signals:
+def signals_from(
+    X: Array, columns: Columns, robot: Robot | None = None, *, to_derive: bool = False
+) -> Signals:
     """Read the signals out of the columns of X.
 
     Parameters
     ----------
     X : ndarray of shape (n_samples, n_features)
-        Validated table.
+        Table of numbers.
     columns : Columns
-        From :func:`skidyn._columns.resolve_columns`; accelerations must be there.
+        From :func:`skidyn._columns.resolve_columns`.
     robot : Robot, optional
         Tells which joints slide.
+    to_derive : bool, default=False
+        Whether accelerations may be missing, to be derived from the positions; they are zero until
+        then.
 
     Returns
     -------
     Signals
     """
-    if columns.ddq is None:
+    if columns.ddq is None and not to_derive:
         raise ValueError("the columns hold no accelerations; derive them first")
-    pick = {name: X[:, list(getattr(columns, name))] for name in ("q", "dq", "ddq")}
+    q, dq = X[:, list(columns.q)], X[:, list(columns.dq)]
     prismatic = np.zeros(columns.n_joints, dtype=bool)
     if robot is not None:
         prismatic = np.array([kind == "prismatic" for kind in robot.joint_types])
     return Signals(
-        **pick,
+        q,
+        dq,
+        np.zeros_like(q) if columns.ddq is None else X[:, list(columns.ddq)],
         trajectory=trajectory_numbers(X, columns),
         time=None if columns.time is None else X[:, columns.time],
         temperature=None if columns.temperature is None else X[:, list(columns.temperature)],
         prismatic=prismatic,
         robot=robot,
     )
+
+
+def read_signals(
+    X: Any,
+    tau: Any,
+    robot: Robot,
+    *,
+    trajectory: ColumnSpec = "auto",
+    time: ColumnSpec = "auto",
+    rate: float | None = None,
+    to_derive: bool = True,
+) -> tuple[Signals, Array]:
+    """Signals and torque of a table that follows the X contract, checked.
+
+    Parameters
+    ----------
+    X : DataFrame or array of shape (n_samples, n_features)
+        Motion; accelerations may be missing where the columns have names, to be derived.
+    tau : array-like of shape (n_samples, n_joints)
+        Torque, N m or N.
+    robot : Robot
+        Robot.
+    trajectory, time : int, str or None, default="auto"
+        Key columns of X.
+    rate : float, Hz, optional
+        Sampling rate where X has no time.
+    to_derive : bool, default=True
+        As in :func:`signals_from`.
+
+    Returns
+    -------
+    signals : Signals
+    torque : ndarray of shape (n_samples, n_joints)
+
+    Raises
+    ------
+    ColumnError
+        A column is missing, or the time.
+    LogError
+        The torque has another shape, or a value is not finite.
+    """
+    names = column_names(X)
+    values = np.asarray(X.to_numpy() if hasattr(X, "to_numpy") else X)
+    torque = np.asarray(tau.to_numpy() if hasattr(tau, "to_numpy") else tau, dtype=float)
+    torque = torque.reshape(len(torque), -1)
+    columns = resolve_columns(
+        names,
+        values.shape[1],
+        robot.joint_names,
+        trajectory=trajectory,
+        time=time,
+        require_acceleration=names is None or not to_derive,
+    )
+    if torque.shape != (len(values), columns.n_joints):
+        raise LogError(
+            f"the torque has shape {torque.shape}; {len(values)} samples of {columns.n_joints} "
+            f"joints ({', '.join(robot.joint_names)}) are expected"
+        )
+    table = np.zeros(values.shape)
+    table[:, columns.used()] = values[:, columns.used()]  # other columns may hold no numbers
+    signals = signals_from(table, columns, robot, to_derive=True)
+    signals = signals.with_(trajectory=signals.trajectory.astype(np.int64))
+    if signals.time is None:
+        if rate is None:
+            raise ColumnError(
+                "X has no time column; name it by time=..., or give the sampling rate by rate=..."
+            )
+        signals = signals.with_(time=np.arange(len(values)) / rate)
+    for name, block in (("q", signals.q), ("dq", signals.dq), ("tau", torque)):
+        bad = ~np.isfinite(block)
+        if bad.any():
+            row, joint = map(int, np.argwhere(bad)[0])
+            raise LogError(
+                f"{name} of joint {joint + 1} ({robot.joint_names[joint]}) is not finite in row "
+                f"{row} ({int(bad.any(1).sum())} such rows); drop or repair them first"
+            )
+    return signals, torque

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import codecs
 import os
 import sys
 import warnings
@@ -12,12 +13,10 @@ from contextlib import AbstractContextManager, nullcontext, redirect_stdout
 from shutil import get_terminal_size
 from typing import Any, NoReturn, TextIO, cast
 
-from skidyn._commands import COMMANDS
-from skidyn._commands._terminal import FittingStream, TeachingFormatter, fit
 from skidyn._exceptions import LogWarning, SkidynError
 
-#: Exit codes: done; the input is at fault; stopped by the user.
-DONE, BAD_INPUT, STOPPED = 0, 2, 130
+#: Exit codes: done; a gate was failed; the input is at fault; stopped by the user.
+DONE, FAILED, BAD_INPUT, STOPPED = 0, 1, 2, 130
 
 _DESCRIPTION = """\
 Robot inverse dynamics: compare a model with measurements, see where it fails, learn what is
@@ -32,8 +31,8 @@ A first contact:
   skidyn add --from report.json --effect dahl --joints 1,4
 
 skidyn COMMAND --help explains each command with examples. --json prints any result for programs.
-Exit codes: 0 done, 2 the input is at fault, 130 stopped by Ctrl-C. Files are written whole or not
-at all.
+Exit codes: 0 done, 1 failed --fail-above, 2 the input is at fault, 130 stopped by Ctrl-C. Files
+are written whole or not at all.
 """
 
 
@@ -48,7 +47,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        Exit code: 0 done, 2 the input is at fault, 130 stopped by Ctrl-C.
+        Exit code: 0 done, 1 failed ``compare --fail-above``, 2 the input is at fault, 130 stopped
+        by Ctrl-C.
 
     Examples
     --------
@@ -56,28 +56,43 @@ def main(arguments: Sequence[str] | None = None) -> int:
     {...
     0
     """
-    parser = make_parser()
-    options = parser.parse_args(arguments)
-    if not hasattr(options, "run"):
-        parser.print_help()
-        return BAD_INPUT
-    try:
-        with warnings.catch_warnings(record=True) as caught, _fitting():
+    command = "skidyn"
+    try:  # imports too: they take a second, in which somebody may press Ctrl-C
+        from skidyn._commands._arguments import check_files
+        from skidyn._writing import keeping_inputs
+
+        _open_closed_streams()
+        parser = make_parser()
+        options = parser.parse_args(arguments)
+        if not hasattr(options, "run"):
+            parser.print_help()
+            return BAD_INPUT
+        command = f"skidyn {options.command}"
+        with warnings.catch_warnings(record=True) as caught, _fitting(), keeping_inputs():
             warnings.simplefilter("always")
             try:
-                options.run(options)
+                check_files(options)
+                passed = options.run(options) is not False
+                sys.stdout.flush()  # here, where a full disk is still told
             finally:  # what is odd about a log often explains why it was refused
+                told = getattr(options, "told", ())  # by the command itself, among its results
                 for text in dict.fromkeys(str(w.message) for w in caught if _is_ours(w)):
-                    _complain(f"warning: {text}")
+                    if text not in told:
+                        _complain(f"warning: {text}")
     except BrokenPipeError:  # the reader, such as head, has seen enough
-        # what is still buffered must not raise again when Python shuts down
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _give_up_output()
     except (SkidynError, OSError, ImportError) as error:
-        _complain(f"skidyn {options.command}: {error}")
+        _complain(f"{command}: {error}")
+        try:
+            sys.stdout.flush()
+        except OSError:
+            _give_up_output()
         return BAD_INPUT
     except KeyboardInterrupt:
         print("stopped; no file was left half written", file=sys.stderr)
         return STOPPED
+    else:
+        return DONE if passed else FAILED
     return DONE
 
 
@@ -99,6 +114,8 @@ def make_parser() -> argparse.ArgumentParser:
         One subparser per command.
     """
     from skidyn import __version__
+    from skidyn._commands import COMMANDS
+    from skidyn._commands._terminal import TeachingFormatter
 
     parser = _Parser(
         prog="skidyn",
@@ -113,8 +130,38 @@ def make_parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _open_closed_streams() -> None:
+    """Print nowhere where the output is closed, and in ASCII where it holds nothing else."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))
+        elif hasattr(stream, "reconfigure") and stream.errors == "strict":
+            stream.reconfigure(errors=PLAIN)
+
+
+def _give_up_output() -> None:
+    """What is still buffered must not raise again when Python shuts down."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _plainly(error: UnicodeError) -> tuple[str, int]:
+    """Signs that an encoding lacks, by ones that it has."""
+    assert isinstance(error, UnicodeEncodeError)
+    lost = error.object[error.start : error.end]
+    return "".join(_SIGNS.get(sign, "?") for sign in lost), error.end
+
+
+#: How signs are printed where the output is ASCII.
+_SIGNS = {"±": "+-", "²": "^2", "·": "*", "°": " deg", "→": "->", "–": "-", "—": "-", "µ": "u"}
+PLAIN = "skidyn.plain"
+codecs.register_error(PLAIN, _plainly)
+
+
 def _fitting() -> AbstractContextManager[Any]:
     """Print lines that fit where a person looks; the bytes of a pipe or file are left alone."""
+    from skidyn._commands._terminal import FittingStream
+
     if not sys.stdout.isatty():
         return nullcontext()
     return redirect_stdout(cast(TextIO, FittingStream(sys.stdout)))
@@ -122,6 +169,8 @@ def _fitting() -> AbstractContextManager[Any]:
 
 def _complain(text: str) -> None:
     if sys.stderr.isatty():
+        from skidyn._commands._terminal import fit
+
         text = "\n".join(fit(line, get_terminal_size().columns) for line in text.split("\n"))
     print(text, file=sys.stderr)
 

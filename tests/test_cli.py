@@ -13,6 +13,7 @@ pandas = pytest.importorskip("pandas", reason="needs skidyn[io]")
 pytest.importorskip("jinja2", reason="needs skidyn[report]")
 
 from skidyn import cli  # noqa: E402
+from skidyn._commands import COMMANDS  # noqa: E402
 from skidyn._commands._identify import ESTIMATORS  # noqa: E402
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log  # noqa: E402
 
@@ -210,7 +211,7 @@ def test_currents_become_torques_by_drive_gains(work, tmp_path, capsys):
 
 
 def test_every_command_teaches_with_an_example(capsys):
-    for command in cli.COMMANDS:
+    for command in COMMANDS:
         name = command.__name__.rpartition("_")[2]
         with pytest.raises(SystemExit) as stopped:
             cli.main([name, "--help"])
@@ -267,3 +268,24 @@ def slow(*paths):
 os.replace = slow
 sys.exit(main(sys.argv[1:]))
 """
+
+
+def test_simulate_runs_a_fitted_model_along_a_log(capsys, tmp_path):
+    pytest.importorskip("skops")
+    from skidyn import save_model
+    from skidyn.identification import RBDRegressor
+
+    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=2, duration=3.0)
+    model = RBDRegressor(log.robot).fit(log.X, log.y)
+    save_model(tmp_path / "arm.skops", model)
+    log.frame.to_csv(tmp_path / "run.csv", index=False)
+    files = [str(tmp_path / name) for name in ("arm.skops", "run.csv")]
+    words = ["simulate", "--model", files[0], "--log", files[1]]
+    assert cli.main([*words, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["joints"] == ["joint1", "joint2"] and max(told["position"]) < 0.05
+    assert cli.main([*words, "--out", str(tmp_path / "motion.csv")]) == 0
+    assert "simulation over 1 s" in capsys.readouterr().out
+    assert "q1" in (tmp_path / "motion.csv").read_text().splitlines()[0]
+    assert cli.main(words[:3]) == 2
+    assert "--log is missing" in capsys.readouterr().err

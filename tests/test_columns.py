@@ -4,7 +4,7 @@ import polars
 import pytest
 
 from skidyn._columns import column_names, resolve_columns
-from skidyn._exceptions import ColumnError
+from skidyn.exceptions import ColumnError
 
 JOINTS = ["shoulder", "elbow"]
 STATE = [f"{s}_{j}" for s in ("q", "dq", "ddq") for j in JOINTS]

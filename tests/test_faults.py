@@ -16,9 +16,9 @@ from sklearn.neighbors import KNeighborsRegressor
 from skidyn import save_model
 from skidyn.datasets import load_planar_arm
 from skidyn.export import write_urdf
+from skidyn.identification import RBDRegressor
 from skidyn.neural_network import LSTMRegressor
 from skidyn.report import write_json
-from skidyn.rigid_body import RBDRegressor
 from skidyn.robots import Robot
 
 

@@ -11,14 +11,14 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
-from skidyn._exceptions import EffectError, LogError, SkidynError
-from skidyn.datasets import load_planar_arm, make_hidden_effect_log, read_log
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.effects import formula
 from skidyn.evidence import Evidence
-from skidyn.rigid_body import RBDRegressor
+from skidyn.exceptions import EffectError, LogError, SkidynError
+from skidyn.identification import RBDRegressor
+from skidyn.logs import read_log
 from skidyn.robots import Robot
 
 LINK = '<link name="{}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" '

@@ -2,8 +2,12 @@
 """Importing skidyn stays light: what is heavy is loaded when it is first used."""
 
 import importlib
+import pkgutil
+import re
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
 
 import pytest
 
@@ -24,15 +28,38 @@ def test_importing_skidyn_loads_nothing_heavy():
     assert not modules_after("import skidyn").intersection((*HEAVY, "numpy", "scipy"))
 
 
-@pytest.mark.parametrize("name", ["effects", "evidence", "rigid_body", "diagnosis", "report"])
+@pytest.mark.parametrize("name", ["effects", "evidence", "identification", "diagnosis", "report"])
 def test_physics_needs_neither_torch_nor_pictures_nor_tables(name):
     # scikit-learn loads pandas by itself where it is installed; what counts is what we add.
     loaded = modules_after(f"import skidyn.{name}") - modules_after("import sklearn.base")
     assert not loaded.intersection({"matplotlib", "pandas", "skorch", "torch"})
 
 
+def test_a_robot_and_its_torques_need_numpy_only():
+    code = (
+        "from skidyn.datasets import load_planar_arm; "
+        "load_planar_arm().inverse_dynamics([[0, 0]], [[1, 1]], [[0, 0]])"
+    )
+    assert not modules_after(code).intersection((*HEAVY, "scipy"))
+
+
 def test_submodules_are_loaded_on_first_use():
     assert skidyn.robots is importlib.import_module("skidyn.robots")
+
+
+def test_every_package_is_reached_from_the_top():
+    found = {m.name for m in pkgutil.iter_modules(skidyn.__path__) if m.ispkg}
+    public = {n for n in found if getattr(importlib.import_module(f"skidyn.{n}"), "__all__", ())}
+    for name in public - {"_commands"}:
+        assert getattr(skidyn, name).__name__ == f"skidyn.{name}"
+
+
+def test_what_is_imported_without_an_extra_is_declared():
+    """Top-level imports of third parties and pandas, which the README's loop needs."""
+    with open(Path(skidyn.__file__).parents[1] / "pyproject.toml", "rb") as file:
+        declared = tomllib.load(file)["project"]["dependencies"]
+    names = {re.split(r"[<>=]", line)[0] for line in declared}
+    assert {"pandas", "threadpoolctl"} <= names
 
 
 def test_unknown_attribute_is_an_attribute_error():

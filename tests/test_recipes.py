@@ -11,8 +11,9 @@ from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from skidyn._columns import Columns
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
-from skidyn.effects._catalogue import unregister_effect
-from skidyn.rigid_body import RBDRegressor
+from skidyn.effects import unregister_effect
+from skidyn.identification import ESTIMATORS, RBDRegressor
+from skidyn.logs import read_log, register_reader
 
 RECIPES = Path(__file__).parents[1] / "docs" / "contributing"
 
@@ -64,3 +65,28 @@ def test_an_effect_as_the_recipe_writes_it(log):
         assert fitted.parameter_table()[-1]["value"] == pytest.approx(1.5, rel=0.05)
     finally:
         unregister_effect("liquid_drag")
+
+
+def test_six_recipes_run_as_they_stand(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = (RECIPES / "recipes.rst").read_text("utf-8")
+    blocks = re.findall(r"code-block:: python\n\n((?:   .*\n|\n)+)", text)
+    assert len(blocks) == 6
+    names = {"__name__": "recipes"}
+    monkeypatch.setitem(ESTIMATORS, "median", None)
+    try:
+        for block in blocks:
+            exec(re.sub(r"^   ", "", block, flags=re.MULTILINE), names)
+        log, frame = names["log"], names["frame"]
+        assert len(frame) == len(log.y) and names["robot"].joint_names == log.robot.joint_names
+        assert names["figure"]["type"] == "bars" and len(names["figure"]["values"]) == 2
+        assert len(names["diagnosis"].findings) == 1
+        (tmp_path / "log.stars").write_text("time*q1*dq1*tau1\n0.0*1.0*0.1*2.0\n0.1*1.1*0.1*2.0\n")
+        assert len(read_log("log.stars", check=False)) == 2
+        air = RBDRegressor(log.robot, ("viscous", "coulomb", "air_drag"), estimator="median")
+        air.fit(log.X, log.y + 4.0 * log.X[["dq1", "dq2"]] * log.X[["dq1", "dq2"]].abs())
+        drag = [row["value"] for row in air.parameter_table()[-2:]]
+        assert drag == pytest.approx([4.0, 4.0], rel=0.2) and np.all(air.coef_std_ > 0)
+    finally:
+        unregister_effect("air_drag")
+        register_reader(".stars", None)

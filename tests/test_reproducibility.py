@@ -23,7 +23,7 @@ from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
 from skidyn.hybrid import HybridRegressor
 from skidyn.neural_network import BLLRegressor, LSTMRegressor, NDLRegressor, SDLRegressor
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
 
 log = make_hidden_effect_log(load_planar_arm(), "stribeck", joints=[2], n_trajectories=5,
                              duration=6.0, rate=100.0)

@@ -15,12 +15,11 @@ import warnings
 from threadpoolctl import threadpool_limits
 
 from skidyn.datasets import load_panda, make_hidden_effect_log
-from skidyn.diagnosis import Settings
-from skidyn.diagnosis._reading import read_signals
+from skidyn.diagnosis import Settings, read_signals
 from skidyn.diagnosis._reversals import look_at_reversals
 from skidyn.diagnosis._search import search
 from skidyn.effects import list_effects, make_terms
-from skidyn.evidence._problem import make_problem
+from skidyn.evidence import make_problem
 
 
 def main() -> None:

@@ -22,7 +22,7 @@ from skidyn.datasets import (
     make_hidden_effect_log,
 )
 from skidyn.diagnosis import diagnose
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
 
 ROBOTS = (load_planar_arm, load_ur5, load_scara, load_srs_arm, load_panda)
 

@@ -5,9 +5,7 @@
 
 The residual of each UR10e recording is tested against every single-column effect computed from the
 motion of a different recording of the same length, at a nominal 5 % and with the Benjamini-Hochberg
-correction: by the ordinary t-test on averaged rows; with the variance inflated by the residual's
-autocorrelation, as the search screens; with blocks of time left out (jackknife, Student's t), as
-every finding must pass; and by both of these, as the diagnosis demands.
+correction: by the ordinary t-test on averaged rows, and by the rule of the diagnosis.
 """
 
 from __future__ import annotations
@@ -17,14 +15,13 @@ import warnings
 from pathlib import Path
 
 import numpy as np
-from scipy.stats import chi2, norm
-from scipy.stats import t as student_t
+from scipy.stats import norm
 
-from skidyn.datasets import load_recording
-from skidyn.diagnosis._hypothesis import variance_inflation
-from skidyn.diagnosis._reading import read_signals
+from skidyn._signals import read_signals
+from skidyn.diagnosis._rule import Tester
 from skidyn.effects import Term, get_effect, make_terms
-from skidyn.evidence._problem import make_problem
+from skidyn.evidence import make_problem
+from skidyn.logs import load_recording
 from skidyn.robots import Robot
 
 GAINS = (14.87, 13.26, 11.13, 10.62, 11.03, 11.47)
@@ -46,19 +43,8 @@ def prepare(name: str, robot: Robot, folder: Path):
     signals, torque = read_signals(frame, frame[[f"tau{j + 1}" for j in range(6)]], robot)
     problem = make_problem(signals, torque, robot=robot, rigid_body=True, terms=make_terms(BASE, 6))
     fit = problem.fit(problem.terms, passes=3)
-    problem.with_fit(fit)
+    problem.set_fit(fit)
     return problem, fit
-
-
-def jackknife(column: np.ndarray, residual: np.ndarray, fold: np.ndarray) -> float:
-    """Chance of a column's coefficient when folds are left out in turn."""
-    own = np.bincount(fold, column**2)
-    cross = np.bincount(fold, column * residual)
-    seen = own > 0
-    left = (cross.sum() - cross[seen]) / (own.sum() - own[seen])
-    n = len(left)
-    error = np.sqrt((n - 1) / n * np.sum((left - left.mean()) ** 2))
-    return float(2 * student_t.sf(abs(cross.sum() / own.sum()) / error, n - 1))
 
 
 def main() -> None:
@@ -66,9 +52,10 @@ def main() -> None:
     folder = Path(os.environ["SKIDYN_DATA"]) / "ur10e"
     robot = Robot.from_urdf(folder / "ur10e_min.urdf")
     problems = {name: prepare(name, robot, folder) for name in RUNS}
-    ordinary, inflated, folds = [], [], []
+    ordinary, rule = [], []
     for here, (problem, fit) in problems.items():
-        inflation = variance_inflation(problem, fit.residual)
+        own = [problem.term_rows(term) for term in problem.terms]
+        tester = Tester(problem, own, fit.noise, problem.target)
         for there, (other, _) in problems.items():
             if there == here:
                 continue
@@ -83,14 +70,12 @@ def main() -> None:
                         a = x[:n] - x[:n].mean()
                         z = float(a @ r[:n] / np.sqrt(a @ a))
                         ordinary.append(2 * norm.sf(abs(z)))
-                        inflated.append(chi2.sf(z**2 / inflation[joint], 1))
-                        folds.append(jackknife(a, r[:n], problem.fold[joint][:n]))
-    both = np.maximum(inflated, folds)
+                        column = np.zeros((len(r), 1))
+                        column[:n, 0] = a
+                        rule.append(tester.test({joint: column}).chance)
     tests = {
         "t-test": ordinary,
-        "inflated by autocorrelation": inflated,
-        "blocks left out": folds,
-        "both": both,
+        "rule of the diagnosis": rule,
     }
     for label, values in tests.items():
         p = np.array(values)

@@ -26,7 +26,7 @@ from joblib import Parallel, delayed
 
 from skidyn.datasets import load_planar_arm, load_ur5, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
 
 ROBOTS = {"planar arm": (load_planar_arm, 2), "ur5": (load_ur5, 3)}
 KINDS = (

@@ -19,9 +19,9 @@ import numpy as np
 from scipy.signal import decimate
 from sklearn.base import BaseEstimator, RegressorMixin
 
-from skidyn.datasets import load_recording
 from skidyn.diagnosis import Diagnosis, Finding, diagnose
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
+from skidyn.logs import load_recording
 from skidyn.robots import Robot
 
 DATA = Path(os.environ.get("SKIDYN_DATA", "no folder given"))

@@ -21,18 +21,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from joblib import Parallel, delayed
-from scipy.stats import f as f_distribution
-from scipy.stats import false_discovery_control
+from scipy.stats import f as f_distribution, false_discovery_control
 from sklearn.linear_model import LassoCV
 from sklearn.model_selection import GroupKFold
 
+from skidyn._signals import read_signals
 from skidyn.datasets import load_planar_arm, load_ur5, make_hidden_effect_log
-from skidyn.diagnosis import diagnose
-from skidyn.diagnosis._candidates import catalogue_candidates
-from skidyn.diagnosis._reading import read_signals
+from skidyn.diagnosis import catalogue_candidates, diagnose
 from skidyn.effects import list_effects, make_terms
-from skidyn.evidence._problem import Problem, make_problem
-from skidyn.rigid_body import RBDRegressor
+from skidyn.evidence import Problem, make_problem
+from skidyn.identification import RBDRegressor
 
 ROBOTS = {"planar arm": (load_planar_arm, 2), "ur5": (load_ur5, 3)}
 KINDS = (
@@ -65,7 +63,7 @@ def columns_of(log) -> tuple[Problem, list[Columns]]:
     terms = make_terms(BASE, len(names))
     problem = make_problem(signals, torque, robot=log.robot, rigid_body=True, terms=terms)
     fit = problem.fit(terms, passes=3)
-    problem.with_fit(fit)
+    problem.set_fit(fit)
     pool = [c for c in catalogue_candidates(problem, list_effects()) if len(c.joints) == 1]
     design = problem.design([problem.term_rows(t) for t in terms])
     last = np.unique(signals.trajectory)[-HELD_OUT]

@@ -16,8 +16,8 @@ import numpy as np
 import pinocchio as pin
 from _timing import embedded_text, models
 
+from skidyn.dynamics._compiled import compile_library
 from skidyn.export import c_source
-from skidyn.rigid_body._compiled import compile_library
 
 N_CALLS = 20_000
 

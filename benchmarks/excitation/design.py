@@ -20,7 +20,7 @@ from scipy.signal import lfilter
 
 from skidyn.datasets import load_panda, load_srs_arm, load_ur5
 from skidyn.excitation import Excitation, design_excitation
-from skidyn.rigid_body._base_parameters import find_base_parameters
+from skidyn.robots import find_base_parameters
 
 RATE, NOISE, CORRELATION, REPEATS = 100.0, 0.01, 0.1, 30
 

@@ -20,10 +20,10 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from skidyn.datasets import load_recording
 from skidyn.explorer import Session
 from skidyn.explorer._server import Explorer
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
+from skidyn.logs import load_recording
 from skidyn.robots import Robot
 
 GAINS = (14.87, 13.26, 11.13, 10.62, 11.03, 11.47)

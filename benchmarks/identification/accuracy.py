@@ -15,7 +15,7 @@ from _common import random_motion
 
 from skidyn.datasets import load_panda
 from skidyn.evidence import evidence_from_motion
-from skidyn.rigid_body import find_base_parameters
+from skidyn.robots import find_base_parameters
 
 RANGES = (1.0, 0.2, 0.05, 0.02, 0.01, 0.003, 0.001, 0.0003)
 

@@ -19,12 +19,8 @@ import pinocchio as pin
 from _common import ROBOTS, Oracle, interleaved, noisy_torque, random_motion
 
 from skidyn.evidence import evidence_from_motion
-from skidyn.rigid_body import (
-    RBDRegressor,
-    find_base_parameters,
-    is_consistent,
-    regressor_from_evidence,
-)
+from skidyn.identification import RBDRegressor, is_consistent, regressor_from_evidence
+from skidyn.robots import find_base_parameters
 
 try:
     from figaroh.tools.regressor import build_regressor_basic

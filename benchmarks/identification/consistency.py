@@ -18,8 +18,7 @@ import warnings
 import numpy as np
 
 from skidyn.datasets import load_panda, load_planar_arm, load_scara, load_srs_arm, load_ur10e
-from skidyn.rigid_body import RBDRegressor
-from skidyn.rigid_body._consistency import pseudo_inertia
+from skidyn.identification import RBDRegressor, pseudo_inertia
 
 ROBOTS = [load() for load in (load_planar_arm, load_scara, load_ur10e, load_srs_arm, load_panda)]
 MOTIONS = ("few samples", "one joint", "tiny", "one pose", "slow line", "rich")

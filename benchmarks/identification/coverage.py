@@ -22,8 +22,8 @@ from scipy.stats import t as student_t
 
 from skidyn.datasets import load_panda, load_planar_arm, load_ur10e
 from skidyn.evidence import evidence_from_motion
-from skidyn.rigid_body import RBDRegressor, bootstrap_coefficients, find_base_parameters
-from skidyn.robots import Robot
+from skidyn.identification import RBDRegressor, bootstrap_coefficients
+from skidyn.robots import Robot, find_base_parameters
 
 LOADS = {"planar arm": load_planar_arm, "UR10e": load_ur10e, "Panda": load_panda}
 FRICTION = ("viscous", "coulomb")

@@ -19,8 +19,8 @@ import numpy as np
 import pandas as pd
 from scipy.signal import decimate
 
-from skidyn.datasets import load_recording
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
+from skidyn.logs import load_recording
 from skidyn.robots import Robot
 
 DATA = Path(os.environ.get("SKIDYN_DATA", "no folder given"))

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from skidyn.datasets import load_recording
+from skidyn.logs import load_recording
 from skidyn.payload import estimate_drive_gains, identify_payload
 from skidyn.robots import Robot
 

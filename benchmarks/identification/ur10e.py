@@ -21,8 +21,8 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import butter, filtfilt
 
-from skidyn.datasets import load_recording
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
+from skidyn.logs import load_recording
 from skidyn.robots import Robot
 
 FOLDER = Path(os.environ.get("SKIDYN_DATA", "no folder given")) / "ur10e"

@@ -18,13 +18,11 @@ from sklearn.model_selection import PredefinedSplit
 from skidyn._columns import resolve_columns
 from skidyn._signals import Signals, signals_from
 from skidyn.diagnosis import EffectSearchCV
-from skidyn.evidence._problem import hysteresis_joints
-from skidyn.evidence._rows import sliding_samples
-from skidyn.model_selection import PhaseKFold, TrajectoryKFold
-from skidyn.model_selection._split import held_out_folds
+from skidyn.evidence import hysteresis_joints, sliding_samples
+from skidyn.identification import RBDRegressor
+from skidyn.model_selection import PhaseKFold, TrajectoryKFold, held_out_folds
 from skidyn.neural_network._physics import effect_columns
 from skidyn.preprocessing import ButterworthFilter, TimeDerivative
-from skidyn.rigid_body import RBDRegressor
 from skidyn.robots import Robot
 
 #: Seconds at both ends of a recording that no one is judged on: the filters need them.

@@ -23,10 +23,10 @@ from _common import load_ur10e, print_table
 from numpy.typing import NDArray
 from sklearn.base import clone
 
+from skidyn.identification import RBDRegressor
 from skidyn.metrics import paired_comparison, trajectory_errors
 from skidyn.model_selection import TrajectoryKFold
 from skidyn.neural_network import NDLRegressor, SDLRegressor
-from skidyn.rigid_body import RBDRegressor
 
 JOINTS = [f"J{j}" for j in range(1, 7)]
 PAPER = {

@@ -23,8 +23,8 @@ from playwright.sync_api import Browser, sync_playwright
 
 from skidyn.datasets import load_panda, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
+from skidyn.identification import RBDRegressor
 from skidyn.report import summarize, write_html
-from skidyn.rigid_body import RBDRegressor
 
 TRAJECTORIES, RATE = 30, 100.0
 #: A frame that is painted after the end of loading holds the plots that are drawn while loading.

@@ -14,7 +14,7 @@ from _tiles import motion, torque
 
 from skidyn._signals import Signals
 from skidyn.datasets import load_scara
-from skidyn.evidence._streaming import evidence_of_signals, linear_terms
+from skidyn.evidence import evidence_of_signals, linear_terms
 from skidyn.fleet import compare_fleet, monitor_drift
 
 TRAJECTORIES, WORN_SHARE, WEAR, SPREAD, NATURE = 10, 0.02, 1.4, 0.05, 3.0

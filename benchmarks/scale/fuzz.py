@@ -2,9 +2,10 @@
 """Damaged and hostile inputs for every reader: each is read, or refused by an error of skidyn.
 
 Usage: python benchmarks/scale/fuzz.py [--inputs 2000] [--seed 0] [--only urdf csv ...]
+       python benchmarks/scale/fuzz.py --seconds 600       ten minutes for every reader
        python benchmarks/scale/fuzz.py --atheris --only formula --seconds 300
 
-The second form lets coverage of skidyn's own code guide the damage; it ends at the first crash,
+The last form lets coverage of skidyn's own code guide the damage; it ends at the first crash,
 after the seconds, or never, and libFuzzer prints how many inputs it tried.
 
 An input counts as a crash if anything but a skidyn error is raised, or if it takes over 10 s.
@@ -14,18 +15,20 @@ from __future__ import annotations
 
 import argparse
 import io
+import itertools
 import json
 import random
 import signal
 import sys
 import tempfile
+import time
 import traceback
 import warnings
 from pathlib import Path
 
 import numpy as np
 
-from skidyn._exceptions import SkidynError
+from skidyn.exceptions import SkidynError
 
 SECONDS = 10
 #: Pieces that break parsers more often than random bytes do.
@@ -45,7 +48,7 @@ def _urdf(data: bytes, folder: Path) -> None:
 
 def _log(suffix: str):
     def read(data: bytes, folder: Path) -> None:
-        from skidyn.datasets import read_log
+        from skidyn.logs import read_log
 
         file = folder / f"log{suffix}"
         file.write_bytes(data)
@@ -98,11 +101,50 @@ TARGETS = {
     "mat": _log(".mat"),
     "hdf5": _log(".h5"),
     "mcap": _log(".mcap"),
+    "bag": _log(".bag"),
     "report": _report,
     "formula": _formula,
     "model": _model,
     "stream": _stream,
 }
+
+
+def _mcap_of(frame) -> bytes:
+    from mcap.writer import Writer
+
+    out = io.BytesIO()
+    writer = Writer(out)
+    writer.start()
+    schema = writer.register_schema("sensor_msgs/msg/JointState", "jsonschema", b"{}")
+    channel = writer.register_channel("/joint_states", "json", schema)
+    for row in frame.to_dict("records"):
+        names = ["joint1", "joint2"]
+        values = {"position": "q", "velocity": "dq", "effort": "tau"}
+        state = {field: [row[f"{s}{j}"] for j in (1, 2)] for field, s in values.items()}
+        stamp = round(1e9 * (row["time"] + 100 * row["trajectory"]))
+        writer.add_message(channel, stamp, json.dumps({"name": names, **state}).encode(), stamp)
+    writer.finish()
+    return out.getvalue()
+
+
+def _bag_of(frame) -> bytes:
+    from rosbags.rosbag1 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC)
+    kinds, kind = store.types, "sensor_msgs/msg/JointState"
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "a.bag")
+        with Writer(path) as writer:
+            connection = writer.add_connection("/joint_states", kind, typestore=store)
+            for row in frame.to_dict("records"):
+                now = round(1e9 * (1 + row["time"] + 100 * row["trajectory"]))
+                stamp = kinds["builtin_interfaces/msg/Time"](now // 10**9, now % 10**9)
+                header = kinds["std_msgs/msg/Header"](seq=0, stamp=stamp, frame_id="")
+                values = [np.array([row[f"{s}{j}"] for j in (1, 2)]) for s in ("q", "dq", "tau")]
+                state = kinds[kind](header, ["joint1", "joint2"], *values)
+                writer.write(connection, now, store.serialize_ros1(state, kind))
+        return path.read_bytes()
 
 
 def seeds(name: str) -> list[bytes]:
@@ -147,7 +189,9 @@ def seeds(name: str) -> list[bytes]:
             for column, values in arrays.items():
                 file[column] = values
     elif name == "mcap":
-        return [b"\x89MCAP0\r\n" + bytes(200) + b"\x89MCAP0\r\n"]
+        return [_mcap_of(frame), b"\x89MCAP0\r\n" + bytes(200) + b"\x89MCAP0\r\n"]
+    elif name == "bag":
+        return [_bag_of(frame)]
     return [buffer.getvalue()]
 
 
@@ -182,14 +226,19 @@ def _alarm(*_):
     raise _TooSlow(f"more than {SECONDS} s")
 
 
-def try_inputs(name: str, count: int, seed: int = 0) -> tuple[int, list[tuple[bytes, str]]]:
-    """How many damaged inputs were read nevertheless, and those that crashed."""
+def try_inputs(
+    name: str, count: int, seed: int = 0, seconds: float = 0.0
+) -> tuple[int, int, list[tuple[bytes, str]]]:
+    """How many damaged inputs were tried, were read nevertheless, and those that crashed."""
     rng, crashes, accepted = random.Random(f"{name} {seed}"), [], 0
     good = seeds(name)
+    end = time.monotonic() + seconds if seconds else None
     signal.signal(signal.SIGALRM, _alarm)
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        for k in range(count):
+        for k in itertools.count():
+            if k >= count if end is None else time.monotonic() > end:
+                break
             data = good[k] if k < len(good) else damage(rng.choice(good), rng)
             signal.alarm(SECONDS)
             try:
@@ -201,7 +250,7 @@ def try_inputs(name: str, count: int, seed: int = 0) -> tuple[int, list[tuple[by
                 crashes.append((data, traceback.format_exc()))
             finally:
                 signal.alarm(0)
-    return accepted, crashes
+    return k, accepted, crashes
 
 
 def guided(name: str, seconds: int) -> None:
@@ -221,7 +270,7 @@ def guided(name: str, seconds: int) -> None:
                 TARGETS[name](data, folder)
             except Exception as error:
                 print(f"seed refused: {error}")
-    from skidyn._exceptions import SkidynError as Refused
+    from skidyn.exceptions import SkidynError as Refused
 
     def once(data: bytes) -> None:
         try:
@@ -250,10 +299,10 @@ def main() -> int:
     total = 0
     print("reader inputs read refused crashes")
     for name in options.only:
-        accepted, crashes = try_inputs(name, options.inputs, options.seed)
+        tried, accepted, crashes = try_inputs(name, options.inputs, options.seed, options.seconds)
         total += len(crashes)
-        refused = options.inputs - accepted - len(crashes)
-        print(name, options.inputs, accepted, refused, len(crashes), flush=True)
+        refused = tried - accepted - len(crashes)
+        print(name, tried, accepted, refused, len(crashes), flush=True)
         seen = set()
         for data, text in crashes:
             last = text.strip().splitlines()[-1][:70]

@@ -57,7 +57,7 @@ def answer(how: str, files: list[Path], client=None, workers: int = 1) -> str:
 
     from skidyn.diagnosis import diagnose, diagnose_parquet
     from skidyn.evidence import evidence_from_parquet
-    from skidyn.rigid_body import RBDRegressor, regressor_from_evidence
+    from skidyn.identification import RBDRegressor, regressor_from_evidence
 
     if how == "diagnosis":
         result = diagnose_parquet(RBDRegressor(robot(), ("viscous",)), files)

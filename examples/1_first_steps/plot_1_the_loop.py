@@ -16,8 +16,8 @@ import numpy as np
 
 from skidyn.datasets import load_ur5, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
+from skidyn.identification import RBDRegressor
 from skidyn.inspection import ErrorBudgetDisplay, ErrorMapDisplay, ResidualDisplay, TorqueDisplay
-from skidyn.rigid_body import RBDRegressor
 
 hidden = {"dahl": {"joints": [3]}, "spring": {"joints": [2], "magnitude": 0.6}}
 log = make_hidden_effect_log(load_ur5(), hidden, n_trajectories=8, duration=6.0, random_state=1)
@@ -49,7 +49,8 @@ for finding in diagnosis.findings:
 ResidualDisplay.from_finding(diagnosis.findings[0])
 
 # %%
-# **Add it and watch the error fall**, here of joint 3, down to the noise floor.
+# **Add it and watch the error fall**, here of joint 3. What is left above the noise floor lies at
+# the starts of trajectories: how far the friction was wound up before is not in the log.
 ErrorBudgetDisplay.from_diagnosis(diagnosis, joint=3)
 
 # %%

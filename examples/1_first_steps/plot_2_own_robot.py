@@ -17,11 +17,12 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 
-from skidyn.datasets import check_log, make_hidden_effect_log, read_log
+from skidyn.datasets import make_hidden_effect_log
 from skidyn.diagnosis import diagnose
+from skidyn.identification import RBDRegressor
 from skidyn.inspection import ErrorBudgetDisplay
+from skidyn.logs import check_log, read_log
 from skidyn.report import summarize, write_html
-from skidyn.rigid_body import RBDRegressor
 from skidyn.robots import Robot
 
 URDF = """

@@ -16,7 +16,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from skidyn.datasets import load_planar_arm
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
 
 robot = load_planar_arm()
 truth = robot.inertial_parameters * np.array([[1.2], [0.85]])

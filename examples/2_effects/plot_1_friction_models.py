@@ -17,8 +17,8 @@ from sklearn.model_selection import cross_validate
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import EffectSearchCV
+from skidyn.identification import RBDRegressor
 from skidyn.model_selection import TrajectoryKFold
-from skidyn.rigid_body import RBDRegressor
 
 CANDIDATES = {
     "viscous": ("viscous",),

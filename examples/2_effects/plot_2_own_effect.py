@@ -17,8 +17,8 @@ import numpy as np
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
 from skidyn.effects import Coefficient, Effect, Shape, register_effect
+from skidyn.identification import RBDRegressor
 from skidyn.inspection import ErrorBudgetDisplay
-from skidyn.rigid_body import RBDRegressor
 
 log = make_hidden_effect_log(load_planar_arm(), None, random_state=3)
 q, dq = log.frame["q2"].to_numpy(), log.frame["dq2"].to_numpy()

@@ -14,7 +14,7 @@ import matplotlib.pyplot as plt
 
 from skidyn.datasets import load_scara, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
 
 log = make_hidden_effect_log(load_scara(), None, n_trajectories=8, duration=6.0, random_state=5)
 diagnosis = diagnose(RBDRegressor(log.robot), log.X, log.y)
@@ -28,8 +28,8 @@ for row in zip(log.robot.joint_names, diagnosis.rmse_before, diagnosis.noise_flo
     print("{:14s} {:7.4f}  {:7.4f}".format(*row))
 
 # %%
-# What could still be hidden. ``None`` means that this log cannot show the effect at all, however
-# large it is: no temperature was logged, for instance.
+# What could still be hidden. Where ``largest_hidden`` is ``None``, this log cannot show the effect
+# at all, however large it is: no temperature was logged, for instance.
 for limit in [limit for limit in diagnosis.limits if limit.joint == 1][:8]:
     print(limit.sentence)
 

@@ -13,8 +13,8 @@ import matplotlib.pyplot as plt
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
+from skidyn.identification import RBDRegressor
 from skidyn.inspection import ResidualDisplay
-from skidyn.rigid_body import RBDRegressor
 
 log = make_hidden_effect_log(load_planar_arm(), "unknown_cable", random_state=2)
 print("hidden:", log.truth[0]["formula"], "on joints", log.truth[0]["joints"])
@@ -24,12 +24,12 @@ diagnosis = diagnose(RBDRegressor(log.robot), log.X, log.y)
 print("verdict:", diagnosis.verdict)
 for finding in diagnosis.findings:
     print(finding.sentence)
-rest = diagnosis.unexplained
-print("joints", rest["joints"], "variables", rest["variables"], f"share {rest['share']:.0%}")
 
 # %%
-# Its shape on joint 1. Whoever knows the robot may recognise it, and write it down as an effect.
-ResidualDisplay.from_finding(diagnosis.findings[0], joint=1)
+# One finding per joint. The shapes, which whoever knows the robot may recognise and write down as
+# an effect:
+for finding in diagnosis.findings:
+    ResidualDisplay.from_finding(finding, joint=finding.joints[0])
 
 # %%
 # Where a short formula does as well as the shape that was measured, it can be added like any

@@ -15,7 +15,7 @@ from sklearn.model_selection import GridSearchCV, GroupKFold, GroupShuffleSplit
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import EffectSearchCV
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
 
 log = make_hidden_effect_log(load_planar_arm(), "stribeck", joints=[2], random_state=4)
 groups = log.X["trajectory"].to_numpy()

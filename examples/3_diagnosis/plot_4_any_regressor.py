@@ -20,8 +20,8 @@ from sklearn.preprocessing import FunctionTransformer
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
+from skidyn.identification import RBDRegressor
 from skidyn.inspection import ErrorMapDisplay
-from skidyn.rigid_body import RBDRegressor
 
 log = make_hidden_effect_log(load_planar_arm(), "spring", joints=[1], n_trajectories=16)
 first = (log.X["trajectory"] < 8).to_numpy()
@@ -47,8 +47,8 @@ for finding in diagnosis.findings:
 
 # %%
 # A regressor that is taken as it is has already bent its other coefficients towards what is
-# missing, and the diagnosis sees that too. Where the model is skidyn's own, everything is fitted
-# anew with each candidate, and the answer is clearer.
+# missing, and what is added cannot bend them back. Where the model is skidyn's own, everything is
+# fitted anew with each candidate, and the addition removes more of the error.
 own = diagnose(RBDRegressor(log.robot), log.X[~first], log.y[~first])
 for finding in own.findings:
     print(finding.sentence)

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from skidyn.datasets import load_recording
 from skidyn.diagnosis import Settings, diagnose
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
+from skidyn.logs import load_recording
 from skidyn.robots import Robot
 
 DATA = Path(os.environ.get("SKIDYN_DATA", "no folder given"))

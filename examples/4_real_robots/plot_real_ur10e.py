@@ -18,9 +18,9 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import butter, filtfilt
 
-from skidyn.datasets import load_recording
 from skidyn.diagnosis import Settings, diagnose
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
+from skidyn.logs import load_recording
 from skidyn.robots import Robot
 
 DATA = Path(os.environ.get("SKIDYN_DATA", "no folder given")) / "ur10e"
@@ -51,7 +51,7 @@ judge = {
 }
 
 # %%
-# What is missing, on the three recordings. The order is that of importance.
+# What is missing, on the three recordings, in the order in which it was added.
 robot = Robot.from_urdf(DATA / "ur10e_min.urdf")
 model = RBDRegressor(robot, ("viscous", "coulomb", "offset", "rotor_inertia"))
 diagnosis = diagnose(model, choose, choose[TAU], settings=Settings(max_findings=6))
@@ -89,13 +89,14 @@ for name, frame in judge.items():
         print(f"   {part:26s}", np.round(before, 2), np.round(after, 2), change)
 
 # %%
-# Where the point-to-point run fails: joints 5 and 6 stand still most of the time, and friction at
-# rest is whatever the controller last left there. No model of sliding friction can know it.
+# Joints 5 and 6 stand still during most of the point-to-point run, and friction at rest is whatever
+# the controller last left there. No model of sliding friction can know it, so an error inside the
+# dry friction is no failure.
 ptp = judge["point to point"]
 where = diagnose(model, ptp, ptp[TAU], settings=Settings(max_findings=0))
-REST = [f for f in where.failures if f.joint in (5, 6)]
-for failure in REST:
-    print(failure.sentence)
+REST = [error for error in where.rest_errors if error.joint in (5, 6)]
+for error in REST:
+    print(error.sentence)
 
 # %%
 # The error by joint and regime before and after.

@@ -87,8 +87,8 @@ for name, error in errors.items():
     print(f"{name:28s} {error:.3f} N m")
 
 # %%
-# The forecasts look best, and the simplest ones are as good as the network. They say nothing about
-# how well the robot's torque is understood: none of them could compute a feedforward torque.
+# The forecasts look best, and a plain autoregression is as good as the network. They say nothing
+# about how well the robot's torque is understood: none of them could compute a feedforward torque.
 figure, axes = plt.subplots(figsize=(7, 3), layout="constrained")
 axes.barh(list(errors), list(errors.values()), color=["C7"] * 3 + ["C0"] * 3)
 axes.invert_yaxis()

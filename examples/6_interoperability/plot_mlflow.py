@@ -18,8 +18,8 @@ import numpy as np
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
+from skidyn.identification import RBDRegressor
 from skidyn.report import summarize, write_html
-from skidyn.rigid_body import RBDRegressor
 
 os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")  # nothing leaves this machine
 try:

@@ -17,7 +17,7 @@ import numpy as np
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.export import write_mjcf
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
 
 try:
     import mujoco

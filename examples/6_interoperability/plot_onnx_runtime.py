@@ -18,7 +18,7 @@ import numpy as np
 
 from skidyn.datasets import load_ur5, make_hidden_effect_log
 from skidyn.export import write_onnx
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
 
 try:
     import onnx  # noqa: F401

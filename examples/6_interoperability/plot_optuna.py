@@ -16,9 +16,9 @@ from sklearn.model_selection import cross_val_score
 from sklearn.pipeline import make_pipeline
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.identification import RBDRegressor
 from skidyn.model_selection import TrajectoryKFold
 from skidyn.preprocessing import SmoothDerivatives
-from skidyn.rigid_body import RBDRegressor
 
 try:
     import optuna

@@ -14,8 +14,8 @@ import sys
 import numpy as np
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.identification import RBDRegressor
 from skidyn.preprocessing import SmoothDerivatives
-from skidyn.rigid_body import RBDRegressor
 
 try:
     import polars as pl

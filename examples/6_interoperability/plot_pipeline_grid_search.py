@@ -14,9 +14,9 @@ from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import Pipeline
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.identification import RBDRegressor
 from skidyn.model_selection import TrajectoryKFold
 from skidyn.preprocessing import SmoothDerivatives
-from skidyn.rigid_body import RBDRegressor
 
 log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=6, duration=6.0)
 X = log.frame[["time", "trajectory", "q1", "q2"]]

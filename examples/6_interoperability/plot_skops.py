@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
 
 try:
     import skops.io as sio

@@ -6,9 +6,10 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from skidyn._commands._arguments import command, with_joints
+from skidyn._commands._arguments import JsonFile, command, with_joints, with_report
 from skidyn._commands._input import joint_numbers, read_model_and_log, read_robot, recorded_options
 from skidyn._commands._output import parameters, print_json, run_diagnosis, write_json
+from skidyn._text import digits
 
 DESCRIPTION = """\
 Add an effect to a model that skidyn diagnose has looked at, and print the held-out error before and
@@ -27,10 +28,12 @@ def add_parser(commands: Any) -> None:
         "add an effect to a diagnosed model and print the error before, after",
         DESCRIPTION,
     )
-    parser.add_argument("--from", dest="report", required=True, help="report.json of diagnose")
+    with_report(parser)
     parser.add_argument("--effect", required=True, help="kind of the catalogue")
     with_joints(parser, "joints that get the effect (default: all)")
-    parser.add_argument("--out", metavar="JSON", help="write the parameters of the better model")
+    parser.add_argument(
+        "--out", type=JsonFile, metavar="JSON", help="write the parameters of the better model"
+    )
 
 
 def run(options: argparse.Namespace) -> None:
@@ -51,7 +54,9 @@ def run(options: argparse.Namespace) -> None:
     if options.json:
         print_json({"before": before.tolist(), "after": after.tolist()})
         return
-    print(f"held-out error with {options.effect} added (N m, N for sliders; sliding samples)")
+    print(f"held-out error on judged samples with {options.effect} added")
     for j, name in enumerate(robot.joint_names):
         change = round(after[j] / before[j] - 1, 2) if before[j] > 0 else 0.0
-        print(f"  {name:24s} {before[j]:9.4g} -> {after[j]:9.4g}  ({change + 0.0:+.0%})")
+        unit = "N" if robot.joint_types[j] == "prismatic" else "N m"
+        told = f"{digits(before[j]):>9s} -> {digits(after[j]):>9s} {unit}"
+        print(f"  {j + 1} {name:24s} {told}  ({change + 0.0:+.0%})")

@@ -3,9 +3,76 @@
 
 from __future__ import annotations
 
+import argparse
+from collections.abc import Iterator
 from typing import Any
 
 from skidyn._commands._terminal import TeachingFormatter
+from skidyn._writing import keep, writable
+
+
+class Input(str):
+    """A file that a command reads, and never writes."""
+
+    __slots__ = ()
+
+
+class Output(str):
+    """A file that a command writes; its ending says of which kind it is.
+
+    A glob of the shell behind ``--out`` names a recording; its ending is not that of a result.
+    """
+
+    __slots__ = ()
+    endings: tuple[str, ...] = ()
+
+    def __new__(cls, name: str) -> Output:
+        if cls.endings and not name.lower().endswith(cls.endings):
+            raise argparse.ArgumentTypeError(
+                f"{name!r} must end in {' or '.join(cls.endings)}, which says what it becomes"
+            )
+        return super().__new__(cls, name)
+
+
+class JsonFile(Output):
+    """Result as JSON."""
+
+    __slots__ = ()
+    endings = (".json",)
+
+
+class Page(Output):
+    """Result as a page."""
+
+    __slots__ = ()
+    endings = (".html", ".htm")
+
+
+class Motion(Output):
+    """Motion as a table."""
+
+    __slots__ = ()
+    endings = (".csv",)
+
+
+class TestReport(Output):
+    """Result for tools that collect tests."""
+
+    __slots__ = ()
+    endings = (".xml",)
+
+
+def check_files(options: argparse.Namespace) -> None:
+    """Refuse outputs that cannot be written or would replace an input, before any work is done."""
+    keep(word for word in _words(options) if isinstance(word, Input))
+    for word in _words(options):
+        if isinstance(word, Output):
+            writable(word)
+
+
+def _words(options: argparse.Namespace) -> Iterator[Any]:
+    for value in vars(options).values():
+        yield from value if isinstance(value, list) else [value]
 
 
 def command(commands: Any, name: str, run: Any, text: str, description: str = "") -> Any:
@@ -22,9 +89,15 @@ def command(commands: Any, name: str, run: Any, text: str, description: str = ""
 
 def with_log_only(parser: Any, urdf_required: bool = True) -> None:
     """Logs, robot, and how the columns are to be read."""
-    parser.add_argument("logs", nargs="+", metavar="LOG", help="recordings, one or more files")
     parser.add_argument(
-        "--urdf", required=urdf_required, metavar="URDF", help="description of the robot"
+        "logs", nargs="+", type=Input, metavar="LOG", help="recordings, one or more files"
+    )
+    parser.add_argument(
+        "--urdf",
+        type=Input,
+        required=urdf_required,
+        metavar="URDF",
+        help="description of the robot",
     )
     with_reading(parser)
 
@@ -34,14 +107,54 @@ def with_reading(parser: Any) -> None:
     parser.add_argument(
         "--columns",
         metavar="JSON",
-        help='which columns hold which signals: {"q": ["pos_a", "pos_b"], "tau": [...]}',
+        help='which columns hold which signals: {"q": ["pos_a", "pos_b"], "tau": [...]}, or '
+        'patterns: "q=position_{i},tau=effort_{joint}"',
     )
-    parser.add_argument("--units", metavar="JSON", help='units that are not SI: {"q": "deg"}')
+    parser.add_argument(
+        "--units", metavar="UNITS", help='units that are not SI: q=deg,time=ms or {"q": "deg"}'
+    )
     parser.add_argument(
         "--drive-gains", metavar="JSON", help="torque per ampere of each joint: logs of currents"
     )
     parser.add_argument("--joints", help="joints the log covers, separated by commas")
     parser.add_argument("--rate", type=float, help="sampling rate in Hz of a log without time")
+    with_remedies(parser)
+
+
+def with_remedies(parser: Any) -> None:
+    """What mends a log that is not what its owner thought; skidyn check says which."""
+    mend = parser.add_argument_group("remedies", "skidyn check says which of them a log needs")
+    mend.add_argument(
+        "--gravity", metavar="X,Y,Z", help="gravity in the base frame, m/s^2 (robot on a wall)"
+    )
+    mend.add_argument(
+        "--flip",
+        metavar="JOINT,..",
+        help="other sign: a joint (its torque), q3 (its motion), or a column such as dq3",
+    )
+    mend.add_argument(
+        "--order", metavar="2,1,3", help="for each joint the column that holds it, or tau=2,1,3"
+    )
+    mend.add_argument("--gain", metavar="tau3=0.02", help="factors of columns or quantities")
+    mend.add_argument("--zero", metavar="q2=1.57", help="what positions read at the robot's zero")
+    mend.add_argument("--late", metavar="tau=0.008", help="delays in s, which are taken out")
+    mend.add_argument("--unwrap", action="store_true", help="take leaps by a turn out")
+    mend.add_argument(
+        "--torque-sign",
+        choices=("recorded", "command"),
+        default="recorded",
+        help="command: magnitudes get the sign of commanded minus measured position",
+    )
+    mend.add_argument(
+        "--clock",
+        choices=("recorded", "regular"),
+        default="recorded",
+        help="regular: samples were taken at even steps, only the stamps jitter",
+    )
+    mend.add_argument(
+        "--drop-repeated", action="store_true", help="leave out rows that repeat the one before"
+    )
+    mend.add_argument("--resample", type=float, metavar="HZ", help="rate of an even clock")
 
 
 def with_log(parser: Any, urdf_required: bool = True) -> None:
@@ -49,6 +162,7 @@ def with_log(parser: Any, urdf_required: bool = True) -> None:
     with_log_only(parser, urdf_required)
     parser.add_argument(
         "--model",
+        type=Input,
         default="rigid_body,viscous,coulomb",
         help="what the model has, separated by commas (default: %(default)s), or a model stored as "
         "*.skops",
@@ -57,6 +171,24 @@ def with_log(parser: Any, urdf_required: bool = True) -> None:
         "--nominal",
         action="store_true",
         help="keep the inertial parameters of the URDF instead of identifying them",
+    )
+
+
+def with_report(parser: Any) -> None:
+    """A report of skidyn diagnose, which names the log and the model."""
+    parser.add_argument(
+        "--from", dest="report", type=Input, required=True, help="report.json of diagnose"
+    )
+    with_other_robot(parser)
+
+
+def with_other_robot(parser: Any) -> None:
+    """The robot in place of that which a report names."""
+    parser.add_argument(
+        "--urdf",
+        type=Input,
+        help="description of the robot (default: that of the report, looked for in the report's "
+        "folder, then here)",
     )
 
 

@@ -11,12 +11,13 @@ from skidyn._commands._input import read_frame, read_robot
 from skidyn._commands._output import print_json, working
 
 DESCRIPTION = """\
-Judge the quality of a log before any model is fitted: rate, jitter, gaps, repeated rows, step of
-the position sensors, saturation, velocity against differentiated position, delay of the torque, and
-how far and how often each joint was moved. What looks wrong is said with its evidence.
+Is a log what its owner thinks it is? Said first is what would change an answer most, with its
+evidence and the option that mends it: units, clock, repeated rows, and with the robot also signs
+and order of joints, gravity, torque without sign, currents taken for torques, delay. Then rate,
+resolution, and how far and how often each joint was moved.
 
   skidyn check run1.csv run2.csv
-  skidyn check run1.csv --urdf robot.urdf     also limits, delay, and currents taken for torques
+  skidyn check run1.csv --urdf robot.urdf
 
 at rest: share of rows in which the joint stands; at limit: share of rows at the extreme torque;
 dq/q': recorded velocity over differentiated position, 1 in a consistent log; delay: of the torque.
@@ -29,7 +30,7 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    from skidyn.datasets import check_log
+    from skidyn.logs import check_log
 
     robot = read_robot(options) if options.urdf else None
     frame = read_frame(options, robot, check=False)
@@ -41,3 +42,9 @@ def run(options: argparse.Namespace) -> None:
         for note in frame.attrs["notes"]:
             print(f"note: {note}")
         print(quality)
+        remedies = [c.remedy.option for c in quality.checks if c.remedy and c.certainty != "noted"]
+        if remedies:
+            robot_option = f" --urdf {options.urdf}" if options.urdf else ""
+            logs = " ".join(options.logs)
+            print("\nto mend all of it, and check again:")
+            print(f"  skidyn check {logs}{robot_option} {' '.join(remedies)}")

@@ -4,10 +4,12 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from skidyn._commands._arguments import command, with_log
+from skidyn._commands._arguments import Input, Page, TestReport, command, with_log
+from skidyn._commands._gate import gate
 from skidyn._commands._input import read_model_and_log, recorded_options
 from skidyn._commands._output import (
     print_comparison,
@@ -35,6 +37,11 @@ JSON beside it.
   skidyn compare run*.csv --urdf robot.urdf --against-model better.skops --html models.html
   skidyn compare new*.csv --urdf robot.urdf --against worn*.csv --html wear.html
   skidyn compare new.json worn.json --html wear.html
+
+A gate for tests: the model is fitted to a healthy recording, and its error on the new one must not
+be larger than so many times the usual; joints that fail are named, and the exit code is 1.
+
+  skidyn compare new*.csv --urdf robot.urdf --against healthy*.csv --fail-above 1.5
 """
 
 
@@ -47,15 +54,36 @@ def add_parser(commands: Any) -> None:
         DESCRIPTION,
     )
     with_log(parser, urdf_required=False)
-    parser.add_argument("--against", nargs="+", metavar="LOG", help="the other recording")
-    parser.add_argument("--against-model", metavar="MODEL", help="the other model, as --model")
+    parser.add_argument(
+        "--against", nargs="+", type=Input, metavar="LOG", help="the other recording"
+    )
+    parser.add_argument(
+        "--against-model", type=Input, metavar="MODEL", help="the other model, as --model"
+    )
     parser.add_argument("--names", metavar="A,B", help="what the two are called on the page")
     parser.add_argument(
-        "--html", metavar="HTML", help="page of the two; its numbers as JSON beside"
+        "--html", type=Page, metavar="HTML", help="page of the two; its numbers as JSON beside"
+    )
+
+    parser.add_argument(
+        "--fail-above",
+        type=float,
+        metavar="RATIO",
+        help="fail if a joint's error is more than RATIO times that of --against",
+    )
+    parser.add_argument(
+        "--junit", type=TestReport, metavar="XML", help="result of --fail-above for test reports"
     )
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: argparse.Namespace) -> bool | None:
+    if options.fail_above is not None or options.junit:
+        return gate(options)
+    _compare(options)
+    return None
+
+
+def _compare(options: argparse.Namespace) -> None:
     pair = _pair(options)
     if pair is None:
         _compare_with_log(options)
@@ -85,10 +113,13 @@ def _compare_with_log(options: argparse.Namespace) -> None:
     diagnosis = run_diagnosis(model, frame, tau, options, kinds=())
     comparison = diagnosis.comparison
     if options.json:
-        print_json({"table": comparison.table(), "failures": [vars(f) for f in diagnosis.failures]})
+        print_json(
+            {"table": comparison.table(), "failures": [asdict(f) for f in diagnosis.failures]}
+        )
         return
     for note in diagnosis.warnings:
-        print(f"note: {note}")
+        print(f"  ! {note}")
+    options.told = list(diagnosis.warnings)
     print_comparison(comparison)
     print_regimes(diagnosis)
 
@@ -96,10 +127,10 @@ def _compare_with_log(options: argparse.Namespace) -> None:
 def _pair(options: argparse.Namespace) -> list[argparse.Namespace] | None:
     """Options of either side; None where there is only one."""
     reports = [name for name in options.logs if name.endswith(".json")]
-    if reports and not options.urdf:
+    if reports:
         if len(options.logs) != 2 or len(reports) != 2:
             raise SkidynError("two reports of skidyn diagnose can be compared, no more and no less")
-        both = [argparse.Namespace(report=name, json=options.json) for name in reports]
+        both = [argparse.Namespace(report=n, json=options.json, urdf=options.urdf) for n in reports]
         return [recorded_options(side) for side in both]
     if not options.urdf:
         raise SkidynError("--urdf wants the description of the robot")

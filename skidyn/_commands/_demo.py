@@ -7,8 +7,12 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from skidyn._commands._arguments import command
+from skidyn._commands._arguments import Page, command
 from skidyn._commands._output import print_json, rmse_per_joint, working, write_reports
+from skidyn._text import digits
+
+#: Speed in rad/s above which a joint moves.
+MOVING = 0.05
 
 DESCRIPTION = """\
 The whole loop on a simulated Panda arm that hides two effects: compare, see where the model fails,
@@ -20,13 +24,13 @@ learn what is missing, add it, and judge the better model on two trajectories pu
 
 def add_parser(commands: Any) -> None:
     parser = command(commands, "demo", run, "the whole loop on a simulated log", DESCRIPTION)
-    parser.add_argument("--html", default="skidyn-demo.html", help="page to write")
+    parser.add_argument("--html", type=Page, default="skidyn-demo.html", help="page to write")
 
 
 def run(options: argparse.Namespace) -> None:
     from skidyn.datasets import load_demo_log
     from skidyn.diagnosis import diagnose
-    from skidyn.rigid_body import RBDRegressor
+    from skidyn.identification import RBDRegressor
 
     say = (lambda *words: None) if options.json else print
     say("1. A Panda arm is simulated with two effects that no model below knows of.")
@@ -38,16 +42,25 @@ def run(options: argparse.Namespace) -> None:
     say("2. The model: rigid body, viscous and Coulomb friction. Where does it fail?")
     with working("Searching for what is missing", options):
         diagnosis = diagnose(model, X, y)
+    story = diagnosis.story()
     for failure in diagnosis.failures[:3]:
         say(f"   {failure.sentence}")
     say("3. What is missing?")
-    for finding in diagnosis.findings:
-        say(f"   {finding.sentence}")
-    say("4. Added and fitted again; error on the trajectories put aside, in N m:")
-    before = rmse_per_joint(model.fit(X, y), X_new, y_new)
-    after = rmse_per_joint(diagnosis.model, X_new, y_new)
-    for name, a, b in zip(log.robot.joint_names, before, after, strict=True):
-        say(f"   {name:22s} {a:8.4f} -> {b:8.4f}  ({b / a - 1:+.0%})")
+    for finding in story["findings"]:
+        size = f": {finding['size']}" if finding["size"] else ""
+        say(f"   {finding['what']} on {finding['where']}{size}; {finding['sure']}")
+    say("4. Added and fitted again; held-out error of the joints that were wrong:")
+    for row in story["joints"]:
+        if row["speaks"]:
+            say(f"   {row['joint']} {row['name']}: {row['text']}")
+    say("   and while these joints move on the trajectories put aside:")
+    moves = abs(X_new[[f"dq{j + 1}" for j in range(log.robot.n_joints)]].to_numpy()) > MOVING
+    before = rmse_per_joint(model.fit(X, y), X_new, y_new, moves)
+    after = rmse_per_joint(diagnosis.model, X_new, y_new, moves)
+    for row in story["joints"]:
+        if row["speaks"]:
+            a, b = (digits(errors[row["joint"] - 1]) for errors in (before, after))
+            say(f"   {row['joint']} {row['name']}: {a} → {b} {row['unit']}")
     write_reports(diagnosis, None, options.html, {"log": "simulated by skidyn demo"})
     page = str(Path(options.html).resolve())
     if options.json:

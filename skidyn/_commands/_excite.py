@@ -7,7 +7,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from skidyn._commands._arguments import command, with_reading
+from skidyn._commands._arguments import Input, Motion, command, with_reading
 from skidyn._commands._input import json_option, read_model_and_log, read_robot
 from skidyn._commands._output import print_json, working
 from skidyn._exceptions import SkidynError
@@ -29,8 +29,8 @@ try the motion slowly. Play it on the robot, log it, then: skidyn diagnose.
 def add_parser(commands: Any) -> None:
     """Add the command to the parser."""
     parser = command(commands, "excite", run, "design a motion for identification", DESCRIPTION)
-    parser.add_argument("--urdf", required=True, help="description of the robot")
-    parser.add_argument("--out", required=True, metavar="CSV", help="motion to write")
+    parser.add_argument("--urdf", type=Input, required=True, help="description of the robot")
+    parser.add_argument("--out", type=Motion, required=True, metavar="CSV", help="motion to write")
     parser.add_argument("--duration", type=float, default=20.0, help="s (default: %(default)s)")
     parser.add_argument(
         "--sampling",
@@ -61,7 +61,11 @@ def add_parser(commands: Any) -> None:
     )
     parser.add_argument("--seed", type=int, default=0, help="of the random starts")
     parser.add_argument(
-        "--recorded", nargs="+", metavar="LOG", help="recordings already made, one or more files"
+        "--recorded",
+        nargs="+",
+        type=Input,
+        metavar="LOG",
+        help="recordings already made, one or more files",
     )
     parser.add_argument(
         "--model",

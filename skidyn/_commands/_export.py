@@ -7,16 +7,21 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from skidyn._commands._arguments import command, with_log
+from skidyn._commands._arguments import Input, Output, command, with_log
 from skidyn._commands._input import read_model_and_log
 from skidyn._commands._output import print_json, working
 from skidyn._exceptions import SkidynError
+from skidyn._writing import writable
 
 DESCRIPTION = """\
 Fit a model to a log and write it for other tools.
 
   skidyn export run1.csv --urdf robot.urdf --format c --out model.c
   skidyn export run1.csv --urdf robot.urdf --format urdf,mjcf --consistent --out identified
+
+With --into, the numbers go into your own MJCF or URDF, whose other bytes stay as they are:
+
+  skidyn export run1.csv --urdf robot.urdf --format mjcf --into own.xml --consistent --out new.xml
 
 C, Python and ONNX get a function of q, dq, ddq for feedforward, which needs nothing of skidyn.
 Several formats at once get the name of --out with their own suffix. What a format cannot hold (a
@@ -37,7 +42,13 @@ def add_parser(commands: Any) -> None:
         metavar="FORMAT",
         help=f"{', '.join(SUFFIXES)}; several separated by commas",
     )
-    parser.add_argument("--out", required=True, metavar="FILE", help="file to write")
+    parser.add_argument("--out", type=Output, required=True, metavar="FILE", help="file to write")
+    parser.add_argument(
+        "--into",
+        type=Input,
+        metavar="FILE",
+        help="your own MJCF or URDF, of which --out becomes a copy",
+    )
     parser.add_argument("--consistent", action="store_true", help="only bodies that can exist")
 
 
@@ -46,21 +57,34 @@ def run(options: argparse.Namespace) -> None:
     from skidyn import export
 
     files = _files(options.format, options.out)
+    if options.into is not None and (len(files) > 1 or not set(files) <= {"urdf", "mjcf"}):
+        raise SkidynError(f"--into takes --format urdf or mjcf, not {options.format}")
+    for path in files.values():
+        writable(path)
     model, frame, tau = read_model_and_log(options)
     model.set_params(consistent=options.consistent)
     with working("Identifying", options):
         model.fit(frame, tau)
-    left = {}
-    # Descriptions of robots refuse bodies that cannot exist: first, before any file is there.
-    for form, path in sorted(files.items(), key=lambda item: item[0] not in ("urdf", "mjcf")):
-        left[str(path.resolve())] = getattr(export, f"write_{form}")(model, path)
+    left, failed = {}, []
+    for form, path in files.items():
+        try:
+            if options.into is not None:
+                effects = getattr(export, f"merge_{form}")(model, options.into, path)
+            else:
+                effects = getattr(export, f"write_{form}")(model, path)
+        except (SkidynError, OSError, ImportError) as error:
+            failed.append(f"{form}: {error}")
+        else:
+            left[str(path.resolve())] = effects
     if options.json:
         print_json(left)
-        return
-    for name, effects in left.items():
-        print(f"written: {name}")
-        if effects:
-            print(f"  not in it, but in {name}.skidyn.json: {', '.join(effects)}")
+    else:
+        for name, effects in left.items():
+            print(f"written: {name}")
+            if effects:
+                print(f"  not in it, but in {name}.skidyn.json: {', '.join(effects)}")
+    if failed:
+        raise SkidynError("not written: " + "; ".join(failed))
 
 
 def _files(formats: str, out: str) -> dict[str, Path]:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from skidyn._commands._arguments import command, with_log
+from skidyn._commands._arguments import JsonFile, command, with_log
 from skidyn._commands._input import read_model_and_log
 from skidyn._commands._output import parameters, print_json, working, write_json
 
@@ -26,7 +26,7 @@ well the motion excites them, and what the data leaves open.
 def add_parser(commands: Any) -> None:
     parser = command(commands, "identify", run, "identify parameters and print them", DESCRIPTION)
     with_log(parser)
-    parser.add_argument("--out", metavar="JSON", help="write the parameters as JSON")
+    parser.add_argument("--out", type=JsonFile, metavar="JSON", help="write the parameters as JSON")
     parser.add_argument("--consistent", action="store_true", help="only bodies that can exist")
     parser.add_argument(
         "--estimator",

@@ -5,27 +5,32 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from skidyn._commands._arguments import Input, check_files
 from skidyn._commands._output import RECORDED, hashes, working
 from skidyn._exceptions import LogWarning, SkidynError
+from skidyn._limits import MOST_COLUMNS
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from skidyn.rigid_body import RBDRegressor
+    from skidyn.identification import RBDRegressor
     from skidyn.robots import Robot
 
 
-def read_model_and_log(options: argparse.Namespace) -> tuple[RBDRegressor, pd.DataFrame, Any]:
+def read_model_and_log(
+    options: argparse.Namespace, *, check: bool = True
+) -> tuple[RBDRegressor, pd.DataFrame, Any]:
     """The model that the options describe, the log, and its torques."""
     from skidyn._persistence import load_model
-    from skidyn.rigid_body import RBDRegressor
+    from skidyn.identification import RBDRegressor
 
     robot = read_robot(options)
-    frame = read_frame(options, robot)
+    frame = read_frame(options, robot, check=check)
     tau = frame[[f"tau{j + 1}" for j in range(robot.n_joints)]].to_numpy()
     if options.model.endswith(".skops"):
         return load_model(options.model), frame, tau
@@ -41,7 +46,7 @@ def read_frame(
     options: argparse.Namespace, robot: Robot | None, *, check: bool = True
 ) -> pd.DataFrame:
     """The log, with the columns, units and gains that the options give."""
-    from skidyn.datasets import read_log
+    from skidyn.logs import read_log
 
     with working("Reading", options):
         return read_log(list(options.logs), robot=robot, check=check, **reading(options))
@@ -49,12 +54,79 @@ def read_frame(
 
 def reading(options: argparse.Namespace) -> dict[str, Any]:
     """What the options say about how the log is to be read: arguments of ``read_log``."""
-    return {
-        "columns": json_option("columns", options.columns),
-        "units": json_option("units", options.units),
-        "drive_gains": json_option("drive-gains", getattr(options, "drive_gains", None)),
+    said = vars(options)
+    arguments = {
+        "columns": columns_option(options.columns),
+        "units": pairs("units", options.units),
+        "drive_gains": json_option("drive-gains", said.get("drive_gains")),
         "rate": options.rate,
+        "resample_rate": said.get("resample"),
+        "order": order_option(said.get("order")),
+        "flip": listed(said.get("flip")),
+        "gain": pairs("gain", said.get("gain"), numbers=True),
+        "zero": pairs("zero", said.get("zero"), numbers=True),
+        "late": pairs("late", said.get("late"), numbers=True),
+        "unwrap": said.get("unwrap"),
+        "torque_sign": said.get("torque_sign"),
+        "clock": said.get("clock"),
+        "drop_repeated": said.get("drop_repeated"),
     }
+    # what was not said is left to read_log, so that a script made of this holds nothing else
+    always = ("columns", "units", "drive_gains", "rate")
+    unsaid: tuple[Any, ...] = (None, False, [], "recorded")
+    return {k: v for k, v in arguments.items() if k in always or v not in unsaid}
+
+
+def listed(text: str | None) -> list[str]:
+    """Words separated by commas."""
+    return [word.strip() for word in text.split(",") if word.strip()] if text else []
+
+
+def pairs(name: str, text: str | None, numbers: bool = False) -> Any:
+    """``q=deg,time=ms`` as a mapping; JSON is taken as it is."""
+    if text is None:
+        return None
+    if text.lstrip().startswith(("{", "[")):
+        content = json_option(name, text)
+        if not isinstance(content, dict):
+            raise SkidynError(f"{name} is {text}; expected NAME=VALUE or an object of JSON")
+        return content
+    said: dict[str, Any] = {}
+    for word in listed(text):
+        key, equals, value = word.partition("=")
+        if not equals or not key.strip() or not value.strip():
+            raise SkidynError(f"--{name} {text}: {word!r} is not NAME=VALUE")
+        said[key.strip()] = number(name, value) if numbers else value.strip()
+    return said
+
+
+def columns_option(text: str | None) -> Any:
+    """``q=pos_{i},tau=8-14`` as a mapping; numbers are positions of columns, from 0."""
+    said = pairs("columns", text)
+    for key, value in (said or {}).items():
+        hit = re.fullmatch(r"(\d+)(?:-(\d+))?", value) if isinstance(value, str) else None
+        if hit:
+            first, last = int(hit[1][:9]), int((hit[2] or hit[1])[:9])
+            if last - first > MOST_COLUMNS:
+                raise SkidynError(f"columns: {value} are more than {MOST_COLUMNS} columns")
+            said[key] = list(range(first, last + 1)) if hit[2] else first
+    return said
+
+
+def order_option(text: str | None) -> Any:
+    """``2,1,3`` as a list, ``tau=2,1,3`` as a mapping."""
+    if text is None:
+        return None
+    quantity, equals, numbers = text.rpartition("=")
+    order = joint_numbers(numbers)
+    return {quantity.strip(): order} if equals else order
+
+
+def number(name: str, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise SkidynError(f"--{name}: {text!r} is no number") from None
 
 
 def covered_joints(options: argparse.Namespace) -> list[str] | None:
@@ -67,8 +139,12 @@ def read_robot(options: argparse.Namespace) -> Robot:
 
     path = Path(options.urdf)
     if not path.is_file():
-        raise SkidynError(f"no file {options.urdf}; --urdf wants the description of the robot")
-    return Robot.from_urdf(path, joints=covered_joints(options))
+        raise SkidynError(f"no file {options.urdf}; --urdf names the description of the robot")
+    gravity = getattr(options, "gravity", None)
+    if gravity is None:
+        return Robot.from_urdf(path, joints=covered_joints(options))
+    along = [number("gravity", word) for word in listed(gravity)]
+    return Robot.from_urdf(path, joints=covered_joints(options), gravity=along)
 
 
 def embedded_robot(name: str) -> Robot:
@@ -91,7 +167,7 @@ def json_option(name: str, text: str | None) -> Any:
         return None
     try:
         return json.loads(text)
-    except json.JSONDecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise SkidynError(f"--{name} is not JSON: {error}") from None
 
 
@@ -105,7 +181,10 @@ def joint_numbers(text: str | None) -> list[int] | None:
 
 
 def recorded_options(options: argparse.Namespace) -> argparse.Namespace:
-    """Options of the diagnosis that a report records, with those of this command."""
+    """Options of the diagnosis that a report records, with those of this command.
+
+    Files that the report names are looked for in its own folder, then in the working directory.
+    """
     try:
         report = json.loads(Path(options.report).read_text(encoding="utf-8"))
     except (ValueError, RecursionError) as error:
@@ -127,9 +206,25 @@ def recorded_options(options: argparse.Namespace) -> argparse.Namespace:
             )
     known = provenance.get("sha256")
     known = known if isinstance(known, dict) else {}
-    for name, digest in hashes([*recorded["logs"], recorded["urdf"]]).items():
-        if digest != known.get(name):
+    given = {name: value for name, value in vars(options).items() if value is not None}
+    folder = Path(options.report).parent
+    for name in [*recorded["logs"], *([] if "urdf" in given else [recorded["urdf"]])]:
+        found = _found(name, folder)
+        if known.get(name) not in (digest := hashes([found])).values() and digest:
             warnings.warn(
-                f"{name} has changed since {options.report} was written", LogWarning, stacklevel=2
+                f"{found} has changed since {options.report} was written", LogWarning, stacklevel=2
             )
-    return argparse.Namespace(**{**recorded, **vars(options)})
+    recorded["logs"] = [Input(_found(name, folder)) for name in recorded["logs"]]
+    recorded["urdf"] = Input(_found(recorded["urdf"], folder))
+    if recorded["model"].endswith(".skops"):
+        recorded["model"] = Input(_found(recorded["model"], folder))
+    both = argparse.Namespace(**{**recorded, **vars(options), **given})
+    both.urdf = given.get("urdf", recorded["urdf"])
+    check_files(both)
+    return both
+
+
+def _found(name: str, folder: Path) -> str:
+    """A file that a report names: beside the report, else where the command runs."""
+    beside = folder / name
+    return str(beside) if beside.exists() else name

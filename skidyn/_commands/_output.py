@@ -5,21 +5,20 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import sys
-import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from skidyn._progress import listening
+from skidyn._writing import replacing
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from skidyn.diagnosis import Comparison, Diagnosis
-    from skidyn.rigid_body import RBDRegressor
+    from skidyn.identification import RBDRegressor
 
 
 def run_diagnosis(
@@ -33,8 +32,10 @@ def run_diagnosis(
     # Without kinds nothing is searched: the model is only compared.
     settings = Settings(max_findings=0) if kinds == () else Settings()
     rate = getattr(options, "rate", None)
+    # what a log is not does not stop a comparison, only what is concluded from it
+    force = kinds == () or bool(getattr(options, "force", False))
     with working("Comparing" if kinds == () else "Searching for what is missing", options):
-        return diagnose(model, frame, tau, effects=kinds, rate=rate, settings=settings)
+        return diagnose(model, frame, tau, effects=kinds, rate=rate, settings=settings, force=force)
 
 
 def write_reports(
@@ -56,13 +57,9 @@ def write_json(path: str, content: dict[str, Any]) -> None:
 
 def write_table(frame: pd.DataFrame, path: str) -> None:
     """Write a log in one step: an interrupted run leaves the previous file whole."""
-    target = Path(path)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    write = frame.to_parquet if target.suffix == ".parquet" else frame.to_csv
-    with tempfile.TemporaryDirectory(dir=target.parent, prefix=".skidyn-") as folder:
-        part = Path(folder, target.name)
+    write = frame.to_parquet if Path(path).suffix == ".parquet" else frame.to_csv
+    with replacing(path) as part:
         write(part, index=False)
-        os.replace(part, target)
 
 
 @contextmanager
@@ -111,6 +108,10 @@ RECORDED: dict[str, tuple[type, ...]] = {
     "nominal": (bool,),
     "rate": (float, int, type(None)),
     **dict.fromkeys(("columns", "units", "drive_gains", "joints", "effects"), (str, type(None))),
+    **dict.fromkeys(("gravity", "flip", "order", "gain", "zero", "late"), (str, type(None))),
+    **dict.fromkeys(("torque_sign", "clock"), (str, type(None))),
+    **dict.fromkeys(("unwrap", "drop_repeated", "force"), (bool, type(None))),
+    "resample": (float, int, type(None)),
 }
 
 
@@ -159,46 +160,29 @@ def parameters(model: RBDRegressor) -> dict[str, Any]:
     }
 
 
-def rmse_per_joint(model: Any, X: Any, y: Any) -> Any:
+def rmse_per_joint(model: Any, X: Any, y: Any, use: Any = None) -> Any:
     import numpy as np
 
-    return np.sqrt(np.mean((np.asarray(model.predict(X)) - np.asarray(y)) ** 2, axis=0))
+    square = (np.asarray(model.predict(X)) - np.asarray(y)) ** 2
+    return np.sqrt(np.average(square, axis=0, weights=use))
 
 
 def print_json(content: Any) -> None:
-    from skidyn.report._plain import plain
+    from skidyn._plain import plain
 
     print(json.dumps(plain(content), indent=2))
 
 
-def print_diagnosis(diagnosis: Diagnosis) -> None:
-    verdicts = {
-        "complete": "Nothing significant is missing.",
-        "missing": "Something is missing, and it has a name.",
-        "unknown": "Something is missing that no named effect explains.",
-    }
-    print(verdicts[diagnosis.verdict])
-    for note in diagnosis.warnings:
-        print(f"  note: {note}")
-    for finding in diagnosis.findings:
-        print(f"  {finding.sentence}")
-        print(f"      {finding.code}")
-    print("held-out error on sliding samples (N m, N for sliders): before, after, noise floor")
-    rows = zip(
-        diagnosis.joint_names,
-        diagnosis.rmse_before,
-        diagnosis.rmse_after,
-        diagnosis.noise_floor,
-        strict=True,
-    )
-    for name, before, after, floor in rows:
-        print(f"  {name:24s} {before:9.4g} {after:9.4g} {floor:9.4g}")
-    for failure in diagnosis.failures[:3]:
-        print(f"  {failure.sentence}")
+def print_diagnosis(diagnosis: Diagnosis, options: argparse.Namespace) -> None:
+    from skidyn._commands._story import story_lines
+
+    for line in story_lines(diagnosis.story(), diagnosis.failures):
+        print(line)
+    options.told = list(diagnosis.warnings)
 
 
 def print_comparison(comparison: Comparison) -> None:
-    print("held-out error by joint and trajectory: rmse (N m, N for sliders), share of the torque")
+    print("error by joint and trajectory, all samples: rmse (N m, N for sliders), share of torque")
     for row in comparison.table():
         print(
             f"  {row['name']:24s} trajectory {row['trajectory']:4d} "
@@ -220,3 +204,5 @@ def print_regimes(diagnosis: Diagnosis) -> None:
         print(f"  {name:{width}s}{row}")
     for failure in diagnosis.failures:
         print(f"  {failure.sentence}")
+    if not diagnosis.failures:
+        print("  No joint errs by more than its noise.")

@@ -7,7 +7,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from skidyn._checks import warn_about_log
-from skidyn._commands._arguments import command, with_log_only
+from skidyn._commands._arguments import Input, JsonFile, command, with_log_only
 from skidyn._commands._input import json_option, read_frame, read_robot
 from skidyn._commands._output import print_json, working, write_json
 from skidyn._exceptions import SkidynError
@@ -36,12 +36,19 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--unloaded",
         nargs="+",
+        type=Input,
         required=True,
         metavar="LOG",
         help="recordings without the payload, if possible of the same motion",
     )
     parser.add_argument(
         "--link", help="link that carries it, in whose frame it is stated (default: the last)"
+    )
+    parser.add_argument(
+        "--com",
+        metavar="X,Y,Z",
+        help="centre of mass in the frame of the link in m, where it is known: weighs a payload of "
+        "which the motion shows the first moment only",
     )
     parser.add_argument(
         "--model",
@@ -54,7 +61,7 @@ def add_parser(commands: Any) -> None:
         metavar="KG",
         help="mass of the load: estimate the drive gains from logs of currents",
     )
-    parser.add_argument("--out", metavar="JSON", help="write the result as JSON")
+    parser.add_argument("--out", type=JsonFile, metavar="JSON", help="write the result as JSON")
 
 
 def run(options: argparse.Namespace) -> None:
@@ -76,6 +83,8 @@ def run(options: argparse.Namespace) -> None:
     }
     with working("Identifying", options):
         found: Any
+        if options.com is not None:
+            common["com"] = _numbers(options.com)
         if options.known_mass is None:
             found = identify_payload(robot, loaded, unloaded, **common)
         else:
@@ -89,9 +98,20 @@ def run(options: argparse.Namespace) -> None:
         print(found.text)
 
 
+def _numbers(text: str) -> list[float]:
+    """Three numbers."""
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) != 3:
+        raise SkidynError(f"--com is {text!r}; expected three numbers in m, such as 0,0,0.1")
+    return values
+
+
 def _read(options: argparse.Namespace, robot: Robot) -> pd.DataFrame:
     """A log that is checked as torques, or without the robot where currents are expected."""
-    from skidyn.datasets import check_log
+    from skidyn.logs import check_log
 
     currents = options.known_mass is not None
     frame = read_frame(options, robot, check=not currents)

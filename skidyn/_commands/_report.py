@@ -7,7 +7,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from skidyn._commands._arguments import command
+from skidyn._commands._arguments import Page, command, with_report
 from skidyn._commands._input import read_model_and_log, recorded_options
 from skidyn._commands._output import print_json, provenance, run_diagnosis, write_reports
 
@@ -23,8 +23,8 @@ def add_parser(commands: Any) -> None:
     parser = command(
         commands, "report", run, "turn the log of a report.json into a page", DESCRIPTION
     )
-    parser.add_argument("--from", dest="report", required=True, help="report.json of diagnose")
-    parser.add_argument("--html", required=True, help="page to write")
+    with_report(parser)
+    parser.add_argument("--html", type=Page, required=True, help="page to write")
 
 
 def run(options: argparse.Namespace) -> None:

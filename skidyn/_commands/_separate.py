@@ -7,12 +7,12 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from skidyn._commands._arguments import command
+from skidyn._commands._arguments import Motion, command, with_report
 from skidyn._commands._input import read_model_and_log, recorded_options
 from skidyn._commands._output import print_json, run_diagnosis, working
 
 DESCRIPTION = """\
-Where a report says "this data hardly tells A from B", design the motion that would.
+Where a report says "this data cannot separate it from B", design the motion that would.
 
   skidyn separate --from report.json --out motion.csv
 
@@ -26,8 +26,8 @@ def add_parser(commands: Any) -> None:
     parser = command(
         commands, "separate", run, "design the motion that tells two effects apart", DESCRIPTION
     )
-    parser.add_argument("--from", dest="report", required=True, help="report.json of diagnose")
-    parser.add_argument("--out", required=True, metavar="CSV", help="motion to write")
+    with_report(parser)
+    parser.add_argument("--out", type=Motion, required=True, metavar="CSV", help="motion to write")
     parser.add_argument("--effect", dest="finding", help="kind of the finding (default: the first)")
     parser.add_argument("--rival", help="the other kind (default: its closest rival)")
     parser.add_argument("--duration", type=float, default=20.0, help="s (default: %(default)s)")
@@ -35,8 +35,8 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Run the command."""
+    from skidyn._writing import write_text
     from skidyn.diagnosis import design_separating_motion
-    from skidyn.report._write import write_text
 
     options = recorded_options(options)
     model, frame, tau = read_model_and_log(options)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``skidyn simulate``: write a log that hides an effect."""
+"""``skidyn simulate``: run a fitted model along a log, or write a log that hides an effect."""
 
 from __future__ import annotations
 
@@ -8,14 +8,20 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from skidyn._commands._arguments import command, with_joints
-from skidyn._commands._input import embedded_robot, joint_numbers
+from skidyn._commands._arguments import Input, Output, command, with_joints
+from skidyn._commands._input import embedded_robot, joint_numbers, read_frame
 from skidyn._commands._output import print_json, working, write_table
 from skidyn._exceptions import SkidynError
 
 DESCRIPTION = """\
-Write a log of a simulated robot that hides an effect, to try the diagnosis on something whose
-answer is known. The answer is printed, and not written into the log.
+With --model and --log, run a fitted model along a log and tell how far its motion gets from the
+logged one; the log should not be the one that the model was fitted to.
+
+  skidyn simulate --model robot.skops --log run2.csv
+  skidyn simulate --model robot.skops --log run2.csv --horizon 0.5 --engine mujoco
+
+Without them, write a log of a simulated robot that hides an effect, to try the diagnosis on
+something whose answer is known. The answer is printed, and not written into the log.
 
   skidyn simulate --robot panda --effect dahl --joints 4 --out log.parquet
   skidyn simulate --robot scara --effect none --noise high --seed 3 --out log.csv
@@ -31,12 +37,79 @@ def add_parser(commands: Any) -> None:
         "--noise", default="low", choices=("low", "high"), help="of torques (default: %(default)s)"
     )
     parser.add_argument("--seed", type=int, default=0, help="of what is random (default: 0)")
-    parser.add_argument("--out", required=True, metavar="LOG", help="file.csv or file.parquet")
+    parser.add_argument(
+        "--out", type=Output, metavar="LOG", help="file.csv or file.parquet to write"
+    )
+    along = parser.add_argument_group("along a log")
+    along.add_argument(
+        "--model", type=Input, metavar="SKOPS", help="fitted model, as skidyn identify saves it"
+    )
+    along.add_argument(
+        "--log",
+        dest="logs",
+        nargs="+",
+        type=Input,
+        metavar="LOG",
+        help="recordings, one or more files",
+    )
+    along.add_argument(
+        "--horizon",
+        type=float,
+        default=1.0,
+        metavar="S",
+        help="seconds until the model is put back on the log; 0 for whole trajectories "
+        "(default: %(default)s)",
+    )
+    along.add_argument(
+        "--engine", default="own", choices=("own", "mujoco"), help="default: %(default)s"
+    )
+    along.add_argument("--columns", metavar="JSON", help="which columns hold which signals")
+    along.add_argument("--units", metavar="JSON", help="units that are not SI")
+    along.add_argument("--drive-gains", metavar="JSON", help="torque per ampere of each joint")
+    along.add_argument("--rate", type=float, help="sampling rate in Hz of a log without time")
 
 
 def run(options: argparse.Namespace) -> None:
+    if (options.model is None) != (options.logs is None):
+        lost = "--log" if options.logs is None else "--model"
+        raise SkidynError(f"{lost} is missing: a simulation along a log needs --model and --log")
+    if options.model is not None:
+        _along(options)
+    else:
+        _hidden(options)
+
+
+def _along(options: argparse.Namespace) -> None:
+    """Simulate a fitted model along a log."""
+    from skidyn import load_model
+    from skidyn.simulation import simulate, simulation_errors
+
+    if options.out is not None and Path(options.out).suffix not in (".csv", ".parquet"):
+        raise SkidynError(f"{options.out}: the motion to write must end in .csv or .parquet")
+    model = load_model(options.model)
+    robot = model.robot_
+    frame = read_frame(options, robot)
+    tau = frame[[f"tau{j + 1}" for j in range(robot.n_joints)]].to_numpy()
+    horizon = options.horizon or None
+    with working("Simulating", options):
+        found = simulation_errors(model, frame, tau, horizon=horizon, engine=options.engine)
+        if options.out is not None:
+            motion = simulate(model, frame, tau, horizon=horizon, engine=options.engine)
+            write_table(motion, options.out)
+    if options.json:
+        print_json(found.to_dict())
+        return
+    print(found.text)
+    if options.out is not None:
+        print(f"simulated motion written: {Path(options.out).resolve()}")
+
+
+def _hidden(options: argparse.Namespace) -> None:
+    """Write a log that hides an effect."""
     from skidyn.datasets import make_hidden_effect_log
 
+    if options.out is None:
+        raise SkidynError("--out is missing: the log to write, file.csv or file.parquet")
     if Path(options.out).suffix not in (".csv", ".parquet"):
         raise SkidynError(f"{options.out}: the log to write must end in .csv or .parquet")
     robot = embedded_robot(options.robot)

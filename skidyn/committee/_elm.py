@@ -16,8 +16,8 @@ from sklearn.utils.validation import _check_sample_weight, check_is_fitted, vali
 
 from skidyn._columns import ColumnSpec
 from skidyn._compat import Interval, StrOptions, fit_context
-from skidyn.preprocessing._affine import scaling_of
-from skidyn.preprocessing._keys import Keys, resolve_keys
+from skidyn._keys import Keys, resolve_keys
+from skidyn.preprocessing import scaling_of
 
 Array = NDArray[Any]
 

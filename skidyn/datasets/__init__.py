@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Logs of robots: readers of recordings, quality checks, simulated logs with a hidden effect."""
+"""Robots, simulated logs with a hidden effect, and public recordings to download."""
 
 from skidyn.datasets._embedded import load_demo_log
 from skidyn.datasets._fetch import (
@@ -10,9 +10,6 @@ from skidyn.datasets._fetch import (
     fetch_screw_drive,
     fetch_xl330,
 )
-from skidyn.datasets._log import read_log
-from skidyn.datasets._log_quality import JointQuality, LogQuality, check_log
-from skidyn.datasets._recording import load_recording
 from skidyn.datasets._robots import (
     load_panda,
     load_planar_arm,
@@ -21,12 +18,16 @@ from skidyn.datasets._robots import (
     load_ur5,
     load_ur10e,
 )
-from skidyn.datasets._simulator import hidden_effect_kinds, make_hidden_effect_log
+from skidyn.datasets.hidden_effects import hidden_effect_kinds, make_hidden_effect_log
+from skidyn.datasets.suite import (
+    SuiteCase,
+    hidden_effect_suite,
+    score_answers,
+    wilson_interval,
+)
 
 __all__ = [
-    "JointQuality",
-    "LogQuality",
-    "check_log",
+    "SuiteCase",
     "fetch_double_pendulum",
     "fetch_emps",
     "fetch_panda_exciting",
@@ -34,14 +35,15 @@ __all__ = [
     "fetch_screw_drive",
     "fetch_xl330",
     "hidden_effect_kinds",
+    "hidden_effect_suite",
     "load_demo_log",
     "load_panda",
     "load_planar_arm",
-    "load_recording",
     "load_scara",
     "load_srs_arm",
     "load_ur5",
     "load_ur10e",
     "make_hidden_effect_log",
-    "read_log",
+    "score_answers",
+    "wilson_interval",
 ]

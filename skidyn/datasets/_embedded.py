@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from sklearn.utils import Bunch
+from typing import TYPE_CHECKING, Any
 
 from skidyn.datasets._robots import load_panda
-from skidyn.datasets._simulator import make_hidden_effect_log
+from skidyn.datasets.hidden_effects._simulator import make_hidden_effect_log
+
+if TYPE_CHECKING:
+    from sklearn.utils import Bunch
 
 
 def load_demo_log() -> Bunch:

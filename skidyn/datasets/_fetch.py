@@ -7,18 +7,17 @@ import hashlib
 import json
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from sklearn.datasets import get_data_home
-from sklearn.utils import Bunch
 
 from skidyn._exceptions import LogError
 from skidyn._optional import import_optional
-from skidyn.datasets._log import read_log
+from skidyn.logs import read_log
 
 if TYPE_CHECKING:
     import pandas as pd
+    from sklearn.utils import Bunch
 
 #: Files are named by the commit that holds them, so that their content cannot change.
 EMPS_URL = (
@@ -69,6 +68,12 @@ SCREW_TORQUE = 9.84e-3
 EMPS_GAIN = 35.15065188248547
 
 
+def _bunch(**fields: Any) -> Bunch:
+    from sklearn.utils import Bunch  # a second of imports that reading a robot does not need
+
+    return Bunch(**fields)
+
+
 def fetch_emps(
     *, data_home: str | os.PathLike[str] | None = None, sha256: str | None = None, url: str = ""
 ) -> Bunch:
@@ -114,7 +119,7 @@ def fetch_emps(
     path = _retrieve(url or EMPS_URL, "emps.mat", data_home, sha256)
     columns = {"time": "t", "q": "qm", "i": "vir"}
     frame = read_log(path, columns=columns, drive_gains=[EMPS_GAIN], check=False)
-    return Bunch(frame=frame, licence="Apache-2.0", path=str(path))
+    return _bunch(frame=frame, licence="Apache-2.0", path=str(path))
 
 
 def fetch_panda_exciting(
@@ -155,7 +160,7 @@ def fetch_panda_exciting(
     >>> panda = fetch_panda_exciting()  # doctest: +SKIP
     """
     path = _retrieve(url or PANDA_URL, "panda_exciting.db3", data_home, sha256)
-    return Bunch(frame=read_log(path, check=False), licence="BSD-3-Clause", path=str(path))
+    return _bunch(frame=read_log(path, check=False), licence="BSD-3-Clause", path=str(path))
 
 
 def fetch_double_pendulum(
@@ -211,7 +216,7 @@ def fetch_double_pendulum(
         "tau": ["tau_meas1", "tau_meas2"],
     }
     frame = read_log(paths, columns=columns, check=False)
-    return Bunch(frame=frame, licence="BSD-3-Clause", paths=[str(p) for p in paths])
+    return _bunch(frame=frame, licence="BSD-3-Clause", paths=[str(p) for p in paths])
 
 
 def fetch_xl330(
@@ -263,7 +268,7 @@ def fetch_xl330(
         paths.append(str(path))
         tables.append(_servo_run(path).assign(trajectory=number))
     frame = pandas.concat(tables, ignore_index=True)
-    return Bunch(frame=frame, load=0.49 * 9.81 * 0.1, licence="Apache-2.0", paths=paths)
+    return _bunch(frame=frame, load=0.49 * 9.81 * 0.1, licence="Apache-2.0", paths=paths)
 
 
 def fetch_panda_gaz(*, data_home: str | os.PathLike[str] | None = None, url: str = "") -> Bunch:
@@ -322,7 +327,7 @@ def fetch_panda_gaz(*, data_home: str | os.PathLike[str] | None = None, url: str
             raise LogError(f"{signal} has shape {values.shape}; ({len(time)}, 7) is expected")
     columns = {f"{s}{j + 1}": v[:, j] for s, v in parts.items() for j in range(7)}
     frame = pandas.DataFrame({"time": time, "trajectory": 0} | columns)
-    return Bunch(frame=frame, licence="GPL-3.0", paths=paths)
+    return _bunch(frame=frame, licence="GPL-3.0", paths=paths)
 
 
 def fetch_screw_drive(
@@ -375,7 +380,7 @@ def fetch_screw_drive(
         paths.append(str(path))
         tables.append(_drive_run(path).assign(trajectory=number))
     frame = pandas.concat(tables, ignore_index=True)
-    return Bunch(frame=frame, licence="MIT", paths=paths)
+    return _bunch(frame=frame, licence="MIT", paths=paths)
 
 
 def _drive_run(path: Path) -> pd.DataFrame:
@@ -424,6 +429,8 @@ def _retrieve(
     """Download once, and hold the file to its checksum ever after."""
     pooch = import_optional("pooch", extra="fetch")
     home = None if data_home is None else str(data_home)
+    from sklearn.datasets import get_data_home
+
     folder = Path(get_data_home(home)) / "skidyn"
     note = folder / f"{name}.sha256"
     known = sha256 or (note.read_text(encoding="ascii").strip() if note.exists() else None)

@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Diagnosis: where a model fails, which physical effect it lacks, and what adding it does."""
 
+from skidyn.diagnosis._comparison import Comparison
 from skidyn.diagnosis._diagnosis import diagnose
 from skidyn.diagnosis._effect_search import EffectSearchCV
-from skidyn.diagnosis._failures import Comparison, Failure
+from skidyn.diagnosis._failures import Failure, Place, RestError
 from skidyn.diagnosis._findings import Finding
-from skidyn.diagnosis._hypothesis import Settings
 from skidyn.diagnosis._limits import Limit
 from skidyn.diagnosis._out_of_core import Confirmation, ParquetDiagnosis, diagnose_parquet
 from skidyn.diagnosis._proposal import Proposal
 from skidyn.diagnosis._result import Diagnosis
+from skidyn.diagnosis._rule import Settings
 from skidyn.diagnosis._separation import SeparatingMotion, design_separating_motion
 from skidyn.diagnosis._unknown import UnknownTorque
 from skidyn.diagnosis._variables import VariableTest
@@ -23,7 +24,9 @@ __all__ = [
     "Finding",
     "Limit",
     "ParquetDiagnosis",
+    "Place",
     "Proposal",
+    "RestError",
     "SeparatingMotion",
     "Settings",
     "UnknownTorque",
@@ -32,3 +35,19 @@ __all__ = [
     "diagnose",
     "diagnose_parquet",
 ]
+
+# For other packages of skidyn; no part of the public interface.
+from skidyn.diagnosis._candidates import (
+    Candidate as Candidate,
+    catalogue_candidates as catalogue_candidates,
+)
+from skidyn.diagnosis._comparison import (
+    REGIMES as REGIMES,
+    error_map as error_map,
+    regimes as regimes,
+)
+from skidyn.diagnosis._diagnosis import own_terms as own_terms
+from skidyn.diagnosis._intervals import parameter_intervals as parameter_intervals
+from skidyn.diagnosis._profile import refine as refine
+from skidyn.diagnosis._screen import CANDIDATE_RIDGE as CANDIDATE_RIDGE
+from skidyn.diagnosis._story import sure as sure

@@ -4,14 +4,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
-
-import numpy as np
+from dataclasses import dataclass
 
 from skidyn._progress import track
 from skidyn._signals import Array
 from skidyn.effects import Term, get_effect
-from skidyn.evidence._problem import Problem
+from skidyn.evidence import Problem
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,22 +35,21 @@ class Candidate:
     rows: dict[int, Array]
     variables: tuple[str, ...] = ()
     n_shapes: int = 0
-    columns: dict[int, Array] = field(default_factory=dict, repr=False)
 
     @property
     def width(self) -> int:
         """Number of coefficients."""
-        return int(next(iter(self.rows.values())).shape[1])
+        return self.term.width
 
     @property
     def signs(self) -> Array:
         """1 for every coefficient that physics forbids to be negative, else 0."""
-        return np.array([c.sign for c in get_effect(self.term.kind).coefficients])
+        return self.term.signs
 
     @property
     def limits(self) -> Array:
         """Largest magnitude of every coefficient at which the formula holds."""
-        return np.array([c.limit for c in get_effect(self.term.kind).coefficients])
+        return self.term.limits
 
     @property
     def joints(self) -> tuple[int, ...]:

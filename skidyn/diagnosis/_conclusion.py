@@ -12,12 +12,21 @@ from numpy.typing import NDArray
 
 from skidyn._progress import track
 from skidyn._signals import Array
-from skidyn.diagnosis._failures import Comparison
+from skidyn.diagnosis._candidates import Candidate
+from skidyn.diagnosis._comparison import Comparison
+from skidyn.diagnosis._confidence import confidence
+from skidyn.diagnosis._episodes import (
+    LEAST_HELD,
+    LEAST_NOISE,
+    LEAST_RANGE,
+    Episode,
+    away_from_reversals,
+    find_episodes,
+)
 from skidyn.diagnosis._findings import (
     Finding,
     effect_curves,
     make_finding,
-    q_values,
     rivals_of,
 )
 from skidyn.diagnosis._floor import predictable_share
@@ -25,14 +34,13 @@ from skidyn.diagnosis._held_out import HeldOut, held_out_residual
 from skidyn.diagnosis._hypothesis import UNKNOWN, Hypothesis, SearchResult
 from skidyn.diagnosis._intervals import parameter_intervals
 from skidyn.diagnosis._limits import Limit
+from skidyn.diagnosis._remainder import Remainder, find_remainder, torque_range
 from skidyn.diagnosis._result import Diagnosis, Verdict
+from skidyn.diagnosis._rule import false_discovery_rate
 from skidyn.diagnosis._search import replace_torque
 from skidyn.diagnosis._unknown import UnknownTorque, describe_unknowns
 from skidyn.effects import Term
-from skidyn.evidence._problem import Problem
-
-#: Share of the error of samples that a finding must remove to be worth a word.
-LEAST_DROP = 0.002
+from skidyn.evidence import Problem
 
 
 def conclude(
@@ -42,6 +50,7 @@ def conclude(
     sliding: NDArray[np.bool_],
     torque: Array,
     notes: list[str],
+    least_drop: float,
     model: Any,
     data: tuple[Any, Any],
 ) -> Diagnosis:
@@ -61,6 +70,8 @@ def conclude(
         Measured torque, N m or N.
     notes : list of str
         Remarks on the data.
+    least_drop : float
+        Share of the error of samples that a finding must remove.
     model : regressor
         The model as given.
     data : tuple
@@ -72,37 +83,52 @@ def conclude(
     """
     robot = problem.robot
     assert robot is not None
-    steps = _steps(problem, result, torque, sliding)
-    while harmful := [h for h in result.findings if _harms(h, result.findings, steps)]:
-        result = _without(problem, result, harmful[-1])
+    while True:
         steps = _steps(problem, result, torque, sliding)
-    terms = [*problem.terms, *_found_terms(problem, result.findings)]
+        terms = [*problem.terms, *_found_terms(problem, result.findings)]
+        intervals = parameter_intervals(problem, terms, result.fit.noise)
+        useless = _useless(result.findings, steps, least_drop) or _vague(result.findings, intervals)
+        if useless is None:
+            break
+        result = _without(problem, result, *useless)
     held = steps[-1].held
     history = [step.entry for step in steps]
-    intervals = parameter_intervals(problem, terms, result.fit.noise)
-    q = q_values(result.findings, result.inflation, max(1, len(result.candidates)))
-    rivals = {id(s.added): rivals_of(s) for s in result.steps if s.added is not None}
+    rivals = {s.added.kind: rivals_of(s) for s in result.steps if s.added is not None}
     unknowns = _unknowns(problem, result, terms)
     findings = []
     for i, hypothesis in enumerate(result.findings):
-        drop = _drop(history[i]["rmse"], history[i + 1]["rmse"], hypothesis.joints)
-        own = [u for u in unknowns if hypothesis.kind == UNKNOWN]
-        finding = make_finding(
-            problem, hypothesis, rivals[id(hypothesis)], q[i], drop, intervals, own
-        )
-        finding.curves.extend(effect_curves(problem, finding.terms, held.torque, held.residual))
-        findings.append(finding)
+        others = rivals.get(hypothesis.kind, ())
+        for candidate, chance in zip(hypothesis.candidates, hypothesis.chances, strict=True):
+            drop = _drop(history[i]["rmse"], history[i + 1]["rmse"], candidate.joints)
+            joints = [j + 1 for j in candidate.joints]
+            own = [u for u in unknowns if hypothesis.kind == UNKNOWN and u.joint in joints]
+            q = false_discovery_rate(chance, hypothesis.tried)
+            finding = make_finding(problem, hypothesis, candidate, others, q, drop, intervals, own)
+            curves = effect_curves(problem, finding.terms, held.torque, held.residual)
+            finding.curves.extend(curves)
+            findings.append(finding)
     share = predictable_share(problem, result.fit.residual)
-    floor = np.array(history[-1]["rmse"]) * np.sqrt(1 - share)
+    rmse = np.array(history[-1]["rmse"])
+    parts = find_remainder(problem, held.residual, torque, rmse, share)
+    least = np.maximum(LEAST_RANGE * torque_range(torque), LEAST_NOISE * parts.noise)
+    smooth = away_from_reversals(problem, result.fit.residual, sliding)
+    # On a joint with a finding, what is large in places is the trace of its imperfect formula.
+    taken = {j - 1 for f in findings for j in f.joints}
+    share_held = np.array([np.inf if j in taken else LEAST_HELD for j in range(len(rmse))])
+    episodes, inside = find_episodes(problem, smooth, least, share_held)
+    if episodes:
+        findings.append(_episodic(episodes, inside, result.fit.residual))
+    ratio = rmse / np.maximum(parts.noise, 1e-300)
+    findings = [_sure(f, ratio) for f in findings]
     return Diagnosis(
-        _verdict(findings),
+        _verdict(findings, parts),
         robot.joint_names,
         findings,
         steps[0].comparison,
         steps[-1].comparison,
         history,
-        floor,
-        _unexplained(findings, unknowns),
+        parts.noise,
+        _unexplained(findings, unknowns, parts, rmse),
         limits,
         notes + _fold_notes(problem),
         model,
@@ -111,6 +137,7 @@ def conclude(
         result,
         share,
         unknowns,
+        parts=parts,
     )
 
 
@@ -128,11 +155,12 @@ def _steps(
 ) -> list[_Step]:
     """The model as given, and after each finding."""
     steps = []
+    dry = [t for t in problem.terms if t.is_dry]
     for k in track(range(len(result.findings) + 1), "Judging what was found"):
         found = _found_terms(problem, result.findings[:k])
-        keep = found if k == len(result.findings) else ()
+        keep = [*dry, *(found if k == len(result.findings) else ())]
         held = _held_out(problem, [*problem.terms, *found], result, keep)
-        comparison = _comparison(problem, torque, held, sliding)
+        comparison = _comparison(problem, torque, held, sliding, dry)
         last = result.findings[k - 1] if k else None
         kind, joints = (last.kind, last.joints) if last else (None, ())
         steps.append(_Step(held, comparison, _entry(comparison, kind, joints)))
@@ -145,15 +173,48 @@ def _found_terms(problem: Problem, findings: Sequence[Hypothesis]) -> list[Term]
     return [t for t in terms if t not in problem.terms]
 
 
-def _harms(hypothesis: Hypothesis, findings: Sequence[Hypothesis], steps: Sequence[_Step]) -> bool:
-    """Whether a finding leaves the error of samples as large, though it helped averaged rows.
+def _useless(
+    findings: Sequence[Hypothesis], steps: Sequence[_Step], least: float
+) -> tuple[Hypothesis, list[Candidate]] | None:
+    """The last finding with terms that leave the error of samples as large, and these terms.
 
-    Neither the mean absolute error nor the squared one, which few samples rule, may stay.
+    They helped averaged rows. The squared error, which few samples may rule, and the mean absolute
+    one count alike.
     """
-    k = [h is hypothesis for h in findings].index(True)
-    errors = [(_mean_error(step.comparison), step.entry["rmse"]) for step in steps[k : k + 2]]
-    drops = [_drop(a, b, hypothesis.joints) for a, b in zip(*errors, strict=True)]
-    return min(drops) < LEAST_DROP
+    for k in reversed(range(len(findings))):
+        errors = [(_mean_error(step.comparison), step.entry["rmse"]) for step in steps[k : k + 2]]
+        terms = []
+        for candidate in findings[k].candidates:
+            drops = [_drop(a, b, candidate.joints) for a, b in zip(*errors, strict=True)]
+            if float(np.mean(drops)) < least:
+                terms.append(candidate)
+        if terms:
+            return findings[k], terms
+    return None
+
+
+def _vague(
+    findings: Sequence[Hypothesis], intervals: dict[Term, dict[str, Any]]
+) -> tuple[Hypothesis, list[Candidate]] | None:
+    """The last finding with terms whose coefficients may all be zero when folds are left out."""
+    for hypothesis in reversed(findings):
+        if hypothesis.kind == UNKNOWN or hypothesis.torque is not None:
+            continue
+        terms = []
+        for candidate in hypothesis.candidates:
+            if candidate.term.trajectories is not None and len(candidate.term.trajectories) == 1:
+                continue  # no fold but its own recording tells of it
+            shapes = {s.name for s in candidate.term.effect.shapes}
+            found = [
+                value
+                for name, value in intervals[candidate.term].items()
+                if name not in shapes and isinstance(value, tuple)
+            ]
+            if found and all(low <= 0 <= high for _, low, high in found):
+                terms.append(candidate)
+        if terms:
+            return hypothesis, terms
+    return None
 
 
 def _mean_error(comparison: Comparison) -> list[float]:
@@ -163,13 +224,23 @@ def _mean_error(comparison: Comparison) -> list[float]:
     return [float(x) for x in total / np.maximum(use.sum(0), 1)]
 
 
-def _without(problem: Problem, result: SearchResult, wrong: Hypothesis) -> SearchResult:
-    """The result with a finding taken back and the rest fitted again."""
-    findings = [h for h in result.findings if h is not wrong]
-    ripple = result.ripple if wrong.torque is None else result.ripple - wrong.torque
-    rest = [t for t in _found_terms(problem, findings) if t.kind != "torque_ripple"]
+def _without(
+    problem: Problem, result: SearchResult, wrong: Hypothesis, terms: Sequence[Candidate]
+) -> SearchResult:
+    """The result with terms of a finding taken back and the rest fitted again."""
+    pairs = zip(wrong.candidates, wrong.chances, strict=True)
+    kept = [(c, p) for c, p in pairs if c not in terms]
+    rest = replace(wrong, candidates=tuple(c for c, _ in kept), chances=tuple(p for _, p in kept))
+    ripple = result.ripple
+    if wrong.torque is not None:
+        torque = wrong.torque.copy()
+        torque[:, [j for c in terms for j in c.joints]] = 0.0
+        ripple = ripple - wrong.torque + torque
+        rest = replace(rest, torque=torque)
+    findings = [rest if h is wrong else h for h in result.findings if h is not wrong or kept]
+    known = [t for t in _found_terms(problem, findings) if t.kind != "torque_ripple"]
     bare = replace_torque(problem, problem.torque - ripple)
-    fit = bare.fit((*problem.terms, *rest), sigma=result.fit.noise)
+    fit = bare.fit((*problem.terms, *known), sigma=result.fit.noise)
     return replace(result, findings=findings, fit=fit, ripple=ripple)
 
 
@@ -201,7 +272,11 @@ def _held_out(
 
 
 def _comparison(
-    problem: Problem, torque: Array, held: HeldOut, sliding: NDArray[np.bool_]
+    problem: Problem,
+    torque: Array,
+    held: HeldOut,
+    sliding: NDArray[np.bool_],
+    dry: Sequence[Term],
 ) -> Comparison:
     assert problem.robot is not None
     return Comparison(
@@ -211,6 +286,7 @@ def _comparison(
         sliding,
         problem.robot.joint_names,
         problem.rows.sliding,
+        sum((held.torque[t] for t in dry), np.zeros_like(torque)) if dry else None,
     )
 
 
@@ -227,24 +303,85 @@ def _drop(before: Sequence[float], after: Sequence[float], joints: Sequence[int]
     return float(np.mean([1 - (a / b) ** 2 for b, a in pairs]))
 
 
-def _verdict(findings: Sequence[Finding]) -> Verdict:
-    if not findings:
-        return "complete"
-    return "unknown" if any(f.kind == UNKNOWN for f in findings) else "missing"
+def _sure(finding: Finding, ratio: Array) -> Finding:
+    """The finding with the probability that its name is right."""
+    if not finding.terms:
+        return finding
+    joints = [j - 1 for j in finding.joints]
+    return replace(finding, confidence=confidence(finding.margin, float(ratio[joints].max())))
+
+
+def _episodic(
+    episodes: list[Episode], inside: Sequence[NDArray[np.bool_]], residual: Sequence[Array]
+) -> Finding:
+    """A torque that comes and goes, as a finding; no model predicts it."""
+    joints = tuple(sorted({j for e in episodes for j in e.joints}))
+    shares = [
+        float(np.sum(residual[j - 1][inside[j - 1]] ** 2) / np.sum(residual[j - 1] ** 2))
+        for j in joints
+    ]
+    numbers = sorted({e.trajectory for e in episodes})
+    where = f"joint {joints[0]}" if len(joints) == 1 else f"joints {', '.join(map(str, joints))}"
+    times = ", ".join(
+        f"{e.start:.2f} to {e.end:.2f} s of trajectory {e.trajectory}" for e in episodes[:4]
+    )
+    more = f" and {len(episodes) - 4} more" if len(episodes) > 4 else ""
+    links = {e.link for e in episodes if e.link is not None}
+    push = (
+        f" A force at link {', '.join(sorted(links))} explains the joints together."
+        if links
+        else ""
+    )
+    sentence = (
+        f"A torque on {where} comes and goes: {times}{more}. It holds {np.mean(shares):.0%} of the "
+        f"squared error that is left there, and nothing that was logged predicts it.{push}"
+    )
+    return Finding(
+        UNKNOWN,
+        "A torque that comes and goes in time",
+        joints,
+        {},
+        ("time",),
+        float(np.mean(shares)),
+        0.0,
+        (),
+        "the same motion again: what comes and goes by chance is not there at the same place",
+        sentence,
+        "diagnosis.findings[-1].when",
+        (),
+        trajectories=tuple(numbers),
+        when=episodes,
+    )
+
+
+def _verdict(findings: Sequence[Finding], parts: Remainder) -> Verdict:
+    if any(f.kind == UNKNOWN for f in findings) or parts.material.any():
+        return "unknown"
+    return "missing" if findings else "complete"
 
 
 def _unexplained(
-    findings: Sequence[Finding], unknowns: Sequence[UnknownTorque]
+    findings: Sequence[Finding],
+    unknowns: Sequence[UnknownTorque],
+    parts: Remainder,
+    rmse: Array,
 ) -> dict[str, Any] | None:
-    for finding in findings:
-        if finding.kind == UNKNOWN:
-            return {
-                "joints": list(finding.joints),
-                "variables": list(finding.variables),
-                "share": finding.error_drop,
-                "torques": [u.to_dict() for u in unknowns],
-            }
-    return None
+    """What has no name: all nameless findings together, else a remainder that is material."""
+    nameless = [f for f in findings if f.kind == UNKNOWN]
+    if nameless:
+        return {
+            "joints": sorted({j for f in nameless for j in f.joints}),
+            "variables": sorted({v for f in nameless for v in f.variables}),
+            "share": float(np.mean([f.error_drop for f in nameless])),
+            "torques": [u.to_dict() for u in unknowns],
+            "when": [e.to_dict() for f in nameless for e in f.when],
+        }
+    if not parts.material.any():
+        return None
+    joints = np.flatnonzero(parts.material)
+    share = float(np.mean(parts.left[joints] ** 2 / rmse[joints] ** 2))
+    numbers = [int(j) + 1 for j in joints]
+    return {"joints": numbers, "variables": [], "share": share, "torques": [], "when": []}
 
 
 def _fold_notes(problem: Problem) -> list[str]:

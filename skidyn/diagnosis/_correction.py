@@ -1,28 +1,35 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Effects added to a regressor that is not a rigid-body model."""
+"""Effects added to a regressor that is not a rigid-body model; models inside other estimators."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.base import BaseEstimator, MetaEstimatorMixin, RegressorMixin, clone
+from sklearn.compose import TransformedTargetRegressor
+from sklearn.exceptions import NotFittedError
+from sklearn.pipeline import Pipeline
 from sklearn.utils.validation import check_is_fitted
 
-from skidyn._signals import Array
+from skidyn._compat import BaseSearchCV
+from skidyn._signals import Array, Signals, read_signals
 from skidyn.effects import make_terms
-from skidyn.evidence._problem import Problem, make_problem
+from skidyn.evidence import Problem, make_problem
+from skidyn.identification import named_recordings, recognise, remember
 from skidyn.robots import Robot
 
 
-class CorrectedRegressor(RegressorMixin, BaseEstimator):
-    """A fitted regressor plus physical effects fitted to its residual.
+class CorrectedRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
+    """A regressor plus physical effects fitted to its residual.
 
     Parameters
     ----------
-    regressor : fitted regressor
-        Predicts torque, N m or N.
+    regressor : regressor
+        Predicts torque, N m or N. :meth:`fit` trains a copy of it, :meth:`fit_effects` takes it as
+        it is.
     robot : Robot
         Robot.
     effects : sequence of str, (str, joints) or Term, default=()
@@ -30,6 +37,8 @@ class CorrectedRegressor(RegressorMixin, BaseEstimator):
 
     Attributes
     ----------
+    regressor_ : regressor
+        Fitted.
     effect_terms_ : list of Term
         Effects.
     coef_ : ndarray of shape (n_coefficients,)
@@ -55,8 +64,13 @@ class CorrectedRegressor(RegressorMixin, BaseEstimator):
         """
         return CorrectedRegressor(self.regressor, self.robot, [*self.effects, *effects])
 
+    def __sklearn_tags__(self) -> Any:
+        tags = super().__sklearn_tags__()
+        tags.target_tags.multi_output = True
+        return tags
+
     def fit(self, X: Any, y: Any) -> CorrectedRegressor:
-        """Fit the effects to the regressor's residual.
+        """Fit a copy of the regressor, then the effects to its residual.
 
         Parameters
         ----------
@@ -69,9 +83,38 @@ class CorrectedRegressor(RegressorMixin, BaseEstimator):
         -------
         CorrectedRegressor
         """
+        if not hasattr(self.regressor, "fit"):
+            return self.fit_effects(X, y)
+        self.regressor_ = clone(self.regressor, safe=False).fit(X, y)
+        return self._fit_effects(X, y)
+
+    def fit_effects(self, X: Any, y: Any) -> CorrectedRegressor:
+        """Fit the effects to the residual of the fitted regressor as it is.
+
+        Parameters
+        ----------
+        X : DataFrame or array of shape (n_samples, n_features)
+            Motion, with time.
+        y : array-like of shape (n_samples, n_joints)
+            Torque, N m or N.
+
+        Returns
+        -------
+        CorrectedRegressor
+        """
+        self.regressor_ = self.regressor
+        return self._fit_effects(X, y)
+
+    def _fit_effects(self, X: Any, y: Any) -> CorrectedRegressor:
+        torque = np.asarray(y, dtype=float)
+        self._one_output = torque.ndim == 1
         self.effect_terms_ = make_terms(self.effects, self.robot.n_joints)
-        problem = self._problem(X, np.asarray(y, dtype=float))
-        self.coef_ = problem.fit(self.effect_terms_, passes=3).coefficients
+        self.__dict__.pop("recordings_", None)
+        problem = self._problem(X, torque.reshape(len(torque), -1))
+        self.coef_ = np.zeros(0)
+        if self.effect_terms_:
+            self.coef_ = problem.fit(self.effect_terms_, passes=3).coefficients
+        self.recordings_ = remember(self._signals(X, torque)[0], self.effect_terms_)
         return self
 
     def predict(self, X: Any) -> Array:
@@ -87,19 +130,29 @@ class CorrectedRegressor(RegressorMixin, BaseEstimator):
         ndarray of shape (n_samples, n_joints), N m or N
         """
         check_is_fitted(self)
-        own = np.asarray(self.regressor.predict(X), dtype=float)
-        problem = self._problem(X, own)
-        fit = problem.fit(self.effect_terms_)
-        torque = problem.term_torque(
-            type(fit)(fit.terms, self.coef_, fit.covariance, fit.residual, fit.sigma)
-        )
-        return own + torque
+        own = self._own(X)
+        torque = own
+        if self.effect_terms_:
+            problem = self._problem(X, own)
+            fit = problem.fit(self.effect_terms_)
+            torque = own + problem.term_torque(replace(fit, coefficients=self.coef_))
+        return torque[:, 0] if self._one_output else torque
+
+    def _own(self, X: Any) -> Array:
+        own = np.asarray(self.regressor_.predict(X), dtype=float)
+        return own.reshape(len(own), -1)
+
+    def _signals(self, X: Any, torque: Array) -> tuple[Signals, Array]:
+        keys: dict[str, Any] = {
+            name: getattr(self.regressor_, name, "auto") for name in ("trajectory", "time")
+        }
+        return read_signals(X, torque, self.robot, **keys)
 
     def _problem(self, X: Any, torque: Array) -> Problem:
-        from skidyn.diagnosis._reading import read_signals
-
-        own = np.asarray(self.regressor.predict(X), dtype=float).reshape(len(torque), -1)
-        signals, torque = read_signals(X, torque, self.robot)
+        own = self._own(X)
+        signals, torque = self._signals(X, torque)
+        if hasattr(self, "recordings_") and named_recordings(self.effect_terms_):
+            signals = recognise(signals, self.recordings_)
         problem = make_problem(
             signals,
             torque - own,
@@ -112,3 +165,74 @@ class CorrectedRegressor(RegressorMixin, BaseEstimator):
         load = self.robot.inverse_dynamics(s.q, s.dq, s.ddq)
         problem.signals = s.with_(load=load, model_torque=own, smooth_torque=own)
         return problem
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A model of a robot inside estimators of scikit-learn.
+
+    Attributes
+    ----------
+    model : regressor
+        The innermost model that knows effects, or the given regressor.
+    X : table
+        What the innermost model sees.
+    outer : tuple of Pipeline
+        What it was taken out of, the outermost first; the steps before the model are fitted.
+    """
+
+    model: Any
+    X: Any
+    outer: tuple[Pipeline, ...] = ()
+
+    def closed(self, model: Any) -> Any:
+        """A better model where the old one was, fitted."""
+        for pipeline in reversed(self.outer):
+            model = Pipeline([*pipeline.steps[:-1], (pipeline.steps[-1][0], model)])
+        return model
+
+
+def _fitted(steps: Pipeline, X: Any, y: Any) -> Pipeline:
+    if not len(steps):
+        return steps
+    try:
+        check_is_fitted(steps)
+    except NotFittedError:
+        return clone(steps).fit(X, y)
+    return steps
+
+
+def open_model(model: Any, X: Any, y: Any) -> Opened:
+    """Take the rigid-body model out of searches, pipelines and transformed targets.
+
+    Parameters
+    ----------
+    model : estimator
+        Fitted or not.
+    X : table
+        Motion.
+    y : array
+        Torque.
+
+    Returns
+    -------
+    Opened
+        With a model of the robot inside, or the given one where none is.
+    """
+    inner, table, outer = model, X, []
+    while True:
+        if isinstance(inner, BaseSearchCV):
+            inner = getattr(inner, "best_estimator_", inner.estimator)
+        elif isinstance(inner, TransformedTargetRegressor):
+            # A rigid body is identified from torque in N m, whatever the target was made of.
+            inner = inner.regressor
+        elif isinstance(inner, Pipeline):
+            steps = _fitted(inner[:-1], table, y)
+            outer.append(Pipeline([*steps.steps, inner.steps[-1]]))
+            table = steps.transform(table) if len(steps) else table
+            inner = inner.steps[-1][1]
+        else:
+            break
+    return (
+        Opened(inner, table, tuple(outer)) if hasattr(inner, "with_effects") else Opened(model, X)
+    )

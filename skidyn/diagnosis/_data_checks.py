@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from skidyn._signals import Array, Signals
-from skidyn.evidence._broken import broken_notes
+from skidyn.evidence import broken_notes
 from skidyn.robots import Robot
 
 #: Positions of more than this many turns on every joint, or velocities of this many units per s.

@@ -8,22 +8,24 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
+from scipy.stats import chi2
 from sklearn.base import clone
 from threadpoolctl import threadpool_limits
 
 from skidyn._columns import ColumnSpec
 from skidyn._exceptions import ColumnError, LogError, LogWarning
-from skidyn._signals import Array, Signals
+from skidyn._signals import Array, Signals, read_signals
 from skidyn.diagnosis._conclusion import conclude
-from skidyn.diagnosis._data_checks import suspicions
-from skidyn.diagnosis._hypothesis import SearchResult, Settings
+from skidyn.diagnosis._correction import open_model
+from skidyn.diagnosis._hypothesis import SearchResult
 from skidyn.diagnosis._limits import Limit, find_limits
-from skidyn.diagnosis._reading import read_signals
 from skidyn.diagnosis._result import Diagnosis
 from skidyn.diagnosis._reversals import look_at_reversals
+from skidyn.diagnosis._rule import Settings
 from skidyn.diagnosis._search import search
-from skidyn.effects import Term, get_effect, list_effects, make_terms
-from skidyn.evidence._problem import Problem, make_problem
+from skidyn.effects import Term, list_effects, make_terms
+from skidyn.evidence import Problem, make_problem
+from skidyn.measurement import Measurement, check_measurement, refuse_certain
 from skidyn.robots import Robot
 
 
@@ -39,15 +41,17 @@ def diagnose(
     rate: float | None = None,
     smooth: bool = True,
     settings: Settings | None = None,
+    force: bool = False,
 ) -> Diagnosis:
     """Compare a model with measurements and learn which physical effects it lacks.
 
     Parameters
     ----------
     model : RBDRegressor or fitted regressor
-        The model to be judged. An :class:`~skidyn.rigid_body.RBDRegressor` is refitted together
+        The model to be judged. An :class:`~skidyn.identification.RBDRegressor` is refitted together
         with every candidate effect, fold by fold; any other fitted regressor is taken as it is and
-        its residual is diagnosed.
+        its residual is diagnosed. A model of the first kind is taken out of a search or a
+        ``TransformedTargetRegressor``; out of a ``Pipeline`` too, which the better model is.
     X : DataFrame or array of shape (n_samples, n_features)
         Motion, following the X contract; ``time`` and ``trajectory`` columns are wanted.
     tau : array-like of shape (n_samples, n_joints)
@@ -65,6 +69,9 @@ def diagnose(
         those of X.
     settings : Settings, optional
         Thresholds of the search.
+    force : bool, default=False
+        Go on although the log is certainly not what it claims
+        (:func:`skidyn.measurement.check_measurement`).
 
     Returns
     -------
@@ -76,21 +83,37 @@ def diagnose(
     ColumnError
         X does not follow the contract, or holds no time and no ``rate`` is given.
     LogError
-        X or the torque hold values that are not finite, or too few samples.
+        X or the torque hold values that are not finite, or too few samples; or the log is not what
+        it claims, and ``force`` is False.
 
     Examples
     --------
     >>> from skidyn.datasets import load_planar_arm, make_hidden_effect_log
-    >>> from skidyn.rigid_body import RBDRegressor
+    >>> from skidyn.identification import RBDRegressor
     >>> log = make_hidden_effect_log(load_planar_arm(), "stribeck", joints=[2])
     >>> diagnosis = diagnose(RBDRegressor(log.robot), log.X, log.y)
     >>> [(finding.kind, finding.joints) for finding in diagnosis.findings]
     [('stribeck', (2,))]
     """
     with threadpool_limits(1):  # many small matrices: more threads only wait for each other
-        return _diagnose(
-            model, X, tau, robot, effects, trajectory, time, rate, smooth, settings or Settings()
+        opened = open_model(model, X, tau)
+        diagnosis = _diagnose(
+            opened.model,
+            opened.X,
+            tau,
+            robot,
+            effects,
+            trajectory,
+            time,
+            rate,
+            smooth,
+            settings or Settings(),
+            force,
         )
+        if opened.outer:
+            diagnosis.opened = opened
+            diagnosis.__dict__.pop("model", None)
+        return diagnosis
 
 
 def _diagnose(
@@ -104,6 +127,7 @@ def _diagnose(
     rate: float | None,
     smooth: bool,
     settings: Settings,
+    force: bool,
 ) -> Diagnosis:
     robot = robot if robot is not None else getattr(model, "robot", None)
     if robot is None:
@@ -117,9 +141,13 @@ def _diagnose(
         trajectory=getattr(model, "trajectory", trajectory) if trajectory == "auto" else trajectory,
         time=getattr(model, "time", time) if time == "auto" else time,
         rate=rate,
+        to_derive=smooth,
     )
     kinds = list_effects() if effects is None else list(effects)
-    notes = suspicions(signals, torque, robot)
+    checks = check_measurement(Measurement(signals, torque, robot, robot.joint_names))
+    if not force:
+        refuse_certain(checks)
+    notes = [str(check) for check in checks]
     for note in notes:
         warnings.warn(note, LogWarning, stacklevel=4)
     own = _is_rigid_body_regressor(model)
@@ -129,7 +157,7 @@ def _diagnose(
             torque,
             robot=robot,
             rigid_body=getattr(model, "parameters", "identified") == "identified",
-            terms=_own_terms(model, robot, X, tau),
+            terms=own_terms(model, robot, X, tau),
             smooth=smooth,
         )
     else:
@@ -140,7 +168,10 @@ def _diagnose(
     wider, completed = look_at_reversals(problem, result, kinds, settings)
     limits = _limits(problem, result, completed, settings)
     sliding = problem.rows.sliding
-    return conclude(wider, completed, limits, sliding, torque, notes, model, (X, tau))
+    least = settings.least_drop
+    diagnosis = conclude(wider, completed, limits, sliding, torque, notes, least, model, (X, tau))
+    diagnosis.checks = checks
+    return diagnosis
 
 
 def _limits(
@@ -155,7 +186,7 @@ def _limits(
         blocks,
         result.fit.noise,
         result.inflation,
-        settings.least_gain,
+        float(chi2.isf(settings.level / result.n_tests, 1)),
     )
 
 
@@ -199,10 +230,10 @@ def _residual_problem(
     return problem(make_terms(friction, robot.n_joints))
 
 
-def _own_terms(model: Any, robot: Robot, X: Any, tau: Any) -> list[Term]:
+def own_terms(model: Any, robot: Robot, X: Any, tau: Any) -> list[Term]:
     """Terms of the user's model, shape parameters as the model fits them."""
     terms = make_terms(model.effects, robot.n_joints)
-    if all(not get_effect(t.kind).shapes or t.shape for t in terms):
+    if not any(t.is_open for t in terms):
         return terms
     fitted = model if hasattr(model, "effect_terms_") else clone(model).fit(X, tau)
     return list(fitted.effect_terms_)

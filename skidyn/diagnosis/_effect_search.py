@@ -4,16 +4,34 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from numbers import Integral
 from typing import Any
 
 import numpy as np
 from sklearn.base import BaseEstimator, MetaEstimatorMixin, RegressorMixin, clone
+from sklearn.metrics import check_scoring
+from sklearn.model_selection import check_cv, cross_val_score
+from sklearn.utils.metaestimators import available_if
 from sklearn.utils.validation import check_is_fitted
 
+from skidyn._columns import column_names
+from skidyn._exceptions import SkidynError
+from skidyn._keys import keys_of
 from skidyn._signals import Array
+from skidyn.diagnosis._correction import open_model
 from skidyn.diagnosis._diagnosis import diagnose
-from skidyn.diagnosis._hypothesis import Settings
 from skidyn.diagnosis._result import Diagnosis
+from skidyn.diagnosis._rule import Settings
+from skidyn.effects import Term
+from skidyn.model_selection import held_out_folds
+
+
+def _refits(search: EffectSearchCV) -> bool:
+    if not search.refit:
+        raise AttributeError(
+            "the search was made with refit=False, so that there is no model; set refit=True"
+        )
+    return True
 
 
 class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
@@ -22,25 +40,49 @@ class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     Parameters
     ----------
     estimator : RBDRegressor
-        Model to start from.
+        Model to start from, also as the last step of a ``Pipeline``.
     effects : sequence of str, optional
         Kinds to try; by default the whole catalogue.
     settings : Settings, optional
         Thresholds of the search.
+    smooth : bool, default=True
+        Derive velocity and acceleration from the positions in the search; False takes those of X.
+    scoring : str, callable or None, default=None
+        By what the models of ``cv_results_`` are scored on held-out folds; R2 if None. The effects
+        themselves are judged by :func:`diagnose`, whatever the scoring.
+    cv : int, cross-validator or iterable, default=5
+        Folds of these scores: by trajectory where it is a number.
+    refit : bool, default=True
+        Fit the better model to all rows.
+    n_jobs : int or None, default=None
+        Processes for the scores.
 
     Attributes
     ----------
     diagnosis_ : Diagnosis
         Everything that was found.
-    best_estimator_ : RBDRegressor
-        The given model with the findings added, fitted to all data.
+    best_estimator_ : estimator
+        The given model with the findings added, fitted to all data; with ``refit=True``.
+    best_params_ : dict
+        The parameter ``effects`` of the better model, by its name in ``estimator``.
     best_effects_ : list of Term
         What was added.
+    best_index_ : int
+        Row of ``cv_results_`` of the better model: the last one.
+    best_score_ : float
+        Its mean score on held-out folds.
     cv_results_ : dict of str to ndarray
-        One entry per step: ``added``, ``mean_rmse`` over the joints (N m or N), ``rmse`` of every
-        joint, held out.
+        One entry per step: ``params`` (list of dict), ``split<k>_test_score``, ``mean_test_score``,
+        ``std_test_score``, ``rank_test_score``; ``added``, ``rmse`` of every joint (N m or N, held
+        out, on the samples judged) and ``mean_rmse``.
+    n_splits_ : int
+        Number of folds.
+    scorer_ : callable
+        What scores.
     n_features_in_ : int
         Number of columns of X.
+    feature_names_in_ : ndarray of str
+        Names of the columns, where X has names.
 
     See Also
     --------
@@ -49,7 +91,7 @@ class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     Examples
     --------
     >>> from skidyn.datasets import load_planar_arm, make_hidden_effect_log
-    >>> from skidyn.rigid_body import RBDRegressor
+    >>> from skidyn.identification import RBDRegressor
     >>> log = make_hidden_effect_log(load_planar_arm(), "stribeck", joints=[2])
     >>> search = EffectSearchCV(RBDRegressor(log.robot)).fit(log.X, log.y)
     >>> search.cv_results_["added"].tolist()
@@ -62,12 +104,27 @@ class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         *,
         effects: Iterable[str] | None = None,
         settings: Settings | None = None,
+        smooth: bool = True,
+        scoring: Any = None,
+        cv: Any = 5,
+        refit: bool = True,
+        n_jobs: int | None = None,
     ) -> None:
         self.estimator = estimator
         self.effects = effects
         self.settings = settings
+        self.smooth = smooth
+        self.scoring = scoring
+        self.cv = cv
+        self.refit = refit
+        self.n_jobs = n_jobs
 
-    def fit(self, X: Any, y: Any) -> EffectSearchCV:
+    def __sklearn_tags__(self) -> Any:
+        tags = super().__sklearn_tags__()
+        tags.target_tags.multi_output = True
+        return tags
+
+    def fit(self, X: Any, y: Any, groups: Any = None) -> EffectSearchCV:
         """Search for missing effects and fit the better model.
 
         Parameters
@@ -76,6 +133,8 @@ class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             Motion, with time and trajectory.
         y : array-like of shape (n_samples, n_joints)
             Torque, N m or N.
+        groups : array-like of shape (n_samples,), default=None
+            Groups of the rows for a `cv` that splits by groups.
 
         Returns
         -------
@@ -83,21 +142,77 @@ class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             The search itself.
         """
         model = clone(self.estimator)
+        opened = open_model(model, X, y)
+        if not hasattr(opened.model, "with_effects"):
+            raise SkidynError(
+                f"{type(self.estimator).__name__} takes no effects; give an RBDRegressor, alone or "
+                "as the last step of a Pipeline. diagnose(model, ...) judges any fitted regressor"
+            )
         self.diagnosis_: Diagnosis = diagnose(
-            model, X, y, effects=self.effects, settings=self.settings
+            model, X, y, effects=self.effects, smooth=self.smooth, settings=self.settings
         )
-        self.best_estimator_ = self.diagnosis_.model
-        self.best_effects_ = [t for f in self.diagnosis_.findings for t in f.terms]
-        history = self.diagnosis_.history
+        findings = self.diagnosis_.findings
+        self.best_effects_ = [t for f in findings for t in f.terms]
+        self.n_features_in_ = int(np.shape(X)[1])
+        names = column_names(X)
+        if names is not None:
+            self.feature_names_in_ = np.asarray(names, dtype=object)
+        prefix = "".join(f"{pipeline.steps[-1][0]}__" for pipeline in opened.outer)
+        self._score_steps(X, y, groups, f"{prefix}effects", list(opened.model.effects))
+        if self.refit:
+            self.best_estimator_ = self.diagnosis_.model
+        return self
+
+    def _score_steps(self, X: Any, y: Any, groups: Any, name: str, start: list[Any]) -> None:
+        """Scores of the models along the history, as scikit-learn's searches hold them."""
+        history, findings = self.diagnosis_.history, self.diagnosis_.findings
+        # One model a step, with the effects found up to it; what was added in several at once last.
+        steps: list[list[Term]] = [[]]
+        for k in range(1, len(history)):
+            upto = findings if k == len(history) - 1 else findings[:k]
+            steps.append([t for f in upto for t in f.terms])
+        params = [{name: [*start, *terms]} for terms in steps]
+        keys = keys_of(X)
+        if isinstance(self.cv, Integral):
+            table = np.asarray(X, dtype=float)
+            folds = held_out_folds(keys.trajectories(table), int(self.cv))
+        else:
+            folds = list(check_cv(self.cv).split(X, y, groups))
+        self.scorer_ = check_scoring(self.estimator, scoring=self.scoring)
+        scores = np.array(
+            [
+                cross_val_score(
+                    clone(self.estimator).set_params(**own),
+                    X,
+                    y,
+                    cv=folds,
+                    scoring=self.scorer_,
+                    n_jobs=self.n_jobs,
+                )
+                for own in params
+            ]
+        )
         rmse = np.array([step["rmse"] for step in history])
+        mean = scores.mean(axis=1)
+        order = np.argsort(-mean, kind="stable")
+        rank = np.empty(len(mean), dtype=np.int32)
+        rank[order] = np.arange(1, len(mean) + 1)
+        self.n_splits_ = len(folds)
         self.cv_results_ = {
+            "params": params,
+            **{f"split{k}_test_score": scores[:, k] for k in range(len(folds))},
+            "mean_test_score": mean,
+            "std_test_score": scores.std(axis=1),
+            "rank_test_score": rank,
             "added": np.array([step["added"] for step in history], dtype=object),
             "rmse": rmse,
             "mean_rmse": rmse.mean(1),
         }
-        self.n_features_in_ = int(np.shape(X)[1])
-        return self
+        self.best_index_ = len(params) - 1
+        self.best_params_ = params[-1]
+        self.best_score_ = float(mean[-1])
 
+    @available_if(_refits)
     def predict(self, X: Any) -> Array:
         """Torque of the better model.
 

@@ -1,245 +1,341 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where a model fails: by joint, trajectory and regime."""
+"""Where a model fails: on which joints, and where on each of them."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from skidyn._signals import Array, Signals
-from skidyn.evidence._rows import REST
+from skidyn._signals import Array
+from skidyn._text import digits
+from skidyn.diagnosis._comparison import Comparison, regimes
 
-#: The first five exclude each other; the others lie across them.
-REGIMES = ("rest", "reversal", "slow", "medium", "fast", "loaded", "warm")
-#: Slow and fast as shares of the speed that a joint exceeds in 5 % of its motion.
-SLOW, FAST = 0.25, 0.7
-#: A regime fails if it holds this share of a joint's squared error, and the odds of error to lie
-#: in it are this many times those of a sample (a ratio that serves regimes of most samples too).
-SHARE, ODDS = 0.15, 2.0
+#: A joint fails where its error on judged rows exceeds the noise by this factor: logs without an
+#: effect stay below it (benchmarks/diagnosis/nothing_hidden.py).
+FAILS = 1.5
+#: Noise below this share of the measured torque is rounding.
+ROUNDING = 1e-9
+#: The excess lies somewhere if that place holds this share of it, and its odds there are this many
+#: times those of a sample.
+SHARE, ODDS = 0.4, 2.5
+#: A stretch of time says more than a regime only where it is much narrower.
+TIME_SHARE, TIME_ODDS = 0.5, 6.0
+#: A stretch of time is told beside its trajectories if it is at most this share of their time.
+NARROWER = 0.5
+#: Ranges of position and stretches of time are made of this many equal parts.
+POSITIONS, TIMES = 24, 80
+#: Samples that a joint must rest, and their share, for its error at rest to be told.
+FEWEST, SHORTEST = 20, 0.01
 
 _WHERE = {
-    "rest": "while it stands still",
     "reversal": "around its reversals",
     "slow": "at low speed",
     "medium": "at medium speed",
     "fast": "at high speed",
     "loaded": "under high load",
-    "warm": "when it is warm, or late in the session",
+    "warm": "when it is warm, or late in the recording",
 }
 
 
 @dataclass(frozen=True)
+class Place:
+    """A part of the motion that holds more of a joint's excess error than its share of time.
+
+    Parameters
+    ----------
+    kind : {"regime", "position", "trajectory", "time"}
+        What the place is a part of.
+    where : str
+        The place in words, such as ``"at low speed"``.
+    share_of_excess : float
+        Share of what the joint's squared error has above the noise.
+    share_of_time : float
+        Share of the judged samples.
+    regime : str, default=""
+        Name of the regime, of places of that kind.
+    low, high : float, optional
+        Ends of a range of the joint's position (rad or m), or of time since the beginning of the
+        trajectory (s).
+    trajectories : tuple of int, default=()
+        Trajectories, of places of the kinds ``"trajectory"`` and ``"time"``.
+
+    Examples
+    --------
+    >>> place = Place("regime", "at low speed", 0.8, 0.2, regime="slow")
+    >>> place.share_of_excess
+    0.8
+    """
+
+    kind: str
+    where: str
+    share_of_excess: float
+    share_of_time: float
+    regime: str = ""
+    low: float | None = None
+    high: float | None = None
+    trajectories: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
 class Failure:
-    """A regime in which a joint's error stands out.
+    """A joint whose error is larger than the noise, and where the excess lies.
 
     Parameters
     ----------
     joint : int
         Joint, counted from 1.
-    regime : str
-        One of ``"rest"``, ``"reversal"``, ``"slow"``, ``"medium"``, ``"fast"``, ``"loaded"``,
-        ``"warm"``.
+    name : str
+        Its name.
     rmse : float
-        Root mean square error in the regime, N m or N.
-    share_of_error : float
-        Share of the joint's squared error.
-    share_of_time : float
-        Share of the samples.
+        Held-out root mean square error on judged samples, N m or N.
+    noise : float
+        Noise of the joint, N m or N.
+    ratio : float
+        Error over noise.
+    places : tuple of Place
+        Regimes, range of position, trajectories and stretch of time in which the excess lies;
+        empty where it is spread evenly.
     sentence : str
         The same in words.
 
     Examples
     --------
-    >>> failure = Failure(5, "rest", 1.9, 0.93, 0.39, "Joint 5 fails at rest.")
-    >>> failure.share_of_error
-    0.93
+    >>> failure = Failure(4, "elbow", 0.63, 0.16, 3.9, (), "Joint 4 (elbow) errs by 0.63 N m.")
+    >>> failure.ratio
+    3.9
     """
 
     joint: int
-    regime: str
+    name: str
     rmse: float
-    share_of_error: float
-    share_of_time: float
+    noise: float
+    ratio: float
+    places: tuple[Place, ...]
     sentence: str
 
 
 @dataclass(frozen=True)
-class Comparison:
-    """Measured against predicted torque; the prediction never saw the sample's trajectory.
+class RestError:
+    """Error of a joint at rest, where dry friction may hold any torque up to its limit.
 
     Parameters
     ----------
-    signals : Signals
-        Smoothed motion.
-    measured, predicted : ndarray of shape (n_samples, n_joints)
-        Torque, N m or N.
-    sliding : ndarray of shape (n_samples, n_joints) of bool
-        Samples away from rest and reversals.
-    joint_names : tuple of str
-        Names of the joints.
-    judged : ndarray of shape (n_samples, n_joints) of bool, optional
-        Samples on which effects are judged: the sliding ones by default, and those at reversals
-        where hysteresis was found.
+    joint : int
+        Joint, counted from 1.
+    name : str
+        Its name.
+    rmse : float
+        Root mean square error at rest, N m or N.
+    stiction : float or None
+        Dry friction that the model holds possible, N m or N; None where it does not tell.
+    beyond : float or None
+        Root mean square of what exceeds it, N m or N.
+    share_of_time : float
+        Share of the samples at rest.
+    sentence : str
+        The same in words.
 
     Examples
     --------
-    >>> comparison = diagnosis.comparison  # doctest: +SKIP
-    >>> comparison.rmse()  # doctest: +SKIP
-    array([0.43, 2.37])
+    >>> error = RestError(2, "shoulder", 1.9, 2.4, 0.0, 0.14, "At rest ...")
+    >>> error.beyond
+    0.0
     """
 
-    signals: Signals
-    measured: Array
-    predicted: Array
-    sliding: NDArray[np.bool_]
-    joint_names: tuple[str, ...]
-    judged: NDArray[np.bool_] | None = None
-
-    @property
-    def residual(self) -> Array:
-        """Measured less predicted torque, N m or N."""
-        return self.measured - self.predicted
-
-    def rmse(self, judged: bool = False) -> Array:
-        """Root mean square error of every joint.
-
-        Parameters
-        ----------
-        judged : bool, default=False
-            Only the samples on which effects are judged.
-
-        Returns
-        -------
-        ndarray of shape (n_joints,), N m or N
-            Errors of the joints.
-        """
-        chosen = self.sliding if self.judged is None else self.judged
-        use = chosen if judged else np.ones_like(chosen)
-        square = np.where(use, self.residual**2, 0.0).sum(0)
-        error: Array = np.sqrt(square / np.maximum(use.sum(0), 1))
-        return error
-
-    def table(self) -> list[dict[str, Any]]:
-        """Errors of every joint and trajectory.
-
-        Returns
-        -------
-        list of dict
-            With ``joint`` (from 1), ``name``, ``trajectory``, ``rmse``, ``mae`` (N m or N) and
-            ``relative`` (rmse over the rms of the measured torque).
-        """
-        rows = []
-        for name in np.unique(self.signals.trajectory):
-            here = self.signals.trajectory == name
-            for j, joint in enumerate(self.joint_names):
-                r, tau = self.residual[here, j], self.measured[here, j]
-                rmse = float(np.sqrt(np.mean(r**2)))
-                scale = float(np.sqrt(np.mean(tau**2)))
-                rows.append(
-                    {
-                        "joint": j + 1,
-                        "name": joint,
-                        "trajectory": int(name),
-                        "rmse": rmse,
-                        "mae": float(np.mean(np.abs(r))),
-                        "relative": rmse / scale if scale > 0 else np.inf,
-                    }
-                )
-        return rows
+    joint: int
+    name: str
+    rmse: float
+    stiction: float | None
+    beyond: float | None
+    share_of_time: float
+    sentence: str
 
 
-def regimes(comparison: Comparison) -> dict[str, NDArray[np.bool_]]:
-    """Which samples lie in which regime, per joint.
+def find_failures(comparison: Comparison, noise: ArrayLike) -> list[Failure]:
+    """Joints whose error on judged samples exceeds the noise, the largest ratio first.
 
     Parameters
     ----------
     comparison : Comparison
         Measured against predicted torque.
-
-    Returns
-    -------
-    dict of str to ndarray of shape (n_samples, n_joints) of bool
-    """
-    s = comparison.signals
-    speed = np.abs(s.dq)
-    rest = speed <= REST * s.unit
-    high = np.array(
-        [
-            np.quantile(v[~r], 0.95) if (~r).any() else 1.0
-            for v, r in zip(speed.T, rest.T, strict=True)
-        ]
-    )
-    reversal = ~rest & ~comparison.sliding
-    moving = ~rest & ~reversal
-    load = np.abs(comparison.measured if s.load is None else s.load)
-    if s.temperature is not None:
-        warmth = s.temperature
-    else:
-        warmth = np.repeat(s.clock[:, None], s.n_joints, axis=1)
-    return {
-        "rest": rest,
-        "reversal": reversal,
-        "slow": moving & (speed < SLOW * high),
-        "medium": moving & (speed >= SLOW * high) & (speed <= FAST * high),
-        "fast": moving & (speed > FAST * high),
-        "loaded": moving & (load > np.quantile(load, 0.8, axis=0)),
-        "warm": moving & (warmth > np.quantile(warmth, 0.8, axis=0)),
-    }
-
-
-def error_map(comparison: Comparison) -> Array:
-    """Root mean square error by joint and regime, NaN where a regime does not occur.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        Measured against predicted torque.
-
-    Returns
-    -------
-    ndarray of shape (n_joints, n_regimes), N m or N
-    """
-    square = comparison.residual**2
-    table = np.full((square.shape[1], len(REGIMES)), np.nan)
-    for k, inside in enumerate(regimes(comparison).values()):
-        count = inside.sum(0)
-        mean = np.where(inside, square, 0.0).sum(0) / np.maximum(count, 1)
-        table[:, k] = np.where(count > 0, np.sqrt(mean), np.nan)
-    return table
-
-
-def find_failures(comparison: Comparison) -> list[Failure]:
-    """Regimes in which the error stands out, the largest share of a joint's error first.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        Measured against predicted torque.
+    noise : array-like of shape (n_joints,), N m or N
+        Noise of every joint.
 
     Returns
     -------
     list of Failure
+        Empty where no joint exceeds its noise.
     """
-    square = comparison.residual**2
-    total = np.maximum(square.sum(0), 1e-300)
-    inside = regimes(comparison)
+    levels = np.asarray(noise, dtype=float)
+    floor = ROUNDING * np.sqrt(np.mean(comparison.measured**2, axis=0))
+    levels = np.maximum(np.maximum(levels, floor), 1e-300)
+    found = []
+    for j, rmse in enumerate(comparison.rmse(judged=True)):
+        ratio = float(rmse / levels[j])
+        if not ratio >= FAILS:  # so that a noise which is not known finds nothing
+            continue
+        places = _places(comparison, j, float(levels[j]))
+        name, unit = comparison.joint_names[j], comparison.units[j]
+        sentence = (
+            f"Joint {j + 1} ({name}) errs by {digits(rmse)} {unit}, {ratio:.2g} times its noise "
+            f"of {digits(levels[j])} {unit}. {_told(places)}"
+        )
+        found.append(Failure(j + 1, name, float(rmse), float(levels[j]), ratio, places, sentence))
+    return sorted(found, key=lambda f: (-f.ratio, f.joint))
+
+
+def find_rest_errors(comparison: Comparison) -> list[RestError]:
+    """Errors of the joints that rest, with what dry friction allows.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        Measured against predicted torque.
+
+    Returns
+    -------
+    list of RestError
+        In the order of the joints.
+    """
+    rest = regimes(comparison)["rest"]
     found = []
     for j, name in enumerate(comparison.joint_names):
-        whole = float(np.sqrt(total[j] / len(square)))
-        for regime, mask in inside.items():
-            here = mask[:, j]
-            if not here.any():
-                continue
-            error, time = float(square[here, j].sum() / total[j]), float(here.mean())
-            rmse = float(np.sqrt(square[here, j].mean()))
-            if error < SHARE or error * (1 - time) < ODDS * time * (1 - error):
-                continue
-            sentence = (
-                f"Joint {j + 1} ({name}): {error:.0%} of the squared error occurs "
-                f"{_WHERE[regime]} ({time:.0%} of the time; {rmse:.3g} against {whole:.3g} in all)."
-            )
-            found.append(Failure(j + 1, regime, rmse, error, time, sentence))
-    return sorted(found, key=lambda f: (-f.share_of_error, f.joint))
+        here = rest[:, j]
+        if here.sum() < FEWEST or here.mean() < SHORTEST:
+            continue
+        residual, unit = comparison.residual[here, j], comparison.units[j]
+        rmse, stiction, beyond = float(np.sqrt(np.mean(residual**2))), None, None
+        text = f"Joint {j + 1} ({name}) errs by {rmse:.2g} {unit} at rest"
+        if comparison.dry_friction is None:
+            text += "; this model does not tell how much of it dry friction may hold"
+        else:
+            friction = comparison.dry_friction[:, j]
+            stiction = float(np.abs(friction).max())
+            # what the model says of friction at rest is one of many possible values
+            free = residual + friction[here]
+            beyond = float(np.sqrt(np.mean(np.maximum(np.abs(free) - stiction, 0.0) ** 2)))
+            text += f"; dry friction may hold ±{stiction:.2g} {unit} of it"
+            if beyond > 0.1 * rmse:
+                text += f", and {beyond:.2g} {unit} exceeds that"
+        found.append(RestError(j + 1, name, rmse, stiction, beyond, float(here.mean()), text + "."))
+    return found
+
+
+def _places(comparison: Comparison, joint: int, noise: float) -> tuple[Place, ...]:
+    """Where the excess of a joint lies."""
+    judged = np.flatnonzero(comparison.judged_samples[:, joint])
+    excess = comparison.residual[judged, joint] ** 2 - noise**2
+    share = excess / excess.sum()
+    places = _regime_places(comparison, joint, judged, share)
+    position = _position_place(comparison, joint, judged, share)
+    which = _trajectory_place(comparison, judged, share)
+    when = _time_place(comparison, judged, share)
+    if when and which and when.share_of_time > NARROWER * which.share_of_time:
+        when = None  # nearly the whole trajectory, which is told already
+    return (*places, *(place for place in (position, which, when) if place is not None))
+
+
+def _stands_out(excess: float, time: float, share: float = SHARE, odds: float = ODDS) -> bool:
+    return 0 < time < 1 and excess >= share and excess * (1 - time) >= odds * time * (1 - excess)
+
+
+def _regime_places(
+    comparison: Comparison, joint: int, judged: NDArray[np.intp], share: Array
+) -> list[Place]:
+    """The regimes that stand out, those with most of the excess first; two at most."""
+    found = []
+    for regime, mask in regimes(comparison).items():
+        here = mask[judged, joint]
+        excess, time = float(share[here].sum()), float(here.mean())
+        if regime in _WHERE and _stands_out(excess, time):
+            found.append(Place("regime", _WHERE[regime], min(excess, 1.0), time, regime))
+    return sorted(found, key=lambda place: -place.share_of_excess)[:2]
+
+
+def _position_place(
+    comparison: Comparison, joint: int, judged: NDArray[np.intp], share: Array
+) -> Place | None:
+    """The range of the joint's own position in which the excess is densest."""
+    q = comparison.signals.q[judged, joint]
+    edges = np.quantile(q, np.linspace(0, 1, POSITIONS + 1))
+    part = np.clip(np.searchsorted(edges, q, side="right") - 1, 0, POSITIONS - 1)
+    first, last = _densest(*_sums(part, share, POSITIONS))
+    here = (part >= first) & (part <= last)
+    excess, time = float(share[here].sum()), float(here.mean())
+    if not _stands_out(excess, time):
+        return None
+    low, high = float(edges[first]), float(edges[last + 1])
+    unit = "m" if comparison.signals.prismatic[joint] else "rad"
+    where = f"at positions from {low:.2f} to {high:.2f} {unit}"
+    return Place("position", where, min(excess, 1.0), time, low=low, high=high)
+
+
+def _trajectory_place(
+    comparison: Comparison, judged: NDArray[np.intp], share: Array
+) -> Place | None:
+    """The trajectories in which the excess is densest."""
+    names, part = np.unique(comparison.signals.trajectory[judged], return_inverse=True)
+    excess, time = _sums(part, share, len(names))
+    order = np.argsort(-excess / time)
+    gained = np.cumsum(excess[order]), np.cumsum(time[order])
+    k = int(np.argmax(gained[0] - gained[1]))
+    held, spent = float(gained[0][k]), float(gained[1][k])
+    if not _stands_out(held, spent):
+        return None
+    which = tuple(sorted(int(name) for name in names[order[: k + 1]]))
+    where = f"in trajector{'y' if len(which) == 1 else 'ies'} {', '.join(map(str, which))}"
+    return Place("trajectory", where, min(held, 1.0), spent, trajectories=which)
+
+
+def _time_place(comparison: Comparison, judged: NDArray[np.intp], share: Array) -> Place | None:
+    """One stretch of time within a trajectory that holds most of the excess."""
+    trajectory, clock = comparison.signals.trajectory, comparison.signals.clock
+    whole = len(judged)
+    best: tuple[float, float, Place] | None = None
+    for name in np.unique(trajectory[judged]):
+        begin = float(clock[trajectory == name].min())
+        here = trajectory[judged] == name
+        time, own = clock[judged][here] - begin, share[here]
+        edges = np.linspace(time.min(), time.max() + 1e-9, TIMES + 1)
+        part = np.clip(np.searchsorted(edges, time, side="right") - 1, 0, TIMES - 1)
+        excess, spent = _sums(part, own, TIMES)
+        spent = spent * len(part) / whole
+        first, last = _densest(excess, spent)
+        held, lasted = float(excess[first : last + 1].sum()), float(spent[first : last + 1].sum())
+        if not _stands_out(held, lasted, TIME_SHARE, TIME_ODDS):
+            continue
+        low, high = float(edges[first]), float(edges[last + 1])
+        where = f"from {low:.1f} to {high:.1f} s of trajectory {int(name)}"
+        place = Place(
+            "time", where, min(held, 1.0), lasted, low=low, high=high, trajectories=(int(name),)
+        )
+        if best is None or held - lasted > best[0] - best[1]:
+            best = (held, lasted, place)
+    return None if best is None else best[2]
+
+
+def _sums(part: NDArray[np.intp], share: Array, n: int) -> tuple[Array, Array]:
+    """Share of the excess and of the samples in every part."""
+    sums: Array = np.bincount(part, share, n).astype(float)
+    return sums, np.bincount(part, minlength=n) / len(part)
+
+
+def _densest(excess: Array, time: Array) -> tuple[int, int]:
+    """First and last part of the run that holds most excess beyond its share of time."""
+    total = np.concatenate([[0.0], np.cumsum(excess - time)])
+    lowest = np.maximum.accumulate(-total)
+    last = int(np.argmax(total[1:] + lowest[:-1]))
+    return int(np.argmin(total[: last + 1])), last
+
+
+def _told(places: Sequence[Place]) -> str:
+    if not places:
+        return "The excess is spread over the whole motion."
+    parts = [
+        f"{p.share_of_excess:.0%} lies {p.where} ({p.share_of_time:.0%} of the time)"
+        for p in places
+    ]
+    return f"Of its excess over the noise, {', '.join(parts)}."

@@ -8,14 +8,15 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
 
 from skidyn._signals import Array
+from skidyn._text import inside, listed
 from skidyn.diagnosis._candidates import Candidate
+from skidyn.diagnosis._episodes import Episode
 from skidyn.diagnosis._hypothesis import UNKNOWN, Hypothesis, Step
 from skidyn.diagnosis._unknown import UnknownTorque
 from skidyn.effects import Term, get_effect
-from skidyn.evidence._problem import Problem
+from skidyn.evidence import Problem
 
 #: Another kind with at least this share of the best one's score is a rival.
 RIVAL_SHARE = 0.8
@@ -34,15 +35,15 @@ class Finding:
     title : str
         Name for people.
     joints : tuple of int
-        Joints, counted from 1.
+        Joints, counted from 1: one, a pair, or all that a tool reaches.
     parameters : dict
-        ``{name: {"value", "low", "high", "unit"}}``, lists over the joints where there are several.
+        ``{name: {"value", "low", "high", "unit"}}``, numbers with 95 % intervals.
     variables : tuple of str
         Signals that an unknown effect depends on.
     error_drop : float
         Share of the held-out squared error on these joints that adding it removes.
     q_value : float
-        False-discovery rate at which it is reported.
+        False-discovery rate at which it was accepted: its chance times the number of candidates.
     rivals : tuple of str
         Kinds this data cannot tell it from.
     separating_motion : str
@@ -53,6 +54,15 @@ class Finding:
         Line of Python that adds it.
     terms : tuple of Term
         Terms to add to a model.
+    margin : float
+        Share of its gain that the best other explanation of the same joints falls short of;
+        negative where a simpler name was preferred.
+    confidence : float or None
+        Probability that the name is right.
+    trajectories : tuple of int or None
+        Recordings that have it; None where all do.
+    when : list of Episode
+        Times at which it was there, for a torque that comes and goes.
     curves : list of dict
         Effect and partial residual against its main signal, for each joint.
 
@@ -75,6 +85,10 @@ class Finding:
     sentence: str
     code: str
     terms: tuple[Term, ...]
+    margin: float = 1.0
+    confidence: float | None = None
+    trajectories: tuple[int, ...] | None = None
+    when: list[Episode] = field(default_factory=list)
     curves: list[dict[str, Any]] = field(default_factory=list, repr=False)
 
     def to_dict(self) -> dict[str, Any]:
@@ -94,6 +108,10 @@ class Finding:
             "q_value": self.q_value,
             "rivals": list(self.rivals),
             "separating_motion": self.separating_motion,
+            "margin": self.margin,
+            "confidence": self.confidence,
+            "trajectories": None if self.trajectories is None else list(self.trajectories),
+            "when": [episode.to_dict() for episode in self.when],
             "sentence": self.sentence,
         }
 
@@ -111,48 +129,17 @@ def rivals_of(step: Step) -> tuple[str, ...]:
     return tuple(dict.fromkeys(k for k in kinds if k != best.kind))
 
 
-def q_values(hypotheses: Sequence[Hypothesis], inflation: Array, n_tests: int) -> list[float]:
-    """Benjamini-Hochberg false-discovery rates over everything that was tried.
-
-    Parameters
-    ----------
-    hypotheses : sequence of Hypothesis
-        Findings.
-    inflation : ndarray of shape (n_joints,)
-        Variance inflation of the residual.
-    n_tests : int
-        Number of candidates tried.
-
-    Returns
-    -------
-    list of float
-    """
-    p = np.array(
-        [
-            chi2.sf(max(h.gain.sum(), 0) / inflation.max(), max(1, h.n_parameters))
-            for h in hypotheses
-        ]
-    )
-    order = np.argsort(p)
-    q = np.empty(len(p))
-    running = 1.0
-    for rank in range(len(p), 0, -1):
-        i = order[rank - 1]
-        running = min(running, p[i] * n_tests / rank)
-        q[i] = running
-    return [float(x) for x in q]
-
-
 def make_finding(
     problem: Problem,
     hypothesis: Hypothesis,
+    candidate: Candidate,
     rivals: tuple[str, ...],
     q_value: float,
     error_drop: float,
     intervals: dict[Term, dict[str, Any]],
     unknowns: Sequence[UnknownTorque] = (),
 ) -> Finding:
-    """Put a hypothesis into words and numbers.
+    """Put one term of a hypothesis into words and numbers.
 
     Parameters
     ----------
@@ -160,6 +147,8 @@ def make_finding(
         Signals of the log.
     hypothesis : Hypothesis
         What was added.
+    candidate : Candidate
+        One of its terms.
     rivals : tuple of str
         Kinds that explain nearly as much.
     q_value, error_drop : float
@@ -173,20 +162,31 @@ def make_finding(
     -------
     Finding
     """
-    candidates = sorted(hypothesis.candidates, key=lambda c: c.joints)
-    unknown = hypothesis.kind == UNKNOWN
-    effect = get_effect(candidates[0].term.kind)
-    joints = _joints(problem, hypothesis, candidates)
-    parameters = {} if unknown else _parameters(problem, candidates, intervals)
+    term = candidate.term
+    effect, unknown = term.effect, hypothesis.kind == UNKNOWN
+    joints = _joints(problem, hypothesis, candidate)
+    parameters = {} if unknown else _parameters(problem, candidate, intervals)
     tested = tuple(sorted({v for u in unknowns for v in u.variables}))
-    variables = tested or hypothesis.variables
+    variables = tested or candidate.variables
     title = f"Something that depends on {' and '.join(variables)}" if unknown else effect.title
     relatives = [k for k in rivals if k != UNKNOWN and get_effect(k).family == effect.family]
     if effect.family and relatives:
         title = f"{effect.family.capitalize()}, best described by {title}"
     formulas = [u for u in unknowns if u.proposal is not None]
-    code = _code(hypothesis, joints, candidates, adopt=bool(formulas))
-    sentence = _sentence(title, joints, parameters, error_drop, rivals, effect.separating_motion)
+    if formulas:
+        code = 'model = diagnosis.add("formula")'
+    elif unknown or term.trajectories is not None:
+        code = "model = diagnosis.model"
+    else:
+        code = f'model = diagnosis.add("{hypothesis.kind}", joints={list(joints)})'
+    sentence = _sentence(title, joints, term.trajectories, parameters, error_drop)
+    if rivals:
+        sentence += (
+            f" This data cannot separate it from {listed([rival_title(k) for k in rivals], 'or')}"
+            + f"; a recording with {effect.separating_motion} would"
+            * bool(effect.separating_motion)
+            + "."
+        )
     for u in formulas:
         assert u.proposal is not None
         sentence += f" A formula that does the same on joint {u.joint}: {u.proposal.text}."
@@ -206,77 +206,55 @@ def make_finding(
         effect.separating_motion,
         sentence,
         code,
-        tuple(c.term for c in candidates),
+        (term,),
+        hypothesis.margin,
+        None,
+        term.trajectories,
     )
 
 
-def _joints(
-    problem: Problem, hypothesis: Hypothesis, candidates: Sequence[Candidate]
-) -> tuple[int, ...]:
+def _joints(problem: Problem, hypothesis: Hypothesis, candidate: Candidate) -> tuple[int, ...]:
     if hypothesis.kind == "payload":
         return (problem.n_joints,)
-    return tuple(sorted({j + 1 for c in candidates for j in c.joints}))
+    return tuple(sorted(j + 1 for j in candidate.joints))
+
+
+def rival_title(kind: str) -> str:
+    """Title of a kind inside a sentence."""
+    return "something without a name" if kind == UNKNOWN else inside(get_effect(kind).title)
 
 
 def _parameters(
-    problem: Problem, candidates: Sequence[Candidate], intervals: dict[Term, dict[str, Any]]
+    problem: Problem, candidate: Candidate, intervals: dict[Term, dict[str, Any]]
 ) -> dict[str, dict[str, Any]]:
-    effect = get_effect(candidates[0].term.kind)
-    table: dict[str, dict[str, Any]] = {}
-    for candidate in candidates:
-        units = effect.units(bool(problem.signals.prismatic[candidate.joints[0]]))
-        for name, value in intervals[candidate.term].items():
-            triple = value if isinstance(value, tuple) and len(value) == 3 else None
-            row = table.setdefault(
-                name, {"value": [], "low": [], "high": [], "unit": units.get(name, "")}
-            )
-            numbers = triple if triple and name != "trajectories" else (value, None, None)
-            for key, number in zip(("value", "low", "high"), numbers, strict=True):
-                row[key].append(number)
-    if len(candidates) == 1:
-        return {n: {k: v[0] if k != "unit" else v for k, v in r.items()} for n, r in table.items()}
+    units = candidate.term.effect.units(bool(problem.signals.prismatic[candidate.joints[0]]))
+    table = {}
+    for name, found in intervals[candidate.term].items():
+        value, low, high = found if isinstance(found, tuple) else (found, None, None)
+        table[name] = {"value": value, "low": low, "high": high, "unit": units.get(name, "")}
     return table
-
-
-def _code(
-    hypothesis: Hypothesis,
-    joints: tuple[int, ...],
-    candidates: Sequence[Candidate],
-    adopt: bool,
-) -> str:
-    if adopt:
-        return 'model = diagnosis.add("formula")'
-    if hypothesis.kind == UNKNOWN or any(c.term.shape.get("trajectories") for c in candidates):
-        return "model = diagnosis.model"
-    return f'model = diagnosis.add("{hypothesis.kind}", joints={list(joints)})'
 
 
 def _sentence(
     title: str,
     joints: tuple[int, ...],
+    trajectories: tuple[int, ...] | None,
     parameters: dict[str, dict[str, Any]],
     drop: float,
-    rivals: tuple[str, ...],
-    motion: str,
 ) -> str:
     where = f"joint {joints[0]}" if len(joints) == 1 else f"joints {', '.join(map(str, joints))}"
-    if "trajectories" in parameters:
-        which = parameters["trajectories"]["value"]
-        where += f" in trajector{'y' if len(which) == 1 else 'ies'} {', '.join(map(str, which))}"
+    if trajectories is not None:
+        many = "y" if len(trajectories) == 1 else "ies"
+        where += f" in trajector{many} {', '.join(map(str, trajectories))}"
     what = next((_value(name, row) for name, row in parameters.items()), "")
-    text = f"{title} on {where}{what}. Adding it removes {drop:.0%} of the held-out squared error"
-    if rivals:
-        text += f"; this data hardly tells it from {', '.join(rivals)} ({motion} would)"
-    return text + "."
+    return f"{title} on {where}{what}. Adding it removes {drop:.0%} of the held-out squared error."
 
 
 def _value(name: str, row: dict[str, Any]) -> str:
-    """The first parameter of a finding in words; of a few joints or axes, all values."""
+    """The first parameter of a finding in words."""
     value, unit = row["value"], "" if row["unit"] == "1" else f" {row['unit']}".rstrip()
     if isinstance(value, float) and row["low"] is not None:
         return f": {name} = {value:.3g} ± {(row['high'] - row['low']) / 2:.2g}{unit}"
-    if isinstance(value, list) and 1 < len(value) <= 7 and all(isinstance(v, float) for v in value):
-        return f": {name} = {', '.join(f'{v:.3g}' for v in value)}{unit}"
     return ""
 
 
@@ -345,7 +323,7 @@ def _reached(torque: Array) -> list[int]:
 def _main_signal(problem: Problem, term: Term, joint: int) -> tuple[str, Array, str]:
     """Signal against which an effect is drawn."""
     s = problem.signals
-    against = get_effect(term.kind).drawn_against
+    against = term.effect.drawn_against
     slides = bool(s.prismatic[joint])
     length = "m" if slides else "rad"
     if against == "temperature" and s.temperature is not None:

@@ -13,11 +13,11 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigh
+from scipy.linalg import cho_factor, cho_solve
 
 from skidyn._signals import Array
 from skidyn.diagnosis._variables import average_at_rows
-from skidyn.evidence._problem import Problem
+from skidyn.evidence import Problem
 
 FEATURES = 200
 #: Lengths over which the learned function varies, in standard deviations of its inputs.
@@ -76,9 +76,10 @@ def _held_out_share(features: Array, r: Array, fold: NDArray[np.int64], n_folds:
     total, right = grams.sum(0), cross.sum(0)
     drop = np.zeros(len(RIDGES))
     for f in range(n_folds):
-        values, vectors = eigh(total - grams[f])
-        rotated = vectors.T @ (right - cross[f])
+        gram, aim = total - grams[f], right - cross[f]
         for k, ridge in enumerate(RIDGES):
-            b = vectors @ (rotated / (np.maximum(values, 0) + ridge * len(r) / n_folds))
+            # Seven triangular factors cost a quarter of the eigenvectors that would serve all.
+            held = gram + ridge * len(r) / n_folds * np.eye(len(gram))
+            b = cho_solve(cho_factor(held, check_finite=False), aim, check_finite=False)
             drop[k] += 2 * b @ cross[f] - b @ grams[f] @ b
     return float(np.clip(drop.max() / (r @ r), 0.0, 1.0))

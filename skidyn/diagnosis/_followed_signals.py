@@ -25,7 +25,7 @@ from sklearn.ensemble import HistGradientBoostingRegressor
 from skidyn._signals import Array
 from skidyn.diagnosis._proposal import pursue
 from skidyn.diagnosis._variables import average_at_rows, averaged_signals
-from skidyn.evidence._problem import Problem
+from skidyn.evidence import Problem
 
 #: Rows looked at, and signals of a set, at most.
 MOST_ROWS, MOST_SIGNALS = 2000, 3
@@ -58,8 +58,9 @@ def followed_signals(problem: Problem, joint: int, residual: Array) -> list[tupl
     step = max(1, -(-len(y) // MOST_ROWS))
     signals = {name: x[::step] for name, x in averaged_signals(problem, joint).items()}
     y = y[::step]
-    fold = problem.fold[joint][::step]
-    if len(np.unique(fold)) < 4:
+    # numbered without gaps: trajectories that were dropped must not leave an empty quarter below
+    numbers, fold = np.unique(problem.fold[joint][::step], return_inverse=True)
+    if len(numbers) < 4:
         return []
     found = [*_by_trees(signals, y, fold), *_by_products(signals, y, fold)]
     return list(dict.fromkeys(found))

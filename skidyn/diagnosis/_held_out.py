@@ -7,29 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from skidyn._signals import Array
-from skidyn.effects import Term, get_effect
-from skidyn.evidence._folded import left_out_coefficients
-from skidyn.evidence._problem import Problem, term_columns
-
-
-def sample_folds(problem: Problem) -> NDArray[np.int64]:
-    """Fold of every sample, from the rows of its trajectory nearest in time."""
-    signals = problem.signals
-    fold = np.zeros(signals.n_samples, dtype=np.int64)
-    joint = int(np.argmax(problem.rows.counts))
-    for name in np.unique(signals.trajectory):
-        rows = np.flatnonzero(problem.rows.trajectory[joint] == name)
-        here = np.flatnonzero(signals.trajectory == name)
-        if not len(rows):
-            continue  # no row of it entered the fit: any fold leaves it out
-        order = rows[np.argsort(problem.rows.time[joint][rows])]
-        middle = problem.rows.time[joint][order]
-        edges = (middle[1:] + middle[:-1]) / 2
-        fold[here] = problem.fold[joint][order][np.searchsorted(edges, signals.clock[here])]
-    return fold
+from skidyn.effects import Term, TermSum
+from skidyn.evidence import Problem, left_out_coefficients
 
 
 @dataclass(frozen=True)
@@ -69,10 +50,11 @@ def held_out_residual(
     HeldOut
     """
     design = problem.design([problem.term_rows(t) for t in terms])
-    whole, left = left_out_coefficients(problem, design, sigma, problem.target)
-    fold = sample_folds(problem)
+    whole, left = left_out_coefficients(
+        problem, design, sigma, problem.target, soft=problem.soft(terms)
+    )
+    fold = problem.sample_folds(int(np.argmax(problem.rows.counts)))
     prediction = np.zeros_like(problem.torque)
-    n_rigid = len(problem.rigid_index)
     if problem.rigid_body and problem.robot is not None:
         s = problem.signals
         for f, coefficients in enumerate(left):
@@ -82,18 +64,15 @@ def held_out_residual(
             )
     torque = {}
     wanted = set(keep)
-    at = n_rigid
-    for term in terms:
-        k = len(get_effect(term.kind).coefficients)
+    for term, place in TermSum(terms).slices(len(problem.rigid_index)):
         own = np.zeros_like(problem.torque) if term in wanted else None
-        for j, block in term_columns(problem.signals, term).items():
+        for j, block in term.torque_columns(problem.signals).items():
             # What one recording alone can tell is not held out with it.
-            own_only = "trajectory" in term.shape
-            coefficients = whole[None, at : at + k] if own_only else left[fold, at : at + k]
+            own_only = term.trajectories is not None and len(term.trajectories) == 1
+            coefficients = whole[None, place] if own_only else left[fold, place]
             prediction[:, j] += (block * coefficients).sum(1)
             if own is not None:
-                own[:, j] += block @ whole[at : at + k]
+                own[:, j] += block @ whole[place]
         if own is not None:
             torque[term] = own
-        at += k
     return HeldOut(problem.torque - prediction, torque)

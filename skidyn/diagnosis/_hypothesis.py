@@ -1,80 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a search works with: thresholds, hypotheses, steps, and its result."""
+"""What a search works with: hypotheses, steps, and its result."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-
-import numpy as np
 
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
-from skidyn.evidence._problem import Fit, Problem
+from skidyn.evidence import Fit
 
 UNKNOWN = "unknown"
-
-
-@dataclass(frozen=True)
-class Settings:
-    """Thresholds of the search; the defaults are what is shipped, for every robot and effect.
-
-    Parameters
-    ----------
-    significance : float
-        Chance of a false candidate over the whole catalogue (Bonferroni).
-    relative_gate : float
-        A drop of squared error smaller than this share is no finding.
-    agreeing_folds : float
-        Share of folds in which a candidate must lower the error.
-    least_gain : float
-        Least penalised gain of a finding (twice a log-likelihood).
-    least_chance : float
-        A finding must have a coefficient that differs from zero when folds are left out (jackknife,
-        Student's t), at this level,
-    sure_gain, weak_chance : float
-        or, if its penalised gain is less than the first, at this one.
-    second_same, second_any : float
-        A later finding must bring this share of the first one's gain, on the same joints or
-        anywhere: what is smaller is mostly the first effect's imperfect shape.
-    unknown_handicap : float
-        Share by which a nameless function must beat a named effect.
-    simpler_share : float
-        A simpler kind is named if it falls behind by less than this share.
-    family_share : float
-        Within a family of effects (hysteresis), the simplest one with this share of the best
-        one's score is named.
-    ripple_share : float
-        Torque ripple must do this share of what a function of the signals does on averaged rows.
-    max_findings : int
-        Kinds added at most.
-    finalists : int
-        Kinds compared with noise re-estimated.
-    refined : int
-        So many of them with their shape parameters refined.
-
-    Examples
-    --------
-    >>> Settings(max_findings=1).max_findings
-    1
-    """
-
-    significance: float = 1e-4
-    relative_gate: float = 0.003
-    agreeing_folds: float = 0.5
-    least_gain: float = 55.0
-    least_chance: float = 0.01
-    sure_gain: float = 220.0
-    weak_chance: float = 0.0015
-    second_same: float = 0.06
-    second_any: float = 0.015
-    unknown_handicap: float = 0.03
-    simpler_share: float = 0.05
-    family_share: float = 0.95
-    ripple_share: float = 0.8
-    max_findings: int = 4
-    finalists: int = 8
-    refined: int = 4
 
 
 @dataclass(frozen=True)
@@ -93,6 +28,12 @@ class Hypothesis:
         Gain less the price of its parameters.
     n_parameters : int
         Coefficients and shape parameters.
+    chances : tuple of float
+        Chance of every term at its acceptance, in the order of the candidates.
+    tried : int
+        Candidates among which it was chosen.
+    margin : float
+        Share of its gain that the best other explanation of the same joints falls short of.
     errors : ndarray of shape (n_folds, n_joints) or None
         Held-out squared error with it; None where it was judged otherwise.
     torque : ndarray of shape (n_samples, n_joints) or None
@@ -104,6 +45,9 @@ class Hypothesis:
     gain: Array
     score: float
     n_parameters: int
+    chances: tuple[float, ...] = ()
+    tried: int = 1
+    margin: float = 1.0
     errors: Array | None = None
     torque: Array | None = None
 
@@ -142,6 +86,10 @@ class SearchResult:
         Torque of the ripple found, N m.
     inflation : ndarray of shape (n_joints,)
         Variance inflation by the residual's autocorrelation.
+    candidates : list of Candidate
+        What was not found.
+    n_tests : int
+        Everything that was tried.
     """
 
     findings: list[Hypothesis]
@@ -150,36 +98,4 @@ class SearchResult:
     ripple: Array
     inflation: Array
     candidates: list[Candidate] = field(default_factory=list)
-
-
-def variance_inflation(problem: Problem, residual: Sequence[Array], lags: int = 12) -> Array:
-    """How much more a slow column's coefficient varies than with independent rows, by joint.
-
-    One plus twice the sum of the residual's autocorrelations up to the first small one.
-
-    Parameters
-    ----------
-    problem : Problem
-        Rows.
-    residual : sequence of ndarray
-        Residual rows of every joint.
-    lags : int, default=12
-        Largest lag in rows.
-
-    Returns
-    -------
-    ndarray of shape (n_joints,)
-    """
-    inflation = np.ones(problem.n_joints)
-    for j, r in enumerate(residual):
-        power, lagged = 1e-30, np.zeros(lags)
-        for name in np.unique(problem.rows.trajectory[j]):
-            x = r[problem.rows.trajectory[j] == name]
-            power += x @ x
-            for lag in range(1, min(lags, len(x))):
-                lagged[lag] += x[:-lag] @ x[lag:]
-        for rho in lagged[1:] / power:
-            if rho < 0.05:
-                break
-            inflation[j] += 2 * rho
-    return inflation
+    n_tests: int = 1

@@ -15,9 +15,8 @@ import numpy as np
 from scipy.stats import t as student_t
 
 from skidyn._signals import Array
-from skidyn.effects import Term, get_effect
-from skidyn.evidence._folded import left_out_coefficients
-from skidyn.evidence._problem import Problem
+from skidyn.effects import Term, TermSum
+from skidyn.evidence import Problem, jackknife, left_out_coefficients
 
 CONFIDENCE = 0.95
 #: Relative step (or absolute, for linear parameters) of the derivative by a shape parameter.
@@ -45,23 +44,20 @@ def parameter_intervals(
     dict of Term to dict of str to (value, low, high), or to a plain value where it has none
     """
     blocks = [problem.term_rows(t) for t in terms]
-    whole, _ = left_out_coefficients(problem, problem.design(blocks), sigma, problem.target)
-    at = len(problem.rigid_index)
-    starts = []
-    for term in terms:
-        starts.append(at)
-        at += len(get_effect(term.kind).coefficients)
-    slopes, owners = _slopes(problem, terms, whole, starts)
+    whole, _ = left_out_coefficients(
+        problem, problem.design(blocks), sigma, problem.target, soft=problem.soft(terms)
+    )
+    places = list(TermSum(terms).slices(len(problem.rigid_index)))
+    at = len(whole)
+    slopes, owners = _slopes(problem, places, whole)
     design = problem.design([*blocks, *slopes])
     full, left = left_out_coefficients(problem, design, sigma, problem.target)
     result = {}
-    for i, (term, start) in enumerate(zip(terms, starts, strict=True)):
-        effect = get_effect(term.kind)
-        k = len(effect.coefficients)
-        value = effect.parameters(whole[start : start + k], term.shape, problem.signals)
+    for i, (term, own) in enumerate(places):
+        value = term.parameters(whole[own], problem.signals)
         replicates = []
         # Without its recording an offset of that recording alone is not determined.
-        seen = np.all(np.abs(left[:, start : start + k]) > 1e-12, axis=1)
+        seen = np.all(np.abs(left[:, own]) > 1e-12, axis=1)
         for coefficients in left[seen] if seen.sum() > 2 else left:
             shape = dict(term.shape)
             for column, (owner, name, log) in enumerate(owners):
@@ -69,41 +65,36 @@ def parameter_intervals(
                     move = coefficients[at + column] - full[at + column]
                     shape[name] = shape[name] * np.exp(move) if log else shape[name] + move
             replicates.append(
-                effect.parameters(
-                    whole[start : start + k]
-                    + coefficients[start : start + k]
-                    - full[start : start + k],
-                    shape,
-                    problem.signals,
+                term.with_shape(**shape).parameters(
+                    whole[own] + coefficients[own] - full[own], problem.signals
                 )
             )
         result[term] = {
-            name: _interval(number, [r[name] for r in replicates]) for name, number in value.items()
+            name: _interval(number, [r[name] for r in replicates if name in r])
+            for name, number in value.items()
         }
     return result
 
 
 def _slopes(
-    problem: Problem, terms: Sequence[Term], whole: Array, starts: Sequence[int]
+    problem: Problem, places: Sequence[tuple[Term, slice]], whole: Array
 ) -> tuple[list[dict[int, Array]], list[tuple[int, str, bool]]]:
     """Derivative of each term's torque by each of its continuous shape parameters."""
     slopes, owners = [], []
-    for i, term in enumerate(terms):
-        effect = get_effect(term.kind)
-        coefficients = whole[starts[i] : starts[i] + len(effect.coefficients)]
-        for shape in effect.shapes:
-            if shape.name not in term.shape or shape.name == "ratio":
+    for i, (term, own) in enumerate(places):
+        for shape in term.effect.shapes:
+            if shape.name not in term.shape or not shape.has_interval:
                 continue
             here = float(term.shape[shape.name])
             log = shape.spacing == "log"
             step = STEP * here if log else STEP * max(abs(here), 1e-3)
             sides = [
-                problem.term_rows(Term(term.kind, term.joints, {**term.shape, shape.name: v}))
+                problem.term_rows(term.with_shape(**{shape.name: v}))
                 for v in (here + step, here - step)
             ]
             width = 2 * step / here if log else 2 * step
             slopes.append(
-                {j: ((sides[0][j] - sides[1][j]) @ coefficients)[:, None] / width for j in sides[0]}
+                {j: ((sides[0][j] - sides[1][j]) @ whole[own])[:, None] / width for j in sides[0]}
             )
             owners.append((i, shape.name, log))
     return slopes, owners
@@ -113,7 +104,5 @@ def _interval(value: Any, replicates: Sequence[Any]) -> Any:
     if not isinstance(value, float | int) or isinstance(value, bool):
         return value
     values = np.array(replicates, dtype=float)
-    n = len(values)
-    spread = np.sqrt((n - 1) / n * np.sum((values - values.mean()) ** 2))
-    half = float(student_t.ppf(0.5 + CONFIDENCE / 2, n - 1) * spread)
+    half = float(student_t.ppf(0.5 + CONFIDENCE / 2, len(values) - 1) * jackknife(values))
     return (float(value), float(value) - half, float(value) + half)

@@ -8,13 +8,13 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 from scipy.stats import norm
 
 from skidyn._signals import Array
+from skidyn._text import inside
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.effects import get_effect, list_effects
-from skidyn.evidence._problem import RIDGE, Problem
+from skidyn.evidence import Normal, Problem, column_sizes
 
 #: Chance of finding an effect of the stated magnitude.
 POWER = 0.8
@@ -91,20 +91,17 @@ def find_limits(
     """
     design = [a / s for a, s in zip(problem.design(blocks), sigma, strict=True)]
     gram = np.asarray(sum(a.T @ a for a in design))
-    scale = np.sqrt(np.diag(gram))
-    scale[scale == 0] = 1.0
-    factor = cho_factor(gram / scale[:, None] / scale + RIDGE * np.eye(len(scale)))
+    model = Normal(gram, np.zeros(len(gram)), column_sizes(gram))
     needed = np.sqrt(least_gain) + norm.ppf(POWER)
     power = [float(np.sum(t**2)) / s**2 for t, s in zip(problem.target, sigma, strict=True)]
     largest: dict[tuple[str, int], list[tuple[Candidate, float]]] = {}
     for candidate in candidates:
-        effect = get_effect(candidate.term.kind)
-        # The coefficient of some effects is a share of their shape and no magnitude by itself.
-        share = effect.coefficients[0].name == "share"
+        effect = candidate.term.effect
+        share = effect.coefficients[0].is_share
         if len(candidate.joints) != 1 or effect.nameless or share:
             continue
         joint = candidate.joints[0]
-        own, swept = _information(candidate, design, sigma, scale, factor)
+        own, swept = _information(candidate, design, sigma, model)
         size = needed * np.sqrt(inflation[joint] / swept) if swept > NEW_SHARE * own else np.inf
         # More than all that the torque holds is no limit.
         told = size if size**2 * own < power[joint] else np.inf
@@ -115,27 +112,30 @@ def find_limits(
 
 def _limit(problem: Problem, joint: int, tried: Sequence[tuple[Candidate, float]]) -> Limit:
     """The limit of one effect on one joint, which holds for every shape that would show."""
-    effect = get_effect(tried[0][0].term.kind)
+    effect = tried[0][0].term.effect
     first = effect.coefficients[0]
     unit = effect.units(bool(problem.signals.prismatic[joint])).get(first.name, first.unit)
     shown = [size for _, size in tried if np.isfinite(size)]
     if not shown:
         sentence = (
-            f"This data cannot tell {effect.title.lower()} of joint {joint + 1} from what the "
+            f"This data cannot tell {inside(effect.title)} of joint {joint + 1} from what the "
             f"model has. It would show with {effect.separating_motion}."
         )
         return Limit(effect.kind, joint + 1, None, unit, sentence)
-    most = f"{max(shown):.3g} {unit}"
-    sentence = f"{effect.title} of joint {joint + 1}: absent, or {first.name} below {most}"
+    most = f"{max(shown):.3g}{'' if unit == '1' else ' ' + unit}"
+    sentence = (
+        f"{effect.title} of joint {joint + 1}: not detected; {first.name} above {most} would have "
+        "been found"
+    )
     if hidden := _hidden_shapes(tried):
         values = ", ".join(f"{value:.3g}" for value in hidden)
-        sentence += f"; with {effect.shapes[0].name} of {values} it could not be seen"
+        sentence += f"; with {effect.shapes[0].name} of {values} it would not show"
     return Limit(effect.kind, joint + 1, max(shown), unit, sentence + ".")
 
 
 def _hidden_shapes(tried: Sequence[tuple[Candidate, float]]) -> list[float]:
     """Values of the first shape parameter with which an effect would not show at any size."""
-    effect = get_effect(tried[0][0].term.kind)
+    effect = tried[0][0].term.effect
     if not effect.shapes:
         return []
     name = effect.shapes[0].name
@@ -147,13 +147,13 @@ def _hidden_shapes(tried: Sequence[tuple[Candidate, float]]) -> list[float]:
 
 
 def _information(
-    candidate: Candidate, design: Sequence[Array], sigma: Array, scale: Array, factor: Any
+    candidate: Candidate, design: Sequence[Array], sigma: Array, model: Normal
 ) -> tuple[float, float]:
     """Squared size of the first column before and after the model and the other columns."""
     z = {j: block / sigma[j] for j, block in candidate.rows.items()}
-    cross = np.asarray(sum(design[j].T @ block for j, block in z.items())) / scale[:, None]
+    cross = np.asarray(sum(design[j].T @ block for j, block in z.items()))
     own = np.asarray(sum(block.T @ block for block in z.values()))
-    swept = own - cross.T @ cho_solve(factor, cross)
+    swept = own - cross.T @ model.solve(cross)
     if len(own) == 1:
         return float(own[0, 0]), float(max(swept[0, 0], 0.0))
     others = swept[1:, 1:] + 1e-9 * np.diag(np.diag(own)[1:] + 1e-300)
@@ -173,7 +173,7 @@ def _not_shown(problem: Problem) -> list[Limit]:
             if reason:
                 unit = effect.units(bool(problem.signals.prismatic[joint]))
                 sentence = (
-                    f"This data cannot show {effect.title.lower()} of joint {joint + 1}: {reason}."
+                    f"This data cannot show {inside(effect.title)} of joint {joint + 1}: {reason}."
                 )
                 first = effect.coefficients[0]
                 text = unit.get(first.name, first.unit)

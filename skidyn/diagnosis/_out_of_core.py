@@ -14,24 +14,24 @@ from scipy import stats
 from skidyn._exceptions import LogError, SkidynError
 from skidyn._optional import import_optional
 from skidyn._signals import Array
-from skidyn.diagnosis._diagnosis import _own_terms, diagnose
+from skidyn.diagnosis._diagnosis import diagnose, own_terms
 from skidyn.diagnosis._findings import Finding
-from skidyn.diagnosis._hypothesis import Settings
 from skidyn.diagnosis._result import Diagnosis
+from skidyn.diagnosis._rule import Settings
 from skidyn.effects import make_terms
-from skidyn.evidence import Evidence
-from skidyn.evidence._evidence import column_names
-from skidyn.evidence._parquet import ColumnMap, read_trajectories, trajectory_lengths
-from skidyn.evidence._streaming import (
+from skidyn.evidence import (
+    ColumnMap,
+    Evidence,
     Options,
     Source,
+    column_names,
     evidence_of_sources,
-    needs_a_fit,
     parquet_files,
+    read_trajectories,
+    trajectory_lengths,
 )
-from skidyn.rigid_body._base_parameters import base_parameter_index
-from skidyn.rigid_body._from_evidence import regressor_from_evidence, weighted_solution
-from skidyn.robots import Robot
+from skidyn.identification import regressor_from_evidence, weighted_solution
+from skidyn.robots import Robot, base_parameter_index
 
 #: Trajectories that cross-validation within the sample needs, and that the rest must have.
 FEWEST_TRAJECTORIES = 4
@@ -178,7 +178,7 @@ def diagnose_parquet(
     >>> import pathlib, tempfile
     >>> from skidyn.datasets import load_planar_arm, make_hidden_effect_log
     >>> from skidyn.diagnosis import diagnose_parquet
-    >>> from skidyn.rigid_body import RBDRegressor
+    >>> from skidyn.identification import RBDRegressor
     >>> log = make_hidden_effect_log(
     ...     load_planar_arm(), "stribeck", joints=[2], n_trajectories=16, rate=100.0
     ... )
@@ -191,7 +191,7 @@ def diagnose_parquet(
     [('stribeck', (2,), True)]
     """
     robot = model.robot
-    refused = [t.kind for t in make_terms(model.effects, robot.n_joints) if needs_a_fit(t)]
+    refused = [t.kind for t in make_terms(model.effects, robot.n_joints) if t.effect.needs_fit]
     if refused:
         raise SkidynError(
             f"the columns of {refused[0]!r} need a fit of the model first, so recordings cannot be "
@@ -205,8 +205,8 @@ def diagnose_parquet(
     )
     X, tau = _sample(sources, n_sampled, robot, columns, max_rows)
     diagnosis = diagnose(model, X, tau, effects=effects, settings=settings)
-    own = _own_terms(model, robot, X, tau)
-    tried = [f for f in diagnosis.findings if not any(map(needs_a_fit, f.terms))]
+    own = own_terms(model, robot, X, tau)
+    tried = [f for f in diagnosis.findings if not any(t.effect.needs_fit for t in f.terms)]
     terms = [*own, *(t for f in tried for t in f.terms)]
     options = Options(columns, GROUPS, max_rows)
     evidence = evidence_of_sources(sources, robot, terms, options, n_jobs, client)

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
-from skidyn.evidence._problem import RIDGE, Problem
-from skidyn.evidence._shapes import Gain, refine_term
+from skidyn.evidence import RIDGE, Gain, Problem, refine_term, soft_prior, solve_left_out
+
+#: Interleaved parts of a trajectory.
+QUARTERS = 4
 
 
 def profile_error(
@@ -21,6 +23,9 @@ def profile_error(
     sigma: Array,
     target: Sequence[Array],
     passes: int = 2,
+    *,
+    within: bool = False,
+    soft: Sequence[float] = (),
 ) -> Array:
     """Held-out squared error of every fold and joint, noise re-estimated from it.
 
@@ -36,43 +41,63 @@ def profile_error(
         Averaged torque of every joint.
     passes : int, default=2
         Rounds of weighting.
+    within : bool, default=False
+        Leave out interleaved parts of every trajectory instead of whole ones: what one trajectory
+        alone has cannot be learnt from the others.
+    soft : sequence of float, default=()
+        For each of the last blocks, by which share its coefficients are drawn to zero where no row
+        says what they are.
 
     Returns
     -------
     ndarray of shape (n_folds, n_joints), (N m)^2 or N^2
     """
-    grams = _joint_grams(problem, blocks, target)
+    grams = _joint_grams(problem, blocks, target, within)
     counts = problem.rows.counts
     errors = np.zeros(grams.shape[:2])
+    places = _places(blocks, soft, grams.shape[2] - 1)
     for _ in range(passes):
         weight = 1 / sigma**2
-        total = np.einsum("fjab,j->ab", grams, weight)
-        scale = np.sqrt(np.diag(total))
-        scale[scale == 0] = 1.0
-        scale[-1] = 1.0
-        ridge = 10 * RIDGE * np.eye(len(scale) - 1)
-        for f, gram in enumerate(grams):
-            train = (total - np.einsum("jab,j->ab", gram, weight)) / scale[:, None] / scale
-            solution = np.linalg.solve(train[:-1, :-1] + ridge, train[:-1, -1]) / scale[:-1]
-            b = np.append(-solution, 1.0)
-            errors[f] = np.einsum("a,jab,b->j", b, gram, b)
+        joined = np.einsum("fjab,j->fab", grams, weight)
+        pull = soft_prior(joined[:, :-1, :-1].sum(0), places) if places else None
+        _, left = solve_left_out(joined[:, :-1, :-1], joined[:, :-1, -1], pull, ridge=10 * RIDGE)
+        b = np.column_stack([-left, np.ones(len(left))])
+        errors = np.einsum("fa,fjab,fb->fj", b, grams, b, optimize=True)
         # A joint that rests has no rows; its weight is of no account but must be finite.
         sigma = np.where(counts > 0, np.sqrt(errors.sum(0) / np.maximum(counts, 1)) + 1e-100, 1.0)
     return errors
 
 
+def _places(
+    blocks: Sequence[dict[int, Array]], soft: Sequence[float], end: int
+) -> list[tuple[slice, float]]:
+    """Columns of the last blocks, those that are drawn to zero."""
+    places = []
+    for block, share in zip(reversed(blocks), reversed(soft), strict=False):
+        start = end - next(iter(block.values())).shape[1]
+        if share:
+            places.append((slice(start, end), share))
+        end = start
+    return places
+
+
 def _joint_grams(
-    problem: Problem, blocks: Sequence[dict[int, Array]], target: Sequence[Array]
+    problem: Problem,
+    blocks: Sequence[dict[int, Array]],
+    target: Sequence[Array],
+    within: bool,
 ) -> Array:
     """Gram matrix of [columns | torque] of every fold and joint."""
     design = problem.design(blocks)
     p = design[0].shape[1] + 1
-    grams = np.zeros((problem.n_folds, problem.n_joints, p, p))
+    labels = problem.rows.quarter if within else problem.fold
+    n_folds = QUARTERS if within else problem.n_folds
+    grams = np.zeros((n_folds, problem.n_joints, p, p))
     for j, (block, y) in enumerate(zip(design, target, strict=True)):
         a = np.column_stack([block, y])
-        edges = np.searchsorted(problem.fold[j], np.arange(problem.n_folds + 1))
-        for f, (i, k) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
-            grams[f, j] = a[i:k].T @ a[i:k]
+        for f in range(n_folds):
+            part = a[labels[j] == f]
+            grams[f, j] = part.T @ part
     return grams
 
 

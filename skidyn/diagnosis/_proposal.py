@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.effects import Term, formula
-from skidyn.evidence._problem import Problem
+from skidyn.evidence import Problem
 
 #: Terms of a formula at most, and the share of what the nameless function explains that it needs.
 LONGEST, LEAST_SHARE = 3, 0.9
@@ -200,34 +200,68 @@ def pursue(
     """
     chosen: list[int] = []
     reached = float(residual @ residual)
+    products = _Products(columns, residual, fold)
     while len(chosen) < longest:
-        errors = _errors_with_each(columns, chosen, residual, fold)
+        errors = products.errors_with_each()
         if admissible is not None:
             errors[~admissible(chosen)] = np.inf
         best = int(np.argmin(errors))
         if reached - errors[best] < worth:
             break
         chosen.append(best)
+        products.choose(best)
         reached = float(errors[best])
     return chosen, reached
 
 
-def _errors_with_each(
-    columns: Array, chosen: Sequence[int], residual: Array, fold: NDArray[np.int64]
-) -> Array:
-    """Held-out squared error with each column added to the chosen ones, (n_columns,)."""
-    errors = np.zeros(columns.shape[1])
-    for f in np.unique(fold):
-        train, test = fold != f, fold == f
-        a, b = columns[train], columns[test]
-        fixed, held = a[:, chosen], b[:, chosen]
-        # Sweep the chosen columns out of the others and of the residual.
-        sweep = np.linalg.pinv(fixed) if chosen else np.zeros((0, len(a)))
-        mimic, base = sweep @ a, sweep @ residual[train]
-        rest_a, rest_y = a - fixed @ mimic, residual[train] - fixed @ base
-        size = np.einsum("ij,ij->j", rest_a, rest_a)
-        new = size > 1e-9 * np.maximum(np.einsum("ij,ij->j", a, a), 1e-300)
-        gain = np.where(new, rest_a.T @ rest_y / np.where(new, size, 1.0), 0.0)
-        left = (residual[test] - held @ base)[:, None] - (b - held @ mimic) * gain
-        errors += np.einsum("ij,ij->j", left, left)
-    return errors
+class _Products:
+    """Products of columns and of a residual within each fold: all that leaving folds out takes.
+
+    The rows are read once at the start, and once for every column that is chosen.
+    """
+
+    def __init__(self, columns: Array, residual: Array, fold: NDArray[np.int64]) -> None:
+        size = np.sqrt(np.einsum("ij,ij->j", columns, columns))
+        self._columns = columns / np.where(size > 0, size, 1.0)
+        self._folds = [np.flatnonzero(fold == f) for f in np.unique(fold)]
+        parts = [(self._columns[rows], residual[rows]) for rows in self._folds]
+        self._square = np.array([np.einsum("ij,ij->j", a, a) for a, _ in parts])
+        self._right = np.array([a.T @ y for a, y in parts])
+        self._energy = np.array([y @ y for _, y in parts])
+        self._chosen: list[int] = []
+        self._with_chosen: list[Array] = []  # one of shape (n_folds, n_columns) per chosen column
+
+    def choose(self, column: int) -> None:
+        """Take a column into the model."""
+        self._chosen.append(column)
+        self._with_chosen.append(
+            np.array([self._columns[rows, column] @ self._columns[rows] for rows in self._folds])
+        )
+
+    def errors_with_each(self) -> Array:
+        """Held-out squared error with each column added to the chosen ones, (n_columns,)."""
+        chosen = self._chosen
+        n_folds, n_columns = self._square.shape
+        cross = np.zeros((n_folds, len(chosen), n_columns))
+        for k, block in enumerate(self._with_chosen):
+            cross[:, k] = block
+        errors = np.zeros(n_columns)
+        for f in range(n_folds):
+            # Sweep the chosen columns out of the others and of the residual of all other folds.
+            mixed = cross.sum(0) - cross[f]
+            square, right = self._square.sum(0) - self._square[f], self._right.sum(0)
+            right = right - self._right[f]
+            inverse = np.linalg.pinv(mixed[:, chosen], rcond=1e-12, hermitian=True)
+            mimic, base = inverse @ mixed, inverse @ right[chosen]
+            size = square - np.einsum("kc,kc->c", mimic, mixed)
+            new = size > 1e-9 * np.maximum(square, 1e-300)
+            gain = np.where(new, (right - right[chosen] @ mimic) / np.where(new, size, 1.0), 0.0)
+            # The error of the fold itself, multiplied out.
+            own, here = cross[f], cross[f][:, chosen]
+            level = self._energy[f] - 2 * base @ self._right[f, chosen] + base @ here @ base
+            slope = self._right[f] - self._right[f, chosen] @ mimic - base @ own
+            slope += (here @ base) @ mimic
+            bend = self._square[f] - 2 * np.einsum("kc,kc->c", mimic, own)
+            bend += np.einsum("kc,kc->c", mimic, here @ mimic)
+            errors += level - 2 * gain * slope + gain**2 * bend
+        return errors

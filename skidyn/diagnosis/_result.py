@@ -12,14 +12,19 @@ import numpy as np
 
 from skidyn._exceptions import EffectError
 from skidyn._signals import Array
-from skidyn.diagnosis._correction import CorrectedRegressor
-from skidyn.diagnosis._failures import REGIMES, Comparison, Failure, error_map, find_failures
+from skidyn.diagnosis._comparison import REGIMES, Comparison, error_map
+from skidyn.diagnosis._correction import CorrectedRegressor, Opened
+from skidyn.diagnosis._failures import Failure, RestError, find_failures, find_rest_errors
 from skidyn.diagnosis._findings import Finding
 from skidyn.diagnosis._hypothesis import SearchResult
 from skidyn.diagnosis._limits import Limit
+from skidyn.diagnosis._notebook import notebook
+from skidyn.diagnosis._remainder import Remainder
+from skidyn.diagnosis._story import story
 from skidyn.diagnosis._unknown import UnknownTorque
 from skidyn.effects import Term, make_terms
-from skidyn.evidence._problem import Problem
+from skidyn.evidence import Problem
+from skidyn.measurement import Suspicion
 
 Verdict = Literal["complete", "missing", "unknown"]
 
@@ -46,7 +51,7 @@ class Diagnosis:
     history : list of dict
         ``{"added", "joints", "rmse"}`` of every step; errors per joint, held out, N m or N.
     noise_floor : ndarray of shape (n_joints,)
-        Error that no smooth function of the motion could remove, N m or N.
+        Noise of torque and position sensors together in the error of samples, N m or N.
     unexplained : dict or None
         Joints, variables and share of what stays predictable without a name.
     limits : list of Limit
@@ -65,12 +70,18 @@ class Diagnosis:
         Share of the remaining squared error that a flexible learner predicts.
     unknowns : list of UnknownTorque
         Tested variables, shape and formula of every nameless torque that was found.
+    checks : list of Suspicion
+        What about the measurement is not what it claims, with evidence and remedy.
+    parts : Remainder
+        What the completed model leaves, by what it is made of.
+    opened : Opened or None
+        What the model was taken out of (a pipeline, a search), if anything.
 
     Examples
     --------
     >>> from skidyn.datasets import load_planar_arm, make_hidden_effect_log
     >>> from skidyn.diagnosis import diagnose
-    >>> from skidyn.rigid_body import RBDRegressor
+    >>> from skidyn.identification import RBDRegressor
     >>> log = make_hidden_effect_log(load_planar_arm(), None)
     >>> diagnose(RBDRegressor(log.robot), log.X, log.y).verdict
     'complete'
@@ -92,6 +103,9 @@ class Diagnosis:
     result: SearchResult = field(repr=False)
     predictable: Array = field(repr=False, default_factory=lambda: np.zeros(0))
     unknowns: list[UnknownTorque] = field(default_factory=list)
+    checks: list[Suspicion] = field(default_factory=list)
+    parts: Remainder | None = None
+    opened: Opened | None = field(repr=False, default=None)
 
     def __repr__(self) -> str:
         units = ["N" if slides else "N m" for slides in self.problem.signals.prismatic]
@@ -112,13 +126,49 @@ class Diagnosis:
 
     @cached_property
     def failures(self) -> list[Failure]:
-        """Regimes in which the error of the given model stands out."""
-        return find_failures(self.comparison)
+        """Joints whose error exceeds their noise, the largest ratio first, and where it does."""
+        return find_failures(self.comparison, self.noise)
+
+    @cached_property
+    def rest_errors(self) -> list[RestError]:
+        """Errors at rest, with what dry friction allows there."""
+        return find_rest_errors(self.comparison)
+
+    @property
+    def noise(self) -> Array:
+        """Noise with which errors are compared, (n_joints,), N m or N."""
+        return self.noise_floor
+
+    @property
+    def sensor_noise(self) -> Array:
+        """Noise of the torque sensors alone, (n_joints,), N m or N."""
+        return self.noise_floor if self.parts is None else self.parts.sensor_noise
+
+    @property
+    def remainder(self) -> Array:
+        """What is neither noise nor predictable from the signals, (n_joints,), N m or N."""
+        return np.zeros(len(self.joint_names)) if self.parts is None else self.parts.left
 
     @property
     def regimes(self) -> tuple[str, ...]:
         """Names of the columns of :meth:`error_map`."""
         return REGIMES
+
+    def story(self) -> dict[str, Any]:
+        """The first screen in words and numbers: verdict, joints, findings, what is left.
+
+        Returns
+        -------
+        dict
+            ``verdict``, ``mark``, ``headline``, ``text``; ``findings`` in a line each (``what``,
+            ``where``, ``size``, ``sure``, ``change``); ``joints`` with ``before``, ``after`` and
+            ``noise`` (N m or N) and ``speaks`` where there is something to say; ``quiet``,
+            ``left``, ``doubts`` about the log and other ``warnings``.
+        """
+        return story(self)
+
+    def _repr_html_(self) -> str:
+        return notebook(self.story())
 
     def error_map(self, after: bool = False) -> Array:
         """Error by joint and regime.
@@ -212,8 +262,13 @@ class Diagnosis:
         model = self.base_model
         if not hasattr(model, "with_effects"):
             assert self.problem.robot is not None
-            model = CorrectedRegressor(model, self.problem.robot)
-        return model.with_effects(terms).fit(*self.data)
+            corrected = CorrectedRegressor(model, self.problem.robot).with_effects(terms)
+            return corrected.fit_effects(*self.data)
+        if isinstance(model, CorrectedRegressor) and hasattr(model, "regressor_"):
+            kept = CorrectedRegressor(model.regressor_, model.robot, model.effects)
+            return kept.with_effects(terms).fit_effects(*self.data)
+        better = model.with_effects(terms).fit(*self.data)
+        return better if self.opened is None else self.opened.closed(better)
 
     def to_dict(self) -> dict[str, Any]:
         """As the report file of ``skidyn diagnose``.
@@ -230,9 +285,12 @@ class Diagnosis:
             "rmse_before": [float(x) for x in self.rmse_before],
             "rmse_after": [float(x) for x in self.rmse_after],
             "noise_floor": [float(x) for x in self.noise_floor],
+            "sensor_noise": [float(x) for x in self.sensor_noise],
+            "remainder": [float(x) for x in self.remainder],
             "effects": [finding.to_dict() for finding in self.findings],
             "unexplained": self.unexplained,
             "limits": [limit.to_dict() for limit in self.limits],
             "history": self.history,
             "warnings": list(self.warnings),
+            "checks": [check.to_dict() for check in self.checks],
         }

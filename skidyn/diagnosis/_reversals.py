@@ -14,15 +14,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from skidyn.diagnosis._hypothesis import SearchResult, Settings
+from skidyn.diagnosis._hypothesis import SearchResult
+from skidyn.diagnosis._rule import Settings
 from skidyn.diagnosis._search import search
 from skidyn.effects import get_effect
-from skidyn.evidence._problem import SHORT_MARGIN, Problem, hysteresis_joints, with_reversals
-from skidyn.evidence._rows import sliding_samples, window_rows
+from skidyn.evidence import (
+    SHORT_MARGIN,
+    Problem,
+    hysteresis_joints,
+    sliding_samples,
+    window_rows,
+    with_reversals,
+)
 
 FAMILY = "hysteresis"
-#: Friction whose direction changes at a reversal.
-DRY = ("coulomb", "stribeck")
 #: A joint is looked at if its error close to reversals is more than this share of its dry
 #: friction, what the uncertain velocity there may leave,
 SHARE_OF_FRICTION = 0.12
@@ -31,9 +36,8 @@ STANDS_OUT = 2.0
 #: Rows at reversals that a joint must have for its error there to be judged, and the share of a
 #: row's weight that lies away from them.
 FEWEST_ROWS, AWAY = 20, 0.6
-#: Gates of the second look: half the least share of a joint's squared error removed, and the share
-#: of folds in which it must be.
-RELATIVE_GATE, AGREEING_FOLDS = 0.03, 0.6
+#: Least share of a joint's squared error that hysteresis must remove there.
+LEAST_SHARE = 0.06
 
 
 def look_at_reversals(
@@ -76,9 +80,7 @@ def look_at_reversals(
     known = [c.term for h in others if h.torque is None for c in h.candidates]
     wider = with_reversals(problem, (*problem.terms, *known), joints)
     wider.torque = problem.torque - result.ripple
-    gates = replace(
-        settings, relative_gate=RELATIVE_GATE, agreeing_folds=AGREEING_FOLDS, max_findings=room
-    )
+    gates = replace(settings, least_share=LEAST_SHARE, max_findings=room)
     second = search(wider, family, gates, nameless=False, joints=joints)
     if not new & {j for h in second.findings for j in h.joints}:
         return problem, result
@@ -112,7 +114,7 @@ def failing_joints(problem: Problem, result: SearchResult) -> list[int]:
     close = sliding_samples(motion.signals, motion.valid, SHORT_MARGIN)
     rows = window_rows(motion.signals, close)
     residual = problem.torque - result.ripple - problem.explained(result.fit)
-    dry = [t for t in result.fit.terms if t.kind in DRY or _is_hysteresis(t.kind)]
+    dry = [t for t in result.fit.terms if t.is_dry or _is_hysteresis(t.kind)]
     friction = problem.term_torque(result.fit, dry)
     failing = []
     for j in range(problem.n_joints):

@@ -14,14 +14,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
-from skidyn.evidence._problem import RIDGE, Problem
+from skidyn.evidence import Normal, Problem, column_sizes, fold_slices
 
 #: Diagonal added to a candidate's swept block: what the model already spans brings nothing.
 CANDIDATE_RIDGE = 1e-6
+#: Share of the largest column's square that a column without any row counts as.
+TINY = 1e-9
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,7 @@ class _Group:
     target: Array  # (n_folds, n_candidates * width)
     signs: Array  # (n_candidates, width)
     limits: Array  # (n_candidates, width)
+    ridge: Array  # (n_candidates, width)
 
 
 class Screen:
@@ -62,16 +64,13 @@ class Screen:
         self.problem = problem
         self.sigma = sigma
         self.target = [y / s for y, s in zip(target, sigma, strict=True)]
-        self.edges = [
-            np.searchsorted(fold, np.arange(problem.n_folds + 1)) for fold in problem.fold
-        ]
+        self.folds = [list(fold_slices(fold, problem.n_folds)) for fold in problem.fold]
         self.candidates = list(candidates)
         self._groups = self._group()
 
     def _folded(self, a: Array, b: Array, joint: int) -> Array:
         """Products a.T @ b of every fold, shape (n_folds, columns of a, columns of b)."""
-        edges = self.edges[joint]
-        return np.stack([a[i:j].T @ b[i:j] for i, j in zip(edges[:-1], edges[1:], strict=True)])
+        return np.stack([a[rows].T @ b[rows] for rows in self.folds[joint]])
 
     def _group(self) -> list[_Group]:
         members: dict[tuple[tuple[int, ...], int], list[int]] = defaultdict(list)
@@ -86,14 +85,15 @@ class Screen:
             own = np.zeros((self.problem.n_folds, len(index), k, k))
             target = np.zeros((self.problem.n_folds, len(index) * k))
             for j, block in rows.items():
-                edges = self.edges[j]
-                for f, (a, b) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
-                    part = block[a:b].reshape(b - a, len(index), k)
+                for f, here in enumerate(self.folds[j]):
+                    part = block[here].reshape(-1, len(index), k)
                     own[f] += np.einsum("rck,rcl->ckl", part, part, optimize=True)
-                    target[f] += block[a:b].T @ self.target[j][a:b]
+                    target[f] += block[here].T @ self.target[j][here]
             signs = np.array([self.candidates[i].signs for i in index])
             limits = np.array([self.candidates[i].limits for i in index])
-            groups.append(_Group(np.array(index), rows, k, own, target, signs, limits))
+            soft = np.array([self.candidates[i].term.effect.softness for i in index])
+            ridge = soft[:, None] * np.einsum("fckk->ck", own).max(1, keepdims=True)
+            groups.append(_Group(np.array(index), rows, k, own, target, signs, limits, ridge))
         return groups
 
     def model(self, blocks: Sequence[dict[int, Array]]) -> _Model:
@@ -140,31 +140,17 @@ class Screen:
                 for j, block in group.rows.items()
             )
             own, target = group.own[:, pick], group.target[:, columns]
+            ridge = group.ridge[pick]
             for f, train in enumerate(trained):
                 errors[group.index[pick], f] = _swept_error(
-                    model, train, f, np.asarray(cross), own, target
+                    model, train, f, np.asarray(cross), own, target, ridge
                 )
             signs, limits = group.signs[pick], group.limits[pick]
             if signs.any() or np.isfinite(limits).any():
-                gain = _gain(whole, np.asarray(cross).sum(0), own.sum(0), target.sum(0))[0]
+                gain = _gain(whole, np.asarray(cross).sum(0), own.sum(0), target.sum(0), ridge)[0]
                 forbidden = (gain * signs < 0) | (np.abs(gain) > limits)
                 errors[group.index[pick[forbidden.any(axis=1)]]] = np.inf
         return errors
-
-
-@dataclass(frozen=True)
-class _Train:
-    """The model fitted without one fold."""
-
-    factor: tuple[Array, bool]
-    scale: Array
-    solution: Array
-
-    def solve(self, right: Array) -> Array:
-        """Solve the normal equations for a matrix of right-hand sides."""
-        scale = self.scale[:, None]
-        solution: Array = cho_solve(self.factor, right / scale, check_finite=False) / scale
-        return solution
 
 
 @dataclass(frozen=True)
@@ -174,30 +160,27 @@ class _Model:
     cross: Array  # (n_folds, p)
     square: Array  # (n_folds,)
 
-    def training(self) -> list[_Train]:
+    def training(self) -> list[Normal]:
         """The model fitted without each fold in turn."""
         return [self._fit(g, c) for g, c in zip(self.gram, self.cross, strict=True)]
 
-    def fitted(self) -> _Train:
+    def fitted(self) -> Normal:
         """The model fitted to all folds."""
         return self._fit(0.0, 0.0)
 
-    def _fit(self, gram: Array | float, cross: Array | float) -> _Train:
+    def _fit(self, gram: Array | float, cross: Array | float) -> Normal:
         total = self.gram.sum(0)
-        scale = np.sqrt(np.diag(total))
-        scale[scale == 0] = 1.0
-        normal = (total - gram) / scale[:, None] / scale + RIDGE * np.eye(len(scale))
-        factor = cho_factor(normal, check_finite=False)
-        right = (self.cross.sum(0) - cross) / scale
-        return _Train(factor, scale, cho_solve(factor, right, check_finite=False) / scale)
+        return Normal(total - gram, self.cross.sum(0) - cross, column_sizes(total))
 
 
-def _gain(train: _Train, cross: Array, own: Array, target: Array) -> tuple[Array, Array]:
+def _gain(
+    train: Normal, cross: Array, own: Array, target: Array, ridge: Array
+) -> tuple[Array, Array]:
     """Coefficients of every candidate beside the fitted model, and how the model mimics it.
 
     Parameters
     ----------
-    train : _Train
+    train : Normal
         Model fitted to some rows.
     cross : ndarray of shape (p, n_candidates * width)
         Products of the model's columns and the candidates' on these rows.
@@ -205,6 +188,8 @@ def _gain(train: _Train, cross: Array, own: Array, target: Array) -> tuple[Array
         Gram matrix of each candidate.
     target : ndarray of shape (n_candidates * width,)
         Products of the candidates' columns and the torque.
+    ridge : ndarray of shape (n_candidates, width)
+        Added to the diagonal of the Gram matrices.
 
     Returns
     -------
@@ -218,17 +203,23 @@ def _gain(train: _Train, cross: Array, own: Array, target: Array) -> tuple[Array
     )
     gradient = (target - cross.T @ train.solution).reshape(n, k)
     diagonal = np.einsum("ckk->ck", own)
-    block = block + np.eye(k) * (CANDIDATE_RIDGE * diagonal + 1e-12)[:, None, :]
+    size = diagonal.max(axis=1, keepdims=True)
+    size = np.where(size > 0, size, 1 / (CANDIDATE_RIDGE * TINY))  # no row at all here
+    block = block + np.eye(k) * (CANDIDATE_RIDGE * (diagonal + TINY * size) + ridge)[:, None, :]
     return np.linalg.solve(block, gradient[:, :, None])[:, :, 0], swept
 
 
 def _swept_error(
-    model: _Model, train: _Train, fold: int, cross: Array, own: Array, target: Array
+    model: _Model, train: Normal, fold: int, cross: Array, own: Array, target: Array, ridge: Array
 ) -> Array:
     """Held-out error of one fold for every candidate of a group, shape (n_candidates,)."""
     n, k = own.shape[1], own.shape[2]
     gain, swept = _gain(
-        train, cross.sum(0) - cross[fold], own.sum(0) - own[fold], target.sum(0) - target[fold]
+        train,
+        cross.sum(0) - cross[fold],
+        own.sum(0) - own[fold],
+        target.sum(0) - target[fold],
+        ridge,
     )
     b = train.solution
     mimic = swept.reshape(-1, n, k)

@@ -9,8 +9,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
-from scipy.stats import t as student_t
 
 from skidyn._progress import track
 from skidyn._signals import Array
@@ -21,21 +19,35 @@ from skidyn.diagnosis._hypothesis import (
     UNKNOWN,
     Hypothesis,
     SearchResult,
-    Settings,
     Step,
-    variance_inflation,
 )
 from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
+from skidyn.diagnosis._recordings import choose, recording_candidates
+from skidyn.diagnosis._rule import (
+    Settings,
+    Tester,
+    false_discovery_rate,
+    variance_inflation,
+)
 from skidyn.diagnosis._screen import Screen
 from skidyn.diagnosis._spectrum import find_lines
-from skidyn.diagnosis._split import split_effects, trajectory_offsets
-from skidyn.effects import Term, get_effect
-from skidyn.effects._catalogue import nameless_kinds
-from skidyn.effects._nameless import FunctionOfSignals, NamelessEffect
-from skidyn.evidence._folded import left_out_coefficients
-from skidyn.evidence._problem import Problem
+from skidyn.diagnosis._split import split_effects
+from skidyn.effects import FunctionOfSignals, NamelessEffect, Term, get_effect, nameless_kinds
+from skidyn.evidence import Problem
 
 Mask = NDArray[np.bool_]
+
+#: Chance at which one of several recordings differs, once all together are more than chance.
+MEMBER = 0.05
+
+#: Candidates of a kind, joints and shapes, that are tested before the kind is given up.
+SHAPES_TESTED = 4
+
+#: Coefficients that a nameless function is charged for at most.
+NAMELESS_PRICE = 6
+
+#: Functions of the signals among which a nameless candidate was chosen, for each candidate tried.
+NAMELESS_TRIED = 20
 
 #: Waves per turn from which a nameless function of position cannot stand for torque ripple.
 RESOLVED = 40.0
@@ -89,7 +101,9 @@ class _Search:
         self.pool = catalogue_candidates(problem, self.kinds)
         if nameless:
             self.pool += _nameless_candidates(problem, problem.torque - problem.explained(base))
-        self.n_tests = len(self.pool)
+        self.by_recording = recording_candidates(problem, self.kinds)
+        self.n_tests = len(self.pool) + len(self.by_recording)
+        self.start = self.left = np.zeros(problem.n_joints)
 
     # ---------------------------------------------------------------- state of the model so far
     @property
@@ -109,7 +123,7 @@ class _Search:
         if not any(_uses_the_fit(c) for c in self.chosen):
             return
         # Their columns were made with the model as it was without them.
-        self.problem.with_fit(self.fit)
+        self.problem.set_fit(self.fit)
         for candidate in filter(_uses_the_fit, self.chosen):
             candidate.rows.update(self.problem.term_rows(candidate.term))
         problem = replace_torque(self.problem, self.problem.torque - self.ripple)
@@ -122,73 +136,143 @@ class _Search:
     # ---------------------------------------------------------------- the loop
     def run(self) -> SearchResult:
         steps = []
-        first: Array | None = None
         for _ in range(self.settings.max_findings):
-            self.inflation = variance_inflation(self.problem, self.fit.residual)
             self.sigma = self.fit.noise
+            self.left = self._left()
+            self.start = np.maximum(self.start, self.left)
             ranking = self.rank()
-            best = self.pick(ranking)
-            while best is not None and self.worth(best, first) and not self.stands(best):
-                ranking.remove(best)
-                best = self.pick(ranking)
-            if best is None or not self.worth(best, first):
+            best = self.accepted(ranking)
+            if best is None:
                 steps.append(Step(ranking, None))
                 break
-            steps.append(Step([best, *(h for h in ranking if h is not best)], best))
-            if first is None:
-                first = np.maximum(best.gain, 0)
+            steps.append(Step([best, *(h for h in ranking if h.kind != best.kind)], best))
             self.add(best)
-            self.prune(best, first)
+            self.withdraw(best)
             self.refit()
         self.sigma = self.fit.noise
-        self.settle()
-        inflation = variance_inflation(self.problem, self.fit.residual)
-        return SearchResult(self.findings, steps, self.fit, self.ripple, inflation, self.pool)
+        self.withdraw()
+        everywhere = range(self.problem.n_joints)
+        inflation = variance_inflation(self.problem, self.fit.residual, everywhere)
+        return SearchResult(
+            self.findings, steps, self.fit, self.ripple, inflation, self.pool, self.n_tests
+        )
 
-    def worth(self, best: Hypothesis, first: Array | None) -> bool:
-        """Whether an explanation is more than noise, and more than a shadow of the first one."""
-        if best.score < self.settings.least_gain:
-            return False
-        if first is None:
-            return True
-        rows = sorted({j for c in best.candidates for j in c.rows} | set(best.joints))
-        same, anywhere = first[rows].sum(), first.sum()
-        least = max(self.settings.second_same * same, self.settings.second_any * anywhere)
-        return bool(best.score >= least)
+    def accepted(self, ranking: list[Hypothesis]) -> Hypothesis | None:
+        """The best explanation that the rule accepts, with the terms that it accepts."""
+        offered = ranking
+        ranking = list(ranking)
+        while (best := self.pick(ranking)) is not None:
+            ranking.remove(best)
+            if self._richer_known(best):
+                continue
+            judged = self.judged(best)
+            if judged is not None and not self.shadow(judged):
+                return replace(judged, margin=_margin(judged, offered))
+        return None
 
-    def stands(self, best: Hypothesis) -> bool:
-        """Whether an explanation holds when folds are left out."""
-        if best.errors is None:
-            return True
-        sure = best.score >= self.settings.sure_gain
-        most = self.settings.least_chance if sure else self.settings.weak_chance
-        return self.chance(best, self.chosen) <= most
+    def _richer_known(self, hypothesis: Hypothesis) -> bool:
+        """Whether a member of the same family that is as rich was found on the same joints."""
+        family = _family(hypothesis)
+        return any(
+            family
+            and _family(h) == family
+            and set(hypothesis.joints) <= set(h.joints)
+            and _simplicity(h) >= _simplicity(hypothesis)
+            for h in self.findings
+        )
 
-    def chance(self, hypothesis: Hypothesis, others: Sequence[Candidate]) -> float:
-        """Chance of an explanation's clearest coefficient, beside other terms (jackknife)."""
-        own = [self.problem.term_rows(term) for term in self.problem.terms]
-        blocks = [*own, *(c.rows for c in (*others, *hypothesis.candidates))]
-        design = self.problem.design(blocks)
-        whole, left = left_out_coefficients(self.problem, design, self.sigma, self.target)
-        n = len(left)
-        error = np.sqrt((n - 1) / n * np.sum((left - left.mean(0)) ** 2, axis=0))
-        new = sum(c.width for c in hypothesis.candidates)
-        t = np.max(np.abs(whole[-new:]) / np.maximum(error[-new:], 1e-300))
-        return float(2 * student_t.sf(t, n - 1))
-
-    def settle(self) -> None:
-        """Take back what no longer holds beside all that was added after it."""
-        while True:
-            judged = [h for h in self.findings if h.errors is not None]
+    def judged(self, hypothesis: Hypothesis) -> Hypothesis | None:
+        """The hypothesis with those of its terms that are more than chance beside the others."""
+        if hypothesis.torque is not None:  # judged on single samples, by its line
+            chance = hypothesis.chances[0]
+            tried = self.tried(hypothesis.kind)
+            return replace(hypothesis, tried=tried) if self.significant(chance) else None
+        candidates = list(hypothesis.candidates)
+        if len(candidates) > 2 and _within(hypothesis):
+            return self._judged_together(hypothesis)
+        while candidates:
             chances = [
-                self.chance(h, [c for c in self.chosen if c not in h.candidates]) for h in judged
+                self.chance(c, [*self.chosen, *(o for o in candidates if o is not c)])
+                for c in candidates
             ]
-            if not judged or max(chances) <= self.settings.least_chance:
-                return
-            weakest = judged[int(np.argmax(chances))]
-            self.findings.remove(weakest)
-            self.chosen = [c for c in self.chosen if c not in weakest.candidates]
-            self.refit()
+            worst = int(np.argmax(chances))
+            if self.significant(chances[worst], hypothesis.kind):
+                kept = [j for c in candidates for j in c.rows]
+                gain = np.where(np.isin(np.arange(len(hypothesis.gain)), kept), hypothesis.gain, 0)
+                gain = hypothesis.gain if len(candidates) == len(hypothesis.candidates) else gain
+                return replace(
+                    hypothesis,
+                    candidates=tuple(candidates),
+                    chances=tuple(chances),
+                    tried=self.tried(hypothesis.kind),
+                    gain=gain,
+                )
+            del candidates[worst]
+        return None
+
+    def _judged_together(self, hypothesis: Hypothesis) -> Hypothesis | None:
+        """What differs between recordings: more than chance together, each by itself at 5 %.
+
+        Each recording by itself would have to stand out of all candidates, and one that does not
+        would spoil the test of the others.
+        """
+        kept = [
+            c
+            for c in hypothesis.candidates
+            if self.chance(c, [*self.chosen, *(o for o in hypothesis.candidates if o is not c)])
+            <= MEMBER
+        ]
+        if not kept:
+            return None
+        reached = sorted({j for c in kept for j in c.rows})
+        counts = self.problem.rows.counts
+        rows = {
+            j: np.hstack([c.rows.get(j, np.zeros((int(counts[j]), c.width))) for c in kept])
+            for j in reached
+        }
+        chance = self.tester(self.chosen).test(rows).chance
+        if not self.significant(chance, hypothesis.kind):
+            return None
+        chances = (chance,) * len(kept)
+        tried = self.tried(hypothesis.kind)
+        return replace(hypothesis, candidates=tuple(kept), chances=chances, tried=tried)
+
+    def significant(self, chance: float, kind: str = "") -> bool:
+        """Whether a candidate is more than chance among all that were tried."""
+        return false_discovery_rate(chance, self.tried(kind)) <= self.settings.level
+
+    def tried(self, kind: str) -> int:
+        """Candidates tried; nameless ones were chosen among products of functions as well."""
+        return self.n_tests * (NAMELESS_TRIED if kind == UNKNOWN else 1)
+
+    def chance(self, candidate: Candidate, others: Sequence[Candidate]) -> float:
+        """Chance of a candidate's coefficients beside the model and other candidates."""
+        return self.tester(others).test(candidate.rows).chance
+
+    def tester(self, others: Sequence[Candidate]) -> Tester:
+        own = [self.problem.term_rows(term) for term in self.problem.terms]
+        blocks = [*own, *(c.rows for c in others)]
+        return Tester(self.problem, blocks, self.sigma, self.target)
+
+    def shadow(self, hypothesis: Hypothesis) -> bool:
+        """Whether an explanation is so small that earlier ones' imperfect formulas may leave it."""
+        joints = sorted({j for c in hypothesis.candidates for j in c.rows})
+        own = self._removed(self.left, hypothesis.gain)[joints]
+        earlier = (self.start - self.left)[joints]
+        weight = 1 / np.maximum(self.left[joints], 1e-300)
+        return bool(weight @ own < self.settings.form_tolerance * (weight @ earlier))
+
+    def _removed(self, errors: Array, gain: Array) -> Array:
+        """Squared error of every joint that a gain of log-likelihood takes away."""
+        counts = np.maximum(self.problem.rows.counts, 1)
+        share: Array = -np.expm1(-np.maximum(gain, 0.0) / counts)
+        return errors * share
+
+    def _left(self) -> Array:
+        """Held-out squared error of every joint with all that was found so far."""
+        errors = profile_error(self.problem, self.blocks, self.sigma, self.target)
+        left: Array = errors.sum(0)
+        return left
 
     def add(self, best: Hypothesis) -> None:
         if best.torque is not None:
@@ -199,32 +283,74 @@ class _Search:
         taken = {c.site for c in best.candidates}
         self.pool = [c for c in self.pool if c.site not in taken]
 
-    def prune(self, newest: Hypothesis, first: Array) -> None:
-        """Drop an earlier kind that the newest one made needless."""
-        reach = {j for c in newest.candidates for j in (*c.joints, *c.rows)}
-        limit = max(30.0, 0.02 * first.sum())
+    def withdraw(self, newest: Hypothesis | None = None) -> None:
+        """Take back what no longer holds beside all that was added after it."""
         for old in [h for h in self.findings if h is not newest and h.torque is None]:
-            if not reach & set(old.joints):
-                continue
             without = [c for c in self.chosen if c not in old.candidates]
-            if _family(old) and _family(old) == _family(newest) and old.joints == newest.joints:
+            richer = newest is not None and _family(old) == _family(newest) != ""
+            if richer and newest is not None and old.joints == newest.joints:
                 # A richer member of the family takes the place of the simpler one.
-                self.chosen = without
-                self.findings.remove(old)
+                self._replace(old, (), without)
+                newest = self._refined_anew(newest)
                 continue
-            errors = [
-                profile_error(
-                    self.problem,
-                    [*map(self.problem.term_rows, self.problem.terms), *(c.rows for c in some)],
-                    self.sigma,
-                    self.target,
-                )
-                for some in (without, self.chosen)
-            ]
-            gain = log_likelihood_gain(errors[0], errors[1], self.problem.rows.counts).sum()
-            if gain < limit:
-                self.chosen = without
-                self.findings.remove(old)
+            together = len(old.candidates) > 2 and _within(old)
+            kept = tuple(
+                c
+                for c in old.candidates
+                if (chance := self.chance(c, [o for o in self.chosen if o is not c])) <= MEMBER
+                and (together or self.significant(chance, c.kind))
+            )
+            if kept and newest is not None and self._needless(old, without):
+                kept = ()
+            if len(kept) < len(old.candidates):
+                self._replace(old, kept, without)
+
+    def _refined_anew(self, finding: Hypothesis) -> Hypothesis:
+        """A finding with its shapes found again, now that another one is gone."""
+        others = [c for c in self.chosen if c not in finding.candidates]
+        own = [self.problem.term_rows(term) for term in self.problem.terms]
+        blocks = [*own, *(c.rows for c in others)]
+        better = tuple(
+            refine(self.problem, blocks, finding.candidates, self.fit.noise, self.target)
+        )
+        place = self.findings.index(finding)
+        self.findings[place] = replace(finding, candidates=better)
+        self.chosen = [*others, *better]
+        self.refit()
+        return self.findings[place]
+
+    def _needless(self, old: Hypothesis, without: list[Candidate]) -> bool:
+        """Whether an earlier finding became the shadow of others."""
+        within = _within(old)
+        errors = [
+            profile_error(
+                self.problem,
+                [*map(self.problem.term_rows, self.problem.terms), *(c.rows for c in some)],
+                self.sigma,
+                self.target,
+                within=within,
+            )
+            for some in (without, self.chosen)
+        ]
+        before, after = (e.sum(0) for e in errors)
+        joints = sorted({j for c in old.candidates for j in c.rows})
+        weight = 1 / np.maximum(after[joints], 1e-300)
+        own, all_found = (before - after)[joints], (self.start - after)[joints]
+        return bool(weight @ own < self.settings.form_tolerance * (weight @ all_found))
+
+    def _replace(
+        self, old: Hypothesis, kept: tuple[Candidate, ...], without: list[Candidate]
+    ) -> None:
+        self.chosen = [*without, *kept]
+        place = self.findings.index(old)
+        if kept:
+            chances = tuple(
+                p for c, p in zip(old.candidates, old.chances, strict=True) if c in kept
+            )
+            self.findings[place] = replace(old, candidates=kept, chances=chances)
+        else:
+            del self.findings[place]
+        self.refit()
 
     # ---------------------------------------------------------------- ranking
     def rank(self) -> list[Hypothesis]:
@@ -233,19 +359,21 @@ class _Search:
         rough.sort(key=lambda item: item[1])
         ranking = self._finals([candidates for candidates, _ in rough[: self.settings.finalists]])
         ranking += [self._against_functions(h, ranking) for h in self._ripples()]
-        ranking += self._offsets_between_recordings()
+        ranking += self._recordings()
         return sorted(ranking, key=lambda h: -h.score)
 
     def pick(self, ranking: list[Hypothesis]) -> Hypothesis | None:
         """The best explanation, or a simpler one that is as good within its standard error."""
         if not ranking:
             return None
-        best = ranking[0]
+        best = self._named(ranking)
         for rival in ranking[1:]:
             if best.errors is None or rival.errors is None:
                 continue
             if rival.n_parameters > best.n_parameters or _simplicity(rival) >= _simplicity(best):
                 continue
+            if best.errors.shape != rival.errors.shape:
+                continue  # one is of some recordings, judged on other folds
             variance = best.errors.sum(0) / np.maximum(self.problem.rows.counts, 1)
             variance = np.where(variance > 0, variance, 1.0)  # a joint that rests
             behind = ((rival.errors - best.errors) / variance).sum(1)
@@ -254,6 +382,26 @@ class _Search:
             if behind.sum() < min(max(error, 6.0), cap):
                 best = rival
         return self._simplest_of_family(best, ranking)
+
+    def _named(self, ranking: list[Hypothesis]) -> Hypothesis:
+        """The first explanation, or a named one whose formula is good enough beside it."""
+        best = ranking[0]
+        if best.kind != UNKNOWN or best.errors is None:
+            return best
+        joints = list(best.joints)
+        weight = 1 / np.maximum(best.errors.sum(0), 1e-300)[joints]
+        after = best.errors.sum(0)[joints]
+        before = after * np.exp(best.gain[joints] / self.problem.rows.counts[joints])
+        removed = float(weight @ (before - after))
+        for rival in ranking[1:]:
+            if rival.kind == UNKNOWN or rival.errors is None:
+                continue
+            if rival.errors.shape != best.errors.shape or not set(joints) <= set(rival.joints):
+                continue
+            behind = float(weight @ (rival.errors.sum(0)[joints] - after))
+            if behind <= self.settings.form_tolerance * removed:
+                return rival
+        return best
 
     def _simplest_of_family(self, best: Hypothesis, ranking: list[Hypothesis]) -> Hypothesis:
         """Members of a family differ only in motion made for it: the simplest near one is named."""
@@ -269,17 +417,6 @@ class _Search:
         ]
         return min([best, *near], key=_simplicity)
 
-    def _limit(self, n_columns: int, joints: Sequence[int], n_rows: int) -> float:
-        """Least drop of squared error (in noise units) that is not chance."""
-        chance = float(chi2.isf(self.settings.significance / self.n_tests, n_columns))
-        inflated = float(self.inflation[list(joints)].max()) * chance
-        return max(inflated, 2 * self.settings.relative_gate * n_rows)
-
-    def _candidate_limit(self, candidate: Candidate) -> float:
-        counts = self.problem.rows.counts
-        n_rows = int(counts[list(candidate.joints)].sum())
-        return self._limit(candidate.width, tuple(candidate.rows), n_rows)
-
     def _greedy_by_kind(self) -> list[tuple[list[Candidate], float]]:
         """For each kind, terms added joint by joint while each lowers the held-out error."""
         screen = Screen(self.problem, self.sigma, self.pool, self.target)
@@ -287,37 +424,57 @@ class _Search:
         base_model = screen.model(self.blocks)
         base = screen.held_out(base_model)
         first = screen.step(base_model)
+        tester = self.tester(self.chosen)
         found = []
         for kind in track(list(dict.fromkeys(kinds)), f"{self._round}: screening effects"):
-            chosen, drop = self._greedy(screen, kinds == kind, base, first)
+            chosen, drop = self._greedy(screen, kinds == kind, base, first, tester)
             if chosen:
                 found.append((chosen, -(drop - 2 * sum(c.width for c in chosen))))
         return found
 
     def _greedy(
-        self, screen: Screen, wanted: Mask, base: Array, first: Array
+        self, screen: Screen, wanted: Mask, base: Array, first: Array, tester: Tester
     ) -> tuple[list[Candidate], float]:
         pool, errors, now = wanted.copy(), first, base
         chosen: list[Candidate] = []
-        # Nameless functions have very different widths: the price that they pay in the end.
-        dear = 3 * float(self.inflation.max())
-        prices = np.array([2 * c.width * (dear if c.kind == UNKNOWN else 1.0) for c in self.pool])
+        widths = np.array([c.width for c in self.pool])
         while pool.any():
-            drops = np.where(pool, now.sum() - errors.sum(1) - prices, -np.inf)
-            i = int(np.argmax(drops))
-            candidate, drop = self.pool[i], now - errors[i]
-            agree = float((drop > 0).mean())
-            if drop.sum() <= self._candidate_limit(candidate):
+            drops = np.where(pool, now.sum() - errors.sum(1), -np.inf)
+            # Nameless functions have very different widths: each coefficient has its price, which
+            # is that of the noise left by the best of them.
+            price = 2.0
+            if self.pool[int(np.argmax(drops))].kind == UNKNOWN:
+                price = self._price([self.pool[int(np.argmax(drops))]], chosen) / 3
+            found = self._first_significant(drops, drops - price * widths, tester)
+            if found is None:
                 break
-            if agree < self.settings.agreeing_folds:
-                break
+            i, candidate = found, self.pool[found]
             chosen.append(candidate)
             now = errors[i]
             pool &= self._still_open(candidate, chosen)
             if pool.any():
                 model = screen.model([*self.blocks, *(c.rows for c in chosen)])
                 errors = screen.step(model, pool)
+                tester = self.tester([*self.chosen, *chosen])
         return chosen, float(base.sum() - now.sum())
+
+    def _first_significant(self, drops: Array, order: Array, tester: Tester) -> int | None:
+        """The first of the best few candidates that is large enough and more than chance."""
+        for i in np.argsort(-order)[:SHAPES_TESTED]:
+            candidate = self.pool[i]
+            n_rows = int(self.problem.rows.counts[list(candidate.joints)].sum())
+            if not drops[i] > self.settings.least_share * n_rows:
+                continue
+            if self.significant(tester.test(candidate.rows).chance, candidate.kind):
+                return int(i)
+        return None
+
+    def _price(self, candidates: Sequence[Candidate], others: Sequence[Candidate] = ()) -> float:
+        """Price of a parameter: the inflation of the variance that is left after candidates."""
+        fitted = self.tester([*self.chosen, *others, *candidates])
+        joints = sorted({j for c in candidates for j in c.joints})
+        left = [fitted.residual[j] for j in joints]
+        return float(np.max(variance_inflation(self.problem, left, joints)))
 
     def _still_open(self, added: Candidate, chosen: list[Candidate]) -> Mask:
         """Which candidates may join one of the same kind."""
@@ -345,40 +502,45 @@ class _Search:
 
     def _splits(self) -> list[tuple[list[Candidate], float]]:
         """Payloads and tool forces of some trajectories, once."""
-        if any(get_effect(c.term.kind).search == "trajectories" for c in self.chosen):
+        if any(c.term.effect.search == "trajectories" for c in self.chosen):
             return []
-        found = []
-        n_joints, n_rows = self.problem.n_joints, int(self.problem.rows.counts.sum())
         splits = split_effects(self.problem, self.kinds, self.blocks, self.sigma, self.target)
-        for split in splits:
-            candidate = split.candidate
-            limit = 1.5 * self._limit(candidate.width, range(n_joints), n_rows)
-            if split.drop.sum() > limit and np.all(split.drop > 0):
-                count = candidate.width + len(np.unique(self.problem.signals.trajectory)) // 2
-                found.append(([candidate], -(float(split.drop.sum()) - 2 * count)))
-        return found
+        return [
+            ([s.candidate], -float(s.drop.sum()) + 2 * s.candidate.width)
+            for s in splits
+            if s.drop.sum() > 0
+        ]
 
     def _finals(self, rough: list[list[Candidate]]) -> list[Hypothesis]:
         """Compare the best kinds with their shape refined and the noise re-estimated."""
-        before = profile_error(self.problem, self.blocks, self.sigma, self.target)
-        price = 2 * float(self.inflation.max())
+        before = {
+            within: profile_error(self.problem, self.blocks, self.sigma, self.target, within=within)
+            for within in (False, True)
+        }
         ranking = []
         for i, candidates in enumerate(track(rough, f"{self._round}: refining the best")):
             kind = candidates[0].kind
+            within = any(_some_recordings(c) for c in candidates)
             if i < self.settings.refined:
                 candidates = refine(self.problem, self.blocks, candidates, self.sigma, self.target)
             blocks = [*self.blocks, *(c.rows for c in candidates)]
-            after = profile_error(self.problem, blocks, self.sigma, self.target)
-            gain = log_likelihood_gain(before, after, self.problem.rows.counts)
+            soft = [c.term.effect.softness for c in candidates]
+            after = profile_error(
+                self.problem, blocks, self.sigma, self.target, within=within, soft=soft
+            )
+            gain = log_likelihood_gain(before[within], after, self.problem.rows.counts)
             count = self._n_parameters(candidates)
+            price = 2 * self._price(candidates)
             score = float(gain.sum()) - price * count
             if kind == UNKNOWN:
-                score = score * (1 - self.settings.unknown_handicap) - 2 * price * count
-            ranking.append(Hypothesis(kind, tuple(candidates), gain, score, count, after))
-        return ranking
+                # The error held out has paid for its coefficients already.
+                score = float(gain.sum()) - price * min(count, NAMELESS_PRICE)
+            ranking.append(Hypothesis(kind, tuple(candidates), gain, score, count, errors=after))
+        return [h for h in ranking if h.score > self.settings.least_gain]
 
     def _n_parameters(self, candidates: Sequence[Candidate]) -> int:
-        count = sum(c.width + c.n_shapes for c in candidates)
+        # What a tool carries is told by its first coefficients; the others ride along.
+        count = sum((c.term.effect.leading or c.width) + c.n_shapes for c in candidates)
         if any("trajectories" in c.term.shape for c in candidates):
             count += len(np.unique(self.problem.signals.trajectory)) // 2
         return count
@@ -388,7 +550,7 @@ class _Search:
         if "torque_ripple" not in self.kinds:
             return []
         problem = self.problem
-        terms = (*problem.terms, *(c.term for c in self.chosen))
+        terms = problem.terms + (c.term for c in self.chosen)
         fit = replace(self.fit, terms=terms)
         residual = problem.torque - self.ripple - problem.explained(fit)
         best: dict[int, Any] = {}
@@ -400,11 +562,10 @@ class _Search:
             if line.waves < RESOLVED and self._follows_position(line.joint):
                 continue  # what the nameless function left of its own edges
             n_rows = int(problem.rows.counts[line.joint])
-            strong = line.gain.sum() > max(40.0, 2 * self.settings.relative_gate * n_rows)
-            agree = _chance_of_mean(line.gain) < self.settings.least_chance
+            strong = line.gain.sum() > self.settings.least_share * n_rows
             if (
                 strong
-                and agree
+                and self.significant(line.chance)
                 and (line.joint not in best or line.gain.sum() > best[line.joint].gain.sum())
             ):
                 best[line.joint] = line
@@ -415,12 +576,17 @@ class _Search:
         for joint, line in best.items():
             gain[joint] = line.gain.sum()
             term = Term("torque_ripple", (joint,), {"N": line.waves})
-            columns = get_effect("torque_ripple").columns(problem.signals, joint, N=line.waves)
+            columns = term.torque_columns(problem.signals)[joint]
             torque[:, joint] = columns @ line.coefficients
             candidates.append(Candidate("torque_ripple", term, problem.term_rows(term)))
         count = 3 * len(candidates)
         score = float(gain.sum()) - 2 * count
-        return [Hypothesis("torque_ripple", tuple(candidates), gain, score, count, None, torque)]
+        chances = tuple(best[c.joints[0]].chance for c in candidates)
+        return [
+            Hypothesis(
+                "torque_ripple", tuple(candidates), gain, score, count, chances, torque=torque
+            )
+        ]
 
     def _follows_position(self, joint: int) -> bool:
         """Whether a nameless function of the joint's own position was added."""
@@ -445,20 +611,17 @@ class _Search:
             return ripple
         return replace(ripple, score=min(score, ripple.score))
 
-    def _offsets_between_recordings(self) -> list[Hypothesis]:
-        """A sensor that was zeroed anew before some recording."""
-        if "offset" not in self.kinds or any("trajectory" in c.term.shape for c in self.chosen):
-            return []
-        found = trajectory_offsets(self.problem, self.blocks, self.target)
-        found = {j: item for j, item in found.items() if item[1] > 60}
-        if not found:
-            return []
-        gain = np.zeros(self.problem.n_joints)
-        for j, (_, value) in found.items():
-            gain[j] = value
-        candidates = tuple(c for some, _ in found.values() for c in some)
-        score = 0.8 * float(gain.sum()) - 10 * len(found)
-        return [Hypothesis("offset", candidates, gain, score, len(candidates))]
+    def _recordings(self) -> list[Hypothesis]:
+        """What changed from one recording to the next."""
+        found = []
+        for kind in dict.fromkeys(c.kind for c in self.by_recording):
+            if any(c.kind == kind and _some_recordings(c) for c in self.chosen):
+                continue
+            pool = [c for c in self.by_recording if c.kind == kind]
+            chosen = choose(pool, lambda more: self.tester([*self.chosen, *more]), self.significant)
+            if chosen:
+                found.append(chosen)
+        return self._finals(found)
 
 
 def replace_torque(problem: Problem, torque: Array) -> Problem:
@@ -467,16 +630,31 @@ def replace_torque(problem: Problem, torque: Array) -> Problem:
 
 
 def _uses_the_fit(candidate: Candidate) -> bool:
-    effect = get_effect(candidate.term.kind)
+    effect = candidate.term.effect
     return bool({"robot", "model_torque"} & set(effect.needs)) and effect.search == "grid"
 
 
-def _chance_of_mean(values: Array) -> float:
-    """Chance of such a mean over folds if it were zero (one-sided Student's t)."""
-    if len(values) < 2:
+def _some_recordings(candidate: Candidate) -> bool:
+    """Whether a candidate acts in some recordings only."""
+    return candidate.term.trajectories is not None
+
+
+def _within(hypothesis: Hypothesis) -> bool:
+    return any(map(_some_recordings, hypothesis.candidates))
+
+
+def _margin(best: Hypothesis, ranking: Sequence[Hypothesis]) -> float:
+    """Share of the best score by which the other explanations of the same joints fall short."""
+    own = set(best.joints)
+    family = _family(best)
+    rivals = [
+        h.score
+        for h in ranking
+        if h.kind != best.kind and own & set(h.joints) and (not family or _family(h) != family)
+    ]
+    if not rivals or best.score <= 0:
         return 1.0
-    error = np.std(values, ddof=1) / np.sqrt(len(values))
-    return float(student_t.sf(values.mean() / max(error, 1e-300), len(values) - 1))
+    return 1.0 - max(rivals) / best.score
 
 
 def _family(hypothesis: Hypothesis) -> str:
@@ -491,16 +669,16 @@ def _simplicity(hypothesis: Hypothesis) -> int:
 
 def _nameless_candidates(problem: Problem, residual: Array) -> list[Candidate]:
     """Nameless functions of the signals for every joint."""
-    joints = range(problem.n_joints)
-    followed = [followed_signals(problem, j, residual[:, j]) for j in joints]
+    followed = [followed_signals(problem, j, residual[:, j]) for j in range(problem.n_joints)]
     candidates = []
     for kind in nameless_kinds():
         effect = get_effect(kind)
         assert isinstance(effect, NamelessEffect)
-        for joint in range(problem.n_joints):
+        for joints in effect.sites(problem.signals):
+            joint = joints[0]
             if effect.not_shown(problem.signals, joint):
                 continue
-            shapes = effect.grid(problem.signals, (joint,))
+            shapes = effect.grid(problem.signals, joints)
             if isinstance(effect, FunctionOfSignals):
                 sets = [names for names in followed[joint] if len(names) == effect.n_signals]
                 shapes = [effect.shape_of(problem.signals, names) for names in sets]
@@ -513,7 +691,7 @@ def _nameless_candidates(problem: Problem, residual: Array) -> list[Candidate]:
                 )
                 shapes = [] if line is None else [{"frequency": line}]
             for shape in shapes:
-                term = Term(kind, (joint,), shape)
+                term = Term(kind, joints, shape)
                 names = effect.variables(joint, shape)
                 candidates.append(Candidate(UNKNOWN, term, problem.term_rows(term), names))
     return candidates

@@ -20,12 +20,13 @@ from scipy.optimize import OptimizeResult, differential_evolution
 
 from skidyn._exceptions import EffectError
 from skidyn._progress import tell
-from skidyn._signals import Array, Signals
-from skidyn.diagnosis._hypothesis import Hypothesis, Settings
+from skidyn._signals import Array, Signals, read_signals
+from skidyn.diagnosis._hypothesis import Hypothesis
+from skidyn.diagnosis._rule import Settings
 from skidyn.diagnosis._search import search
 from skidyn.effects import Term, get_effect
-from skidyn.evidence._problem import Fit, Problem, hysteresis_joints, make_problem
-from skidyn.excitation._fourier import fourier, product, rest_window
+from skidyn.evidence import Fit, Problem, hysteresis_joints, make_problem
+from skidyn.excitation import fourier, product, rest_window
 
 if TYPE_CHECKING:
     from skidyn.diagnosis._result import Diagnosis
@@ -287,12 +288,11 @@ def _opponents(
 ) -> tuple[Hypothesis, Hypothesis]:
     """The finding and the other explanation of the same step of the search."""
     known = []
-    for step, finding in zip(
-        [s for s in diagnosis.result.steps if s.added in diagnosis.result.findings],
-        diagnosis.findings,
-        strict=False,
-    ):
-        assert step.added is not None
+    findings = {f.kind: f for f in diagnosis.findings}
+    for step in diagnosis.result.steps:
+        if step.added is None or step.added.kind not in findings:
+            continue
+        finding = findings[step.added.kind]
         others = [h for h in step.ranking if h.kind not in (step.added.kind, "unknown")]
         known.append(f"{step.added.kind} against {', '.join(h.kind for h in others) or 'nothing'}")
         if kind not in (None, step.added.kind):
@@ -385,13 +385,16 @@ def _recognised(
 
 def _position_noise(diagnosis: Diagnosis) -> Array:
     """Noise of the logged positions: what the smoother takes off, (n_joints,), rad or m."""
-    from skidyn.diagnosis._reading import read_signals
-
     model, (X, tau) = diagnosis.base_model, diagnosis.data
     robot = diagnosis.problem.robot
     assert robot is not None
-    keys = {k: getattr(model, k, "auto") for k in ("trajectory", "time")}
-    rate = diagnosis.problem.motion.rate
-    raw, _ = read_signals(X, tau, robot, **keys, rate=rate)
+    raw, _ = read_signals(
+        X,
+        tau,
+        robot,
+        trajectory=getattr(model, "trajectory", "auto"),
+        time=getattr(model, "time", "auto"),
+        rate=diagnosis.problem.motion.rate,
+    )
     rough = (raw.q - diagnosis.problem.signals.q)[diagnosis.problem.motion.valid.all(1)]
     return np.asarray(np.std(rough, axis=0))

@@ -3,22 +3,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from skidyn._signals import Array
-from skidyn.diagnosis._held_out import sample_folds
-from skidyn.evidence._problem import Problem
+from skidyn.diagnosis._rule import SHORTEST_BLOCK, chance_of_score
+from skidyn.evidence import Problem
 
 #: Angle covered by the spectrum in rad and its number of bins; sets resolution and range.
 SPAN, BINS = 4 * np.pi, 32768
 #: Waves per rad searched.
 LOWEST, HIGHEST = 8.0, 420.0
-#: Chance of one false line over all joints and waves.
-FALSE_LINE = 1e-6
+#: A line lower than this, in units of the local noise, is not looked at.
+LEAST_HEIGHT = 8.0
 #: Width in bins of the running median that gives the local noise level.
 MEDIAN_WIDTH = 161
 
@@ -33,6 +33,8 @@ class Line:
         Joint, from 0.
     waves : float
         Periods per rad times 2 pi: the N of sin(N q).
+    chance : float
+        Of so high a line over all waves of the joint if there were none.
     gain : ndarray of shape (n_folds,)
         Twice the held-out log-likelihood gain, by fold.
     coefficients : ndarray of shape (2,)
@@ -41,6 +43,7 @@ class Line:
 
     joint: int
     waves: float
+    chance: float
     gain: Array
     coefficients: Array
 
@@ -59,8 +62,7 @@ def find_lines(problem: Problem, residual: Array) -> list[Line]:
     -------
     list of Line
     """
-    threshold = np.log(2 * HIGHEST * problem.n_joints / FALSE_LINE)
-    fold = sample_folds(problem)
+    fold = problem.sample_folds(int(np.argmax(problem.rows.counts)))
     lines = []
     for joint in range(problem.n_joints):
         use = problem.rows.sliding[:, joint]
@@ -68,13 +70,15 @@ def find_lines(problem: Problem, residual: Array) -> list[Line]:
             continue
         q, r = problem.signals.q[:, joint], residual[:, joint]
         for waves, height in _peaks(q[use], r[use]):
-            if height < threshold:
+            if height < LEAST_HEIGHT:
                 continue
-            line = _test_line(problem, joint, waves, use, r, fold)
+            # Power over its level is exponentially distributed; any wave of a joint may be highest.
+            chance = min(1.0, 2 * HIGHEST * float(np.exp(-height)))
+            line = _test_line(problem, joint, waves, chance, use, r, fold)
             if line.gain.sum() > 0 and _explained_share(q[use], r[use], line) <= 0.2:
                 # A weak line cannot gain more than its height over the local noise tells.
                 cap = 2.4 * height / line.gain.sum()
-                line = Line(joint, waves, line.gain * min(1.0, cap), line.coefficients)
+                line = replace(line, gain=line.gain * min(1.0, cap))
             lines.append(line)
     return lines
 
@@ -98,18 +102,41 @@ def _peaks(q: Array, r: Array, count: int = 2) -> list[tuple[float, float]]:
     for _ in range(count):
         k = int(np.argmax(ratio))
         ratio[max(0, k - 8) : k + 9] = 0.0
-        fine = np.linspace(k / 2 - 0.5, k / 2 + 0.5, 21)
-        waves = float(fine[int(np.argmax([np.abs(np.exp(-1j * w * q) @ r) for w in fine]))])
+        waves = _strongest_wave(q, r, k / 2 - 0.5, k / 2 + 0.5)
         block = np.column_stack([np.sin(waves * q), np.cos(waves * q)])
         rest = r - block @ np.linalg.lstsq(block, r, rcond=None)[0]
         peaks.append((waves, float(power[k] / _spectrum(q, rest)[1][k])))
     return peaks
 
 
+def _strongest_wave(q: Array, r: Array, lowest: float, highest: float, count: int = 21) -> float:
+    """Of evenly spaced waves, the one that a signal over q holds most of."""
+    # Each wave is the one before it turned by the same angle at every sample: one product of
+    # complex numbers in place of a sine and a cosine.
+    turned, turn = r * np.exp(-1j * lowest * q), np.exp(-1j * (highest - lowest) / (count - 1) * q)
+    strength = []
+    for _ in range(count):
+        strength.append(float(np.abs(turned.sum())))
+        turned *= turn
+    return float(np.linspace(lowest, highest, count)[int(np.argmax(strength))])
+
+
+def sample_blocks(problem: Problem) -> tuple[NDArray[np.int64], int]:
+    """Block of half a second of every sample, and their number."""
+    index: NDArray[np.int64] = np.zeros(problem.signals.n_samples, dtype=np.int64)
+    count = 0
+    for rows in problem.signals.segments:
+        clock = problem.signals.clock[rows]
+        index[rows] = count + ((clock - clock[0]) / SHORTEST_BLOCK).astype(np.int64)
+        count = int(index[rows].max()) + 1
+    return index, count
+
+
 def _test_line(
     problem: Problem,
     joint: int,
     waves: float,
+    chance: float,
     use: NDArray[np.bool_],
     r: Array,
     fold: NDArray[np.int64],
@@ -122,6 +149,12 @@ def _test_line(
         grams.append(block[here].T @ block[here])
         cross.append(block[here].T @ r[here])
     total, right = sum(grams), sum(cross)
+    both = np.linalg.lstsq(total, right, rcond=None)[0]
+    left = (r - block @ both)[use]
+    steps, count = sample_blocks(problem)
+    sums: Array = np.stack([np.bincount(steps[use], z * left, count) for z in block[use].T], axis=1)
+    by_blocks = chance_of_score(np.asarray(right), sums[np.any(sums != 0, axis=1)])
+    chance = max(chance, min(1.0, 2 * HIGHEST * by_blocks))
     drop = []
     for g, c in zip(grams, cross, strict=True):
         b = np.linalg.lstsq(total - g, right - c, rcond=None)[0]
@@ -130,7 +163,7 @@ def _test_line(
     change = np.array(drop)
     gain = use.sum() * np.log(before / max(before - change.sum(), 1e-12 * before))
     shares = change / change.sum() * gain if change.sum() > 0 else 0 * change
-    return Line(joint, waves, shares, np.linalg.lstsq(total, right, rcond=None)[0])
+    return Line(joint, waves, chance, shares, both)
 
 
 def _explained_share(q: Array, r: Array, line: Line) -> float:

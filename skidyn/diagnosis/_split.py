@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Effects that some trajectories have and others do not: payloads, tool forces, new offsets.
+"""Effects that some trajectories have and others do not: payloads and tool forces.
 
 Leaving whole trajectories out cannot judge them: what a trajectory carries is seen in that
 trajectory alone. They are judged on interleaved quarters of every trajectory instead.
@@ -16,14 +16,12 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
+from skidyn.diagnosis._profile import QUARTERS
 from skidyn.effects import Term, get_effect
-from skidyn.evidence._problem import Problem
+from skidyn.evidence import Problem, left_out_errors
 
-#: Coefficients of each trajectory's own estimate: mass and first moments, or the force.
-_LEADING = {"payload": 4, "external_wrench": 3}
 #: Largest gaps between the sorted estimates that are tried as the border of the split.
 CUTS = 3
-QUARTERS = 4
 
 
 @dataclass(frozen=True)
@@ -75,19 +73,20 @@ def split_effects(
     y = [t / s for t, s in zip(target, sigma, strict=True)]
     found = []
     for kind in kinds:
-        if get_effect(kind).search != "trajectories":
+        effect = get_effect(kind)
+        if effect.search != "trajectories":
             continue
         term = Term(kind, tuple(range(problem.n_joints)))
         rows = {j: b / sigma[j] for j, b in problem.term_rows(term).items()}
-        own = _own_estimates(problem, design, y, rows, names, _LEADING[kind])
+        own = _own_estimates(problem, design, y, rows, names, effect.leading or term.width)
         best: tuple[Array, list[Any]] | None = None
-        for chosen in _splits(kind, own, names):
+        for chosen in _splits(effect.grows, own, names):
             drop = _quarter_drop(problem, design, y, rows, chosen)
             if best is None or drop.sum() > best[0].sum():
                 best = drop, chosen
         if best is not None:
             shape = {"trajectories": tuple(sorted(int(name) for name in best[1]))}
-            split = Term(kind, term.joints, shape)
+            split = term.with_shape(**shape)
             found.append(Split(Candidate(kind, split, problem.term_rows(split)), best[0]))
     return found
 
@@ -120,12 +119,12 @@ def _own_estimates(
     return solution[p:].reshape(len(names), leading)
 
 
-def _splits(kind: str, own: Array, names: NDArray[Any]) -> list[list[Any]]:
+def _splits(grows: bool, own: Array, names: NDArray[Any]) -> list[list[Any]]:
     """Groups of trajectories worth trying: those beyond a gap in the estimates."""
     away = own - np.median(own, axis=0)
     moved = away @ np.linalg.svd(away, full_matrices=False)[2][0]
     groups = _beyond_gaps(moved, names, sides=2)
-    if kind != "payload":
+    if not grows:
         return groups  # a force acts in the smaller group
     # A payload adds mass, be it to most of the trajectories.
     mass = own[:, 0]
@@ -166,78 +165,5 @@ def _quarter_drop(
         for f in range(QUARTERS):
             here = a[problem.rows.quarter[j] == f]
             grams[f] += here.T @ here
-    without = np.arange(p)
-    both = np.arange(p + k)
-    errors = [held_out_error(grams, columns) for columns in (without, both)]
-    return errors[0] - errors[1]
-
-
-def held_out_error(grams: Array, columns: NDArray[np.int64]) -> Array:
-    """Squared error of every fold left out, from Gram matrices of [columns | torque]."""
-    total = grams.sum(0)
-    scale = np.sqrt(np.diag(total))
-    scale[scale == 0] = 1.0
-    scale[-1] = 1.0
-    scaled = grams / scale[:, None] / scale
-    total = scaled.sum(0)
-    ridge = 10 * 1e-9 * np.eye(len(columns))
-    errors = np.empty(len(grams))
-    for f, gram in enumerate(scaled):
-        train = total - gram
-        block = np.ix_(columns, columns)
-        b = np.linalg.solve(train[block] + ridge, train[columns, -1])
-        errors[f] = gram[-1, -1] - 2 * b @ gram[columns, -1] + b @ gram[block] @ b
-    return errors
-
-
-def trajectory_offsets(
-    problem: Problem, blocks: Sequence[dict[int, Array]], target: Sequence[Array]
-) -> dict[int, tuple[list[Candidate], float]]:
-    """Offsets that differ between recordings, by joint, with twice their log-likelihood gain.
-
-    Parameters
-    ----------
-    problem : Problem
-        Rows.
-    blocks : sequence of dict
-        Columns of the model beside the rigid body.
-    target : sequence of ndarray
-        Averaged torque.
-
-    Returns
-    -------
-    dict of int to (list of Candidate, float)
-    """
-    names = np.unique(np.concatenate(problem.rows.trajectory))
-    if len(names) < 2:
-        return {}
-    found = {}
-    for j, (design, y) in enumerate(zip(problem.design(blocks), target, strict=True)):
-        if not _moves_both_ways(problem, j):
-            continue  # an offset of a recording in one direction is its friction
-        ones = problem.rows.average(np.ones(problem.signals.n_samples), j)
-        inside = problem.rows.trajectory[j][:, None] == names
-        a = np.hstack([design[:, np.abs(design).max(0, initial=0) > 0], ones[:, None] * inside])
-        p = a.shape[1] - len(names)
-        full = np.column_stack([a, y])
-        quarter = problem.rows.quarter[j]
-        parts = [full[quarter == f] for f in range(QUARTERS)]
-        grams = np.stack([part.T @ part for part in parts])
-        before = held_out_error(grams, np.arange(p)).sum()
-        after = held_out_error(grams, np.arange(a.shape[1])).sum()
-        gain = len(y) * np.log(before / after) - 2 * len(names)
-        terms = [Term("offset", (j,), {"trajectory": int(name)}) for name in names]
-        candidates = [
-            Candidate("offset", t, {j: (ones * inside[:, i])[:, None]}, ("trajectory",))
-            for i, t in enumerate(terms)
-        ]
-        found[j] = (candidates, float(gain))
-    return found
-
-
-def _moves_both_ways(problem: Problem, joint: int) -> bool:
-    """Whether most recordings hold motion of a joint in both directions."""
-    direction = problem.rows.average(problem.signals.sign[:, joint], joint)
-    trajectory = problem.rows.trajectory[joint]
-    shares = [np.mean(direction[trajectory == name] > 0) for name in np.unique(trajectory)]
-    return float(np.mean([0.1 < s < 0.9 for s in shares])) > 0.5
+    without = np.r_[:p, p + k]
+    return left_out_errors(grams[:, without][:, :, without]) - left_out_errors(grams)

@@ -13,10 +13,8 @@ from numpy.typing import NDArray
 from skidyn._signals import Array
 from skidyn.diagnosis._proposal import Proposal, propose
 from skidyn.diagnosis._variables import VariableTest, depends_on
-from skidyn.effects import Term, get_effect
-from skidyn.effects._nameless import NamelessEffect
-from skidyn.evidence._folded import left_out_coefficients
-from skidyn.evidence._problem import Problem, term_columns
+from skidyn.effects import NamelessEffect, Term, TermSum
+from skidyn.evidence import Problem, jackknife, left_out_coefficients
 
 #: Bins of a curve, and of each side of a map; a bin with fewer samples stays empty.
 CURVE, MAP, FEWEST = 40, 16, 5
@@ -112,24 +110,27 @@ def describe_unknowns(
     terms = list(terms)
     design = problem.design([problem.term_rows(t) for t in terms])
     target = problem.target
-    whole, left = left_out_coefficients(problem, design, sigma, target)
-    starts = len(problem.rigid_index) + np.cumsum(
-        [0, *(len(get_effect(t.kind).coefficients) for t in terms)]
-    )
+    whole, left = left_out_coefficients(problem, design, sigma, target, soft=problem.soft(terms))
+    place = dict(TermSum(terms).slices(len(problem.rigid_index)))
     found = []
     for term in unknown:
+        span = place[term]
+        effect = term.effect
+        assert isinstance(effect, NamelessEffect)
+        guessed = effect.variables(term.joints[0], dict(term.shape))
+        if len(term.joints) > 1:  # on the whole robot, as a force at the tool
+            for joint in term.joints:
+                own = (f"q{joint + 1}",)
+                shape = _shape(problem, term, joint, whole[span], left[:, span], own)
+                found.append(UnknownTorque(joint + 1, guessed, (), shape, None))
+            continue
         (joint,) = term.joints
-        i = terms.index(term)
-        span = slice(starts[i], starts[i + 1])
         known = np.ones(len(whole), dtype=bool)
         known[span] = False
         without = _Remainder([d[:, known] for d in design], sigma, joint)
         rows = without(problem.term_rows(term)[joint])
         explained = rows @ whole[span]
         residual = target[joint] - design[joint] @ whole + explained
-        effect = get_effect(term.kind)
-        assert isinstance(effect, NamelessEffect)
-        guessed = effect.variables(joint, dict(term.shape))
         tests = depends_on(problem, joint, residual, guessed, rows, without)
         needed = {t.variable for t in tests if t.needed} or set(guessed)
         variables = tuple(sorted(needed, key=lambda v: (v not in guessed, v)))
@@ -176,7 +177,7 @@ def _shape(
 ) -> dict[str, Any]:
     """Torque in bins of one or two signals, with a band from leaving folds out (jackknife)."""
     use = problem.rows.sliding[:, joint]
-    columns = term_columns(problem.signals, term)[joint][use]
+    columns = term.torque_columns(problem.signals)[joint][use]
     drawn = [v for v in variables if v != "time"][:2] or ["time"]
     n_bins = CURVE if len(drawn) == 1 else MAP
     index: NDArray[np.int64] = np.zeros(len(columns), dtype=np.int64)
@@ -193,9 +194,7 @@ def _shape(
     mean = np.column_stack([np.bincount(index, c, minlength=size) for c in columns.T])
     average: Array = mean / np.maximum(count, 1)[:, None]
     value = average @ coefficients
-    ways = average @ left.T
-    n = left.shape[0]
-    spread = np.sqrt((n - 1) / n * np.sum((ways - ways.mean(1, keepdims=True)) ** 2, axis=1))
+    spread = jackknife(left @ average.T)
     empty = count < FEWEST
 
     def grid(x: Array) -> Array:

@@ -20,7 +20,7 @@ from scipy.linalg import eigh
 from scipy.stats import ttest_1samp
 
 from skidyn._signals import Array
-from skidyn.evidence._problem import Problem
+from skidyn.evidence import Problem
 
 FEATURES = 120
 #: Lengths over which the learned function varies, in standard deviations of its inputs.

@@ -1,10 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Physical effects: what can be added to a rigid-body model, and the catalogue of all kinds."""
 
-from skidyn.effects._base import Coefficient, Effect, Shape, Term
-from skidyn.effects._catalogue import get_effect, list_effects, make_terms, register_effect
+from skidyn.effects._base import Coefficient, Effect, Shape
+from skidyn.effects._catalogue import make_terms
 from skidyn.effects._formula import formula
 from skidyn.effects._hysteresis import dahl_state, stop_state
+from skidyn.effects._registry import (
+    get_effect,
+    list_effects,
+    register_effect,
+    unregister_effect,
+)
+from skidyn.effects._term import Term, TermSum
 from skidyn.effects._transformer import FrictionTransformer
 
 __all__ = [
@@ -13,6 +20,7 @@ __all__ = [
     "FrictionTransformer",
     "Shape",
     "Term",
+    "TermSum",
     "dahl_state",
     "formula",
     "get_effect",
@@ -20,4 +28,13 @@ __all__ = [
     "make_terms",
     "register_effect",
     "stop_state",
+    "unregister_effect",
 ]
+
+# For other packages of skidyn; no part of the public interface.
+from skidyn.effects._hysteresis import Law as Law, PathMemory as PathMemory
+from skidyn.effects._nameless import (
+    FunctionOfSignals as FunctionOfSignals,
+    NamelessEffect as NamelessEffect,
+)
+from skidyn.effects._registry import nameless_kinds as nameless_kinds

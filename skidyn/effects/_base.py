@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -33,6 +33,8 @@ class Coefficient:
         1 where physics allows no negative value.
     limit : float
         Largest magnitude at which the formula still describes the effect.
+    is_share : bool
+        Whether it is a share of a shape parameter, so that its own size says nothing.
 
     Examples
     --------
@@ -44,6 +46,7 @@ class Coefficient:
     unit: str
     sign: int = 0
     limit: float = np.inf
+    is_share: bool = False
 
 
 @dataclass(frozen=True)
@@ -65,6 +68,8 @@ class Shape:
         How refinement steps: by factors or by differences.
     scales : bool
         Whether the value is an angle or angular velocity, so that it scales for sliders.
+    has_interval : bool
+        Whether a confidence interval of the value is stated.
 
     Examples
     --------
@@ -79,42 +84,7 @@ class Shape:
     high: float
     spacing: Literal["log", "linear"] = "log"
     scales: bool = True
-
-
-@dataclass(frozen=True)
-class Term:
-    """An effect on certain joints with certain shape parameters: one block of regressor columns.
-
-    Parameters
-    ----------
-    kind : str
-        Kind of the effect, a name of the catalogue.
-    joints : tuple of int
-        Joints, counted from 0; all joints for an effect of the whole robot.
-    shape : mapping of str to object
-        Values of the shape parameters; empty where the effect has none.
-
-    Examples
-    --------
-    >>> print(Term("dahl", (0,), {"presliding": 0.02}))
-    dahl(joint 1, presliding=0.02)
-    """
-
-    kind: str
-    joints: tuple[int, ...]
-    shape: Mapping[str, Any] = field(default_factory=dict)
-
-    def __hash__(self) -> int:
-        return hash((self.kind, self.joints, tuple(sorted(map(str, self.shape.items())))))
-
-    def __str__(self) -> str:
-        joints = ", ".join(str(j + 1) for j in self.joints)
-        shape = "".join(f", {k}={_short(v)}" for k, v in self.shape.items())
-        return f"{self.kind}(joint {joints}{shape})"
-
-
-def _short(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    has_interval: bool = True
 
 
 class Effect:
@@ -151,6 +121,17 @@ class Effect:
     needs : tuple of str
         Optional signals it needs: ``"temperature"``, ``"time"``, ``"load"``, ``"model_torque"``,
         ``"robot"``.
+    leading : int
+        With ``search="trajectories"``: how many of its first coefficients every trajectory by
+        itself can tell; all of them if 0.
+    grows : bool
+        With ``search="trajectories"``: whether it is the trajectories with the larger first
+        coefficient that have the effect, be they the most, as a payload adds mass.
+    softness : float
+        Share of its largest column's square by which its coefficients are drawn to zero when parts
+        of the data are left out; for flexible functions, which no row may determine there.
+    by_recording : bool
+        Whether it may change from one recording to the next, and is tried for some of them alone.
     simplicity : int
         Rank among rivals that explain the data equally well; the lower is named.
     rivals : tuple of str
@@ -189,11 +170,35 @@ class Effect:
     drawn_against: ClassVar[str] = "q"
     family: ClassVar[str] = ""
     needs: ClassVar[tuple[str, ...]] = ()
+    leading: ClassVar[int] = 0
+    grows: ClassVar[bool] = False
+    by_recording: ClassVar[bool] = False
+    softness: ClassVar[float] = 0.0
     simplicity: ClassVar[int] = 50
     rivals: ClassVar[tuple[str, ...]] = ()
     separating_motion: ClassVar[str] = ""
     caveat: ClassVar[str] = ""
     reference: ClassVar[str] = ""
+
+    @property
+    def has_shape(self) -> bool:
+        """Whether the columns depend on a shape that has to be given or found."""
+        return bool(self.shapes) or type(self).grid is not Effect.grid
+
+    @property
+    def needs_fit(self) -> bool:
+        """Whether there are no columns before a model has been fitted."""
+        return not {"load", "model_torque"}.isdisjoint(self.needs)
+
+    @property
+    def follows_fit(self) -> bool:
+        """Whether the columns change with the fit: with its torque, or its rigid body."""
+        return self.needs_fit or "robot" in self.needs
+
+    @property
+    def sees_model(self) -> bool:
+        """Whether it acts on the torque of the whole model, as a sensor does."""
+        return "model_torque" in self.needs
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         """Columns of the effect on its own joint.
@@ -301,6 +306,44 @@ class Effect:
             axes.append([value * unit for value in shape.grid])
         names = [shape.name for shape in self.shapes]
         return [dict(zip(names, values, strict=True)) for values in itertools.product(*axes)]
+
+    def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
+        """Whether shape parameters lie where this data can tell them from a simpler effect.
+
+        Parameters
+        ----------
+        signals : Signals
+            Motion.
+        joints : sequence of int
+            Joints of the term.
+        shape : mapping
+            Shape parameters.
+
+        Returns
+        -------
+        bool
+            True by default. A contact is one only if some samples touch and others do not.
+        """
+        return True
+
+    def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
+        """Range over which a shape parameter with linear spacing moves, in its own unit.
+
+        Parameters
+        ----------
+        signals : Signals
+            Motion.
+        joints : sequence of int
+            Joints of the term.
+        shape : mapping
+            Shape parameters.
+
+        Returns
+        -------
+        float
+            The positions of the first joint by default.
+        """
+        return float(np.ptp(signals.q[:, joints[0]]))
 
     def parameters(
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None

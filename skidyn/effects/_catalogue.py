@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The catalogue: every kind of effect by its name, and how users name terms."""
+"""The catalogue of all effects of the package, and how users write terms."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from skidyn._exceptions import EffectError
-from skidyn.effects._base import Effect, Term
+from skidyn.effects._base import Effect
 from skidyn.effects._coupling import CoupledFriction, CoupledInertia, CouplingSpring
 from skidyn.effects._formula import Formula
 from skidyn.effects._friction import (
@@ -22,9 +22,12 @@ from skidyn.effects._hysteresis import Dahl, LuGre, MaxwellSlip
 from skidyn.effects._inertia import RotorInertia
 from skidyn.effects._load import LoadDependentFriction
 from skidyn.effects._nameless import NAMELESS
+from skidyn.effects._nameless_history import HISTORY
 from skidyn.effects._position import PositionDependentFriction, TorqueRipple
+from skidyn.effects._registry import get_effect, register_effect
 from skidyn.effects._sensor import Saturation, TimeDelay, TorqueGain
 from skidyn.effects._springs import EndStop, GravityCompensator, NonlinearSpring, Offset, Spring
+from skidyn.effects._term import Term
 from skidyn.effects._thermal import FrictionDrift, TemperatureFriction, TemperatureOffset
 from skidyn.effects._tool import EnvironmentContact, ExternalWrench, Payload
 from skidyn.effects._transmission import Backlash, JointElasticity
@@ -63,103 +66,11 @@ _CLASSES: tuple[type[Effect], ...] = (
     ExternalWrench,
     EnvironmentContact,
 )
-_ALL: tuple[type[Effect], ...] = (*_CLASSES, *NAMELESS, Formula)
-_CATALOGUE: dict[str, Effect] = {cls.kind: cls() for cls in _ALL}
+for _cls in (*_CLASSES, *NAMELESS, *HISTORY, Formula):
+    register_effect(_cls)
 
 #: What users may write for a term: a kind, a kind with joints counted from 1, or a Term.
 TermSpec = str | tuple[str, Sequence[int]] | Term
-
-
-def list_effects() -> list[str]:
-    """Kinds of the catalogue, without the nameless functions that stand for ``unknown``.
-
-    Returns
-    -------
-    list of str
-        In the order of the catalogue.
-
-    Examples
-    --------
-    >>> "dahl" in list_effects()
-    True
-    """
-    return [kind for kind, effect in _CATALOGUE.items() if not effect.nameless]
-
-
-def get_effect(kind: str) -> Effect:
-    """Effect of a kind.
-
-    Parameters
-    ----------
-    kind : str
-        Name in the catalogue.
-
-    Returns
-    -------
-    Effect
-        The instance of the catalogue.
-
-    Raises
-    ------
-    EffectError
-        No such kind.
-
-    Examples
-    --------
-    >>> get_effect("stribeck").title
-    'Stribeck friction'
-    """
-    try:
-        return _CATALOGUE[kind]
-    except KeyError:
-        raise EffectError(
-            f"no effect {kind!r}; the catalogue has {', '.join(_CATALOGUE)}"
-        ) from None
-
-
-def nameless_kinds() -> list[str]:
-    """Nameless functions that the diagnosis tries when no name fits."""
-    return [kind for kind, e in _CATALOGUE.items() if e.nameless and e.search != "given"]
-
-
-def register_effect(effect: Effect | type[Effect]) -> None:
-    """Add your own effect to the catalogue; diagnosis and reports then know it.
-
-    Parameters
-    ----------
-    effect : Effect or subclass of Effect
-        A complete declaration. An effect of the same kind is replaced.
-
-    Raises
-    ------
-    EffectError
-        The declaration is incomplete.
-
-    Examples
-    --------
-    >>> from skidyn.effects import Coefficient, Effect, list_effects, register_effect
-    >>> class AirDrag(Effect):
-    ...     kind = "air_drag"
-    ...     title = "Air drag"
-    ...     formula = "c dq abs(dq)"
-    ...     coefficients = (Coefficient("c", "N m s^2/rad^2", sign=1),)
-    ...
-    ...     def columns(self, signals, joint, **shape):
-    ...         dq = signals.dq[:, joint]
-    ...         return (dq * abs(dq))[:, None]
-    >>> register_effect(AirDrag)
-    >>> "air_drag" in list_effects()
-    True
-    >>> unregister_effect("air_drag")
-    """
-    instance = effect() if isinstance(effect, type) else effect
-    instance.check()
-    _CATALOGUE[instance.kind] = instance
-
-
-def unregister_effect(kind: str) -> None:
-    """Take an effect out of the catalogue again."""
-    _CATALOGUE.pop(kind, None)
 
 
 def make_terms(specs: Iterable[TermSpec], n_joints: int) -> list[Term]:
@@ -188,10 +99,12 @@ def make_terms(specs: Iterable[TermSpec], n_joints: int) -> list[Term]:
     >>> [str(term) for term in make_terms(["viscous", ("dahl", [2])], 2)]
     ['viscous(joint 1)', 'viscous(joint 2)', 'dahl(joint 2)']
     """
+    if isinstance(specs, str):
+        raise EffectError(f"effects={specs!r} is one word; write a list, effects=[{specs!r}]")
     terms: list[Term] = []
     for spec in specs:
         if isinstance(spec, Term):
-            get_effect(spec.kind)
+            get_effect(spec.kind)  # refuses an unknown kind
             _check_joints(spec.kind, spec.joints, n_joints)
             terms.append(spec)
             continue

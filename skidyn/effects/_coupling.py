@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,9 @@ import numpy as np
 from skidyn._signals import SIGN_BLUR, Signals
 from skidyn.effects._base import Array, Coefficient, Effect, Shape
 
-_RATIO = Shape("ratio", "1", (1.0, -1.0), -10.0, 10.0, spacing="linear", scales=False)
+_RATIO = Shape(
+    "ratio", "1", (1.0, -1.0), -10.0, 10.0, spacing="linear", scales=False, has_interval=False
+)
 _GAUTIER = "Janot, Vandanjon, Gautier (2014), IEEE TCST 22(1), 132-145 (TX40 wrist)."
 
 
@@ -32,6 +34,9 @@ class _PairEffect(Effect):
         ratio = shape["ratio"]
         block = self.coupled_columns(signals, i, j, ratio)
         return {i: block, j: ratio * block}
+
+    def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
+        return 1.0
 
     def not_shown(self, signals: Signals, joint: int) -> str | None:
         if signals.prismatic[joint]:

@@ -13,7 +13,8 @@ import numpy as np
 
 from skidyn._exceptions import EffectError
 from skidyn._signals import Signals
-from skidyn.effects._base import Array, Coefficient, Effect, Term
+from skidyn.effects._base import Array, Coefficient, Effect
+from skidyn.effects._term import Term
 
 #: Longest formula and largest exponent: nothing that a formula of friction or a spring needs.
 LONGEST, LARGEST_POWER = 200, 9

@@ -17,6 +17,7 @@ class Viscous(Effect):
     """Friction proportional to velocity."""
 
     kind = "viscous"
+    by_recording = True
     drawn_against = "dq"
     title = "Viscous friction"
     formula = r"F_v\,\dot q"
@@ -34,6 +35,7 @@ class Coulomb(Effect):
     """Dry friction of constant size against the motion."""
 
     kind = "coulomb"
+    by_recording = True
     drawn_against = "dq"
     title = "Coulomb friction"
     formula = r"F_c\,\mathrm{sign}(\dot q)"

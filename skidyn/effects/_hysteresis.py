@@ -7,21 +7,68 @@ only the reversals are visited one by one.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skidyn._signals import Signals
 from skidyn.effects._base import Array, Coefficient, Effect, Shape
 
-#: State after a monotone stroke: (state at its start, direction, way gone) -> state.
-Law = Callable[[Array, Array, Array], Array]
+
+@dataclass(frozen=True)
+class Law:
+    """How a state changes along a monotone stroke, of numbers and of arrays.
+
+    Attributes
+    ----------
+    measure : callable
+        Of ways in rad or m: what the change depends on.
+    change : callable
+        ``change(start, direction, measure) -> state``.
+    """
+
+    measure: Callable[[Any], Any]
+    change: Callable[[Any, Any, Any], Any]
+
+    def __call__(self, start: Any, direction: Any, way: Any) -> Any:
+        return self.change(start, direction, self.measure(way))
 
 
-def _run(position: Array, segments: list[slice], law: Law) -> Array:
-    """State of a rate-independent hysteresis along a path, zero at the start of each segment."""
-    state = np.zeros(len(position))
+@dataclass(frozen=True)
+class Strokes:
+    """A path cut where it turns back; what all laws of hysteresis need of it.
+
+    Attributes
+    ----------
+    rows : ndarray of shape (n_moving,)
+        Samples that have a state; the others, first samples and paths that stand, have none.
+    stroke : ndarray of shape (n_moving,)
+        Stroke of each of them.
+    way : ndarray of shape (n_moving,), rad or m
+        Way gone since the stroke began.
+    direction : ndarray of shape (n_strokes,)
+        1 or -1.
+    length : ndarray of shape (n_strokes,), rad or m
+        Way of the whole stroke.
+    opens : ndarray of shape (n_strokes,) of bool
+        Whether a stroke is the first of its segment, which starts without a state.
+    """
+
+    rows: NDArray[np.int64]
+    stroke: NDArray[np.int64]
+    way: Array
+    direction: Array
+    length: Array
+    opens: NDArray[np.bool_]
+
+
+def cut_strokes(position: Array, segments: list[slice]) -> Strokes:
+    """Strokes of a path within each segment."""
+    parts: list[tuple[Any, ...]] = []
+    count = 0
     for rows in segments:
         x = position[rows]
         if len(x) < 2:
@@ -34,13 +81,42 @@ def _run(position: Array, segments: list[slice], law: Law) -> Array:
         last = np.searchsorted(moving, np.arange(len(direction)), side="right") - 1
         direction = direction[moving[np.maximum(last, 0)]]
         first = np.r_[0, np.flatnonzero(np.diff(direction)) + 1]
-        length = np.diff(np.r_[first, len(direction)])
-        ends = np.abs(x[first + length] - x[first])
-        start = np.zeros(len(first))
-        for k in range(len(first) - 1):
-            start[k + 1] = law(start[k], direction[first[k]], ends[k])
-        way = np.abs(x[1:] - np.repeat(x[first], length))
-        state[rows.start + 1 : rows.stop] = law(np.repeat(start, length), direction, way)
+        steps = np.diff(np.r_[first, len(direction)])
+        parts.append(
+            (
+                np.arange(rows.start + 1, rows.stop),
+                np.repeat(np.arange(count, count + len(first)), steps),
+                np.abs(x[1:] - np.repeat(x[first], steps)),
+                direction[first],
+                np.abs(x[first + steps] - x[first]),
+                np.arange(len(first)) == 0,
+            )
+        )
+        count += len(first)
+    if not parts:
+        none = np.zeros(0)
+        whole = none.astype(np.int64)
+        return Strokes(whole, whole, none, none, none, none.astype(bool))
+    return Strokes(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+
+def _run(strokes: Strokes, n_samples: int, law: Law) -> Array:
+    """State of a rate-independent hysteresis along a path, zero at the start of each segment."""
+    state = np.zeros(n_samples)
+    start, value = [], 0.0
+    # Plain numbers: NumPy's take fifty times as long one by one.
+    for opens, direction, gone in zip(
+        strokes.opens.tolist(),
+        strokes.direction.tolist(),
+        law.measure(strokes.length).tolist(),
+        strict=True,
+    ):
+        value = 0.0 if opens else value
+        start.append(value)
+        value = law.change(value, direction, gone)
+    if start:
+        own = strokes.stroke
+        state[strokes.rows] = law(np.array(start)[own], strokes.direction[own], strokes.way)
     return state
 
 
@@ -71,11 +147,14 @@ def dahl_state(position: Array, segments: list[slice], presliding: float) -> Arr
     >>> dahl_state(np.linspace(0, 1, 11), [slice(0, 11)], 0.05)[-1].round(3)
     np.float64(1.0)
     """
+    return _run(cut_strokes(position, segments), len(position), _dahl_law(presliding))
 
-    def law(start: Array, direction: Array, way: Array) -> Array:
-        return direction - (direction - start) * np.exp(-way / presliding)
 
-    return _run(position, segments, law)
+def _dahl_law(presliding: float) -> Law:
+    def change(start: Any, direction: Any, fading: Any) -> Any:
+        return direction - (direction - start) * fading
+
+    return Law(lambda way: np.exp(-way / presliding), change)
 
 
 def stop_state(position: Array, segments: list[slice], presliding: float) -> Array:
@@ -101,14 +180,51 @@ def stop_state(position: Array, segments: list[slice], presliding: float) -> Arr
     >>> stop_state(np.array([0.0, 0.1, 0.3]), [slice(0, 3)], 0.2).tolist()
     [0.0, 0.5, 1.0]
     """
-
-    def law(start: Array, direction: Array, way: Array) -> Array:
-        return np.clip(start + direction * way / presliding, -1.0, 1.0)
-
-    return _run(position, segments, law)
+    return _run(cut_strokes(position, segments), len(position), _stop_law(presliding))
 
 
-class Dahl(Effect):
+def _stop_law(presliding: float) -> Law:
+    def change(start: Any, direction: Any, bend: Any) -> Any:
+        force = start + direction * bend
+        if isinstance(force, float):
+            return min(max(force, -1.0), 1.0)
+        return np.clip(force, -1.0, 1.0)
+
+    return Law(lambda way: way / presliding, change)
+
+
+class PathMemory(Effect):
+    """Base of effects whose state depends on the path of their own joint alone.
+
+    A subclass says how each state changes along a stroke in one direction, and what the columns
+    are for given states. Logs are walked through from reversal to reversal; a simulation advances
+    the same laws step by step.
+    """
+
+    def laws(self, **shape: Any) -> tuple[Law, ...]:
+        """How every state changes along a stroke: ``law(start, direction, way) -> state``."""
+        raise NotImplementedError
+
+    def columns_at(
+        self, signals: Signals, joint: int, states: Sequence[Array], **shape: Any
+    ) -> Array:
+        """Columns for given states, each of shape (n_samples,)."""
+        return np.column_stack(states)
+
+    def path_states(self, signals: Signals, joint: int, **shape: Any) -> list[Array]:
+        """States along the logged path, zero at the start of every segment."""
+        # The path is cut once for all laws and all their shapes.
+        strokes = signals.once(
+            ("strokes", joint), lambda: cut_strokes(signals.q[:, joint], signals.segments)
+        )
+        return [_run(strokes, signals.n_samples, law) for law in self.laws(**shape)]
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        states = self.path_states(signals, joint, **shape)
+        return self.columns_at(signals, joint, states, **shape)
+
+
+class Dahl(PathMemory):
     """Friction that builds up over a short way after each reversal."""
 
     kind = "dahl"
@@ -125,11 +241,11 @@ class Dahl(Effect):
     separating_motion = "small reversals inside the pre-sliding range, of several amplitudes"
     reference = "Dahl (1968), A solid friction model, Aerospace Corporation TOR-0158."
 
-    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        return dahl_state(signals.q[:, joint], signals.segments, shape["presliding"])[:, None]
+    def laws(self, **shape: Any) -> tuple[Law, ...]:
+        return (_dahl_law(shape["presliding"]),)
 
 
-class LuGre(Effect):
+class LuGre(PathMemory):
     """Bristles whose strength follows a Stribeck curve."""
 
     kind = "lugre"
@@ -147,13 +263,17 @@ class LuGre(Effect):
     separating_motion = "small reversals and slow constant-speed sweeps in one recording"
     reference = "Canudas de Wit, Olsson, Astrom, Lischinsky (1995), IEEE TAC 40(3), 419-425."
 
-    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        state = dahl_state(signals.q[:, joint], signals.segments, shape["presliding"])
+    def laws(self, **shape: Any) -> tuple[Law, ...]:
+        return (_dahl_law(shape["presliding"]),)
+
+    def columns_at(
+        self, signals: Signals, joint: int, states: Sequence[Array], **shape: Any
+    ) -> Array:
         stribeck = np.exp(-((signals.dq[:, joint] / shape["vs"]) ** 2))
-        return np.column_stack([state, stribeck * state])
+        return np.column_stack([states[0], stribeck * states[0]])
 
 
-class MaxwellSlip(Effect):
+class MaxwellSlip(PathMemory):
     """Several spring-slider elements in parallel."""
 
     kind = "maxwell_slip"
@@ -172,8 +292,5 @@ class MaxwellSlip(Effect):
     separating_motion = "small reversals inside the pre-sliding range, of several amplitudes"
     reference = "Al-Bender, Lampaert, Swevers (2005), IEEE TAC 50(11), 1883-1887."
 
-    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        q, way = signals.q[:, joint], shape["presliding"]
-        return np.column_stack(
-            [stop_state(q, signals.segments, way * share) for share in (1.0, 0.5, 2.0)]
-        )
+    def laws(self, **shape: Any) -> tuple[Law, ...]:
+        return tuple(_stop_law(shape["presliding"] * share) for share in (1.0, 0.5, 2.0))

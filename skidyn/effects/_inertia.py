@@ -19,7 +19,7 @@ class RotorInertia(Effect):
     coefficients = (Coefficient("Ia", "kg m^2", sign=1),)
     simplicity = 3
     rivals = ("joint_elasticity", "time_delay")
-    separating_motion = "accelerations in several poses; on the first joint it cannot be told"
+    separating_motion = "accelerations in several poses; on the first joint nothing separates it"
     reference = "Gautier, Khalil (1990), IEEE TRA 6(3), 368-373."
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:

@@ -35,6 +35,7 @@ class NamelessEffect(Effect):
     """A smooth function of the signals in :attr:`depends_on`."""
 
     nameless = True
+    softness = 1e-5
     #: Signals it depends on: ``own`` joint, the ``other`` joint or time.
     depends_on: ClassVar[tuple[str, ...]] = ()
 
@@ -65,6 +66,7 @@ class NamelessEffect(Effect):
 
 
 class _Spline(NamelessEffect):
+    softness = 2e-3
     signal: ClassVar[str] = "q"
     n_splines: ClassVar[int] = 10
 

@@ -29,6 +29,9 @@ class PositionDependentFriction(Effect):
         waves = (15.0, 30.0, 60.0) if signals.prismatic[joints[0]] else (1.0, 2.0)
         return [{"n": n} for n in waves]
 
+    def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
+        return 1.0
+
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         phase = shape["n"] * signals.q[:, joint]
         sign = signals.sign[:, joint]

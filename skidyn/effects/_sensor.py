@@ -79,7 +79,7 @@ class Saturation(Effect):
     drawn_against = "load"
     title = "Torque saturation"
     formula = r"-c\,\mathrm{sign}(\tau)\max(0,\,|\tau| - L)"
-    coefficients = (Coefficient("share", "1", sign=1),)
+    coefficients = (Coefficient("share", "1", sign=1, is_share=True),)
     shapes = (Shape("limit", "N m", (0.97, 0.93, 0.88, 0.8, 0.7, 0.6), 1e-9, np.inf, scales=False),)
     needs = ("model_torque",)
     simplicity = 15

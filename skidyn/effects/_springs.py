@@ -16,6 +16,7 @@ class Offset(Effect):
     """Constant torque: a sensor or current zero, an unbalanced drive."""
 
     kind = "offset"
+    by_recording = True
     title = "Torque offset"
     formula = r"\tau_0"
     coefficients = (Coefficient("tau0", "N m"),)
@@ -25,18 +26,14 @@ class Offset(Effect):
     reference = "Gautier, Khalil (1988), ICRA."
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        recording = shape.get("trajectory")
-        if recording is None:
-            return np.ones((signals.n_samples, 1))
-        # The sensor was zeroed anew: this offset belongs to one recording.
-        here: Array = (signals.trajectory == recording).astype(float)
-        return here[:, None]
+        return np.ones((signals.n_samples, 1))
 
 
 class Spring(Effect):
     """Linear spring between the joint's two links."""
 
     kind = "spring"
+    by_recording = True
     title = "Spring"
     formula = r"k\,(q - q_0)"
     coefficients = (Coefficient("k", "N m/rad", sign=1), Coefficient("tau0", "N m"))
@@ -115,6 +112,10 @@ class GravityCompensator(Effect):
         return super().not_shown(signals, joint)
 
 
+#: Shares of the samples between which a contact is one: with more it is a spring.
+FEWEST_TOUCHING, MOST_TOUCHING = 0.001, 0.6
+
+
 class EndStop(Effect):
     """One-sided elastic contact beyond a position: bumper, hose, cable pulled tight."""
 
@@ -136,6 +137,10 @@ class EndStop(Effect):
             for share in shares
             for side in (1.0, -1.0)
         ]
+
+    def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
+        beyond = shape["side"] * (signals.q[:, joints[0]] - shape["q_lim"]) > 0
+        return bool(FEWEST_TOUCHING < beyond.mean() < MOST_TOUCHING)
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         beyond = shape["side"] * (signals.q[:, joint] - shape["q_lim"])

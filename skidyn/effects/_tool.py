@@ -10,14 +10,25 @@ import numpy as np
 
 from skidyn._signals import Signals
 from skidyn.effects._base import Array, Coefficient, Effect, Shape
+from skidyn.effects._springs import FEWEST_TOUCHING, MOST_TOUCHING
 
 
-def _inside(signals: Signals, shape: Mapping[str, Any]) -> Array:
-    """1 on the samples of the term's trajectories, 0 elsewhere; all of them without a list."""
-    chosen = shape.get("trajectories")
-    if chosen is None:
-        return np.ones((signals.n_samples, 1))
-    return np.isin(signals.trajectory, list(chosen)).astype(float)[:, None]
+def tool_position(signals: Signals) -> Array:
+    """Place of the tool, (n_samples, 3), computed once for all shapes."""
+    robot = signals.robot
+    assert robot is not None
+    position: Array = signals.once("tool", lambda: robot.forward_kinematics(signals.q)[0])
+    return position
+
+
+def tool_jacobian(signals: Signals) -> Array:
+    """Its velocity per unit joint velocity, (n_samples, 3, n_joints), computed once."""
+    robot = signals.robot
+    assert robot is not None
+    jacobian: Array = signals.once(
+        "tool jacobian", lambda: robot.jacobian(signals.q)[:, :3].copy(order="K")
+    )
+    return jacobian
 
 
 #: Distance of a centre of mass from its link, in m, beyond which the motion does not tell the mass.
@@ -50,9 +61,12 @@ class Payload(_ToolEffect):
         Coefficient("mcz", "kg m"),
         *(Coefficient(name, "kg m^2") for name in ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")),
     )
-    simplicity = 28
+    # The inertia of a payload shows in the sum of many trajectories only.
+    leading = 4
+    grows = True
+    simplicity = 27
     caveat = (
-        "mass and drive gain cannot be told apart by this data: the mass scales with the "
+        "this data cannot separate mass from drive gain: the mass scales with the "
         "calibration of the torque"
     )
     rivals = ("external_wrench", "torque_gain")
@@ -68,7 +82,6 @@ class Payload(_ToolEffect):
         # Chunk by chunk: the whole regressor of a long log does not fit into memory.
         for rows, chunk in robot.iter_torque_regressor(signals.q, signals.dq, signals.ddq):
             columns[:, rows] = chunk[:, -10:].transpose(0, 2, 1)
-        columns *= _inside(signals, shape)
         return {j: columns[j] for j in joints}
 
     def parameters(
@@ -77,11 +90,13 @@ class Payload(_ToolEffect):
         mass, moment = float(coefficients[0]), [float(v) for v in coefficients[1:4]]
         if max(map(abs, moment)) > FARTHEST * abs(mass):
             # Fewer joints than it takes to weigh it, as on a single pendulum.
-            return {"first_moment": moment, **shape}
-        return {"mass": mass, "com": [v / mass if mass else 0.0 for v in moment], **shape}
+            return {f"first_moment_{a}": v for a, v in zip("xyz", moment, strict=True)}
+        place = {f"com_{a}": v / mass if mass else 0.0 for a, v in zip("xyz", moment, strict=True)}
+        return {"mass": mass, **place}
 
     def units(self, prismatic: bool = False) -> dict[str, str]:
-        return {"mass": "kg", "com": "m", "first_moment": "kg m"}
+        moment = {f"first_moment_{a}": "kg m" for a in "xyz"}
+        return {"mass": "kg", **{f"com_{a}": "m" for a in "xyz"}, **moment}
 
 
 class ExternalWrench(_ToolEffect):
@@ -92,7 +107,7 @@ class ExternalWrench(_ToolEffect):
     title = "External force at the tool"
     formula = r"-J_n(q)^\top f"
     coefficients = (Coefficient("fx", "N"), Coefficient("fy", "N"), Coefficient("fz", "N"))
-    simplicity = 27
+    simplicity = 28
     rivals = ("payload", "environment_contact")
     separating_motion = "the tool moved through several orientations while the force acts"
     reference = "Khatib (1987), IEEE JRA 3(1), 43-53."
@@ -100,18 +115,16 @@ class ExternalWrench(_ToolEffect):
     def torque_columns(
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
-        assert signals.robot is not None
-        jacobian = signals.robot.jacobian(signals.q)
-        inside = _inside(signals, shape)
-        return {j: -jacobian[:, :3, j] * inside for j in joints}
+        jacobian = tool_jacobian(signals)
+        return {j: -jacobian[:, :, j] for j in joints}
 
     def parameters(
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
     ) -> dict[str, Any]:
-        return {"force": [float(v) for v in coefficients], **shape}
+        return {f"force_{a}": float(v) for a, v in zip("xyz", coefficients, strict=True)}
 
     def units(self, prismatic: bool = False) -> dict[str, str]:
-        return {"force": "N"}
+        return {f"force_{a}": "N" for a in "xyz"}
 
 
 class EnvironmentContact(Effect):
@@ -130,8 +143,7 @@ class EnvironmentContact(Effect):
     reference = "Khatib (1987), IEEE JRA 3(1), 43-53."
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        assert signals.robot is not None
-        position, _ = signals.robot.forward_kinematics(signals.q)
+        position = tool_position(signals)
         return [
             {
                 "z0": float(side * np.quantile(side * position[:, axis], share)),
@@ -143,13 +155,19 @@ class EnvironmentContact(Effect):
             for share in (0.05, 0.1, 0.15, 0.2, 0.3)
         ]
 
+    def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
+        position = tool_position(signals)
+        touching = shape["side"] * (shape["z0"] - position[:, int(shape["axis"])]) > 0
+        return bool(FEWEST_TOUCHING < touching.mean() < MOST_TOUCHING)
+
+    def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
+        position = tool_position(signals)
+        return float(np.ptp(position[:, int(shape["axis"])]))
+
     def torque_columns(
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
-        robot = signals.robot
-        assert robot is not None
         axis, side = int(shape["axis"]), shape["side"]
-        position, _ = robot.forward_kinematics(signals.q)
-        depth = np.maximum(0.0, side * (shape["z0"] - position[:, axis]))
-        pressed = -side * depth[:, None] * robot.jacobian(signals.q)[:, axis, :]
+        depth = np.maximum(0.0, side * (shape["z0"] - tool_position(signals)[:, axis]))
+        pressed = -side * depth[:, None] * tool_jacobian(signals)[:, axis, :]
         return {j: pressed[:, [j]] for j in joints}

@@ -14,8 +14,8 @@ from sklearn.utils.validation import _check_feature_names_in, check_is_fitted, v
 from skidyn._columns import Columns, ColumnSpec, _key_column, resolve_columns
 from skidyn._exceptions import ColumnError, EffectError
 from skidyn._signals import Array, signals_from
-from skidyn.effects._base import Effect, Term
-from skidyn.effects._catalogue import get_effect, make_terms
+from skidyn.effects._catalogue import make_terms
+from skidyn.effects._term import Term
 
 
 class FrictionTransformer(TransformerMixin, BaseEstimator):
@@ -44,7 +44,7 @@ class FrictionTransformer(TransformerMixin, BaseEstimator):
 
     See Also
     --------
-    skidyn.rigid_body.RBDRegressor : Rigid body and effects identified together.
+    skidyn.identification.RBDRegressor : Rigid body and effects identified together.
 
     Examples
     --------
@@ -112,7 +112,7 @@ class FrictionTransformer(TransformerMixin, BaseEstimator):
         check_is_fitted(self)
         X = validate_data(self, X, reset=False, dtype=np.float64)
         signals = signals_from(X, self.columns_)
-        blocks = [get_effect(t.kind).columns(signals, t.joints[0], **t.shape) for t in self.terms_]
+        blocks = [t.torque_columns(signals)[t.joints[0]] for t in self.terms_]
         return np.hstack([X, *blocks])
 
     def get_feature_names_out(self, input_features: Any = None) -> NDArray[Any]:
@@ -131,7 +131,7 @@ class FrictionTransformer(TransformerMixin, BaseEstimator):
         check_is_fitted(self)
         names = list(_check_feature_names_in(self, input_features))
         for i, term in enumerate(self.terms_):
-            own = [f"{term.kind}_{c.name}_{term.joints[0] + 1}" for c in _coefficients(term)]
+            own = [f"{term.kind}_{c.name}_{term.joints[0] + 1}" for c in term.coefficients]
             # The same kind twice on a joint differs in its shape parameters alone.
             names += [f"{name}_{i}" if name in names else name for name in own]
         return np.asarray(names, dtype=object)
@@ -164,13 +164,9 @@ class FrictionTransformer(TransformerMixin, BaseEstimator):
         return found
 
 
-def _coefficients(term: Term) -> Any:
-    return get_effect(term.kind).coefficients
-
-
 def _refuse(term: Term, columns: Columns) -> None:
     """Refuse an effect that the motion of one joint does not determine."""
-    effect = get_effect(term.kind)
+    effect = term.effect
     beyond = [need for need in effect.needs if need not in ("temperature", "time")]
     if effect.scope != "joint" or beyond:
         what = ", ".join(beyond) or f"scope {effect.scope!r}"
@@ -178,7 +174,7 @@ def _refuse(term: Term, columns: Columns) -> None:
             f"{term.kind} does not follow from the motion of one joint alone ({what}); "
             "use RBDRegressor, which knows the robot and its torque"
         )
-    if not term.shape and (effect.shapes or type(effect).grid is not Effect.grid):
+    if term.is_open:
         example = ", ".join(f"{s.name!r}: .." for s in effect.shapes) or ".."
         raise EffectError(
             f"{term.kind} needs shape parameters; pass Term({term.kind!r}, ({term.joints[0]},), "

@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from functools import lru_cache, partial
+from typing import Any
 
 import numpy as np
-from scipy.signal import bilinear, lfilter, lfilter_zi, savgol_filter
 
+from skidyn._local_polynomial import local_polynomial
 from skidyn._signals import Signals
 from skidyn.effects._base import Array, Coefficient, Effect, Shape
 
@@ -26,8 +27,10 @@ def _smooth_derivatives(values: Array, signals: Signals) -> tuple[Array, Array, 
         step = float(np.median(np.diff(signals.clock[rows])))
         half = max(3, int(_SMOOTHING / 2 / step))
         width = min(2 * half + 1, (len(y) - 1) // 2 * 2 + 1)
-        for order, out in enumerate(result):
-            out[rows] = savgol_filter(y, width, min(4, width - 1), deriv=order, delta=step)
+        for out, part in zip(
+            result, local_polynomial(y, width, min(4, width - 1), step), strict=True
+        ):
+            out[rows] = part
     return result  # type: ignore[return-value]
 
 
@@ -52,6 +55,8 @@ def _oscillator(load: Array, signals: Signals, resonance: float, damping: float)
     -------
     ndarray of shape (n_samples,), N m or N
     """
+    from scipy.signal import lfilter
+
     omega = 2 * np.pi * resonance
     wind_up = np.zeros_like(load)
     for rows in signals.segments:
@@ -60,10 +65,58 @@ def _oscillator(load: Array, signals: Signals, resonance: float, damping: float)
         rate = 1.0 / float(np.median(np.diff(signals.clock[rows])))
         # The swing of a link faster than the sampling cannot be seen; it follows at once.
         w = min(omega, rate)
-        b, a = bilinear([1.0], [1 / w**2, 2 * damping / w, 1.0], rate)
-        start = lfilter_zi(b, a) * load[rows.start]
-        wind_up[rows] = lfilter(b, a, load[rows], zi=start)[0]
+        b, a, settled = _swing(w, damping, rate)
+        wind_up[rows] = lfilter(b, a, load[rows], zi=settled * load[rows.start])[0]
     return wind_up
+
+
+@lru_cache(maxsize=256)
+def _swing(omega: float, damping: float, rate: float) -> tuple[Array, Array, Array]:
+    """Digital filter of a spring-mass at a sampling rate, and its state under a unit load."""
+    from scipy.signal import bilinear, lfilter_zi
+
+    b, a = bilinear([1.0], [1 / omega**2, 2 * damping / omega, 1.0], rate)
+    return b, a, lfilter_zi(b, a)
+
+
+#: Step of the difference quotients: they err by about this share, and round by a thousandth of it.
+_STEP = 1e-6
+
+
+def _torque_slopes(signals: Signals, joint: int) -> tuple[Array, Array, Array]:
+    """Change of all torques per change of a joint's position, velocity and acceleration.
+
+    Shapes only change how the link moves, so that they share these slopes. They are kept for the
+    joint that was asked for last: shapes of one joint follow each other, and all joints together
+    would take many times the memory of the log.
+
+    Returns
+    -------
+    by_position, by_velocity, by_acceleration : ndarray of shape (n_samples, n_joints)
+        N m/rad, N m s/rad, kg m^2, or what takes their place where joints slide.
+    """
+    kept: dict[int, tuple[Array, Array, Array]] = signals.once("torque slopes", dict)
+    if joint not in kept:
+        kept.clear()
+        kept[joint] = _differentiate_torque(signals, joint)
+    return kept[joint]
+
+
+def _differentiate_torque(signals: Signals, joint: int) -> tuple[Array, Array, Array]:
+    robot = signals.robot
+    assert robot is not None
+    inverse_dynamics = partial(robot.inverse_dynamics, parameters=signals.inertial_parameters)
+    q, dq, ddq = signals.q, signals.dq, signals.ddq
+    here: Array = signals.once("torque", lambda: inverse_dynamics(q, dq, ddq))
+    direction = np.zeros(signals.n_joints)
+    direction[joint] = 1.0
+    step = _STEP * signals.unit[joint]
+    by_position = (inverse_dynamics(q + step * direction, dq, ddq) - here) / step
+    by_velocity = (inverse_dynamics(q, dq + step * direction, ddq) - here) / step
+    by_acceleration = inverse_dynamics(
+        q, np.zeros_like(dq), np.broadcast_to(direction, q.shape), gravity=(0.0, 0.0, 0.0)
+    )
+    return by_position, by_velocity, by_acceleration
 
 
 class _LinkSideEffect(Effect):
@@ -74,8 +127,6 @@ class _LinkSideEffect(Effect):
     """
 
     needs = ("robot", "load", "time")
-    #: Displacement used for the finite difference, rad or m.
-    _step: ClassVar[float] = 1e-3
 
     def displacement(self, signals: Signals, joint: int, **shape: Any) -> Array:
         """Displacement of the link for a unit coefficient, shape (n_samples,)."""
@@ -84,19 +135,16 @@ class _LinkSideEffect(Effect):
     def torque_columns(
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
-        assert signals.robot is not None
         (joint,) = joints
-        derivatives = _smooth_derivatives(self.displacement(signals, joint, **shape), signals)
-        scale = self._step * signals.unit[joint] / (np.abs(derivatives[0]).max() + 1e-300)
-        moved = [signals.q.copy(), signals.dq.copy(), signals.ddq.copy()]
-        for values, change in zip(moved, derivatives, strict=True):
-            values[:, joint] -= scale * change
-        parameters = signals.inertial_parameters
-        torque = signals.robot.inverse_dynamics
-        change = torque(*moved, parameters=parameters) - torque(
-            signals.q, signals.dq, signals.ddq, parameters=parameters
-        )
-        return {j: change[:, [j]] / scale for j in range(signals.n_joints)}
+        moves = _smooth_derivatives(self.displacement(signals, joint, **shape), signals)
+        slopes = _torque_slopes(signals, joint)
+        columns = {}
+        for j in range(signals.n_joints):
+            change = np.zeros(signals.n_samples)
+            for slope, move in zip(slopes, moves, strict=True):
+                change -= slope[:, j] * move
+            columns[j] = change[:, None]
+        return columns
 
 
 class JointElasticity(_LinkSideEffect):
@@ -137,7 +185,7 @@ class Backlash(_LinkSideEffect):
     title = "Backlash"
     drawn_against = "load"
     formula = r"\tau(q - g\,x) - \tau(q),\quad m\,\ddot x = \tau_\mathrm{load}/g,\ |x| \le 1/2"
-    coefficients = (Coefficient("share", "1", sign=1),)
+    coefficients = (Coefficient("share", "1", sign=1, is_share=True),)
     shapes = (Shape("gap", "rad", (0.003, 0.008, 0.02), 2e-4, 0.2),)
     simplicity = 18
     rivals = ("joint_elasticity", "dahl")
@@ -145,18 +193,9 @@ class Backlash(_LinkSideEffect):
     reference = "Nordin, Gutman (2002), Automatica 38(10), 1633-1649."
 
     def displacement(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        robot = signals.robot
-        assert signals.load is not None and robot is not None
+        assert signals.load is not None
         # Inertia that the free link presents to its own joint.
-        unit = np.zeros_like(signals.q)
-        unit[:, joint] = 1.0
-        inertia = robot.inverse_dynamics(
-            signals.q,
-            np.zeros_like(signals.q),
-            unit,
-            parameters=signals.inertial_parameters,
-            gravity=(0.0, 0.0, 0.0),
-        )[:, joint]
+        inertia = _torque_slopes(signals, joint)[2][:, joint]
         # Identified parameters need not be consistent; an inertia that vanishes would fly at once.
         inertia = np.maximum(inertia, 0.05 * np.abs(np.median(inertia)) + 1e-12)
         free = signals.load[:, joint] / inertia

@@ -6,3 +6,67 @@ from skidyn.evidence._from_motion import evidence_from_motion
 from skidyn.evidence._streaming import evidence_from_parquet
 
 __all__ = ["Evidence", "evidence_from_motion", "evidence_from_parquet"]
+
+# For other packages of skidyn; no part of the public interface.
+from skidyn.evidence._broken import broken_notes as broken_notes
+from skidyn.evidence._evidence import column_names as column_names
+from skidyn.evidence._folds import (
+    RIDGE as RIDGE,
+    Normal as Normal,
+    column_sizes as column_sizes,
+    fold_products as fold_products,
+    fold_slices as fold_slices,
+    jackknife as jackknife,
+    jackknife_rows as jackknife_rows,
+    left_out_coefficients as left_out_coefficients,
+    left_out_errors as left_out_errors,
+    soft_prior as soft_prior,
+    solve_left_out as solve_left_out,
+    without_each as without_each,
+)
+from skidyn.evidence._from_motion import (
+    evidence_of_rows as evidence_of_rows,
+    renumbered as renumbered,
+    sample_blocks as sample_blocks,
+)
+from skidyn.evidence._kinematics import (
+    as_given as as_given,
+    sampling_rate as sampling_rate,
+    smooth_motion as smooth_motion,
+)
+from skidyn.evidence._parquet import (
+    ColumnMap as ColumnMap,
+    read_trajectories as read_trajectories,
+    trajectory_lengths as trajectory_lengths,
+)
+from skidyn.evidence._problem import (
+    SHORT_MARGIN as SHORT_MARGIN,
+    Fit as Fit,
+    Problem as Problem,
+    hysteresis_joints as hysteresis_joints,
+    independent_columns as independent_columns,
+    make_problem as make_problem,
+    own_noise as own_noise,
+    read_motion as read_motion,
+    regressor_rows as regressor_rows,
+    weighted_least_squares as weighted_least_squares,
+    with_reversals as with_reversals,
+)
+from skidyn.evidence._rows import (
+    REST as REST,
+    sliding_samples as sliding_samples,
+    window_rows as window_rows,
+)
+from skidyn.evidence._shapes import (
+    Gain as Gain,
+    best_on_grid as best_on_grid,
+    refine_term as refine_term,
+)
+from skidyn.evidence._streaming import (
+    Options as Options,
+    Source as Source,
+    evidence_of_signals as evidence_of_signals,
+    evidence_of_sources as evidence_of_sources,
+    linear_terms as linear_terms,
+    parquet_files as parquet_files,
+)

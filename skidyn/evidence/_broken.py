@@ -24,6 +24,8 @@ WIDTH = 7
 FAR, TAILS = 3.0, (0.01, 0.99)
 #: and than this share of the range of the signal itself.
 TORQUE_SHARE, POSITION_SHARE = 0.25, 0.05
+#: and than so many steps of a coarse sensor, of which one at rest shows one or two.
+STEPS = 5.0
 
 
 def leaps(
@@ -56,15 +58,22 @@ def leaps(
             for end in (rows.start, rows.stop - WIDTH // 2):
                 least[end : end + WIDTH // 2] = 1.0
     broken = np.zeros(values.shape, dtype=bool)
+    coarse = STEPS * _smallest_change(values)
     for name in np.unique(signals.trajectory):
         own = signals.trajectory == name
         low, high = np.quantile(away[own], TAILS, axis=0)
         bottom, top = np.quantile(values[own], TAILS, axis=0)
         # Strictly above: a signal that rests has no range and no leaps.
         broken[own] = np.abs(away[own]) > np.maximum(
-            FAR * (high - low), least[own] * (top - bottom)
+            np.maximum(FAR * (high - low), coarse), least[own] * (top - bottom)
         )
     return broken
+
+
+def _smallest_change(values: Array) -> Array:
+    """A small change between neighbouring samples, by column: the step of a coarse sensor."""
+    changes = np.abs(np.diff(values, axis=0))
+    return np.array([np.quantile(c[c > 0], 0.05) if (c > 0).any() else 0.0 for c in changes.T])
 
 
 def reversals(signals: Signals) -> NDArray[np.bool_]:

@@ -21,7 +21,7 @@ from scipy.linalg import lstsq
 
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Array
-from skidyn.effects import Term, get_effect
+from skidyn.effects import Term, TermSum
 from skidyn.evidence._problem import Problem
 from skidyn.robots import Robot
 
@@ -387,10 +387,7 @@ def column_names(
         Such as ``"m_link1"`` and ``"viscous.Fv[1]"``, joints counted from 1.
     """
     names = [] if robot is None else [robot.parameter_names[i] for i in rigid_index]
-    for term in terms:
-        joints = ",".join(str(j + 1) for j in term.joints)
-        names += [f"{term.kind}.{c.name}[{joints}]" for c in get_effect(term.kind).coefficients]
-    return tuple(names)
+    return (*names, *TermSum(terms).names)
 
 
 def _triangle(rows: Array) -> Array:

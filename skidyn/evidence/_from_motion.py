@@ -13,12 +13,11 @@ from scipy.linalg import lapack
 
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Array, Signals
-from skidyn.effects import Term, get_effect
+from skidyn.effects import Term
 from skidyn.evidence._evidence import Evidence, Key
 from skidyn.evidence._problem import FEW_TRAJECTORIES, FEWEST_BLOCKS, MOST_FOLDS
 from skidyn.evidence._streaming import linear_terms
-from skidyn.rigid_body._base_parameters import BaseParameters, find_base_parameters
-from skidyn.robots import Robot
+from skidyn.robots import BaseParameters, Robot, find_base_parameters
 
 Method = Literal["auto", "gram", "qr"]
 #: Samples at a time: their columns stay in the third-level cache between making and using them.
@@ -76,7 +75,7 @@ def evidence_from_motion(
     See Also
     --------
     skidyn.evidence.evidence_from_parquet : From files, with parallel filtering.
-    skidyn.rigid_body.regressor_from_evidence : The fitted model.
+    skidyn.identification.regressor_from_evidence : The fitted model.
 
     References
     ----------
@@ -88,7 +87,7 @@ def evidence_from_motion(
     >>> import numpy as np
     >>> from skidyn.datasets import load_planar_arm
     >>> from skidyn.evidence import evidence_from_motion
-    >>> from skidyn.rigid_body import regressor_from_evidence
+    >>> from skidyn.identification import regressor_from_evidence
     >>> robot = load_planar_arm()
     >>> q, dq, ddq = np.random.default_rng(0).uniform(-2, 2, (3, 1000, 2))
     >>> torque = robot.inverse_dynamics(q, dq, ddq) + 0.3 * dq
@@ -262,12 +261,9 @@ class _Layout:
         names = [robot.parameter_names[i] for i in base.index]
         effects: list[list[tuple[int, Array]]] = [[] for _ in range(robot.n_joints)]
         for term in terms:
-            effect = get_effect(term.kind)
-            blocks = effect.torque_columns(signals, term.joints, **term.shape)
-            for j, block in blocks.items():
+            for j, block in term.torque_columns(signals).items():
                 effects[j] += [(len(names) + k, block[:, k]) for k in range(block.shape[1])]
-            joints = ",".join(str(j + 1) for j in term.joints)
-            names += [f"{term.kind}.{c.name}[{joints}]" for c in effect.coefficients]
+            names += term.names
         columns = tuple(int(i) for i in base.index)
         used = robot._engine.program("torque_regressor", robot._engine.gravity_key()).outputs
         first = [

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
-from scipy.signal import savgol_filter
 
+from skidyn._local_polynomial import local_polynomial
 from skidyn._signals import Array, Signals
 
 #: Order of the local polynomial; quartic keeps accelerations unbiased over the window.
@@ -108,9 +108,7 @@ def _local_polynomial(time: Array, q: Array, rate: float, half: int) -> list[Arr
     even = np.ptp(np.diff(time)) < EVEN_STEPS * step or np.any(np.diff(time) <= 0)
     grid = time if even else np.arange(time[0], time[-1] + step / 2, step)
     values = q if even else CubicSpline(time, q)(grid)
-    smoothed = [
-        savgol_filter(values, 2 * half + 1, ORDER, deriv=k, delta=step, axis=0) for k in range(3)
-    ]
+    smoothed = list(local_polynomial(values, 2 * half + 1, ORDER, step))
     if even:
         return smoothed
     inside = np.clip(time, grid[0], grid[-1])

@@ -19,7 +19,7 @@ from skidyn.robots import Robot
 
 #: Rows that are decoded at once.
 BATCH_ROWS = 65_536
-#: How the user says which column holds which signal; see :func:`skidyn.datasets.read_log`.
+#: How the user says which column holds which signal; see :func:`skidyn.logs.read_log`.
 ColumnMap = Mapping[str, str | int | Sequence[str | int]]
 
 
@@ -45,7 +45,7 @@ def read_trajectories(
     robot : Robot
         Its joints give the order of the columns.
     columns : mapping, optional
-        As in :func:`skidyn.datasets.read_log`.
+        As in :func:`skidyn.logs.read_log`.
     max_rows : int
         Longest trajectory that is read.
 
@@ -95,7 +95,7 @@ def trajectory_lengths(path: Path, robot: Robot, columns: ColumnMap | None = Non
     robot : Robot
         Its joints.
     columns : mapping, optional
-        As in :func:`skidyn.datasets.read_log`.
+        As in :func:`skidyn.logs.read_log`.
 
     Returns
     -------
@@ -153,7 +153,7 @@ def _decoded(path: Path, parquet: Any, robot: Robot, columns: ColumnMap | None) 
 
 
 def _layout(names: Sequence[str], robot: Robot, columns: ColumnMap | None, path: Path) -> _Layout:
-    from skidyn.datasets._log_names import match_names  # datasets as a whole imports much more
+    from skidyn._names import match_names
 
     found = match_names(
         names, robot_joints=robot.joint_names, columns=columns, source=str(path)

@@ -8,12 +8,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, qr
+from scipy.linalg import qr
 
 from skidyn._progress import tell
 from skidyn._signals import Array, Signals
-from skidyn.effects import Term, get_effect
+from skidyn.effects import Term, TermSum
 from skidyn.evidence._broken import without_broken
+from skidyn.evidence._folds import Normal, nearest_folds
 from skidyn.evidence._kinematics import SmoothedMotion, as_given, smooth_motion
 from skidyn.evidence._rows import (
     FEWEST_SAMPLES,
@@ -22,20 +23,15 @@ from skidyn.evidence._rows import (
     sliding_samples,
     window_rows,
 )
-from skidyn.rigid_body._base_parameters import base_parameter_index
-from skidyn.robots import Robot
+from skidyn.robots import Robot, base_parameter_index
 
 #: Columns of the rigid body weaker than this (relative, after pivoting) are dependent on others.
 RANK_TOLERANCE = 2e-6
-#: Diagonal added to normalised normal equations, far below any information in the data.
-RIDGE = 1e-9
 #: Folds: whole trajectories where there are more than this many, else blocks of them.
 FEW_TRAJECTORIES, FEWEST_BLOCKS, MOST_FOLDS = 6, 8, 20
 #: Share of the smoother's half width that is left out around rest and reversals, and the samples
 #: left out where a model of hysteresis says what happens between the two.
 MARGIN, SHORT_MARGIN = 0.75, 1
-#: What effects may need that is known after a first fit only.
-_FED = {"load", "model_torque", "robot"}
 
 
 @dataclass(frozen=True)
@@ -44,21 +40,18 @@ class Fit:
 
     Attributes
     ----------
-    terms : tuple of Term
+    terms : TermSum
         Terms beside the rigid body, in the order of the coefficients.
     coefficients : ndarray of shape (n_coefficients,)
         First the rigid body's independent parameters, then those of the terms.
-    covariance : ndarray of shape (n_coefficients, n_coefficients)
-        For independent rows of unit weight; inflate it for autocorrelation.
     residual : list of ndarray of shape (n_rows_j,)
         Residual of the averaged rows of every joint, N m or N.
     sigma : ndarray of shape (n_joints,)
         Noise of one row of every joint, by which the rows were weighted.
     """
 
-    terms: tuple[Term, ...]
+    terms: TermSum
     coefficients: Array
-    covariance: Array
     residual: list[Array]
     sigma: Array
 
@@ -84,7 +77,7 @@ class Problem:
         Measured torque less what is not fitted: the rigid body with the parameters of the URDF, or
         the prediction of a given regressor. Identified parameters are corrections to the URDF's,
         so that what the data leaves open stays as in the URDF.
-    terms : tuple of Term
+    terms : TermSum
         Effects that the user's model has already.
     rows : Rows
         Averaging windows.
@@ -96,13 +89,15 @@ class Problem:
         Whether folds are whole trajectories.
     rigid_body : bool
         Whether rigid-body parameters are identified together with the effects.
+    logged : Signals or None
+        Motion as it was logged.
     """
 
     robot: Robot | None
     motion: SmoothedMotion
     signals: Signals
     torque: Array
-    terms: tuple[Term, ...]
+    terms: TermSum
     rows: Rows
     fold: list[NDArray[np.int64]]
     n_folds: int
@@ -110,6 +105,7 @@ class Problem:
     rigid_body: bool
     rigid_index: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     rigid_rows: list[Array] = field(default_factory=list)
+    logged: Signals | None = None
     _cache: dict[Term, dict[int, Array]] = field(default_factory=dict, repr=False)
 
     @property
@@ -125,7 +121,7 @@ class Problem:
     def term_rows(self, term: Term) -> dict[int, Array]:
         """Averaged columns of a term, per joint it reaches."""
         if term not in self._cache:
-            self._cache[term] = self.average(term_columns(self.signals, term))
+            self._cache[term] = self.average(term.torque_columns(self.signals))
         return self._cache[term]
 
     def average(self, columns: dict[int, Array]) -> dict[int, Array]:
@@ -141,6 +137,11 @@ class Problem:
             parts += [b[j] if j in b else np.zeros((n_rows, width(b))) for b in blocks]
             design.append(np.hstack(parts))
         return design
+
+    def soft(self, terms: Sequence[Term]) -> list[tuple[slice, float]]:
+        """Coefficients of the flexible functions among some terms, and how they are drawn to 0."""
+        places = TermSum(terms).slices(len(self.rigid_index))
+        return [(own, term.effect.softness) for term, own in places if term.effect.softness]
 
     def with_base_columns(self) -> Problem:
         """The same problem with the columns of all base parameters, also of those left open."""
@@ -167,7 +168,7 @@ class Problem:
         -------
         Fit
         """
-        terms = tuple(terms)
+        terms = TermSum(terms)
         design = self.design([self.term_rows(t) for t in terms])
         target = self.target
         if sigma is None:
@@ -177,6 +178,24 @@ class Problem:
             tell("Fitting", k / passes)
             fit = _weighted(terms, design, target, fit.noise)
         return fit
+
+    def sample_folds(self, joint: int, rows: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
+        """Fold of samples, that of the nearest averaged row of a joint.
+
+        Parameters
+        ----------
+        joint : int
+            Joint, from 0.
+        rows : ndarray of shape (n,) of int, optional
+            Which samples; all by default.
+
+        Returns
+        -------
+        ndarray of shape (n,) of int
+        """
+        rows = np.arange(self.signals.n_samples) if rows is None else rows
+        trajectory, time = self.rows.trajectory[joint], self.rows.time[joint]
+        return nearest_folds(self.signals, rows, trajectory, time, self.fold[joint])
 
     def fit_own(self, passes: int = 3) -> Fit:
         """Fit of the model as given, whose load and torque its own terms and others then know.
@@ -190,11 +209,11 @@ class Problem:
         -------
         Fit
         """
-        free = [t for t in self.terms if not _FED & set(get_effect(t.kind).needs)]
+        free = [t for t in self.terms if not t.effect.follows_fit]
         if len(free) < len(self.terms):  # the others begin with the load of a model without them
-            self.with_fit(self.fit(free, passes=passes))
+            self.set_fit(self.fit(free, passes=passes))
         fit = self.fit(self.terms, passes=passes)
-        self.with_fit(fit)
+        self.set_fit(fit)
         return fit
 
     def inertial_parameters(self, fit: Fit) -> Array | None:
@@ -224,13 +243,10 @@ class Problem:
         """Torque of some terms of a fit at every sample, N m or N."""
         wanted = None if terms is None else set(terms)
         torque = np.zeros_like(self.torque)
-        at = len(self.rigid_index)
-        for term in fit.terms:
-            k = len(get_effect(term.kind).coefficients)
+        for term, own in fit.terms.slices(len(self.rigid_index)):
             if wanted is None or term in wanted:
-                for j, block in term_columns(self.signals, term).items():
-                    torque[:, j] += block @ fit.coefficients[at : at + k]
-            at += k
+                for j, block in term.torque_columns(self.signals).items():
+                    torque[:, j] += block @ fit.coefficients[own]
         return torque
 
     def explained(self, fit: Fit) -> Array:
@@ -243,34 +259,25 @@ class Problem:
             torque += self.robot.inverse_dynamics(s.q, s.dq, s.ddq, parameters=change)
         return torque
 
-    def with_fit(self, fit: Fit) -> None:
+    def set_fit(self, fit: Fit) -> None:
         """Hand the load and the model torque of a fit to the effects that need them."""
         load = self.rigid_torque(fit)
         # What a sensor does to the torque acts on the torque before the sensor.
-        before = [t for t in fit.terms if "model_torque" not in get_effect(t.kind).needs]
-        smooth = [t for t in before if t.kind not in ("coulomb", "stribeck", "offset")]
+        before = [t for t in fit.terms if not t.effect.sees_model]
+        smooth = [t for t in before if not t.is_dry]
         self.signals = self.signals.with_(
             load=load,
             model_torque=load + self.term_torque(fit, before),
             smooth_torque=load + self.term_torque(fit, smooth),
             inertial_parameters=self.inertial_parameters(fit),
         )
-        self._cache = {
-            term: rows
-            for term, rows in self._cache.items()
-            if not _FED & set(get_effect(term.kind).needs)
-        }
+        self._cache = {t: rows for t, rows in self._cache.items() if not t.effect.follows_fit}
 
 
 def hysteresis_joints(terms: Iterable[Term]) -> list[int]:
     """Joints, from 0, whose friction at reversals some of the terms describe."""
-    joints = {j for t in terms if get_effect(t.kind).family == "hysteresis" for j in t.joints}
+    joints = {j for t in terms if t.effect.family == "hysteresis" for j in t.joints}
     return sorted(joints)
-
-
-def term_columns(signals: Signals, term: Term) -> dict[int, Array]:
-    """Columns of a term at every sample, per joint it reaches."""
-    return get_effect(term.kind).torque_columns(signals, term.joints, **term.shape)
 
 
 def width(block: dict[int, Array]) -> int:
@@ -288,6 +295,7 @@ def make_problem(
     smooth: bool = True,
     subtract_urdf: bool = True,
     reversals: Sequence[int] = (),
+    weight: Array | None = None,
 ) -> Problem:
     """Set up rows, folds and rigid-body columns.
 
@@ -310,25 +318,30 @@ def make_problem(
     reversals : sequence of int, default=()
         Joints, from 0, of which the rows reach up to the reversals. Only a model that says what
         friction does there, one of the family ``"hysteresis"``, can be held to them.
+    weight : ndarray of shape (n_samples,), optional
+        Weight of every sample; those of weight 0 enter no row.
 
     Returns
     -------
     Problem
     """
     motion = read_motion(signals, smooth, torque)
-    rows, fold, n_folds, whole = _rows_and_folds(motion, reversals)
+    if weight is not None:
+        motion = replace(motion, valid=motion.valid & (weight > 0)[:, None])
+    rows, fold, n_folds, whole = _rows_and_folds(motion, reversals, weight)
     problem = Problem(
         robot,
         motion,
         motion.signals.with_(robot=robot),
         torque,
-        tuple(terms),
+        TermSum(terms),
         rows,
         fold,
         n_folds,
         whole,
         rigid_body and robot is not None,
     )
+    problem.logged = signals
     problem.rigid_rows = [np.zeros((n, 0)) for n in rows.counts]
     if subtract_urdf and robot is not None:
         s = problem.signals
@@ -357,7 +370,7 @@ def with_reversals(problem: Problem, terms: Iterable[Term], joints: Sequence[int
     rows, fold, n_folds, whole = _rows_and_folds(problem.motion, joints)
     wider = replace(
         problem,
-        terms=tuple(terms),
+        terms=TermSum(terms),
         rows=rows,
         fold=fold,
         n_folds=n_folds,
@@ -391,13 +404,14 @@ def motion_rows(motion: SmoothedMotion, reversals: Sequence[int]) -> Rows:
 
 
 def _rows_and_folds(
-    motion: SmoothedMotion, reversals: Sequence[int]
+    motion: SmoothedMotion, reversals: Sequence[int], weight: Array | None = None
 ) -> tuple[Rows, list[NDArray[np.int64]], int, bool]:
     """Averaging windows and the folds they fall into."""
     # A slow log has wider windows, which reach further over a border; samples reach over none.
     clock = motion.signals.time is not None
     guard = max(WINDOW_GUARD, _half_window(motion.rate)) if clock else 0.0
-    return _folds(motion_rows(motion, reversals), guard)
+    rows = motion_rows(motion, reversals)
+    return _folds(rows if weight is None else rows.weighted(weight), guard)
 
 
 def regressor_rows(problem: Problem, index: NDArray[np.int64] | None = None) -> list[Array]:
@@ -505,22 +519,18 @@ def own_noise(design: Array, target: Array, count: float) -> float:
 
 def weighted_least_squares(design: list[Array], target: list[Array], sigma: Array) -> Array:
     """Coefficients of least squares with joints weighted by their noise."""
-    return _weighted((), design, target, sigma).coefficients
+    return _weighted(TermSum(), design, target, sigma).coefficients
 
 
-def _weighted(
-    terms: tuple[Term, ...], design: list[Array], target: list[Array], sigma: Array
-) -> Fit:
+def _weighted(terms: TermSum, design: list[Array], target: list[Array], sigma: Array) -> Fit:
     a = np.vstack([block / s for block, s in zip(design, sigma, strict=True)])
     y = np.concatenate([t / s for t, s in zip(target, sigma, strict=True)])
     size = np.linalg.norm(a, axis=0)
     size[size == 0] = 1.0
-    gram = (a / size).T @ (a / size) + RIDGE * np.eye(a.shape[1])
-    factor = cho_factor(gram)
-    scaled = cho_solve(factor, (a / size).T @ y)
+    unit = a / size
+    normal = Normal(unit.T @ unit, unit.T @ y, np.ones(len(size)))
     # One refinement step recovers the accuracy that forming the Gram matrix costs.
-    scaled += cho_solve(factor, (a / size).T @ (y - a @ (scaled / size)))
+    scaled = normal.solution + normal.solve(unit.T @ (y - a @ (normal.solution / size)))
     coefficients = scaled / size
-    covariance = cho_solve(factor, np.eye(len(size))) / size[:, None] / size
     residual = [t - block @ coefficients for block, t in zip(design, target, strict=True)]
-    return Fit(terms, coefficients, covariance, residual, np.asarray(sigma, dtype=float))
+    return Fit(terms, coefficients, residual, np.asarray(sigma, dtype=float))

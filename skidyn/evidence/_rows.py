@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
-from scipy.sparse import csc_matrix
+from scipy.sparse import csc_matrix, diags
 
 from skidyn._signals import Array, Signals
 
@@ -66,6 +66,34 @@ class Rows:
     def average(self, values: Array, joint: int) -> Array:
         """Rows of a joint from values at every sample, shape (n_samples,) or (n_samples, k)."""
         return np.asarray(self.weights[joint] @ values)
+
+    def weighted(self, weight: Array) -> Rows:
+        """The same rows, each multiplied by the root of the mean weight of its samples.
+
+        Parameters
+        ----------
+        weight : ndarray of shape (n_samples,)
+            Weight of every sample, 0 or more; only ratios count.
+
+        Returns
+        -------
+        Rows
+            Without rows of weight 0.
+        """
+        shares = [abs(w) for w in self.weights]
+        mean = [np.asarray((s @ weight) / (s @ np.ones_like(weight))) for s in shares]
+        unit = float(np.concatenate(mean)[np.concatenate(mean) > 0].mean())
+        keep = [np.flatnonzero(m > 0) for m in mean]
+        return Rows(
+            [
+                csc_matrix(diags(np.sqrt(m[k] / unit)) @ w.tocsr()[k])
+                for w, m, k in zip(self.weights, mean, keep, strict=True)
+            ],
+            [x[k] for x, k in zip(self.trajectory, keep, strict=True)],
+            [x[k] for x, k in zip(self.time, keep, strict=True)],
+            [x[k] for x, k in zip(self.quarter, keep, strict=True)],
+            self.sliding,
+        )
 
 
 def every_sample(signals: Signals) -> Rows:

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from skidyn._signals import Array
 from skidyn.effects import Shape, Term, get_effect
-from skidyn.evidence._problem import RIDGE, Problem
+from skidyn.evidence._folds import RIDGE, Normal, column_sizes
+from skidyn.evidence._problem import Problem
 
 #: First step of a refinement (a factor 1.5, or a share of the travel), its shrinkage and rounds.
 FIRST_STEP, SHRINK, ROUNDS = 0.5, 2.2, 7
@@ -44,20 +44,16 @@ class Gain:
         self.design = [a / s for a, s in zip(problem.design(blocks), sigma, strict=True)]
         y = [t / s for t, s in zip(target, sigma, strict=True)]
         gram = np.asarray(sum(a.T @ a for a in self.design))
-        scale = np.sqrt(np.diag(gram))
-        scale[scale == 0] = 1.0
-        self.scale = scale
-        self.factor = cho_factor(gram / scale[:, None] / scale + RIDGE * np.eye(len(scale)))
-        cross = sum(a.T @ t for a, t in zip(self.design, y, strict=True)) / scale
-        solution = cho_solve(self.factor, cross) / scale
-        self.residual = [t - a @ solution for a, t in zip(self.design, y, strict=True)]
+        right = np.asarray(sum(a.T @ t for a, t in zip(self.design, y, strict=True)))
+        self.model = Normal(gram, right, column_sizes(gram))
+        self.residual = [t - a @ self.model.solution for a, t in zip(self.design, y, strict=True)]
 
     def __call__(self, rows: dict[int, Array], signs: Array) -> float:
         """Drop of squared error in units of the noise; -inf where a sign is forbidden."""
         z = {j: block / self.sigma[j] for j, block in rows.items()}
-        cross = sum(self.design[j].T @ block for j, block in z.items()) / self.scale[:, None]
+        cross = np.asarray(sum(self.design[j].T @ block for j, block in z.items()))
         own = np.asarray(sum(block.T @ block for block in z.values()))
-        swept = own - cross.T @ cho_solve(self.factor, cross)
+        swept = own - cross.T @ self.model.solve(cross)
         slope = sum(block.T @ self.residual[j] for j, block in z.items())
         swept = swept + (RIDGE * np.trace(own) + 1e-12) * np.eye(len(own))
         coefficients = np.linalg.solve(swept, slope)
@@ -66,16 +62,11 @@ class Gain:
         return float(slope @ coefficients)
 
 
-def coefficient_signs(term: Term) -> Array:
-    """1 for every coefficient of a term that physics forbids to be negative, else 0."""
-    return np.array([c.sign for c in get_effect(term.kind).coefficients])
-
-
 def best_on_grid(problem: Problem, kind: str, joints: tuple[int, ...], gain: Gain) -> Term:
     """The term of a kind whose grid shape explains most."""
     grid = get_effect(kind).grid(problem.signals, joints)
     terms = [Term(kind, joints, shape) for shape in grid]
-    gains = [gain(problem.term_rows(t), coefficient_signs(t)) for t in terms]
+    gains = [gain(problem.term_rows(t), t.signs) for t in terms]
     return terms[int(np.argmax(gains))] if terms else Term(kind, joints)
 
 
@@ -95,11 +86,11 @@ def refine_term(problem: Problem, term: Term, gain: Gain) -> Term:
     -------
     Term
     """
-    effect = get_effect(term.kind)
+    effect = term.effect
     shapes = [s for s in effect.shapes if s.name in term.shape]
     if not shapes or effect.search != "grid":
         return term
-    signs = coefficient_signs(term)
+    signs = term.signs
     values: dict[str, Any] = dict(term.shape)
     best = gain(problem.term_rows(term), signs)
     # The first parameters are visited again after the last has moved.
@@ -113,28 +104,21 @@ def refine_term(problem: Problem, term: Term, gain: Gain) -> Term:
                 if not low <= there <= high:
                     continue
                 trial = {**values, shape.name: float(there)}
-                rows = problem.term_rows(Term(term.kind, term.joints, trial))
+                if not effect.admissible(problem.signals, term.joints, trial):
+                    continue
+                rows = problem.term_rows(term.with_shape(**trial))
                 value = gain(rows, signs)
                 if value > best:
                     best, values, improved = value, trial, True
             if not improved:
                 step /= SHRINK
-    return Term(term.kind, term.joints, values)
+    return term.with_shape(**values)
 
 
 def _range(problem: Problem, term: Term, shape: Shape) -> tuple[float, float, float]:
     """Lowest and highest value of a shape parameter and the first step."""
     unit = float(problem.signals.unit[term.joints[0]]) if shape.scales else 1.0
-    step = FIRST_STEP if shape.spacing == "log" else FIRST_SHARE * _travel(problem, term)
+    step = FIRST_STEP
+    if shape.spacing == "linear":
+        step = FIRST_SHARE * term.effect.travel(problem.signals, term.joints, term.shape)
     return shape.low * unit, shape.high * unit, step
-
-
-def _travel(problem: Problem, term: Term) -> float:
-    """Range over which a linear shape parameter moves, in its own unit."""
-    if "axis" in term.shape:
-        assert problem.robot is not None
-        position, _ = problem.robot.forward_kinematics(problem.signals.q)
-        return float(np.ptp(position[:, int(term.shape["axis"])]))
-    if "ratio" in term.shape or "n" in term.shape:
-        return 1.0
-    return float(np.ptp(problem.signals.q[:, term.joints[0]]))

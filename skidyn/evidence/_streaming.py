@@ -16,12 +16,11 @@ from joblib import Parallel, delayed, effective_n_jobs
 
 from skidyn._exceptions import LogError, SkidynError
 from skidyn._signals import Array, Signals
-from skidyn.effects import Term, get_effect, make_terms
+from skidyn.effects import Term, TermSum, make_terms
 from skidyn.evidence._evidence import Evidence, column_names
 from skidyn.evidence._parquet import ColumnMap, read_trajectories
 from skidyn.evidence._problem import Problem, hysteresis_joints, motion_rows, read_motion
-from skidyn.rigid_body._base_parameters import base_parameter_index
-from skidyn.robots import Robot
+from skidyn.robots import Robot, base_parameter_index
 
 PathLike = str | os.PathLike[str]
 #: More tasks balance the load and lose less with a worker; fewer cost less to hand out.
@@ -67,7 +66,7 @@ def evidence_from_parquet(
     paths : path or iterable of path
         Files, or a folder of ``*.parquet``, with position and torque of every joint and, where
         they are known, ``time`` (s), ``trajectory``, velocity, acceleration and temperature, in SI
-        units, under any of the names that :func:`skidyn.datasets.read_log` knows. Consecutive rows
+        units, under any of the names that :func:`skidyn.logs.read_log` knows. Consecutive rows
         of one trajectory number are one trajectory; none reaches over the end of a file.
     robot : Robot
         Robot.
@@ -75,7 +74,7 @@ def evidence_from_parquet(
         Effects beside the rigid body. Their shape parameters must be given.
     columns : mapping, optional
         Which column holds which signal where the names do not tell, as in
-        :func:`skidyn.datasets.read_log`: ``{"tau": "load_{joint}"}``.
+        :func:`skidyn.logs.read_log`: ``{"tau": "load_{joint}"}``.
     groups : int or None, default=20
         Trajectories are numbered in the order of files and rows, whatever their numbers in the
         files. The factor of trajectory ``k`` is merged into that of group ``k % groups``, so that
@@ -204,7 +203,7 @@ def evidence_of_signals(
         motion=motion,
         signals=s.with_(robot=robot),
         torque=torque - robot.inverse_dynamics(s.q, s.dq, s.ddq),
-        terms=terms,
+        terms=TermSum(terms),
         rows=rows,
         fold=[np.zeros(n, dtype=np.int64) for n in rows.counts],
         n_folds=1,
@@ -226,24 +225,18 @@ def linear_terms(effects: Iterable[Any], n_joints: int) -> list[Term]:
     """
     terms = make_terms(effects, n_joints)
     for term in terms:
-        effect = get_effect(term.kind)
-        if needs_a_fit(term):
+        if term.effect.needs_fit:
             raise SkidynError(
                 f"the columns of {term.kind!r} need a fit of the model first, so no evidence can "
                 "be had in one pass; leave it out, or fit an RBDRegressor on data in memory"
             )
-        if effect.shapes and not term.shape:
-            names = ", ".join(shape.name for shape in effect.shapes)
+        if term.is_open:
+            names = ", ".join(shape.name for shape in term.effect.shapes) or "found from the log"
             raise SkidynError(
                 f"{term.kind!r} has open shape parameters ({names}); give them with Term(...), for "
                 "example those found on a part of the data"
             )
     return terms
-
-
-def needs_a_fit(term: Term) -> bool:
-    """Whether a term's columns are known only when a model has been fitted."""
-    return bool({"load", "model_torque"} & set(get_effect(term.kind).needs))
 
 
 def parquet_files(paths: PathLike | Iterable[PathLike]) -> list[Path]:

@@ -10,3 +10,10 @@ __all__ = [
     "MotionLimits",
     "design_excitation",
 ]
+
+# For other packages of skidyn; no part of the public interface.
+from skidyn.excitation._fourier import (
+    fourier as fourier,
+    product as product,
+    rest_window as rest_window,
+)

@@ -18,7 +18,7 @@ from skidyn.excitation._basis import FourierBasis, QuinticBasis
 from skidyn.excitation._excitation import Excitation
 from skidyn.excitation._information import Model, evaluate, make_model, recorded_information
 from skidyn.excitation._limits import MotionLimits
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
 
 if TYPE_CHECKING:
@@ -88,12 +88,12 @@ def design_excitation(
         regressor with columns of equal length (and a small share of the determinant, so that the
         motion stays large).
     effects : iterable, default=None
-        Effects that are to be told too, as for :class:`~skidyn.rigid_body.RBDRegressor`. None:
+        Effects that are to be told too, as for :class:`~skidyn.identification.RBDRegressor`. None:
         those of a fitted model, else viscous and Coulomb friction.
     limits : MotionLimits, optional
         Limits; those of the URDF by default.
     recorded : DataFrame, Excitation or list of them, default=()
-        Recordings already made, as :func:`~skidyn.datasets.read_log` returns them, or motions
+        Recordings already made, as :func:`~skidyn.logs.read_log` returns them, or motions
         already designed: the new one adds to what they tell. They count by their length in s.
     iterations : int, default=100
         Steps of the descent from each of the two best of 40 random motions, for each of two
@@ -301,7 +301,7 @@ class _Search:
         """How far torque and workspace limits are broken: mean squares, zero where they hold."""
         import torch
 
-        from skidyn.rigid_body._torch import evaluate as run
+        from skidyn.dynamics import evaluate_torch as run
 
         total = q.new_zeros(())
         if np.isfinite(self.limits.torque).any():

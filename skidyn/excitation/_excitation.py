@@ -71,6 +71,7 @@ class Excitation:
         Returns
         -------
         time : ndarray of shape (n_samples,), s
+            From 0 to :attr:`duration`, both included.
         q, dq, ddq : ndarray of shape (n_samples, n_joints)
             Position, velocity and acceleration, SI units.
         """
@@ -106,7 +107,7 @@ class Excitation:
         """Write the motion as CSV, in one step.
 
         With the measured torques as columns ``tau1 ..`` it is a log that
-        :func:`~skidyn.datasets.read_log` reads.
+        :func:`~skidyn.logs.read_log` reads.
 
         Parameters
         ----------
@@ -115,6 +116,6 @@ class Excitation:
         rate : float, Hz, default=100
             Samples per second.
         """
-        from skidyn.report._write import write_text
+        from skidyn._writing import write_text
 
         write_text(path, self.to_frame(rate).to_csv(index=False))

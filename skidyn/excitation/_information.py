@@ -12,17 +12,13 @@ import numpy as np
 from skidyn._columns import resolve_columns
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Array, signals_from
-from skidyn._symbols import Instant, SymbolicRobot, replay, symbols
-from skidyn.effects import Term, get_effect, make_terms
-from skidyn.evidence._kinematics import as_given, sampling_rate, smooth_motion
+from skidyn.dynamics import BoundProgram, Program, Scalar, Tape, chunk_size, evaluate_rows
+from skidyn.effects import Term, TermSum, make_terms
+from skidyn.evidence import as_given, sampling_rate, smooth_motion
 from skidyn.excitation._excitation import Excitation
-from skidyn.export._model import check_model, static_model
-from skidyn.rigid_body import RBDRegressor
-from skidyn.rigid_body._base_parameters import base_parameter_index
-from skidyn.rigid_body._numpy import BoundProgram, chunk_size, evaluate_rows
-from skidyn.rigid_body._recursion import Program
-from skidyn.rigid_body._tape import Scalar, Tape
-from skidyn.robots import Robot
+from skidyn.export import check_model, static_model
+from skidyn.identification import RBDRegressor
+from skidyn.robots import Instant, Robot, SymbolicRobot, base_parameter_index, replay, symbols
 
 if TYPE_CHECKING:
     import torch
@@ -71,9 +67,9 @@ class Model:
         """The same, differentiable."""
         import torch
 
-        from skidyn.rigid_body import _torch
+        from skidyn.dynamics import evaluate_torch
 
-        columns = _torch.evaluate(self.columns, {"q": q, "dq": dq, "ddq": ddq})
+        columns = evaluate_torch(self.columns, {"q": q, "dq": dq, "ddq": ddq})
         flat = (columns / torch.from_numpy(self.noise)[:, None]).reshape(-1, columns.shape[2])
         return flat.T @ flat * (seconds / len(q))
 
@@ -118,18 +114,16 @@ def _columns(robot: Robot, terms: Sequence[Term]) -> Program:
     instant = Instant(
         q, dq, ddq, np.zeros(1, dtype=int), prismatic=sliding, robot=symbolic, load=load
     )
-    at = len(place)
-    for term in terms:
+    for term, own in TermSum(terms).slices(len(place)):
         for j, block in _effect_columns(term, instant).items():
             for k, value in enumerate(np.asarray(block)[0]):
-                outputs[j, at + k] = tape.constant(0.0) + value
-        at += len(get_effect(term.kind).coefficients)
-    return Program(tape, outputs, (n, at))
+                outputs[j, own.start + k] = tape.constant(0.0) + value
+    return Program(tape, outputs, (n, len(place) + TermSum(terms).width))
 
 
 def _effect_columns(term: Term, instant: Instant) -> dict[int, Array]:
     try:
-        return get_effect(term.kind).torque_columns(instant, term.joints, **term.shape)
+        return term.torque_columns(instant)
     except KeyError as error:
         raise SkidynError(
             f"{term.kind} has the shape parameter {error}: give a Term with its value, such as "
@@ -167,15 +161,9 @@ def _information_of_log(model: Model, frame: Any) -> Array:
     if columns.time is None:
         raise SkidynError("a recording has no column 'time'; its length is needed")
     smooths = columns.ddq is None
-    if columns.ddq is None:  # a placeholder; the smoother replaces it
-        columns = type(columns)(
-            columns.q, columns.dq, columns.dq, columns.trajectory, columns.time, None
-        )
-    keys = (columns.time, columns.trajectory)
-    used = [*columns.state(), *(key for key in keys if key is not None)]
     table = np.full((len(frame), len(names)), np.nan)
-    table[:, used] = np.asarray(frame.iloc[:, used], dtype=float)
-    signals = signals_from(table, columns, model.robot)
+    table[:, columns.used()] = np.asarray(frame.iloc[:, columns.used()], dtype=float)
+    signals = signals_from(table, columns, model.robot, to_derive=True)
     motion = smooth_motion(signals) if smooths else as_given(signals)
     s = motion.signals.take(np.asarray(motion.valid.all(axis=1)))
     if s.n_samples == 0:

@@ -15,12 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from skidyn._signals import Array
-from skidyn.diagnosis._candidates import Candidate
-from skidyn.diagnosis._screen import CANDIDATE_RIDGE
-from skidyn.evidence._problem import RIDGE, Problem
+from skidyn.diagnosis import CANDIDATE_RIDGE, Candidate
+from skidyn.evidence import Normal, Problem, column_sizes, fold_products, fold_slices
 
 Block = dict[int, Array]
 
@@ -71,8 +69,8 @@ class FoldedModel:
     blocks: list[Block]
     design: list[Array]
     weight: Array
-    fits: list[_Normal]
-    whole: _Normal
+    fits: list[Normal]
+    whole: Normal
 
 
 class Ranking:
@@ -92,9 +90,7 @@ class Ranking:
         self, problem: Problem, candidates: Sequence[Candidate], target: Sequence[Array]
     ) -> None:
         self.problem, self.candidates, self.target = problem, list(candidates), list(target)
-        self._edges = [
-            np.searchsorted(fold, np.arange(problem.n_folds + 1)) for fold in problem.fold
-        ]
+        self._folds = [list(fold_slices(fold, problem.n_folds)) for fold in problem.fold]
         widths = [c.width for c in self.candidates]
         ends = np.cumsum([0, *widths])
         self._columns = [np.arange(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
@@ -132,23 +128,17 @@ class Ranking:
         """
         design = self.problem.design(blocks)
         weight = 1 / np.asarray(sigma) ** 2
-        gram, right = self._normal_equations(design, weight)
-        total = gram.sum(0), right.sum(0)
-        fits = [
-            _Normal(total[0] - g, total[1] - r, total[0]) for g, r in zip(gram, right, strict=True)
-        ]
-        return FoldedModel(list(blocks), design, weight, fits, _Normal(*total, total[0]))
+        grams, cross = fold_products(self.problem, design, sigma, self.target)
+        gram, right = grams.sum(0), cross.sum(0)
+        size = column_sizes(gram)
+        fits = [Normal(gram - g, right - r, size) for g, r in zip(grams, cross, strict=True)]
+        return FoldedModel(list(blocks), design, weight, fits, Normal(gram, right, size))
 
     def residual(self, model: FoldedModel, joint: int) -> Array:
         """Residual of every row of a joint, counted from 0, under the fit without its fold."""
         y, a = self.target[joint], model.design[joint]
-        edges = self._edges[joint]
-        return np.concatenate(
-            [
-                y[i:k] - a[i:k] @ fit.solution
-                for fit, i, k in zip(model.fits, edges[:-1], edges[1:], strict=True)
-            ]
-        )
+        pairs = zip(model.fits, self._folds[joint], strict=True)
+        return np.concatenate([y[rows] - a[rows] @ fit.solution for fit, rows in pairs])
 
     def noise(self, model: FoldedModel) -> Array:
         """Root mean square of the residual rows of every joint under the fit to all folds."""
@@ -178,12 +168,11 @@ class Ranking:
         target = np.tensordot(model.weight, self._target[:, :, 0], 1)[:, columns]
         now = self.residual(model, joint)
         then = np.empty((len(now), len(index)))
-        edges = self._edges[joint]
-        for f, (fit, a, b) in enumerate(zip(model.fits, edges[:-1], edges[1:], strict=True)):
+        for f, (fit, rows) in enumerate(zip(model.fits, self._folds[joint], strict=True)):
             left = cross.sum(0) - cross[f], target.sum(0) - target[f]
             gain, change = self._gain(fit, *left, index, f, model.weight)
-            explained = self._explained(joint, slice(a, b), index, gain)
-            then[a:b] = (now[a:b, None] - explained + model.design[joint][a:b] @ change) ** 2
+            explained = self._explained(joint, rows, index, gain)
+            then[rows] = (now[rows, None] - explained + model.design[joint][rows] @ change) ** 2
         gain, _ = self._gain(model.whole, cross.sum(0), target.sum(0), index, None, model.weight)
         allowed = np.array(
             [self._allowed(i, g) for i, g in zip(index, gain, strict=True)], dtype=bool
@@ -210,9 +199,8 @@ class Ranking:
         n_columns = sum(len(c) for c in self._columns)
         out = np.zeros((len(left), self.problem.n_folds, left[0].shape[1], n_columns))
         for j, (a, b) in enumerate(zip(left, right, strict=True)):
-            edges = self._edges[j]
-            for f, (i, k) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
-                out[j, f][:, where[j]] = a[i:k].T @ b[i:k]
+            for f, rows in enumerate(self._folds[j]):
+                out[j, f][:, where[j]] = a[rows].T @ b[rows]
         return out
 
     def _crossed(self, block: Block) -> Array:
@@ -235,27 +223,15 @@ class Ranking:
         shape = (self.problem.n_joints, self.problem.n_folds, len(index), k, k)
         grams = np.zeros(shape)
         for n, candidate in enumerate(self.candidates[int(i)] for i in index):
-            for j, rows in candidate.rows.items():
-                edges = self._edges[j]
-                for f, (a, b) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
-                    grams[j, f, n] = rows[a:b].T @ rows[a:b]
+            for j, block in candidate.rows.items():
+                for f, rows in enumerate(self._folds[j]):
+                    grams[j, f, n] = block[rows].T @ block[rows]
         return grams
-
-    def _normal_equations(self, design: Sequence[Array], weight: Array) -> tuple[Array, Array]:
-        p = design[0].shape[1]
-        gram = np.zeros((self.problem.n_folds, p, p))
-        right = np.zeros((self.problem.n_folds, p))
-        for j, (a, y) in enumerate(zip(design, self.target, strict=True)):
-            edges = self._edges[j]
-            for f, (i, k) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
-                gram[f] += weight[j] * (a[i:k].T @ a[i:k])
-                right[f] += weight[j] * (a[i:k].T @ y[i:k])
-        return gram, right
 
     # ------------------------------------------------------------------ one fold
     def _gain(
         self,
-        fit: _Normal,
+        fit: Normal,
         cross: Array,
         target: Array,
         index: NDArray[np.int64],
@@ -300,20 +276,3 @@ class Ranking:
 
 def _without(grams: Array, fold: int) -> Array:
     return np.asarray(grams.sum(1) - grams[:, fold])
-
-
-class _Normal:
-    """The model fitted to some folds by its normal equations."""
-
-    def __init__(self, gram: Array, right: Array, total: Array) -> None:
-        scale = np.sqrt(np.diag(total))
-        scale[scale == 0] = 1.0
-        self._scale = scale
-        normal = gram / scale[:, None] / scale + RIDGE * np.eye(len(scale))
-        self._factor = cho_factor(normal, check_finite=False)
-        self.solution = self.solve(right[:, None])[:, 0]
-
-    def solve(self, right: Array) -> Array:
-        """Solve for a matrix of right-hand sides."""
-        scale = self._scale[:, None]
-        return np.asarray(cho_solve(self._factor, right / scale, check_finite=False)) / scale

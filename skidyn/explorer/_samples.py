@@ -8,9 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from skidyn._signals import Array
-from skidyn.diagnosis._held_out import sample_folds
-from skidyn.effects import Term, get_effect
-from skidyn.evidence._problem import Problem, term_columns
+from skidyn.effects import Term, TermSum
+from skidyn.evidence import Problem
 
 #: Samples for which the rigid body is worked out at once.
 MOST = 8192
@@ -27,7 +26,7 @@ class Samples:
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        fold = sample_folds(problem)
+        fold = problem.sample_folds(int(np.argmax(problem.rows.counts)))
         self._fold = fold
         self._of_fold = [np.flatnonzero(fold == f) for f in range(problem.n_folds)]
         self._columns: dict[Term, dict[int, Array]] = {}
@@ -50,20 +49,17 @@ class Samples:
         """
         residual = np.array(self.problem.torque)
         self._take_rigid_body(residual, coefficients)
-        at = len(self.problem.rigid_index)
-        for term in terms:
-            k = len(get_effect(term.kind).coefficients)
-            own = np.array([left[at : at + k] for left in coefficients])[self._fold]
-            if "trajectory" in term.shape:
-                own = whole[None, at : at + k]
+        for term, place in TermSum(terms).slices(len(self.problem.rigid_index)):
+            own = np.array([left[place] for left in coefficients])[self._fold]
+            if term.trajectories is not None:
+                own = whole[None, place]
             for j, block in self._term_columns(term).items():
                 residual[:, j] -= np.sum(block * own, axis=1)
-            at += k
         return residual
 
     def _term_columns(self, term: Term) -> dict[int, Array]:
         if term not in self._columns:
-            self._columns[term] = term_columns(self.problem.signals, term)
+            self._columns[term] = term.torque_columns(self.problem.signals)
         return self._columns[term]
 
     def _take_rigid_body(self, residual: Array, coefficients: Sequence[Array]) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from skidyn.effects import Term
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
 
 
 def script(
@@ -36,7 +36,7 @@ def script(
     joints : sequence of str, optional
         Joints the log covers.
     reading : mapping
-        Further arguments of :func:`skidyn.datasets.read_log`; None where not given.
+        Further arguments of :func:`skidyn.logs.read_log`; None where not given.
 
     Returns
     -------
@@ -49,10 +49,10 @@ def script(
         '"""What was clicked in skidyn explore; prints the held-out errors that it showed."""',
         "",
         "from skidyn import save_model",
-        "from skidyn.datasets import read_log",
+        "from skidyn.logs import read_log",
         *(["from skidyn.effects import Term"] if "Term(" in effects else []),
         "from skidyn.explorer import Session",
-        "from skidyn.rigid_body import RBDRegressor",
+        "from skidyn.identification import RBDRegressor",
         "from skidyn.robots import Robot",
         "",
         f"robot = Robot.from_urdf({str(urdf)!r}{only})",

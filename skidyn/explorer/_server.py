@@ -7,11 +7,13 @@ import asyncio
 import json
 import secrets
 import socket
+import threading
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future
 from dataclasses import asdict
 from importlib.resources import files
 from pathlib import Path
+from queue import SimpleQueue
 from typing import Any
 
 from skidyn._bundled import bundled
@@ -19,9 +21,13 @@ from skidyn._exceptions import SkidynError
 from skidyn._optional import import_optional
 from skidyn._progress import listening
 from skidyn.explorer._session import Session
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
 
+#: What saving writes, into the folder chosen at the start.
+SAVED = ("model.skops", "explored.py", "report.html")
 HOST = "127.0.0.1"
+#: Longest question of the page, bytes; its own have some hundred.
+LONGEST_BODY = 2**16
 
 
 class Explorer:
@@ -64,8 +70,8 @@ class Explorer:
 
         Parameters
         ----------
-        question : {"state", "curves", "ranked", "add", "refine", "undo", "save", "report", \
-                "progress"}
+        question : {"state", "curves", "ranked", "add", "refine", "undo", "remove", "sizes", \
+                "save", "report", "progress"}
             What is asked.
         words : dict
             Its arguments.
@@ -82,6 +88,8 @@ class Explorer:
             "add": self._add,
             "refine": self._refine,
             "undo": self._undo,
+            "remove": self._remove,
+            "sizes": self._sizes,
             "save": self._save,
             "report": self._report,
             "progress": self._progress,
@@ -99,6 +107,8 @@ class Explorer:
             "trajectories": s.trajectories,
             "history": s.history,
             "refinable": s.refinable,
+            "noise": [float(x) for x in s.noise],
+            "worst": s.worst,
         }
 
     def _curves(self, joint: int, trajectory: int) -> dict[str, Any]:
@@ -118,16 +128,26 @@ class Explorer:
 
     def _add(self, kind: str, joint: int, trajectory: int) -> dict[str, Any]:
         """First answer, at once: the shape is that of the grid until the page asks to refine."""
+        self.session.check_place(int(joint), int(trajectory))
         self.session.add(str(kind), int(joint), refined=False)
         return self._changed(joint, trajectory)
 
     def _refine(self, joint: int, trajectory: int) -> dict[str, Any]:
+        self.session.check_place(int(joint), int(trajectory))
         self.session.refine()
         return self._changed(joint, trajectory)
 
     def _undo(self, joint: int, trajectory: int) -> dict[str, Any]:
+        self.session.check_place(int(joint), int(trajectory))
         self.session.undo()
         return self._changed(joint, trajectory)
+
+    def _remove(self, step: int, joint: int, trajectory: int) -> dict[str, Any]:
+        self.session.remove(int(step))
+        return self._changed(joint, trajectory)
+
+    def _sizes(self) -> dict[str, Any]:
+        return {"sizes": self.session.sizes()}
 
     def _changed(self, joint: int, trajectory: int) -> dict[str, Any]:
         return {**self._state(), "curves": self._curves(joint, trajectory)}
@@ -135,7 +155,7 @@ class Explorer:
     def _save(self) -> dict[str, Any]:
         """Model and script, under fixed names in the folder chosen at the start."""
         from skidyn import save_model
-        from skidyn.report._write import write_text
+        from skidyn._writing import write_text
 
         self.session.refine()
         self.folder.mkdir(parents=True, exist_ok=True)
@@ -155,7 +175,7 @@ class Explorer:
         if self._saved is None:
             raise SkidynError("no model is saved yet")
         with listening(self._hear):
-            diagnosis = diagnose(self._saved, *self.session.data)
+            diagnosis = diagnose(self._saved, *self.session.data, force=True)
         return {"saved": [str(write_html(self.folder / "report.html", summarize(diagnosis)))]}
 
     def _hear(self, text: str, share: float | None) -> None:
@@ -183,6 +203,38 @@ def page() -> str:
     return text
 
 
+class _Worker:
+    """A thread that answers one question after the other, and ends with the process.
+
+    Those of concurrent.futures are waited for: after Ctrl-C, until a report is done.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._tasks: SimpleQueue[tuple[Future[Any], Callable[..., Any], tuple[Any, ...]]] = (
+            SimpleQueue()
+        )
+        threading.Thread(target=self._run, name=name, daemon=True).start()
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        """Call a function when those before it are done."""
+        future: Future[Any] = Future()
+        self._tasks.put((future, function, arguments))
+        return future
+
+    def _run(self) -> None:
+        while True:
+            future, function, arguments = self._tasks.get()
+            if future.set_running_or_notify_cancel():
+                try:
+                    future.set_result(function(*arguments))
+                except BaseException as error:  # the one who asked hears of it
+                    future.set_exception(error)
+
+
+def _refuse_constant(name: str) -> float:
+    raise SkidynError(f"{name} is no number of JSON")
+
+
 def make_app(explorer: Explorer, port: int) -> Any:
     """The web application.
 
@@ -200,16 +252,13 @@ def make_app(explorer: Explorer, port: int) -> Any:
     import_optional("starlette", extra="explore")
     from starlette.applications import Starlette
     from starlette.requests import Request
-    from starlette.responses import HTMLResponse, JSONResponse, Response
+    from starlette.responses import FileResponse, HTMLResponse, JSONResponse, Response
     from starlette.routing import Route
 
     # one thread: one answer at a time, and the rigid body's buffers, kept per thread, stay warm
-    worker = ThreadPoolExecutor(1, "skidyn-explore")
+    worker = _Worker("skidyn-explore")
     # the report takes long, and the loop goes on meanwhile
-    beside = {
-        "report": ThreadPoolExecutor(1, "skidyn-report"),
-        "progress": ThreadPoolExecutor(1, "skidyn-progress"),
-    }
+    beside = {"report": _Worker("skidyn-report"), "progress": _Worker("skidyn-progress")}
     hosts = {f"{HOST}:{port}", f"localhost:{port}"}
     headers = {
         "Cache-Control": "no-store",
@@ -219,7 +268,7 @@ def make_app(explorer: Explorer, port: int) -> Any:
     }
 
     def refused(request: Request, token: str | None) -> bool:
-        right = secrets.compare_digest(token or "", explorer.token)
+        right = secrets.compare_digest((token or "").encode(), explorer.token.encode())
         return not right or request.headers.get("host") not in hosts
 
     async def start(request: Request) -> Response:
@@ -231,18 +280,39 @@ def make_app(explorer: Explorer, port: int) -> Any:
         if refused(request, request.headers.get("x-token")):
             return JSONResponse({"error": "wrong token"}, 403)
         try:
-            words = json.loads(await request.body() or b"{}")
+            body = b""
+            async for part in request.stream():
+                body += part
+                if len(body) > LONGEST_BODY:
+                    told = f"a question has at most {LONGEST_BODY} bytes"
+                    return JSONResponse({"error": told}, 413, headers=headers)
+            words = json.loads(body or b"{}", parse_constant=_refuse_constant)
             if not isinstance(words, dict):
                 raise SkidynError("an object is expected")
             question = request.path_params["question"]
-            loop = asyncio.get_running_loop()
             thread = beside.get(question, worker)
-            content = await loop.run_in_executor(thread, explorer.answer, question, words)
-        except (SkidynError, LookupError, OSError, TypeError, ValueError) as error:
+            content = await asyncio.wrap_future(thread.submit(explorer.answer, question, words))
+            return JSONResponse(content, headers=headers)
+        except (LookupError, OSError, TypeError, ValueError, OverflowError) as error:
             return JSONResponse({"error": str(error)}, 400, headers=headers)
-        return JSONResponse(content, headers=headers)
+        except RecursionError:
+            return JSONResponse({"error": "the question is nested too deep"}, 400, headers=headers)
 
-    routes = [Route("/", start), Route("/api/{question}", api, methods=["POST"])]
+    async def saved(request: Request) -> Response:
+        """A file that was saved, by one of its fixed names."""
+        name = request.path_params["name"]
+        if refused(request, request.query_params.get("token")):
+            return HTMLResponse("Open the address that skidyn explore printed.", 403)
+        if name not in SAVED or not (explorer.folder / name).is_file():
+            return HTMLResponse("There is no such file.", 404)
+        # a report draws itself and loads nothing; it brings its own policy
+        return FileResponse(explorer.folder / name, headers={"Cache-Control": "no-store"})
+
+    routes = [
+        Route("/", start),
+        Route("/saved/{name}", saved),
+        Route("/api/{question}", api, methods=["POST"]),
+    ]
     return Starlette(routes=routes)
 
 
@@ -272,7 +342,7 @@ def serve(
     joints : sequence of str, optional
         Joints the log covers, for the script.
     reading : mapping, optional
-        Further arguments with which :func:`skidyn.datasets.read_log` read the log, for the script.
+        Further arguments with which :func:`skidyn.logs.read_log` read the log, for the script.
     port : int, default=0
         Port; a free one if 0.
     ready : callable, default=print
@@ -295,6 +365,9 @@ def serve(
     listener.bind((HOST, port))
     port = listener.getsockname()[1]
     app = make_app(explorer, port)
-    config = uvicorn.Config(app, log_level="error", access_log=False)
+    # a report that is running is given up: files are written whole or not at all
+    config = uvicorn.Config(
+        app, log_level="critical", access_log=False, timeout_graceful_shutdown=1
+    )
     ready(f"http://{HOST}:{port}/?token={explorer.token}")
     uvicorn.Server(config).run(sockets=[listener])

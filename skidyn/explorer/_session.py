@@ -5,31 +5,38 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._exceptions import EffectError
-from skidyn._signals import Array
-from skidyn.diagnosis._candidates import Candidate, catalogue_candidates
-from skidyn.diagnosis._diagnosis import _own_terms
-from skidyn.diagnosis._profile import refine
-from skidyn.diagnosis._reading import read_signals
+from skidyn._signals import Array, read_signals
+from skidyn._text import measure
+from skidyn.diagnosis import (
+    Candidate,
+    catalogue_candidates,
+    own_terms,
+    parameter_intervals,
+    refine,
+)
 from skidyn.effects import Term, get_effect, list_effects
-from skidyn.evidence._problem import make_problem
+from skidyn.evidence import make_problem
 from skidyn.explorer._ranking import FoldedModel, HeldOutRows, Ranking
 from skidyn.explorer._samples import Samples
 from skidyn.explorer._script import script
-from skidyn.report._decimate import rows_with_peaks
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
+from skidyn.report import rows_with_peaks
 
+#: Parameters of an addition that are told, and the median size of a normal variable.
+TOLD, MEDIAN = 3, 0.6744897501960817
 #: Points of a curve, and effects in a ranking.
 POINTS, RANKED = 1500, 8
 #: A click stands for this long, s, and for at least so many averaged rows.
 STRETCH, LEAST_ROWS = 1.0, 8
-#: An effect that takes less of the squared error, held out, is not listed.
-LEAST_DROP = 1e-3
+#: An effect that takes less of the squared error of samples, held out, is not listed.
+LEAST_DROP = 0.02
 
 
 @dataclass(frozen=True)
@@ -85,7 +92,7 @@ class Session:
     Examples
     --------
     >>> from skidyn.datasets import load_planar_arm, make_hidden_effect_log
-    >>> from skidyn.rigid_body import RBDRegressor
+    >>> from skidyn.identification import RBDRegressor
     >>> log = make_hidden_effect_log(load_planar_arm(), "spring", joints=[2])
     >>> session = Session(RBDRegressor(log.robot), log.X, log.y)
     >>> session.ranked(joint=2)[0].kind
@@ -103,7 +110,7 @@ class Session:
         self.robot = robot
         signals, torque = read_signals(X, tau, robot, trajectory=model.trajectory, time=model.time)
         self.torque = torque
-        terms = _own_terms(model, robot, X, tau)
+        terms = own_terms(model, robot, X, tau)
         identified = model.parameters == "identified"
         self.problem = make_problem(
             signals, torque, robot=robot, rigid_body=identified, terms=terms
@@ -132,6 +139,45 @@ class Session:
         which it was added, counted from 1.
         """
         return [step.entry for step in self._steps]
+
+    @cached_property
+    def noise(self) -> Array:
+        """Fast noise of the torque sensors, N m or N; no model can be better.
+
+        Third differences of the residual leave what is faster than any motion; noise that is
+        correlated over several samples is not in it.
+        """
+        residual = self._steps[0].residual
+        parts = [np.diff(residual[rows], n=3, axis=0) for rows in self.problem.signals.segments]
+        size: Array = np.median(np.abs(np.concatenate(parts)), axis=0) / MEDIAN / np.sqrt(20)
+        return size
+
+    @property
+    def worst(self) -> int:
+        """Joint whose held-out error as given is largest over its noise, counted from 1."""
+        error = np.array(self.history[0]["rmse"])
+        return int(np.argmax(error / np.maximum(self.noise, 1e-9 * np.abs(self.torque).max()))) + 1
+
+    def sizes(self) -> list[str]:
+        """What was added in numbers: parameters with half their 95 % intervals, step by step.
+
+        Returns
+        -------
+        list of str
+            Such as ``"k = 3.5 ± 0.4 N m/rad"``, one for each addition.
+        """
+        if not self.added:
+            return []
+        intervals = parameter_intervals(self.problem, self.terms, self._steps[-1].noise)
+        slides = self.problem.signals.prismatic
+        return [
+            ", ".join(
+                measure(name, value, term.effect.units(bool(slides[term.joints[0]])).get(name, ""))
+                for term in terms
+                for name, value in list(intervals[term].items())[:TOLD]
+            )
+            for terms in self.added
+        ]
 
     @property
     def refinable(self) -> bool:
@@ -286,13 +332,14 @@ class Session:
         rows = self._rows_in(j, trajectory, span)
         here = drop if rows.all() else found.drops(rows)
         best: dict[str, RankedEffect] = {}
+        least = LEAST_DROP / self._of_samples(j, found)
         for at in np.argsort(-drop, kind="stable"):
             candidate = self._pool[found.index[at]]
-            if min(drop[at], here[at]) < LEAST_DROP or candidate.kind in best:
+            if min(drop[at], here[at]) < least or candidate.kind in best:
                 continue
             if self._has(candidate):
                 continue
-            effect = get_effect(candidate.kind)
+            effect = candidate.term.effect
             best[candidate.kind] = RankedEffect(
                 candidate.kind,
                 effect.title,
@@ -374,12 +421,43 @@ class Session:
             self._steps.pop()
         return self.history[-1]
 
+    def remove(self, step: int) -> dict[str, Any]:
+        """Take one addition back, whatever was added after it.
+
+        Parameters
+        ----------
+        step : int
+            Place in :attr:`history`, from 1.
+
+        Returns
+        -------
+        dict
+            The last entry of :attr:`history`, all later additions fitted again.
+
+        Raises
+        ------
+        EffectError
+            There is no such addition.
+        """
+        if not 1 <= step < len(self._steps):
+            raise EffectError(f"no addition {step}; there are {len(self._steps) - 1}")
+        later = self._steps[step + 1 :]
+        del self._steps[step:]
+        for old in later:
+            noise = self._steps[-1].noise
+            self._steps.append(
+                self._step(old.terms, (*self.terms, *old.terms), noise, old.entry["joint"])
+            )
+            self._steps[-1].coarse = old.coarse
+        return self.history[-1]
+
     def fitted_model(self) -> RBDRegressor:
         """The model with everything added, fitted to the whole log.
 
         Returns
         -------
         RBDRegressor
+            A fitted copy; the model of the session stays as it is.
         """
         terms = [t for step in self.added for t in step]
         return self.model.with_effects(terms).fit(*self.data)
@@ -403,7 +481,7 @@ class Session:
         joints : sequence of str, optional
             Joints the log covers, as given to :meth:`skidyn.robots.Robot.from_urdf`.
         reading : mapping, optional
-            Further arguments with which :func:`skidyn.datasets.read_log` read the log.
+            Further arguments with which :func:`skidyn.logs.read_log` read the log.
 
         Returns
         -------
@@ -413,6 +491,24 @@ class Session:
         """
         clicks = [(entry["added"], entry["joint"]) for entry in self.history[1:]]
         return script(self.model, clicks, logs, urdf, joints, reading or {})
+
+    def check_place(self, joint: int, trajectory: int) -> None:
+        """Raise unless there are such a joint, counted from 1, and such a trajectory.
+
+        Parameters
+        ----------
+        joint : int
+            Joint, counted from 1.
+        trajectory : int
+            Number of a recorded trajectory, one of :attr:`trajectories`.
+
+        Raises
+        ------
+        EffectError
+            There is no such joint, or no such trajectory.
+        """
+        self._joint(joint)
+        self._check_trajectory(trajectory)
 
     # ------------------------------------------------------------------ inside
     def _joint(self, joint: int) -> int:
@@ -426,6 +522,12 @@ class Session:
 
     def _has(self, candidate: Candidate) -> bool:
         return any((t.kind, t.joints) == candidate.site for t in self.terms)
+
+    def _of_samples(self, joint: int, found: HeldOutRows) -> float:
+        """What the whole residual of averaged rows makes up of the squared error of samples."""
+        weight = np.asarray(self.problem.rows.weights[joint].sum(axis=1)).ravel()
+        mean = float(np.mean((found.residual / weight) ** 2))
+        return float(min(mean / max(self.history[-1]["rmse"][joint] ** 2, 1e-300), 1.0))
 
     def _held_out(self, joint: int) -> HeldOutRows:
         step = self._steps[-1]

@@ -2,6 +2,7 @@
 """Models out of skidyn: functions in C, Python and ONNX, and descriptions in URDF and MJCF."""
 
 from skidyn.export._c import c_source, write_c
+from skidyn.export._merge import merge_mjcf, merge_urdf
 from skidyn.export._mjcf import write_mjcf
 from skidyn.export._onnx import to_onnx, write_onnx
 from skidyn.export._python import python_source, write_python
@@ -9,6 +10,8 @@ from skidyn.export._urdf import write_urdf
 
 __all__ = [
     "c_source",
+    "merge_mjcf",
+    "merge_urdf",
     "python_source",
     "to_onnx",
     "write_c",
@@ -17,3 +20,10 @@ __all__ = [
     "write_python",
     "write_urdf",
 ]
+
+# For other packages of skidyn; no part of the public interface.
+from skidyn.export._model import (
+    check_model as check_model,
+    name_term as name_term,
+    static_model as static_model,
+)

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from skidyn._exceptions import SkidynError
+from skidyn.dynamics import inertial_parts, skew
 from skidyn.effects import Term, get_effect
 from skidyn.export._model import check_model, is_carried
-from skidyn.rigid_body import RBDRegressor
-from skidyn.rigid_body._tree import inertial_parts, skew
+from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
 
 

@@ -6,10 +6,10 @@ from __future__ import annotations
 import re
 
 from skidyn._exceptions import SkidynError
+from skidyn.dynamics import C, renumber, statements
 from skidyn.export._files import PathLike, write_files
 from skidyn.export._model import StaticModel, name_term, static_model
-from skidyn.rigid_body import RBDRegressor
-from skidyn.rigid_body._source import C, renumber, statements
+from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
 
 _TEMPLATE = """\

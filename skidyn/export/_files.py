@@ -4,13 +4,13 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
+from skidyn._writing import write_bytes, write_json
 from skidyn.effects import Term
 from skidyn.export._model import describe_term, name_term
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
 
 PathLike = str | os.PathLike[str]
@@ -30,9 +30,7 @@ def write_files(
         Names of what the file does not hold. If it holds everything there is no side-car, and one
         of an earlier export is removed.
     """
-    from skidyn.report import write_json
-
-    _write(Path(path), content)
+    write_bytes(path, content.encode() if isinstance(content, str) else content)
     beside = Path(f"{os.fspath(path)}.skidyn.json")
     if isinstance(model, Robot) or not left:
         beside.unlink(missing_ok=True)
@@ -45,13 +43,3 @@ def write_files(
     }
     write_json(beside, content_beside)
     return tuple(name_term(model.robot_, term) for term in left)
-
-
-def _write(target: Path, content: str | bytes) -> None:
-    """Write a file in one step, so that an interrupted run leaves the previous one whole."""
-    data = content.encode() if isinstance(content, str) else content
-    target.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=target.parent, prefix=".skidyn-") as folder:
-        part = Path(folder, target.name)
-        part.write_bytes(data)
-        os.replace(part, target)

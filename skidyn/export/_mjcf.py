@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from skidyn._exceptions import SkidynError
 from skidyn.export._bodies import central_inertia, described, numbers
 from skidyn.export._files import PathLike, write_files
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
 
 #: MuJoCo refuses moving bodies with less mass (kg) or inertia (kg m^2).

@@ -12,13 +12,10 @@ import numpy as np
 
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Signals
-from skidyn._symbols import Instant, SymbolicRobot, symbols
-from skidyn.effects import Term, get_effect
-from skidyn.rigid_body import RBDRegressor
-from skidyn.rigid_body._numpy import BoundProgram, evaluate_rows
-from skidyn.rigid_body._recursion import Program
-from skidyn.rigid_body._tape import Scalar, Tape
-from skidyn.robots import Robot
+from skidyn.dynamics import BoundProgram, Program, Scalar, Tape, evaluate_rows
+from skidyn.effects import Term
+from skidyn.identification import RBDRegressor
+from skidyn.robots import Instant, Robot, SymbolicRobot, symbols
 
 #: Samples at which what was written down is compared with the model, and what may differ, relative.
 _SAMPLES, _ROUNDING = 64, 1e-9
@@ -164,7 +161,7 @@ def _sliding(robot: Robot) -> np.ndarray:
 
 def describe_term(model: RBDRegressor, term: Term) -> dict[str, Any]:
     """An effect as plain data, complete: coefficients by name, with units."""
-    effect = get_effect(term.kind)
+    effect = term.effect
     robot = model.robot_
     prismatic = bool(_sliding(robot)[list(term.joints)].all())
     turns = {c.name: c.unit for c in effect.coefficients}

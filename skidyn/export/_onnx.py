@@ -7,10 +7,10 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from skidyn._optional import import_optional
+from skidyn.dynamics import operands
 from skidyn.export._files import PathLike, write_files
 from skidyn.export._model import StaticModel, name_term, static_model
-from skidyn.rigid_body import RBDRegressor
-from skidyn.rigid_body._tape import operands
+from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
 
 if TYPE_CHECKING:

@@ -7,11 +7,11 @@ import keyword
 import re
 
 from skidyn._exceptions import SkidynError
+from skidyn.dynamics import python_function
 from skidyn.export._c import printable
 from skidyn.export._files import PathLike, write_files
 from skidyn.export._model import StaticModel, name_term, static_model
-from skidyn.rigid_body import RBDRegressor
-from skidyn.rigid_body._scalar import python_function
+from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
 
 _FUNCTIONS = ("abs", "cos", "exp", "maximum", "sign", "sin", "sqrt", "tanh")

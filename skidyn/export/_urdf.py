@@ -9,7 +9,7 @@ import numpy as np
 
 from skidyn.export._bodies import central_inertia, described, numbers
 from skidyn.export._files import PathLike, write_files
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
 
 

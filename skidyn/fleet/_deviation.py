@@ -14,7 +14,7 @@ from scipy import stats
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Array
 from skidyn.evidence import Evidence
-from skidyn.rigid_body._from_evidence import weighted_solution
+from skidyn.identification import weighted_solution
 
 #: Fewer robots do not tell how much robots of the type differ.
 FEWEST_ROBOTS = 8

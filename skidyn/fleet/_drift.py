@@ -14,7 +14,7 @@ from skidyn._exceptions import SkidynError
 from skidyn._signals import Array
 from skidyn.evidence import Evidence
 from skidyn.fleet._deviation import deviation, effect_columns
-from skidyn.rigid_body._from_evidence import weighted_solution
+from skidyn.identification import weighted_solution
 
 #: Weight of the newest trajectory in the moving average.
 NEWEST = 0.25

@@ -15,8 +15,8 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 
 from skidyn._columns import ColumnSpec
 from skidyn._compat import Interval, fit_context
+from skidyn._keys import Keys, resolve_keys
 from skidyn._signals import find_segments
-from skidyn.preprocessing._keys import Keys, resolve_keys
 
 Array = NDArray[np.float64]
 

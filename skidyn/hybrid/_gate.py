@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from skidyn.evidence import jackknife
+
 Array = NDArray[np.float64]
 
 #: Keeps ratios finite.
@@ -73,9 +75,8 @@ def learned_weights(
 
 def _cautious_factor(products: Array, squares: Array) -> Array:
     """Least-squares factor from the sums of each unit, less its standard error, in 0 to 1."""
-    n = len(products)
     without = (products.sum(axis=0) - products) / np.maximum(squares.sum(axis=0) - squares, TINY)
-    error = np.sqrt((n - 1) / n * ((without - without.mean(axis=0)) ** 2).sum(axis=0))
+    error = jackknife(without)
     factor = products.sum(axis=0) / np.maximum(squares.sum(axis=0), TINY)
     cautious: Array = np.clip(factor - error, 0.0, 1.0)
     return cautious

@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterable
 from numbers import Integral, Real
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, MetaEstimatorMixin, RegressorMixin, clone
+from sklearn.model_selection import check_cv
 from sklearn.utils import _safe_indexing
 from sklearn.utils.validation import (
     _check_sample_weight,
@@ -27,11 +29,11 @@ from skidyn._compat import (
     fit_context,
     fit_progress,
 )
+from skidyn._keys import Keys, resolve_keys
 from skidyn.hybrid._gate import learned_weights
 from skidyn.hybrid._own_joint import OwnJointRegressor
 from skidyn.hybrid._range import TrainingRange, distances, fade
-from skidyn.model_selection._split import held_out_folds
-from skidyn.preprocessing._keys import Keys, resolve_keys
+from skidyn.model_selection import held_out_folds
 
 Array = NDArray[np.float64]
 
@@ -58,9 +60,9 @@ class HybridRegressor(CallbackSupportMixin, MetaEstimatorMixin, RegressorMixin, 
     learner : estimator, default=None
         Any scikit-learn regressor; :class:`OwnJointRegressor` if None, with the joint names of the
         physics' ``robot``, if it has one.
-    cv : int or cross-validator, default=5
-        Folds: by trajectory, or by blocks of rows of a single trajectory. A cross-validator must
-        test every row exactly once; for one recording of a periodic motion use ``PhaseKFold``.
+    cv : int, cross-validator or iterable of splits, default=5
+        Folds: by trajectory, or by blocks of rows of a single trajectory. Others must test every
+        row exactly once; for one recording of a periodic motion use ``PhaseKFold``.
     alpha : float, default=0.05
         Level of the one-sided tests over trajectories that the learned part must pass: for all
         joints together, or for a joint alone with correction for their number. 1 keeps every joint
@@ -69,7 +71,7 @@ class HybridRegressor(CallbackSupportMixin, MetaEstimatorMixin, RegressorMixin, 
         hybrid is the physics, with a warning, unless `alpha` is 1. A long recording of a motion
         that does not repeat may be cut into trajectories.
     trajectory, time : int, str or None, default="auto"
-        Key columns of X.
+        Key columns of X. Physics and learners that have no parameters for them do not see them.
 
     Attributes
     ----------
@@ -119,7 +121,7 @@ class HybridRegressor(CallbackSupportMixin, MetaEstimatorMixin, RegressorMixin, 
     _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
         "physics": [HasMethods(["fit", "predict"])],
         "learner": [HasMethods(["fit", "predict"]), None],
-        "cv": [Interval(Integral, 2, None, closed="left"), HasMethods(["split"])],
+        "cv": [Interval(Integral, 2, None, closed="left"), HasMethods(["split"]), Iterable],
         "alpha": [Interval(Real, 0, 1, closed="both")],
         "trajectory": [str, Integral, None],
         "time": [str, Integral, None],
@@ -148,7 +150,7 @@ class HybridRegressor(CallbackSupportMixin, MetaEstimatorMixin, RegressorMixin, 
         return tags
 
     @fit_context(prefer_skip_nested_validation=False)
-    def fit(self, X: Any, y: Any, sample_weight: Any = None) -> HybridRegressor:
+    def fit(self, X: Any, y: Any, sample_weight: Any = None, groups: Any = None) -> HybridRegressor:
         """Fit the physics, then the learner on what it leaves over.
 
         Parameters
@@ -159,6 +161,8 @@ class HybridRegressor(CallbackSupportMixin, MetaEstimatorMixin, RegressorMixin, 
             Torque.
         sample_weight : array-like of shape (n_samples,), default=None
             Weight of each row, for physics and learners that take weights.
+        groups : array-like of shape (n_samples,), default=None
+            Groups of the rows for a `cv` that splits by groups, such as ``GroupKFold``.
 
         Returns
         -------
@@ -174,7 +178,7 @@ class HybridRegressor(CallbackSupportMixin, MetaEstimatorMixin, RegressorMixin, 
         if sample_weight is not None:
             weight = _check_sample_weight(sample_weight, array, dtype=np.float64)
         keys = self._keys()
-        folds = self._folds(table, torque, keys.trajectories(array))
+        folds = self._folds(table, torque, keys.trajectories(array), groups)
         n_fits = len(folds) * (len(folds) + 3) // 2 + 2  # pairs of folds, folds, and all rows
         with fit_progress(self, n_fits, X, y, "model") as progress:
             self._learn(table, array, torque, weight, folds, progress)
@@ -191,7 +195,11 @@ class HybridRegressor(CallbackSupportMixin, MetaEstimatorMixin, RegressorMixin, 
     ) -> None:
         keys = self._keys()
         learner = self._own_joints() if self.learner is None else self.learner
-        residuals = _honest_residuals(self.physics, table, torque, weight, folds, progress)
+        seen_by_physics = keys.for_learner(table, self.physics)
+        residuals = _honest_residuals(
+            self.physics, seen_by_physics, torque, weight, folds, progress
+        )
+        table = keys.for_learner(table, learner)
         residual, learned = np.zeros(torque.shape), np.zeros(torque.shape)
         for (train, test), seen in zip(folds, residuals, strict=True):
             residual[test] = seen[test]
@@ -218,15 +226,17 @@ class HybridRegressor(CallbackSupportMixin, MetaEstimatorMixin, RegressorMixin, 
             self.p_value_[:] = 1.0
             if self.alpha < 1:
                 warnings.warn(NOT_TESTED, UserWarning, stacklevel=4)
-        self.physics_ = _fit(clone(self.physics), table, torque, weight, progress)
+        self.physics_ = _fit(clone(self.physics), seen_by_physics, torque, weight, progress)
         self.learner_ = None
         if self.learned_weight_.any():
             self.learner_ = _fit(clone(learner), table, residual, weight, progress)
 
-    def _folds(self, table: Any, torque: Array, trajectories: NDArray[Any]) -> list[Any]:
-        if not hasattr(self.cv, "split"):
-            return held_out_folds(trajectories, self.cv)
-        folds = list(self.cv.split(table, torque))
+    def _folds(
+        self, table: Any, torque: Array, trajectories: NDArray[Any], groups: Any
+    ) -> list[Any]:
+        if isinstance(self.cv, Integral):
+            return held_out_folds(trajectories, int(self.cv))
+        folds = list(check_cv(self.cv).split(table, torque, groups))
         tested = np.sort(np.concatenate([test for _, test in folds]))
         if not np.array_equal(tested, np.arange(len(torque))):
             raise ValueError("cv must test every row exactly once, as KFold does.")
@@ -262,7 +272,8 @@ class HybridRegressor(CallbackSupportMixin, MetaEstimatorMixin, RegressorMixin, 
         check_is_fitted(self)
         array = validate_data(self, X, reset=False, dtype=np.float64)
         table = _like(X, array)
-        return self._shaped(self.physics_.predict(table)) + self._learned(table, array)
+        physics = self.physics_.predict(self._keys().for_learner(table, self.physics_))
+        return self._shaped(physics) + self._learned(table, array)
 
     def learned_torque(self, X: Any) -> Array:
         """Learned part of the prediction: weighted per joint and faded out of range.
@@ -284,7 +295,8 @@ class HybridRegressor(CallbackSupportMixin, MetaEstimatorMixin, RegressorMixin, 
     def _learned(self, table: Any, array: Array) -> Array:
         learned = np.zeros((len(array), len(self.learned_weight_)))
         if self.learner_ is not None:
-            learned += np.reshape(self.learner_.predict(table), learned.shape)
+            own = self._keys().for_learner(table, self.learner_)
+            learned += np.reshape(self.learner_.predict(own), learned.shape)
             learned *= self.learned_weight_ * fade(self._novelty(array))[:, None]
         return self._shaped(learned)
 

@@ -12,13 +12,18 @@ from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, MetaEstimatorMixin, RegressorMixin, clone
 from sklearn.ensemble import HistGradientBoostingRegressor
 from sklearn.utils.parallel import Parallel, delayed
-from sklearn.utils.validation import check_is_fitted, validate_data
+from sklearn.utils.validation import (
+    _check_sample_weight,
+    check_is_fitted,
+    has_fit_parameter,
+    validate_data,
+)
 
 from skidyn._columns import Columns, ColumnSpec, resolve_columns
 from skidyn._compat import HasMethods, fit_context
 from skidyn._exceptions import ColumnError
-from skidyn.effects._hysteresis import dahl_state
-from skidyn.preprocessing._keys import resolve_keys
+from skidyn._keys import resolve_keys
+from skidyn.effects import dahl_state
 
 Array = NDArray[np.float64]
 
@@ -101,7 +106,7 @@ class OwnJointRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         return tags
 
     @fit_context(prefer_skip_nested_validation=False)
-    def fit(self, X: Any, y: Any) -> OwnJointRegressor:
+    def fit(self, X: Any, y: Any, sample_weight: Any = None) -> OwnJointRegressor:
         """Fit one regressor per joint.
 
         Parameters
@@ -110,6 +115,8 @@ class OwnJointRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             Positions, velocities and accelerations of all joints, with key columns.
         y : array-like of shape (n_samples,) or (n_samples, n_joints), N m (N if prismatic)
             Torque, or what a physical model leaves over.
+        sample_weight : array-like of shape (n_samples,), default=None
+            Weight of each row, where the regressor of a joint takes weights.
 
         Returns
         -------
@@ -122,8 +129,14 @@ class OwnJointRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         self._columns = self._resolve(targets.shape[1])
         base = _cautious_boosting() if self.estimator is None else self.estimator
         features = self._features(X)
+        weights = {}
+        if sample_weight is not None:
+            if not has_fit_parameter(base, "sample_weight"):
+                raise ValueError(f"{type(base).__name__} takes no sample_weight; fit without it.")
+            weights["sample_weight"] = _check_sample_weight(sample_weight, X, dtype=np.float64)
         self.estimators_ = Parallel(n_jobs=self.n_jobs)(
-            delayed(clone(base).fit)(own, targets[:, j]) for j, own in enumerate(features)
+            delayed(clone(base).fit)(own, targets[:, j], **weights)
+            for j, own in enumerate(features)
         )
         return self
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from skidyn._exceptions import ColumnError
 from skidyn._optional import import_optional
-from skidyn._signals import Array, Signals
+from skidyn._signals import Array, Signals, read_signals
 
 if TYPE_CHECKING:
     from skidyn.robots import Robot
@@ -38,8 +38,6 @@ def robot_of(estimator: Any, robot: Robot | None) -> Robot:
 
 def read_table(estimator: Any, X: Any, y: Any, robot: Robot | None) -> tuple[Signals, Array, Robot]:
     """Signals and measured torque of a table that follows the X contract."""
-    from skidyn.diagnosis._reading import read_signals
-
     robot = robot_of(estimator, robot)
     # A picture needs a clock only to be drawn over; without one it is drawn over the sample number.
     signals, torque = read_signals(
@@ -83,7 +81,7 @@ def joint_index(joint: int, n_joints: int) -> int:
 
 def thinned(signals: list[Array], segments: list[slice]) -> list[NDArray[np.intp]]:
     """Rows of each segment to draw, without losing a peak."""
-    from skidyn.report._decimate import rows_with_peaks
+    from skidyn.report import rows_with_peaks
 
     return rows_with_peaks(signals, segments, DRAWN // (2 * len(signals)))
 

@@ -151,8 +151,8 @@ class ErrorMapDisplay:
         display : ErrorMapDisplay
             The drawn display, with its artists.
         """
-        from skidyn.diagnosis._failures import REGIMES, Comparison, error_map
-        from skidyn.evidence._rows import sliding_samples
+        from skidyn.diagnosis import REGIMES, Comparison, error_map
+        from skidyn.evidence import sliding_samples
 
         measured, predicted = both_torques(y_true, y_pred)
         names = tuple(joint_names or (f"joint {j + 1}" for j in range(measured.shape[1])))

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Errors of a torque model per joint, the papers' tables, and intervals over recordings."""
 
+from skidyn.metrics._drift import Drift, drift
 from skidyn.metrics._errors import (
     SCORERS,
     joint_error_table,
@@ -14,7 +15,9 @@ from skidyn.metrics._paired import PairedComparison, paired_comparison, trajecto
 
 __all__ = [
     "SCORERS",
+    "Drift",
     "PairedComparison",
+    "drift",
     "joint_error_table",
     "joint_scores",
     "max_absolute_error",

@@ -13,3 +13,6 @@ __all__ = [
     "leakage_report",
     "trajectory_learning_curve",
 ]
+
+# For other packages of skidyn; no part of the public interface.
+from skidyn.model_selection._split import held_out_folds as held_out_folds

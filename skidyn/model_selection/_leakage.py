@@ -15,8 +15,8 @@ from sklearn.model_selection import BaseCrossValidator, check_cv, cross_val_scor
 from sklearn.utils import Bunch
 
 from skidyn._columns import ColumnSpec
+from skidyn._keys import Keys, keys_of
 from skidyn.model_selection._split import TrajectoryKFold
-from skidyn.preprocessing._keys import Keys, keys_of
 
 Rows = NDArray[np.intp]
 

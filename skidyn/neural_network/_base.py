@@ -27,11 +27,11 @@ from skidyn._compat import (
     fit_context,
     fit_progress,
 )
+from skidyn._keys import Keys, resolve_keys
 from skidyn.neural_network._engine import Task, Training, TrainingPlan, run, train
 from skidyn.neural_network._network import LSTMNetwork, from_arrays
 from skidyn.neural_network._stream import TorqueStream
-from skidyn.preprocessing._affine import scaling_of
-from skidyn.preprocessing._keys import Keys, resolve_keys
+from skidyn.preprocessing import scaling_of
 
 Array = NDArray[np.float64]
 

@@ -14,6 +14,7 @@ from sklearn.base import BaseEstimator, MetaEstimatorMixin, RegressorMixin, clon
 from sklearn.compose import TransformedTargetRegressor
 from sklearn.ensemble import BaggingRegressor
 from sklearn.linear_model import RidgeCV
+from sklearn.model_selection import check_cv
 from sklearn.neural_network import MLPRegressor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
@@ -24,13 +25,15 @@ from sklearn.utils.validation import (
     has_fit_parameter,
     validate_data,
 )
+from skorch import NeuralNet
 
 from skidyn._columns import ColumnSpec
 from skidyn._compat import HasMethods, Interval, StrOptions, fit_context
-from skidyn.model_selection._split import held_out_folds
+from skidyn._keys import Keys, resolve_keys
+from skidyn.model_selection import held_out_folds
 from skidyn.neural_network._base import SequenceRegressor, deferred_training, train_together
 from skidyn.neural_network._lstm import LSTMRegressor
-from skidyn.preprocessing._keys import Keys, resolve_keys
+from skidyn.neural_network._skorch_member import SkorchMember
 
 Array = NDArray[np.float64]
 
@@ -53,8 +56,10 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     Parameters
     ----------
     estimator : estimator, default=None
-        Member; :class:`LSTMRegressor` if None. Its key columns are set from those given here. With
-        ``per_joint=True`` of the member each output has networks of its own.
+        Member: a network of this package, any scikit-learn regressor or a skorch
+        ``NeuralNetRegressor``; :class:`LSTMRegressor` if None. Its key columns are set from those
+        given here; one that has no parameters for them does not see them. With ``per_joint=True``
+        of the member each output has networks of its own.
     final_estimator : estimator, default=None
         Meta-regressor; a linear one (ridge) if None.
     n_estimators : int, default=10
@@ -116,7 +121,12 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         "final_estimator": [HasMethods(["fit", "predict"]), None],
         "n_estimators": [Interval(Integral, 1, None, closed="left")],
         "resample": [StrOptions({"trajectory", "window"})],
-        "cv": [Interval(Integral, 2, None, closed="left"), HasMethods(["split"]), None],
+        "cv": [
+            Interval(Integral, 2, None, closed="left"),
+            HasMethods(["split"]),
+            Iterable,
+            None,
+        ],
         "n_jobs": [Integral, None],
         "trajectory": [str, Integral, None],
         "time": [str, Integral, None],
@@ -195,7 +205,7 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         return tags
 
     @fit_context(prefer_skip_nested_validation=False)
-    def fit(self, X: Any, y: Any, sample_weight: Any = None) -> BLLRegressor:
+    def fit(self, X: Any, y: Any, sample_weight: Any = None, groups: Any = None) -> BLLRegressor:
         """Train the members and the meta-regressor.
 
         Parameters
@@ -206,6 +216,8 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             Torque, or what a physical model leaves over.
         sample_weight : array-like of shape (n_samples,), default=None
             Weight of each row: members draw rows in proportion to it.
+        groups : array-like of shape (n_samples,), default=None
+            Groups of the rows for a `cv` that splits by groups, such as ``GroupKFold``.
 
         Returns
         -------
@@ -220,13 +232,14 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         rng = check_random_state(self.random_state)
         bagging = self._bagging(keys, sample_weight is not None, int(rng.randint(2**31 - 1)))
         trajectories = keys.trajectories(X)
+        X = keys.for_learner(X, bagging.estimator)
         leave_out = self.cv is None and len(np.unique(trajectories)) > 2
         self.bagging_, unseen = self._train(bagging, X, y, sample_weight, trajectories, leave_out)
         if unseen is not None:
             inputs = _unseen_means(self.bagging_, X, unseen)
         else:
             inputs = np.full((len(X), y[:1].size), np.nan)
-            for train, test in self._folds(table, X, y, trajectories):
+            for train, test in self._folds(table, y, trajectories, groups):
                 part = None if sample_weight is None else sample_weight[train]
                 again, _ = self._train(
                     bagging, X[train], y[train], part, trajectories[train], False
@@ -271,11 +284,13 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
 
     def _bagging(self, keys: Keys, weighted: bool, seed: int) -> BaggingRegressor:
         member = LSTMRegressor() if self.estimator is None else clone(self.estimator)
+        if isinstance(member, NeuralNet):
+            member = SkorchMember(member)
         names = member.get_params()
         # BaggingRegressor hands arrays down, so the keys are given by position
-        for name, position in (("trajectory", keys.trajectory), ("time", keys.time)):
-            if name in names:
-                member.set_params(**{name: position})
+        position = {"trajectory": keys.trajectory, "time": keys.time}
+        wanted = {name: name.rpartition("__")[2] for name in names}
+        member.set_params(**{n: position[key] for n, key in wanted.items() if key in position})
         if self.resample == "trajectory":
             if "resample" not in names:
                 raise ValueError(
@@ -292,12 +307,14 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             random_state=seed,
         )
 
-    def _folds(self, table: Any, X: Array, y: Array, trajectories: NDArray[Any]) -> Iterable[Any]:
-        if hasattr(self.cv, "split"):
-            return list(self.cv.split(table, y))
+    def _folds(
+        self, table: Any, y: Array, trajectories: NDArray[Any], groups: Any
+    ) -> Iterable[Any]:
+        if self.cv is not None and not isinstance(self.cv, Integral):
+            return list(check_cv(self.cv).split(table, y, groups))
         member = LSTMRegressor() if self.estimator is None else self.estimator
         guard = int(getattr(member, "window", 0))
-        return held_out_folds(trajectories, self.cv or BLOCKS, guard=guard)
+        return held_out_folds(trajectories, int(self.cv or BLOCKS), guard=guard)
 
     def _keys(self) -> Keys:
         names = getattr(self, "feature_names_in_", None)
@@ -327,6 +344,7 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         """
         check_is_fitted(self)
         X = validate_data(self, X, reset=False, dtype=np.float64)
+        X = self._keys().for_learner(X, self.bagging_.estimator_)
         members = np.stack([member.predict(X) for member in self.bagging_.estimators_])
         mean = members.mean(axis=0)
         torque = self.final_estimator_.predict(mean.reshape(len(X), -1)).reshape(mean.shape)

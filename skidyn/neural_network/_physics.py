@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 from sklearn.base import clone
 
 from skidyn._columns import Columns
-from skidyn.evidence._kinematics import smooth_motion
-from skidyn.evidence._problem import term_columns
-from skidyn.rigid_body import RBDRegressor
-from skidyn.rigid_body._rbd_regressor import _DRY
+from skidyn.effects import TermSum
+from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
 
 Array = NDArray[np.float64]
@@ -55,7 +53,7 @@ class BareRigidBody:
 
 
 class IdentifiedPhysics:
-    """Rigid body with effects, as an :class:`~skidyn.rigid_body.RBDRegressor` has identified them.
+    """Rigid body with effects as an :class:`~skidyn.identification.RBDRegressor` identified them.
 
     Effects that see a load see that of the identified model.
 
@@ -93,42 +91,20 @@ class IdentifiedPhysics:
 
     def columns(self, X: Array) -> Iterator[tuple[slice, NDArray[Any]]]:
         """Torque per coefficient, (n_joints, n_coefficients, rows), part by part."""
-        signals = self.model._read(X[:, self._order])
-        if self.model._smooths():
-            signals = smooth_motion(signals).signals
-        blocks = effect_columns(self.model, signals)
-        widths = [next(iter(block.values())).shape[1] for block in blocks]
+        signals, _ = self.model._motion(X[:, self._order])
         motion = signals.q, signals.dq, signals.ddq
-        for rows, rigid in self.model.robot_.iter_torque_regressor(*motion):
-            own = np.zeros((len(rigid), sum(widths), rigid.shape[2]))
-            for block, end, width in zip(blocks, np.cumsum(widths), widths, strict=True):
-                for joint, values in block.items():
-                    own[joint, end - width : end] = values[rows].T
+        robot, torque = self.model.robot_, self.model.rigid_body_torque(*motion)
+        effects = list(self.model._effects(signals.with_(robot=robot), torque))
+        places = TermSum(term for term, _ in effects)
+        for rows, rigid in robot.iter_torque_regressor(*motion):
+            own = np.zeros((len(rigid), places.width, rigid.shape[2]))
+            for (_, blocks), (_, place) in zip(effects, places.slices(), strict=True):
+                for joint, values in blocks.items():
+                    own[joint, place] = values[rows].T
             yield rows, np.concatenate([rigid, own], axis=1)
 
 
-def effect_columns(model: RBDRegressor, signals: Any) -> list[dict[int, Array]]:
-    """Columns of a fitted model's effects, each seeing the torque of those before it."""
-    torque = model.rigid_body_torque(signals.q, signals.dq, signals.ddq)
-    load, smooth, blocks = torque.copy(), torque.copy(), []
-    signals = signals.with_(robot=model.robot_)
-    for term in model._in_order():  # as RBDRegressor.predict does
-        seen = signals.with_(
-            load=load,
-            model_torque=torque.copy(),
-            smooth_torque=smooth.copy(),
-            inertial_parameters=model.inertial_parameters_,
-        )
-        blocks.append(term_columns(seen, term))
-        for joint, block in blocks[-1].items():
-            part = block @ model.effect_coefficients_[term]
-            torque[:, joint] += part
-            if term.kind not in _DRY:
-                smooth[:, joint] += part
-    return blocks
-
-
-def robot_of(physics: Robot | RBDRegressor) -> Robot:
+def robot_of(physics: Any) -> Robot:
     """Robot of a physical model."""
-    robot = physics if isinstance(physics, Robot) else physics.robot
+    robot = physics.robot if isinstance(physics, RBDRegressor) else physics
     return robot if isinstance(robot, Robot) else Robot.from_urdf(robot)

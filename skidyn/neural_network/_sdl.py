@@ -4,25 +4,29 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from numbers import Integral
+from os import PathLike
 from typing import Any, ClassVar
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from sklearn.base import clone
+from sklearn.utils import _safe_indexing
 from sklearn.utils.validation import check_is_fitted, validate_data
 from torch import nn
 
-from skidyn._columns import Columns, ColumnSpec, resolve_columns
-from skidyn._compat import StrOptions
-from skidyn.hybrid._range import TrainingRange, distances, fade
-from skidyn.model_selection._split import held_out_folds
+from skidyn._columns import Columns, ColumnSpec, column_names, resolve_columns
+from skidyn._compat import Interval, StrOptions
+from skidyn._keys import Keys
+from skidyn.hybrid import TrainingRange, distances, fade, learned_weights
+from skidyn.identification import RBDRegressor
+from skidyn.model_selection import held_out_folds
 from skidyn.neural_network._base import SequenceRegressor
 from skidyn.neural_network._engine import Task, Training, TrainingPlan, run
 from skidyn.neural_network._network import LSTMNetwork, from_arrays
 from skidyn.neural_network._physics import BareRigidBody, IdentifiedPhysics, robot_of
-from skidyn.preprocessing._affine import scaling_of
-from skidyn.preprocessing._keys import Keys
-from skidyn.rigid_body import RBDRegressor
+from skidyn.preprocessing import scaling_of
 from skidyn.robots import Robot
 
 Array = NDArray[np.float64]
@@ -68,18 +72,25 @@ class SDLRegressor(SequenceRegressor):
     the torque is linear (``rigid_body="joint"``), or stay at these values (``"frozen"``).
     Directions of the coefficients that the log does not show keep the model's own values.
 
-    Far from the training samples the network's output fades into the physical torque.
+    Far from the training samples the network's output fades into the physical torque. What the
+    optimisation adds to the physics counts as much as it is worth on held-out trajectories, joint
+    by joint, so that the model is not worse than its physics (see `cv`).
 
     Parameters
     ----------
-    physics : Robot or RBDRegressor
-        What is read: the rigid body of a robot, as in the paper, or a rigid body with effects,
-        which is identified first. Its robot's joints are those that the columns of X describe.
+    physics : Robot, RBDRegressor, str or path
+        What is read: the rigid body of a robot (or of its URDF), as in the paper, or a rigid body
+        with effects, which is identified first. Its robot's joints are those that the columns of X
+        describe.
     rigid_body : {"joint", "frozen"}, default="joint"
         Whether the coefficients are optimised with the network.
     residual : bool, default=True
         Add the physical torque to the network's output, so that the network learns what is
         missing. False is the paper's architecture, which only reads it.
+    cv : int or None, default=3
+        Folds, by trajectory (or by blocks of a single one), on which copies of the model are held
+        out to find ``learned_weight_``. None trusts the network wholly and trains once, as does
+        ``residual=False``.
     window : int, default=4
         Rows of history.
     stride : int, default=4
@@ -124,6 +135,9 @@ class SDLRegressor(SequenceRegressor):
     ----------
     physics_ : Robot or RBDRegressor
         The physics as given, identified where it has effects.
+    learned_weight_ : ndarray of shape (n_joints,)
+        Factor of what the optimisation adds to the physics: its least-squares factor on held-out
+        trajectories less one standard error, between 0 and 1.
     coef_ : ndarray of shape (n_coefficients,)
         What the optimisation added to the coefficients of ``physics_``: inertial parameters of
         every body, then its effects.
@@ -171,7 +185,8 @@ class SDLRegressor(SequenceRegressor):
 
     _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
         **{k: v for k, v in SequenceRegressor._parameter_constraints.items() if k != "per_joint"},
-        "physics": [Robot, RBDRegressor],
+        "cv": [Interval(Integral, 2, None, closed="left"), None],
+        "physics": [Robot, RBDRegressor, str, PathLike],
         "rigid_body": [StrOptions({"joint", "frozen"})],
         "residual": ["boolean"],
     }
@@ -179,10 +194,11 @@ class SDLRegressor(SequenceRegressor):
 
     def __init__(
         self,
-        physics: Robot | RBDRegressor,
+        physics: Robot | RBDRegressor | str | PathLike[str],
         *,
         rigid_body: str = "joint",
         residual: bool = True,
+        cv: int | None = 3,
         window: int = 4,
         stride: int = 4,
         hidden_size: int = 32,
@@ -206,6 +222,7 @@ class SDLRegressor(SequenceRegressor):
         self.physics = physics
         self.rigid_body = rigid_body
         self.residual = residual
+        self.cv = cv
         self.window = window
         self.stride = stride
         self.hidden_size = hidden_size
@@ -225,6 +242,65 @@ class SDLRegressor(SequenceRegressor):
         self.trajectory = trajectory
         self.time = time
         self.random_state = random_state
+
+    def fit(self, X: Any, y: Any, sample_weight: Any = None) -> SDLRegressor:
+        """Train the network and the physics, and find how much of what they learn to keep.
+
+        Parameters
+        ----------
+        X : DataFrame or array-like of shape (n_samples, n_features)
+            Features, with key columns; rows of a trajectory in order of time.
+        y : array-like of shape (n_samples,) or (n_samples, n_joints), N m (N if prismatic)
+            Torque.
+        sample_weight : array-like of shape (n_samples,), default=None
+            Weight of each row's squared error. Rows of weight zero still serve as history.
+
+        Returns
+        -------
+        self : object
+            The fitted regressor.
+        """
+        self.__dict__.pop("learned_weight_", None)
+        super().fit(X, y, sample_weight)
+        if self.residual and self.cv is not None and hasattr(self, "weights_"):
+            self.learned_weight_ = self._held_out_weight(X, y, sample_weight)
+        return self
+
+    def _held_out_weight(self, X: Any, y: Any, sample_weight: Any) -> Array:
+        """Weight of what is learned beyond the physics, from copies that have not seen a fold."""
+        array = validate_data(self, X, reset=False, dtype=np.float64)
+        table = array if column_names(X) is None else X
+        target = np.asarray(y, dtype=np.float64)
+        torque = target.reshape(len(array), -1)
+        counts = np.ones(len(array)) if sample_weight is None else np.asarray(sample_weight)
+        trajectories = self._keys().trajectories(array)
+        residual, learned = np.zeros(torque.shape), np.zeros(torque.shape)
+        unit = np.zeros(len(array), dtype=int)
+        for k, (train, test) in enumerate(held_out_folds(trajectories, self.cv or 2, guard=8)):
+            unit[test] = k
+            train = train[counts[train] > 0]
+            if not len(train):
+                continue
+            copy = clone(self).set_params(cv=None)
+            copy.fit(_safe_indexing(table, train), target[train], counts[train])
+            part = array[test]
+            physics = copy._physics_torque(part)
+            residual[test] = torque[test] - physics
+            learned[test] = copy._output(part) - physics
+        if len(np.unique(trajectories)) > 2:
+            unit = np.unique(trajectories, return_inverse=True)[1]
+        root = np.sqrt(counts)[:, None]
+        weight, _, _ = learned_weights(root * residual, root * learned, unit, 1.0)
+        return weight
+
+    def _physics_torque(self, X: Array) -> Array:
+        """Torque of the physics by itself: as it was identified, or by least squares."""
+        physics = self._read(self.physics_)
+        torque = physics.torque(X)
+        if isinstance(physics, BareRigidBody):
+            for part, columns in physics.columns(X):
+                torque[part] += np.einsum("jpc,p->cj", columns, self.initial_coef_, optimize=True)
+        return torque
 
     # The two hooks that the common tests replace, because their tables are of any width.
 
@@ -255,8 +331,8 @@ class SDLRegressor(SequenceRegressor):
         return Keys(columns.trajectory, columns.time, tuple(columns.state()))
 
     def _read(self, physics: Any) -> BareRigidBody | IdentifiedPhysics:
-        if isinstance(physics, Robot):
-            return BareRigidBody(physics, self._resolve())
+        if not isinstance(physics, RBDRegressor):
+            return BareRigidBody(self._robot, self._resolve())
         return IdentifiedPhysics(physics, self._resolve())
 
     def _tasks(self, X: Array, y: Array, weight: Array, keys: Keys, seed: int) -> list[Task]:
@@ -346,7 +422,8 @@ class SDLRegressor(SequenceRegressor):
     def rigid_body_torque(self, X: Any) -> Array:
         """Torque of the physics, which the prediction falls back on.
 
-        Its coefficients are the learned ones, ``coef_``. With ``residual=False`` nothing but the
+        Its coefficients are the learned ones, ``coef_``, as far as ``learned_weight_`` keeps what
+        was learned. With ``residual=False`` nothing but the
         network reads the learned torque, which may then be far from one: there they are the
         least-squares ones, ``initial_coef_``.
 
@@ -361,7 +438,8 @@ class SDLRegressor(SequenceRegressor):
             Prediction far from the training samples.
         """
         check_is_fitted(self)
-        _, torque = self._rigid_body(validate_data(self, X, reset=False, dtype=np.float64))
+        X = validate_data(self, X, reset=False, dtype=np.float64)
+        torque = self._weighted(X, self._rigid_body(X)[1])
         return torque[:, 0] if self._one_dimensional else torque
 
     def outside_range(self, X: Any) -> NDArray[np.bool_]:
@@ -410,5 +488,12 @@ class SDLRegressor(SequenceRegressor):
         else:
             torque = output * self.output_scale_ + self.output_offset_
         kept = fade(self._novelty(features))[:, None]
-        prediction: Array = kept * torque + (1 - kept) * last_resort
-        return prediction
+        return self._weighted(X, kept * torque + (1 - kept) * last_resort)
+
+    def _weighted(self, X: Array, torque: Array) -> Array:
+        """As much of a torque beyond the physics as held-out trajectories support."""
+        if not hasattr(self, "learned_weight_"):
+            return torque
+        physics = self._physics_torque(X)
+        weighted: Array = physics + self.learned_weight_ * (torque - physics)
+        return weighted

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,12 +12,11 @@ from scipy.optimize import least_squares
 
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Array
-from skidyn.evidence._streaming import linear_terms
+from skidyn.evidence import jackknife, linear_terms, without_each
 from skidyn.payload._runs import (
     FRICTION,
     Runs,
     interval_factor,
-    jackknife,
     make_runs,
     open_columns,
     read_runs,
@@ -219,10 +218,7 @@ def _estimate(runs: Runs, robot: Robot, known: Array, nominal: Array) -> DriveGa
         solution = system.refine(whole, noise, solution)
         noise = system.noise(whole, solution, runs)
     left = np.array(
-        [
-            1 / system.refine(_merged(factors[:f] + factors[f + 1 :]), noise, solution)[-system.n :]
-            for f in range(len(factors))
-        ]
+        [1 / system.refine(rest, noise, solution)[-system.n :] for rest in _merged_without(factors)]
     )
     gains, std = 1 / solution[-system.n :], jackknife(left)
     place = range(len(solution) - system.n, len(solution))
@@ -345,6 +341,12 @@ class _System:
 
 def _merged(factors: list[list[Array]]) -> list[Array]:
     return [_triangle(np.vstack(parts)) for parts in zip(*factors, strict=True)]
+
+
+def _merged_without(factors: list[list[Array]]) -> Iterator[list[Array]]:
+    """Factors of all folds but one, each left out in turn."""
+    for rows in zip(*map(without_each, zip(*factors, strict=True)), strict=True):
+        yield [_triangle(own) for own in rows]
 
 
 def _triangle(rows: Array) -> Array:

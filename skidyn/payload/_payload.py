@@ -13,19 +13,17 @@ from sklearn.utils.validation import check_is_fitted
 
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Array
-from skidyn.evidence._streaming import linear_terms
+from skidyn.evidence import jackknife, linear_terms, without_each
+from skidyn.identification import RBDRegressor, make_consistent
 from skidyn.payload._runs import (
     FRICTION,
     SYMBOLS,
     Runs,
     interval_factor,
-    jackknife,
     make_runs,
     open_columns,
     read_runs,
 )
-from skidyn.rigid_body._consistency import make_consistent
-from skidyn.rigid_body._rbd_regressor import RBDRegressor
 from skidyn.robots import Robot
 
 CONFOUNDED = (
@@ -34,6 +32,9 @@ CONFOUNDED = (
 )
 #: Times the noise of the joints is estimated anew and the fit repeated.
 PASSES = 3
+#: Standard errors from the common size beyond which a joint's own is told as contradicting it, and
+#: the standard error, as a share, beyond which a joint weighs too badly to contradict anything.
+DISAGREES, LARGEST_ERROR = 4.0, 0.3
 #: Radius in m of the sphere that stands for a payload where the data leaves its inertia open.
 RADIUS = 0.05
 
@@ -45,7 +46,7 @@ class PayloadEstimate:
     Parameters
     ----------
     mass : float
-        kg.
+        kg; NaN where the motion shows its first moment only.
     com : ndarray of shape (3,)
         Centre of mass in the frame of the link, m.
     inertia : ndarray of shape (3, 3)
@@ -66,6 +67,14 @@ class PayloadEstimate:
         Root mean square of the averaged loaded rows without and with the payload, N m or N.
     notes : tuple of str
         What cannot be told apart or was left open, in words.
+    first_moment : ndarray of shape (3,)
+        Mass times centre of mass, kg m; NaN where the motion does not show it.
+    first_moment_interval : ndarray of shape (3, 2)
+        95 % intervals, kg m.
+    by_joint, by_joint_std : ndarray of shape (n_joints,)
+        The payload's size as every joint by itself weighs it, as a share of the common one, and
+        its standard error; NaN for joints that do not feel it. Shares that differ beyond their
+        errors tell of drive gains, not of the payload.
 
     Examples
     --------
@@ -83,12 +92,42 @@ class PayloadEstimate:
     rmse_before: Array
     rmse_after: Array
     notes: tuple[str, ...]
+    first_moment: Array
+    first_moment_interval: Array
+    by_joint: Array
+    by_joint_std: Array
 
     @property
     def text(self) -> str:
         """The result in words."""
+        return "\n".join([*self._body(), *self._joints(), *self.notes])
+
+    def _joints(self) -> list[str]:
+        felt = np.flatnonzero(np.isfinite(self.by_joint))
+        if len(felt) < 2:
+            return []
+        shares = ", ".join(
+            f"joint {j + 1} {100 * self.by_joint[j]:.0f} +- {100 * self.by_joint_std[j]:.0f}"
+            for j in felt
+        )
+        return [f"as every joint weighs it, in % of this: {shares}"]
+
+    def _body(self) -> list[str]:
+        if not np.isfinite(self.mass):
+            shown = ", ".join(
+                f"{axis} {value:.4g} ({a:.4g} to {b:.4g})"
+                for axis, value, (a, b) in zip(
+                    "xyz", self.first_moment, self.first_moment_interval, strict=True
+                )
+                if np.isfinite(value)
+            )
+            return [
+                f"payload at {self.link}: its mass does not show in this motion, its first moment "
+                f"does, in kg m (95 %):  {shown}",
+                "with the centre of mass, com, it is weighed by this",
+            ]
         low, high = self.mass_interval
-        lines = [
+        return [
             f"payload at {self.link}: {self.mass:.4g} kg (95 %: {low:.4g} to {high:.4g})",
             "centre of mass in m:  "
             + ", ".join(
@@ -102,9 +141,7 @@ class PayloadEstimate:
                 for (j, b) in enumerate("xyz")
                 if j >= i
             ),
-            *self.notes,
         ]
-        return "\n".join(lines)
 
     def __str__(self) -> str:
         return self.text
@@ -129,6 +166,10 @@ class PayloadEstimate:
                 zip(SYMBOLS, self.inertial_parameters.tolist(), strict=True)
             ),
             "std": dict(zip(SYMBOLS, self.std.tolist(), strict=True)),
+            "first_moment": self.first_moment.tolist(),
+            "first_moment_interval": self.first_moment_interval.tolist(),
+            "by_joint": self.by_joint.tolist(),
+            "by_joint_std": self.by_joint_std.tolist(),
             "rmse_before": self.rmse_before.tolist(),
             "rmse_after": self.rmse_after.tolist(),
             "notes": list(self.notes),
@@ -142,6 +183,7 @@ def identify_payload(
     unloaded: Any = None,
     *,
     link: str | None = None,
+    com: Sequence[float] | None = None,
     effects: Sequence[Any] = FRICTION,
     smooth: bool | None = None,
 ) -> PayloadEstimate:
@@ -157,12 +199,15 @@ def identify_payload(
         The robot; a fitted regressor where there are no unloaded runs.
     loaded : DataFrame or sequence of DataFrame
         Runs with the payload: ``time`` (s), ``q1..``, ``dq1..`` (rad, m), ``tau1..`` (N m, N) and,
-        where known, ``trajectory`` and ``ddq1..``, such as :func:`skidyn.datasets.read_log` gives.
+        where known, ``trajectory`` and ``ddq1..``, such as :func:`skidyn.logs.read_log` gives.
     unloaded : DataFrame or sequence of DataFrame, optional
         Runs without it, if possible the same motion on the same day.
     link : str, optional
         Link of the URDF to which the payload is fixed and in whose frame it is stated; the last
         moving link by default.
+    com : sequence of 3 floats, optional
+        Centre of mass in the frame of the link, m, where it is known. A motion that shows the first
+        moment only, such as that of one joint, weighs the payload by it.
     effects : sequence of str, (str, joints) or Term
         Effects beside the rigid body that are fitted with unloaded runs; viscous and dry friction,
         offset and rotor inertia by default.
@@ -225,7 +270,10 @@ def identify_payload(
         smooth=smooths,
         rigid_body=unloaded is not None,
     )
-    return _estimate(runs, link or robot.body_names[-1], notes)
+    centre = None if com is None else np.asarray(com, dtype=np.float64)
+    if centre is not None and (centre.shape != (3,) or not np.isfinite(centre).all()):
+        raise SkidynError(f"com is {com!r}; expected three numbers in m, in the frame of the link")
+    return _estimate(runs, link or robot.body_names[-1], notes, centre)
 
 
 def _robot_of(model: RBDRegressor) -> Robot:
@@ -248,8 +296,15 @@ def _prediction(model: Robot | RBDRegressor, loaded: Any) -> Array:
     return np.concatenate([part.reshape(len(part), -1) for part in parts])
 
 
-def _estimate(runs: Runs, link: str, notes: list[str]) -> PayloadEstimate:
-    designs = [np.hstack(pair) for pair in zip(runs.body, runs.rest, strict=True)]
+def _estimate(runs: Runs, link: str, notes: list[str], com: Array | None = None) -> PayloadEstimate:
+    # Parameters of the body from those that are free: with a known centre of mass one number
+    # stands for mass and first moment.
+    free = np.eye(10)
+    if com is not None:
+        free = np.delete(free, [1, 2, 3], axis=1)
+        free[1:4, 0] = com
+    bodies = [body @ free for body in runs.body]
+    designs = [np.hstack(pair) for pair in zip(bodies, runs.rest, strict=True)]
     noise = np.ones(len(designs))
     for _ in range(PASSES):
         factors = _fold_factors(designs, runs, noise)
@@ -257,24 +312,57 @@ def _estimate(runs: Runs, link: str, notes: list[str]) -> PayloadEstimate:
         noise = _noise(designs, runs.target, solution)
     factors = _fold_factors(designs, runs, noise)
     whole = _triangle(np.vstack(factors))
-    is_open = open_columns(whole[:, :-1], range(10))
-    if is_open[0]:
+    width = free.shape[1]
+    hidden = open_columns(whole[:, :-1], range(width))
+    is_open: NDArray[np.bool_] = np.any(np.abs(free[:, hidden]) > 0, axis=1)
+    if is_open[:4].all():
         raise SkidynError(
-            f"this motion does not show a mass at {link}: no joint feels it against gravity or "
-            "inertia. Move joints whose axes are not vertical."
+            f"this motion shows neither mass nor first moment of a payload at {link}: the torque "
+            "of no joint depends on them, or on them apart from the robot's own. Turn it about a "
+            "joint whose axis is not vertical, with and without the load."
         )
-    left = np.array(
-        [_solve(np.vstack(factors[:f] + factors[f + 1 :])) for f in range(len(factors))]
-    )[:, :10]
+    left = np.array([_solve(rows) for rows in without_each(factors)])[:, :width] @ free.T
     std = jackknife(left)
     std[is_open] = np.nan
+    wide = interval_factor(len(factors))
+    body = free @ solution[:width]
+    first_moment = np.where(is_open[1:4], np.nan, body[1:4])
+    moments = first_moment[:, None] + wide * std[1:4, None] * [-1.0, 1.0]
+    shares, share_std = _by_joint(designs, runs, body)
+    notes = notes + _disagreement(shares, share_std)
+    before, after = _loaded_errors(designs, runs, solution, width)
+    common: dict[str, Any] = {
+        "std": std,
+        "link": link,
+        "rmse_before": before,
+        "rmse_after": after,
+        "first_moment": first_moment,
+        "first_moment_interval": moments,
+        "by_joint": shares,
+        "by_joint_std": share_std,
+    }
+    if is_open[0]:
+        nothing = np.full((3, 3), np.nan)
+        return PayloadEstimate(
+            mass=np.nan,
+            com=nothing[0],
+            inertia=nothing,
+            mass_interval=(np.nan, np.nan),
+            com_interval=nothing[:, :2],
+            inertial_parameters=np.where(is_open, np.nan, body),
+            notes=tuple(notes),
+            **common,
+        )
     if is_open.any():
         names = ", ".join(np.array(SYMBOLS)[is_open])
         notes.append(f"This motion leaves open: {names}. They are those of a small sphere.")
-    parameters = _consistent(whole, solution[:10], is_open)
+    if com is not None:
+        notes.append("The centre of mass is the one that was given; the mass rests on it.")
+        parameters = _sphere(body[0], com) if is_open[4:].any() else body
+    else:
+        parameters = _consistent(whole, solution[:10], is_open)
     about = _about_com(parameters)
     mass, first = parameters[0], parameters[1:4]
-    wide = interval_factor(len(factors))
     least = wide * float(np.max(std[[4, 7, 9]]))  # of Ixx, Iyy, Izz; NaN where one is open
     if np.trace(about) < least:
         notes.append(
@@ -284,7 +372,6 @@ def _estimate(runs: Runs, link: str, notes: list[str]) -> PayloadEstimate:
     com_std = jackknife(left[:, 1:4] / left[:, :1])
     com_std[is_open[1:4]] = np.inf
     half = wide * com_std[:, None] * [-1.0, 1.0]
-    before, after = _loaded_errors(designs, runs, solution)
     return PayloadEstimate(
         mass=float(mass),
         com=first / mass,
@@ -292,12 +379,51 @@ def _estimate(runs: Runs, link: str, notes: list[str]) -> PayloadEstimate:
         mass_interval=(float(mass - wide * std[0]), float(mass + wide * std[0])),
         com_interval=(first / mass)[:, None] + half,
         inertial_parameters=parameters,
-        std=std,
-        link=link,
-        rmse_before=before,
-        rmse_after=after,
         notes=tuple(notes),
+        **common,
     )
+
+
+def _sphere(mass: float, com: Array) -> Array:
+    """Parameters of a small sphere."""
+    inertia = 0.4 * mass * RADIUS**2 * np.eye(3)
+    inertia += mass * (com @ com * np.eye(3) - np.outer(com, com))
+    return np.asarray(np.r_[mass, mass * com, inertia[np.triu_indices(3)]])
+
+
+def _by_joint(designs: list[Array], runs: Runs, body: Array) -> tuple[Array, Array]:
+    """Size of the payload by every joint alone, over the common one, with its standard error."""
+    shares, errors = [], []
+    for own, rest, target, fold in zip(runs.body, runs.rest, runs.target, runs.fold, strict=True):
+        torque = own @ body
+        design = np.column_stack([torque, rest, target])
+        parts = [_triangle(design[fold == f]) for f in range(runs.problem.n_folds)]
+        whole = _triangle(np.vstack(parts))
+        if not np.any(torque) or open_columns(whole[:, :-1], [0])[0]:
+            shares.append(np.nan)
+            errors.append(np.nan)
+            continue
+        shares.append(_solve(whole)[0])
+        errors.append(float(jackknife(np.array([_solve(r)[0] for r in without_each(parts)]))))
+    return np.array(shares), np.array(errors)
+
+
+def _disagreement(shares: Array, errors: Array) -> list[str]:
+    """A note where joints weigh differently beyond their errors."""
+    felt = np.flatnonzero(np.isfinite(shares) & (errors < LARGEST_ERROR))
+    if len(felt) < 2:
+        return []
+    weight = 1.0 / (errors[felt] + 1e-12) ** 2
+    mean = float(weight @ shares[felt] / weight.sum())
+    distance = np.abs(shares[felt] - mean) / (errors[felt] + 1e-12)
+    worst = int(np.argmax(distance))
+    if distance[worst] < DISAGREES:
+        return []
+    j = felt[worst]
+    return [
+        f"Joint {j + 1} by itself weighs {100 * shares[j]:.0f} % of it, {distance[worst]:.1f} "
+        "standard errors from what all joints say: check its drive gain before the mass is used."
+    ]
 
 
 def _fold_factors(designs: list[Array], runs: Runs, noise: Array) -> list[Array]:
@@ -355,13 +481,15 @@ def _about_com(parameters: Array) -> Array:
     return np.asarray(about_origin - mass * (com @ com * np.eye(3) - np.outer(com, com)))
 
 
-def _loaded_errors(designs: list[Array], runs: Runs, solution: Array) -> tuple[Array, Array]:
+def _loaded_errors(
+    designs: list[Array], runs: Runs, solution: Array, width: int = 10
+) -> tuple[Array, Array]:
     """Errors on the rows that feel the payload, without it and with it."""
     errors = []
     for design, target, body in zip(designs, runs.target, runs.body, strict=True):
         felt = np.any(body != 0, axis=1)
         residual = (target - design @ solution)[felt]
-        payload = body[felt] @ solution[:10]
+        payload = design[felt, :width] @ solution[:width]
         errors.append(
             [np.sqrt(np.mean(x**2)) if felt.any() else 0.0 for x in (residual + payload, residual)]
         )

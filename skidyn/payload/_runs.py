@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student_t
 
-from skidyn._columns import column_names, resolve_columns, trajectory_numbers
+from skidyn._columns import column_names, resolve_columns
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Array, Signals, signals_from
 from skidyn.effects import Term
-from skidyn.evidence._problem import Problem, make_problem
-from skidyn.rigid_body._consistency import from_pseudo_inertia, pseudo_inertia
+from skidyn.evidence import Problem, make_problem
+from skidyn.identification import from_pseudo_inertia, pseudo_inertia
 from skidyn.robots import Robot
 
 #: Parameters of a body, as in :attr:`skidyn.robots.Robot.inertial_parameters`.
@@ -138,12 +138,6 @@ def interval_factor(n_folds: int) -> float:
     return float(student_t.ppf(0.975, max(1, n_folds - 1)))
 
 
-def jackknife(estimates: Array) -> Array:
-    """Standard errors from estimates that leave one fold out each (Efron, Stein 1981)."""
-    n = len(estimates)
-    return np.asarray(np.sqrt((n - 1) / n * np.sum((estimates - estimates.mean(0)) ** 2, axis=0)))
-
-
 def open_columns(design: Array, columns: Sequence[int]) -> NDArray[np.bool_]:
     """Which columns are, nearly, combinations of all others of a design or triangular factor."""
     size = np.linalg.norm(design, axis=0)
@@ -164,7 +158,7 @@ def _frames(runs: Any, name: str) -> list[Any]:
         if column_names(frame) is None:
             raise SkidynError(
                 f"{name} holds a {type(frame).__name__}; expected tables with the columns time, "
-                "q1.., dq1.., tau1.., such as skidyn.datasets.read_log gives"
+                "q1.., dq1.., tau1.., such as skidyn.logs.read_log gives"
             )
     return frames
 
@@ -182,18 +176,14 @@ def _read(robot: Robot, frame: Any) -> tuple[Signals, Array, bool]:
     given = columns.ddq is not None
     if columns.time is None:
         raise SkidynError("a run has no column time, by which it is smoothed and averaged")
-    keep = [*columns.q, *columns.dq, *(columns.ddq or ()), columns.time]
-    keep += [] if columns.trajectory is None else [columns.trajectory]
+    columns = replace(columns, temperature=None)
     table = np.zeros((len(frame), len(names)))
-    for k in keep:
+    for k in columns.used():
         table[:, k] = np.asarray(frame[names[k]], dtype=np.float64)
     torque = np.column_stack([np.asarray(frame[name], dtype=np.float64) for name in wanted])
     if not (np.isfinite(table).all() and np.isfinite(torque).all()):
         raise SkidynError("a run holds values that are not finite; leave such rows out")
-    # Placeholders for accelerations that the smoother derives.
-    columns = replace(columns, ddq=columns.ddq or columns.dq, temperature=None)
-    signals = signals_from(table, columns, robot)
-    return signals.with_(trajectory=trajectory_numbers(table, columns)), torque, given
+    return signals_from(table, columns, robot, to_derive=True), torque, given
 
 
 def _joined(parts: Sequence[Signals], robot: Robot) -> Signals:

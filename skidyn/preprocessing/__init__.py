@@ -19,3 +19,6 @@ __all__ = [
     "cross_fitted_residual",
     "estimate_delay",
 ]
+
+# For other packages of skidyn; no part of the public interface.
+from skidyn.preprocessing._affine import scaling_of as scaling_of

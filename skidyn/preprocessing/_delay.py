@@ -62,7 +62,7 @@ def estimate_delay(
     differentiated position, the torque of two sensors, a motor current and the torque it makes.
     The delay is where the cross-correlation of their differences is largest, between samples by a
     parabola. For torque against motion, whose shapes differ, see the delay that
-    :func:`skidyn.datasets.check_log` reports.
+    :func:`skidyn.logs.check_log` reports.
 
     Parameters
     ----------

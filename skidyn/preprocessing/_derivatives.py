@@ -12,7 +12,11 @@ from sklearn.utils.validation import _check_feature_names_in, check_is_fitted, v
 
 from skidyn._columns import ColumnSpec, _key_column
 from skidyn._compat import Interval, StrOptions, fit_context
-from skidyn.preprocessing._signals import _sampling_rate, _SignalTransformer
+from skidyn.preprocessing._signals import (
+    _sampling_rate,
+    _SignalTransformer,
+    refuse_columns_there,
+)
 from skidyn.preprocessing._smoothers import SMOOTHERS, Smoothed
 
 Array = NDArray[np.float64]
@@ -148,6 +152,7 @@ class SmoothDerivatives(_SignalTransformer):
         self.columns_ = np.array(found, dtype=int)
         of_velocities = self.columns is None and bool(velocities)
         self.derivatives_ = self.derivatives or (1 if of_velocities else 2)
+        refuse_columns_there(names, self.columns_, self.derivatives_)
         self.rate_ = _sampling_rate(X, keys, self.rate)
         if self.cutoff is not None and not self.cutoff < self.rate_ / 2:
             raise ValueError(

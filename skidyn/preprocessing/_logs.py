@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from sklearn.base import clone
 from sklearn.utils import _safe_indexing
 
-from skidyn.model_selection._split import held_out_folds
-from skidyn.preprocessing._keys import keys_of
+from skidyn._keys import keys_of
+from skidyn.model_selection import held_out_folds
 
 if TYPE_CHECKING:
     import pandas as pd

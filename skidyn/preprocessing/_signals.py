@@ -14,8 +14,9 @@ from sklearn.utils.validation import _check_feature_names_in, check_is_fitted, v
 
 from skidyn._columns import ColumnSpec, _key_column
 from skidyn._compat import Interval, fit_context
+from skidyn._exceptions import ColumnError
+from skidyn._keys import Keys, resolve_keys
 from skidyn.preprocessing._affine import scaling_of
-from skidyn.preprocessing._keys import Keys, resolve_keys
 
 Array = NDArray[np.float64]
 
@@ -256,6 +257,7 @@ class TimeDerivative(_SignalTransformer):
         else:
             found = [*keys.features[len(keys.features) // 2 :]]
         self.columns_ = np.array(found, dtype=int)
+        refuse_columns_there(names, self.columns_, 1)
         self.rate_ = _sampling_rate(X, keys, self.rate)
         return self
 
@@ -421,3 +423,15 @@ class SignalScaler(OneToOneFeatureMixin, _SignalTransformer):
         """
         check_is_fitted(self)
         return np.asarray(X, dtype=np.float64) * self.scale_ + self.offset_
+
+
+def refuse_columns_there(names: list[str] | None, columns: Array, derivatives: int) -> None:
+    """Refuse to append derivatives that X has already."""
+    given = names or []
+    made = [f"{'d' * k}{given[int(i)]}" for i in columns if names for k in (1, derivatives)]
+    there = sorted({name for name in made if name in given})
+    if there:
+        raise ColumnError(
+            f"X has {', '.join(there)} already, which would be appended again. Leave them out of X "
+            "to derive them anew, or the transformer to keep them"
+        )

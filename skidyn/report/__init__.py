@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reports: a diagnosis, or two compared, as plain dictionaries and as self-contained pages."""
 
+from skidyn._writing import write_json
 from skidyn.report._compare import summarize_comparison
 from skidyn.report._compare_html import render_comparison
 from skidyn.report._html import render_html
 from skidyn.report._summary import summarize
-from skidyn.report._write import write_comparison, write_html, write_json
+from skidyn.report._write import write_comparison, write_html
 
 __all__ = [
     "render_comparison",
@@ -16,3 +17,6 @@ __all__ = [
     "write_html",
     "write_json",
 ]
+
+# For other packages of skidyn; no part of the public interface.
+from skidyn.report._decimate import rows_with_peaks as rows_with_peaks

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from skidyn._exceptions import SkidynError
+from skidyn._plain import plain
 from skidyn._version import versions
 from skidyn.metrics import paired_comparison, trajectory_errors
 from skidyn.report._html import parameter_rows
 from skidyn.report._overlay import overlays, time_tables
-from skidyn.report._plain import plain
-from skidyn.report._summary import verdict_sentence
+from skidyn.report._summary import judged_regimes, verdict_sentence
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -122,8 +122,9 @@ def _side(diagnosis: Diagnosis, name: str, provenance: Mapping[str, Any]) -> dic
         "rms_torque": torque,
         "rmse_before": diagnosis.rmse_before,
         "rmse_after": diagnosis.rmse_after,
-        "noise_floor": diagnosis.noise_floor,
+        "noise": diagnosis.noise,
         "error_map": diagnosis.error_map(),
+        "judged": judged_regimes(diagnosis),
         "warnings": list(diagnosis.warnings),
         "provenance": dict(provenance),
     }
@@ -230,12 +231,16 @@ def _sentence(report: dict[str, Any]) -> str:
     first, second = (f"“{name}”" for name in report["names"])
     ratios = np.array([row["ratio"] for row in report["ratios"]], dtype=float)
     good = ratios[np.isfinite(ratios) & (ratios > 0)]
-    text = "The two are models of one log. " if report["same_log"] else "The two are two logs. "
+    text = (
+        "These are two models of the same recording. "
+        if report["same_log"]
+        else "These are two different recordings. "
+    )
     if len(good):
         mean = float(np.exp(np.log(good).mean()))
         less = int((good < 1).sum())
         text += (
-            f"As given, {second} has {_change(mean)} than {first} in the mean over joints, and the "
+            f"As given, {second} has {_change(mean, first)} in the mean over joints, and the "
             f"smaller one on {less} of {len(good)} joints. "
         )
     findings = report["findings"]
@@ -254,10 +259,11 @@ def _sentence(report: dict[str, Any]) -> str:
     return text + "Missing " + "; ".join(parts) + "."
 
 
-def _change(ratio: float) -> str:
+def _change(ratio: float, first: str) -> str:
     if abs(ratio - 1) < 0.005:
-        return "no other held-out error"
-    return f"a held-out error {abs(ratio - 1):.0%} {'smaller' if ratio < 1 else 'larger'}"
+        return f"the same held-out error as {first}"
+    size = "smaller" if ratio < 1 else "larger"
+    return f"a held-out error {abs(ratio - 1):.0%} {size} than {first}"
 
 
 def _listed(rows: Sequence[dict[str, Any]]) -> str:

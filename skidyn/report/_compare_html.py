@@ -5,8 +5,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from skidyn.report._bars import scale_of
 from skidyn.report._html import VERDICTS
-from skidyn.report._page import heat, packed, render_page
+from skidyn.report._page import heat, packed, render_page, short
 
 #: Colours of the two, by their names in page.css.
 COLOURS = ("before", "after")
@@ -50,10 +51,30 @@ def render_comparison(summary: dict[str, Any]) -> str:
         b=report["sides"][1],
         verdicts=VERDICTS,
         maps=_maps(report),
+        ranked=_ranked(report),
+        scale=scale_of(ratio for row in _ranked(report) for ratio in row["ratios"]),
         overlays=drawn,
         parts=[*parts, ("provenance", "Provenance")],
         numbers={"panels": _panels(summary), "figures": figures},
     )
+
+
+def _ranked(report: dict[str, Any]) -> list[dict[str, Any]]:
+    """Errors of both as given over their noise, the joint with the largest first."""
+    rows = []
+    for j, name in enumerate(report["joints"]):
+        errors = [side["rmse_before"][j] for side in report["sides"]]
+        noises = [side["noise"][j] for side in report["sides"]]
+        ratios = [
+            e / n if e is not None and n else 0.0 for e, n in zip(errors, noises, strict=True)
+        ]
+        text = ", ".join(
+            f"{label} {short(error)}" for label, error in zip(report["names"], errors, strict=True)
+        )
+        rows.append(
+            {"joint": j + 1, "name": name, "ratios": ratios, "text": f"{text} {report['units'][j]}"}
+        )
+    return sorted(rows, key=lambda row: -max(row["ratios"]))
 
 
 def _overlay(picture: dict[str, Any], report: dict[str, Any]) -> dict[str, Any]:
@@ -74,10 +95,7 @@ def _overlay(picture: dict[str, Any], report: dict[str, Any]) -> dict[str, Any]:
 
 def _maps(report: dict[str, Any]) -> list[list[list[dict[str, Any]]]]:
     """Error maps of both; a colour means the same on either side."""
-    both = [side["error_map"] for side in report["sides"]]
-    joined = heat([[*one, *other] for one, other in zip(*both, strict=True)])
-    n = len(report["regimes"])
-    return [[row[:n] for row in joined], [row[n:] for row in joined]]
+    return [heat(side["error_map"], side["noise"], side["judged"]) for side in report["sides"]]
 
 
 def _panels(summary: dict[str, Any]) -> dict[str, Any]:

@@ -5,7 +5,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from skidyn._text import digits
+from skidyn.report._bars import scale_of
 from skidyn.report._figures import budget_bars, curve_figure, fall_figure, map_figure
+from skidyn.report._glossary import MEANINGS
 from skidyn.report._page import heat, packed, render_page
 
 VERDICTS = {
@@ -41,22 +44,29 @@ def render_html(summary: dict[str, Any]) -> str:
     """
     report, units = summary["report"], summary["units"]
     causes = _causes(summary["budget"])
-    mark, headline = VERDICTS[report["verdict"]]
     figures: list[dict[str, Any]] = []
     findings = [_finding(finding, units, figures) for finding in summary["findings"]]
+    told = summary["story"]
     falls = []
     if findings:
-        for j, unit in enumerate(units):
+        for row in told["joints"]:
+            if not row["speaks"]:
+                continue
+            j = row["joint"] - 1
             errors = [step["rmse"][j] for step in report["history"]]
-            figures.append(fall_figure(errors, report["noise_floor"][j], unit))
-            falls.append(len(figures) - 1)
+            falls.append({"joint": j + 1, "figure": len(figures)})
+            figures.append(fall_figure(errors, summary["noise"][j], units[j]))
     return render_page(
         "diagnosis.html.jinja",
         s=summary,
         r=report,
-        mark=mark,
-        headline=headline,
-        heat=heat(summary["error_map"]),
+        t=told,
+        ranked=sorted(told["joints"], key=lambda row: -(row["ratios"][0] or 0.0)),
+        scale=scale_of(ratio for row in told["joints"] for ratio in row["ratios"]),
+        hero=_hero(findings, told["joints"]),
+        heat=heat(summary["error_map"], summary["noise"], summary["judged"]),
+        remainder=summary["remainder"],
+        glossary=MEANINGS,
         findings=findings,
         falls=falls,
         causes=causes,
@@ -70,11 +80,28 @@ def _parts(summary: dict[str, Any]) -> list[tuple[str, str]]:
     """Sections of the page that hold something: anchor and title, for the list of contents."""
     parts = [("where", "Where it fails")]
     if summary["findings"]:
-        parts += [("what", "What is missing"), ("adding", "What adding it does")]
-    parts += [("unexplained", "Unexplained"), ("limits", "Limits")]
-    if summary["warnings"]:
-        parts.append(("warnings", "Warnings"))
-    return [*parts, ("provenance", "Provenance")]
+        parts += [("what", "What is missing"), ("adding", "The error falling")]
+    return [
+        *parts,
+        ("left", "What is left"),
+        ("limits", "What could hide"),
+        ("glossary", "Terms"),
+        ("provenance", "Provenance"),
+    ]
+
+
+def _hero(findings: list[dict[str, Any]], rows: list[dict[str, Any]]) -> dict[str, Any] | None:
+    """The picture of the first screen: the effect on the joint whose error is worst."""
+    charts = [
+        {**chart, "title": finding["title"], "map": bool(finding["map_figures"])}
+        for finding in findings
+        for chart in (finding["map_figures"] or finding["charts"])
+    ]
+
+    def worst(chart: dict[str, Any]) -> float:
+        return rows[chart["joint"] - 1]["ratios"][0] or 0.0
+
+    return max(charts, key=worst, default=None)
 
 
 def _finding(
@@ -133,7 +160,7 @@ def _panels(summary: dict[str, Any]) -> dict[str, Any]:
     found = [joint - 1 for finding in summary["findings"] for joint in finding["joints"]]
     failing = [failure["joint"] - 1 for failure in summary["failures"]]
     torque = [
-        {"label": "measured", "colour": "measured", "of": [0, "measured"]},
+        {"label": "measured", "colour": "measured", "wide": True, "of": [0, "measured"]},
         {"label": "as given", "colour": "before", "dash": True, "of": [0, "before"]},
     ]
     residual = [{"label": "as given", "colour": "before", "of": [0, "measured", "before"]}]
@@ -152,16 +179,29 @@ def _panels(summary: dict[str, Any]) -> dict[str, Any]:
             "breaks": trace["breaks"],
             "columns": {key: packed(trace[key]) for key in keys},
         }
+        reach = trace["frame"]["reach"]
         plots = [
-            {"label": f"torque in {unit}", "height": 210, "series": torque},
-            {"label": f"residual in {unit}", "height": 150, "series": residual},
-        ]
+            {"label": f"residual in {unit}", "height": 210, "series": residual,
+             "range": [-reach, reach], "note": _cut(trace["frame"], unit)},
+            {"label": f"torque in {unit}", "height": 150, "series": torque},
+        ]  # fmt: skip
         name = f"{j + 1} {summary['report']['joints'][j]}"
-        joints.append({"name": name, "unit": unit, "tables": [table], "plots": plots})
+        joints.append(
+            {"name": name, "unit": unit, "tables": [table], "plots": plots,
+             "apart": trace["apart"]}
+        )  # fmt: skip
     return {
         "joints": joints,
         "starts": summary["traces"][0]["starts"],
         "end": max(trace["time"][-1] for trace in summary["traces"]),
         # the first joints a reader wants to see
-        "shown": list(dict.fromkeys(found + failing))[:2] or [0],
+        "shown": list(dict.fromkeys(failing + found))[:2] or [0],
     }
+
+
+def _cut(frame: dict[str, Any], unit: str) -> str:
+    """A note on the peaks that the axis of the residual leaves out."""
+    if not frame["cut"]:
+        return ""
+    peaks = "One sample lies" if frame["cut"] == 1 else f"{frame['cut']:,} samples lie"
+    return f"{peaks} outside this frame; the largest is {digits(frame['largest'])} {unit}."

@@ -9,7 +9,7 @@ import numpy as np
 
 from skidyn._signals import Array, Signals
 from skidyn.report._decimate import rows_with_peaks
-from skidyn.report._summary import BUCKETS, elapsed
+from skidyn.report._traces import BUCKETS, elapsed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

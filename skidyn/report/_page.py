@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from importlib import resources
 from typing import Any
 
@@ -12,7 +12,11 @@ import numpy as np
 
 from skidyn._bundled import bundled
 from skidyn._optional import import_optional
+from skidyn._text import digits, raised
+from skidyn.report._glossary import meaning
 
+#: Error over noise that has the strongest colour of an error map.
+DEEPEST = 5.0
 #: In this order: each script uses what the ones before it define.
 SCRIPTS = ("common.js", "figures.js", "panels.js")
 
@@ -40,7 +44,16 @@ def render_page(template: str, **content: Any) -> str:
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined,
     )  # fmt: skip
     environment.filters.update(
-        number=number, percent=percent, change=change, chance=chance, words=words, raised=raised
+        number=number,
+        percent=percent,
+        change=change,
+        chance=chance,
+        words=words,
+        raised=raised,
+        capital=capital,
+        short=short,
+        mathml=mathml,
+        meaning=meaning,
     )
     return str(
         environment.get_template(template).render(
@@ -66,23 +79,18 @@ def number(value: Any) -> str:
 
 def percent(value: float | None) -> str:
     """Share in whole per cent."""
-    return "–" if value is None else f"{100 * value:.0f} %"
+    return "–" if value is None else f"{value:.0%}"
 
 
 def change(ratio: float) -> str:
     """Relative change in per cent, with a sign only where something changed."""
     rounded = round(100 * ratio)
-    return f"{rounded:+d} %".replace("-", "−") if rounded else "0 %"
+    return f"{rounded:+d}%".replace("-", "−") if rounded else "0%"
 
 
 def words(kind: str) -> str:
     """Kind of the vocabulary as words."""
     return "effect without a name" if kind == "unknown" else kind.replace("_", " ")
-
-
-def raised(unit: str) -> str:
-    """Unit with its powers as they are printed."""
-    return unit.replace("^2", "²").replace("^3", "³")
 
 
 def chance(q_value: float | None) -> str:
@@ -96,26 +104,52 @@ def packed(values: Iterable[float | None]) -> str:
     return base64.b64encode(array.tobytes()).decode("ascii")
 
 
-def heat(table: list[list[float | None]]) -> list[list[dict[str, Any]]]:
-    """Cells of an error map; the colour is the squared error relative to the joint's largest.
+def short(value: float | None) -> str:
+    """Two significant digits; a dash where there is no number."""
+    return "–" if value is None else digits(value).replace("-", "−")
+
+
+def capital(text: str) -> str:
+    """Text with a capital first letter."""
+    return text[:1].upper() + text[1:]
+
+
+def mathml(formula: str) -> Any:
+    """A formula in LaTeX as MathML, which browsers draw themselves."""
+    convert = import_optional("latex2mathml.converter", extra="report").convert
+    markup = import_optional("markupsafe", extra="report").Markup
+    return markup(convert(formula.replace(r"\mathrm{sign}", r"\operatorname{sign}")))
+
+
+def heat(
+    table: list[list[float | None]],
+    noise: Sequence[float | None],
+    judged: Sequence[Sequence[bool]] | None = None,
+) -> list[list[dict[str, Any]]]:
+    """Cells of an error map; the colour is the error over the noise of the joint.
 
     Parameters
     ----------
     table : list of list of float or None
         Errors by joint and regime.
+    noise : sequence of float or None
+        Noise of the joints.
+    judged : sequence of sequence of bool, optional
+        Whether effects are judged there, by joint and regime; everywhere by default.
 
     Returns
     -------
     list of list of dict
-        ``value`` and ``depth`` between 0 and 1.
+        ``value``, ``depth`` between 0 (noise) and 1, and ``judged``.
     """
     rows = []
-    for row in table:
-        largest = max((v for v in row if v is not None), default=0.0) or 1.0
-        rows.append(
-            [
-                {"value": v, "depth": None if v is None else round((v / largest) ** 2, 2)}
-                for v in row
-            ]
-        )
+    for j, row in enumerate(table):
+        floor = noise[j]
+        cells = []
+        for k, value in enumerate(row):
+            ratio = 1.0 if value is None or not floor else value / floor
+            depth = min(max((ratio - 1) / (DEEPEST - 1), 0.0), 1.0)
+            counts = True if judged is None else judged[j][k]
+            cells.append({"value": value, "depth": round(depth, 2), "judged": counts})
+        rows.append(cells)
     return rows

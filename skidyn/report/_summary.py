@@ -5,23 +5,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from skidyn._signals import Array, Signals
+from skidyn._plain import plain
+from skidyn._text import joints_told, listed
 from skidyn._version import versions
-from skidyn.report._decimate import rows_with_peaks
+from skidyn.diagnosis import regimes, sure
+from skidyn.effects import get_effect
 from skidyn.report._maps import residual_maps
-from skidyn.report._plain import plain
+from skidyn.report._traces import traces
 
 if TYPE_CHECKING:
-    from skidyn.diagnosis import Diagnosis
+    from skidyn.diagnosis import Diagnosis, Finding
 
-#: Buckets over the whole log; up to six rows of each bucket are drawn.
-BUCKETS = 3000
-#: Gap between pieces of a log on the axis of time, as a share of the whole.
-GAP = 0.004
 #: Share of what is left of a joint's squared error that is worth a word if it is predictable.
 WORTH_A_WORD = 0.1
 
@@ -66,23 +65,30 @@ def summarize(
         {
             "report": report,
             "title": title or getattr(signals.robot, "name", "") or "Robot inverse dynamics",
+            "story": diagnosis.story(),
             "verdict_sentence": verdict_sentence(diagnosis),
             "units": units,
             "n_samples": signals.n_samples,
             "n_trajectories": len(np.unique(signals.trajectory)),
             "comparison": diagnosis.comparison.table(),
-            "failures": [vars(failure) for failure in diagnosis.failures],
+            "failures": [asdict(failure) for failure in diagnosis.failures],
+            "rest_errors": [asdict(error) for error in diagnosis.rest_errors],
+            "noise": diagnosis.noise,
             "regimes": list(diagnosis.regimes),
+            "judged": judged_regimes(diagnosis),
+            "remainder": remainders(diagnosis),
             "error_map": diagnosis.error_map(),
             "findings": [
                 {**finding.to_dict(), "title": finding.title, "code": finding.code,
+                 "formula": formula(finding.kind), "notes": notes(finding),
+                 "sure": sure(finding),
                  "curves": finding.curves, "maps": residual_maps(diagnosis, finding)}
                 for finding in diagnosis.findings
             ],
             "budget": diagnosis.budget,
             "left": predictable_left(diagnosis),
             "warnings": list(diagnosis.warnings),
-            "traces": _traces(diagnosis),
+            "traces": traces(diagnosis),
         }
     )  # fmt: skip
     return document
@@ -103,10 +109,13 @@ def predictable_left(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 def verdict_sentence(diagnosis: Diagnosis) -> str:
     """The outcome in one or two sentences."""
     left = predictable_left(diagnosis)
+    if not diagnosis.findings and diagnosis.verdict == "unknown":
+        told = diagnosis.story()
+        return f"{told['headline']}. {told['left']}"
     if not diagnosis.findings and left:
         return (
             "No effect stands out enough to be called missing, but the error is not all noise: on "
-            f"{_joints(sorted(row['joint'] for row in left))} part of it can be predicted from "
+            f"{joints_told(sorted(row['joint'] for row in left))} part of it can be predicted from "
             "the motion."
         )
     if not diagnosis.findings:
@@ -115,13 +124,13 @@ def verdict_sentence(diagnosis: Diagnosis) -> str:
             "data."
         )
     named = [f for f in diagnosis.findings if f.kind != "unknown"]
-    parts = [f"{f.title} ({_joints(f.joints)}{_rivals(f.rivals)})" for f in named]
+    parts = [f"{f.title} ({joints_told(f.joints)}{_rivals(f.rivals)})" for f in named]
     text = ""
     if parts:
-        text = f"{_and(parts)} {'is' if len(parts) == 1 else 'are'} missing."
+        text = f"{listed(parts)} {'is' if len(parts) == 1 else 'are'} missing."
     if diagnosis.unexplained:
-        where = _joints(diagnosis.unexplained["joints"])
-        variables = _and(list(diagnosis.unexplained["variables"]))
+        where = joints_told(diagnosis.unexplained["joints"])
+        variables = listed(list(diagnosis.unexplained["variables"]))
         also = " also" if parts else ""
         text += (
             f" Something that depends on {variables} is{also} missing on {where}; no effect of "
@@ -142,73 +151,58 @@ def verdict_sentence(diagnosis: Diagnosis) -> str:
     return text.strip()
 
 
-def _joints(joints: Any) -> str:
-    numbers = [str(j) for j in joints]
-    return f"joint {numbers[0]}" if len(numbers) == 1 else f"joints {_and(numbers)}"
-
-
 def _rivals(kinds: Any) -> str:
     """A name that the data do not settle is not said without its rivals."""
     return f"; or {', '.join(kind.replace('_', ' ') for kind in kinds)}" if kinds else ""
 
 
-def _and(parts: list[str]) -> str:
-    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
+def judged_regimes(diagnosis: Diagnosis) -> list[list[bool]]:
+    """Whether effects are judged in a regime, by joint and regime."""
+    judged = diagnosis.comparison.judged_samples
+    table = []
+    for inside in regimes(diagnosis.comparison).values():
+        count = np.maximum(inside.sum(0), 1)
+        table.append((inside & judged).sum(0) >= 0.5 * count)
+    found: list[list[bool]] = np.array(table).T.tolist()
+    return found
 
 
-def _traces(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Measured and modelled torque over time for each joint, trajectories laid end to end."""
-    comparison, after = diagnosis.comparison, diagnosis.comparison_after
-    signals = comparison.signals
-    clock, starts = elapsed(signals)
-    traces = []
-    for j in range(signals.n_joints):
-        measured, before = comparison.measured[:, j], comparison.predicted[:, j]
-        pieces = rows_with_peaks(
-            [measured, measured - before, measured - after.predicted[:, j]],
-            signals.segments,
-            BUCKETS,
-        )
-        rows = np.concatenate(pieces)
-        traces.append(
-            {
-                "time": np.round(clock[rows], 5),
-                "measured": measured[rows],
-                "before": before[rows],
-                "after": after.predicted[rows, j],
-                # where a line must not be drawn on from the previous row
-                "breaks": np.cumsum([len(piece) for piece in pieces])[:-1],
-                "starts": starts,
-            }
-        )
-    return traces
+def remainders(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """What the completed model leaves of each joint, where the diagnosis tells it apart.
 
-
-def elapsed(signals: Signals) -> tuple[Array, list[dict[str, Any]]]:
-    """Time that runs on over the borders of trajectories, with a gap that the eye sees.
-
-    Parameters
-    ----------
-    signals : Signals
-        Motion.
-
-    Returns
-    -------
-    clock : ndarray of shape (n_samples,), s
-        Time on the axis.
-    starts : list of dict
-        ``trajectory`` and ``time``, s, of each beginning.
+    Noise of the torque sensor and of the positions, ``predictable`` what the signals still tell,
+    ``remainder`` what is neither; N m or N.
     """
-    pieces = [signals.clock[segment] for segment in signals.segments]
-    total = sum(float(piece[-1] - piece[0]) for piece in pieces)
-    gap = min(GAP * total, 0.1 * total / len(pieces))
-    clock = np.empty(signals.n_samples)
-    starts: list[dict[str, Any]] = []
-    end = 0.0
-    for segment, time in zip(signals.segments, pieces, strict=True):
-        clock[segment] = time - time[0] + end
-        name = int(signals.trajectory[segment.start])
-        if not starts or starts[-1]["trajectory"] != name:
-            starts.append({"trajectory": name, "time": end})
-        end = float(clock[segment.stop - 1]) + gap
-    return clock, starts
+    parts = diagnosis.parts
+    if parts is None:
+        return []
+    return [
+        {
+            "joint": j + 1,
+            "name": name,
+            "unit": diagnosis.comparison.units[j],
+            "after": diagnosis.rmse_after[j],
+            "torque_noise": parts.sensor_noise[j],
+            "position_noise": parts.position_noise[j],
+            "predictable": parts.predictable[j],
+            "remainder": parts.left[j],
+        }
+        for j, name in enumerate(diagnosis.joint_names)
+    ]
+
+
+def notes(finding: Finding) -> list[str]:
+    """What there is to say of a finding beside its name, size and rivals."""
+    sentences = []
+    caveat = "" if finding.kind == "unknown" else get_effect(finding.kind).caveat
+    if caveat:
+        sentences.append(f"Note that {caveat}.")
+    mass = finding.parameters.get("mass", {}).get("value", 0.0)
+    if isinstance(mass, float) and mass < 0:
+        sentences.append("The mass is negative: the description has a load that the robot lacks.")
+    return sentences
+
+
+def formula(kind: str) -> str:
+    """Formula of a kind in LaTeX, empty for what has none."""
+    return "" if kind == "unknown" else str(get_effect(kind).formula)

@@ -3,66 +3,16 @@
 
 from __future__ import annotations
 
-import json
 import os
-import tempfile
 from pathlib import Path
 from typing import Any
 
 from skidyn._exceptions import SkidynError
+from skidyn._writing import write_json, write_text
 from skidyn.report._compare_html import render_comparison
 from skidyn.report._html import render_html
-from skidyn.report._plain import plain
 
 PathLike = str | os.PathLike[str]
-
-
-def write_text(path: PathLike, text: str) -> Path:
-    """Write a file in one step, so that an interrupted run leaves no half of it."""
-    target = Path(path)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-        # mkstemp makes private files; a report has the mode of any other new file
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(temporary, 0o666 & ~umask)
-        os.replace(temporary, target)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
-    return target
-
-
-def write_json(path: PathLike, content: dict[str, Any]) -> Path:
-    """Write a dictionary as JSON; numbers that are not finite become null.
-
-    Parameters
-    ----------
-    path : path
-        File to write; it is replaced in one step.
-    content : dict
-        For example ``diagnosis.to_dict()``.
-
-    Returns
-    -------
-    path : Path
-        The file.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> from skidyn.report import write_json
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     file = write_json(pathlib.Path(folder, "a.json"), {"rmse": float("nan")})
-    ...     print(file.read_text().strip())
-    {
-      "rmse": null
-    }
-    """
-    return write_text(path, json.dumps(plain(content), indent=2, allow_nan=False) + "\n")
 
 
 def write_html(path: PathLike, summary: dict[str, Any]) -> Path:

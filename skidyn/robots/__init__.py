@@ -1,6 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Robots: read from a URDF, checked, with batched rigid-body dynamics."""
+"""Robots: read from a URDF, checked, with batched rigid-body dynamics; base parameters."""
 
+from skidyn.robots._base_parameters import BaseParameters, find_base_parameters
 from skidyn.robots._robot import Robot
 
-__all__ = ["Robot"]
+__all__ = ["BaseParameters", "Robot", "find_base_parameters"]
+
+# For other packages of skidyn; no part of the public interface.
+from skidyn.robots._base_parameters import base_parameter_index as base_parameter_index
+from skidyn.robots._symbols import (
+    Instant as Instant,
+    SymbolicRobot as SymbolicRobot,
+    Symbols as Symbols,
+    filled as filled,
+    replay as replay,
+    symbols as symbols,
+)

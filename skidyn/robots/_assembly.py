@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from skidyn._exceptions import RobotDescriptionError
-from skidyn.rigid_body._tree import KinematicTree, transform_inertial
-from skidyn.robots._urdf import Description, Joint, Mimic
+from skidyn.dynamics import KinematicTree, transform_inertial
+from skidyn.robots._description import Description, Joint, Mimic
 
 
 @dataclass(frozen=True)

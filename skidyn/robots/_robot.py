@@ -13,15 +13,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from skidyn._exceptions import RobotDescriptionError, SkidynError
-from skidyn.rigid_body._engine import Engine
-from skidyn.rigid_body._recursion import Program
-from skidyn.rigid_body._tree import KinematicTree
+from skidyn.dynamics import Engine, KinematicTree
 from skidyn.robots._assembly import LinkPlacement, assemble
+from skidyn.robots._chain import build_chain
+from skidyn.robots._description import Description
+from skidyn.robots._mjcf import parse_mjcf
+from skidyn.robots._sdf import parse_sdf
 from skidyn.robots._urdf import parse_urdf
 from skidyn.robots._xml import parse_robot_element, read_description
 
 if TYPE_CHECKING:
     import torch
+    from pytorch_kinematics.chain import Chain
 
 _PARAMETER_SYMBOLS = ("m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 
@@ -30,7 +33,8 @@ _PARAMETER_SYMBOLS = ("m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz
 class Robot:
     """A robot arm or tree: joints, limits, inertial parameters and rigid-body dynamics.
 
-    Made by :meth:`from_urdf`. A robot never changes; it can be pickled and shared between threads.
+    Made by :meth:`from_urdf`, :meth:`from_sdf` or :meth:`from_mjcf`. A robot never changes; it can
+    be pickled and shared between threads.
 
     Links that are fixed to each other are one body; its frame is that of the link whose joint moves
     it. All methods take joint positions ``q`` (rad, m), velocities ``dq`` and accelerations ``ddq``
@@ -148,6 +152,115 @@ class Robot:
         array([[9.81]])
         """
         description = parse_urdf(parse_robot_element(read_description(source)))
+        return cls._from_description(description, joints, gravity)
+
+    @classmethod
+    def from_sdf(
+        cls,
+        source: str | bytes | os.PathLike[str],
+        *,
+        model: str | None = None,
+        joints: Sequence[str] | None = None,
+        gravity: Sequence[float] = (0.0, 0.0, -9.81),
+    ) -> Robot:
+        """Read a robot from an SDF, the format of Gazebo.
+
+        Revolute, continuous, prismatic and fixed joints of one model without nested models. Poses
+        may be relative to links, joints and frames. A link without ``<inertial>`` has 1 kg and 1 kg
+        m^2, as the SDF standard says; a warning names it. The base frame is that of the model.
+
+        Parameters
+        ----------
+        source : str, bytes or path
+            Path of the file, or the text itself (anything that starts with ``<``).
+        model : str, default=None
+            Name of the model; needed where the file has several.
+        joints : sequence of str, default=None
+            Joints that the logs cover, as in :meth:`from_urdf`.
+        gravity : sequence of 3 floats, default=(0, 0, -9.81)
+            Gravitational acceleration in the frame of the model, m/s^2.
+
+        Returns
+        -------
+        Robot
+
+        Raises
+        ------
+        RobotDescriptionError
+            The description is not a robot that can be modelled; the message names the link or joint
+            and says what to change.
+
+        Examples
+        --------
+        >>> from skidyn.robots import Robot
+        >>> robot = Robot.from_sdf('''
+        ...   <sdf version="1.9"><model name="pendulum">
+        ...     <link name="rod"><pose>0 0 1 0 0 0</pose><inertial>
+        ...       <pose>0 0 -0.5 0 0 0</pose><mass>2</mass>
+        ...       <inertia><ixx>0.1</ixx><iyy>0.1</iyy><izz>0.01</izz></inertia>
+        ...     </inertial></link>
+        ...     <joint name="swing" type="revolute">
+        ...       <parent>world</parent><child>rod</child><axis><xyz>1 0 0</xyz></axis>
+        ...     </joint>
+        ...   </model></sdf>''')
+        >>> robot.gravity_torque([[1.5707963267948966]]).round(2)
+        array([[9.81]])
+        """
+        return cls._from_description(parse_sdf(read_description(source), model), joints, gravity)
+
+    @classmethod
+    def from_mjcf(
+        cls,
+        source: str | bytes | os.PathLike[str],
+        *,
+        joints: Sequence[str] | None = None,
+        gravity: Sequence[float] | None = None,
+    ) -> Robot:
+        """Read a robot from an MJCF, the format of MuJoCo; needs the extra ``mujoco``.
+
+        MuJoCo compiles the model, with all its defaults; hinges and slides, several on a body too,
+        with their reference positions. Ratios between joints are read as mimic joints. Armature
+        and springs are no rigid bodies: they are left out with a warning. Sites are links.
+
+        Parameters
+        ----------
+        source : str, bytes or path
+            Path of the file, or the text itself (anything that starts with ``<``).
+        joints : sequence of str, default=None
+            Joints that the logs cover, as in :meth:`from_urdf`.
+        gravity : sequence of 3 floats, default=None
+            Gravitational acceleration in the frame of the world, m/s^2; that of the file if None.
+
+        Returns
+        -------
+        Robot
+
+        Raises
+        ------
+        RobotDescriptionError
+            The description is not a robot that can be modelled; the message names the joint and
+            says what to change.
+        ImportError
+            MuJoCo is not installed.
+
+        Examples
+        --------
+        >>> from skidyn.robots import Robot
+        >>> robot = Robot.from_mjcf('''
+        ...   <mujoco model="pendulum"><worldbody><body name="rod">
+        ...     <joint name="swing" axis="1 0 0"/>
+        ...     <inertial pos="0 0 -0.5" mass="2" diaginertia="0.1 0.1 0.01"/>
+        ...   </body></worldbody></mujoco>''')
+        >>> robot.gravity_torque([[1.5707963267948966]]).round(2)
+        array([[9.81]])
+        """
+        description, own = parse_mjcf(source)
+        return cls._from_description(description, joints, own if gravity is None else gravity)
+
+    @classmethod
+    def _from_description(
+        cls, description: Description, joints: Sequence[str] | None, gravity: Any
+    ) -> Robot:
         assembly = assemble(description, joints)
         own = assembly.joints
         return cls(
@@ -168,6 +281,25 @@ class Robot:
             tree=assembly.tree(),
             links=assembly.links,
         )
+
+    @property
+    def chain(self) -> Chain:
+        """Chain of pytorch-kinematics: batched, differentiable kinematics, float64, on the CPU.
+
+        A new one at every access, because ``chain.to(dtype=..., device=...)`` changes it. Its
+        joints are :attr:`body_joints` in their order; where no joint mimics another, its positions
+        are ``q``. ``SerialChain(robot.chain, link)`` gives the Jacobian of a link.
+
+        Examples
+        --------
+        >>> import torch
+        >>> from skidyn.datasets import load_planar_arm
+        >>> robot = load_planar_arm()
+        >>> pose = robot.chain.forward_kinematics(torch.zeros(5, 2, dtype=torch.float64))
+        >>> pose[robot.body_names[-1]].get_matrix().shape
+        torch.Size([5, 4, 4])
+        """
+        return build_chain(self)
 
     @property
     def n_joints(self) -> int:
@@ -506,24 +638,6 @@ class Robot:
             Joint torque per unit of every inertial parameter.
         """
         return self._engine.torque_regressor_torch({"q": q, "dq": dq, "ddq": ddq})
-
-    def fixed_program(self, parameters: Any = None) -> Program:
-        """Inverse dynamics as a list of operations with the parameters written in, for exporters.
-
-        Parameters
-        ----------
-        parameters : array-like of shape (n_bodies, 10), default=None
-            Inertial parameters in place of those of the URDF.
-
-        Returns
-        -------
-        Program
-            Operations, the inputs ``q``, ``dq``, ``ddq`` and the outputs ``(joint,)``.
-        """
-        values = self._parameters(parameters)
-        return self._engine.fixed_inverse_dynamics(
-            self.inertial_parameters if values is None else values
-        )
 
     def _signals(self, **signals: Any) -> dict[str, np.ndarray]:
         """Signals as float64 arrays of one shape (n_samples, n_joints)."""

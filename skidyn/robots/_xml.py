@@ -8,6 +8,8 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 from xml.parsers import expat
 
+import numpy as np
+
 from skidyn._exceptions import RobotDescriptionError
 
 #: Larger descriptions are refused; whole humanoids take 1 MB, their meshes are other files.
@@ -52,16 +54,12 @@ def parse_robot_element(data: bytes) -> ElementTree.Element:
     RobotDescriptionError
         Not well-formed XML, a document type or entity declaration, or not a URDF.
     """
-    _refuse_declarations(data)
-    try:
-        root = ElementTree.fromstring(data)
-    except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise RobotDescriptionError(f"The description is not well-formed XML: {error}.") from error
+    root = parse_xml(data)
     if _local(root.tag) != "robot":
-        hint = " Load MJCF and SDF models after converting them to URDF."
+        reader = {"mujoco": "from_mjcf", "sdf": "from_sdf"}.get(_local(root.tag))
         raise RobotDescriptionError(
             f"The root element is <{_local(root.tag)}>; expected a URDF <robot>."
-            + (hint if _local(root.tag) in ("mujoco", "sdf") else "")
+            + (f" Robot.{reader} reads it." if reader else "")
         )
     if any("xacro" in element.tag for element in root.iter() if isinstance(element.tag, str)):
         raise RobotDescriptionError("The description holds xacro macros; expand them first: xacro.")
@@ -73,6 +71,121 @@ def parse_robot_element(data: bytes) -> ElementTree.Element:
         else:
             root.remove(element)
     return root
+
+
+def only(element: ElementTree.Element, tag: str, what: str) -> ElementTree.Element | None:
+    """The child with a tag, None without one.
+
+    Raises
+    ------
+    RobotDescriptionError
+        There are several.
+    """
+    found = element.findall(tag)
+    if len(found) > 1:
+        raise RobotDescriptionError(f"The {what} has {len(found)} <{tag}> elements; keep one.")
+    return found[0] if found else None
+
+
+def required(element: ElementTree.Element, tag: str, what: str) -> ElementTree.Element:
+    """The child with a tag.
+
+    Raises
+    ------
+    RobotDescriptionError
+        There is none, or several.
+    """
+    child = only(element, tag, what)
+    if child is None:
+        raise RobotDescriptionError(f"The {what} has no <{tag}>; add one.")
+    return child
+
+
+def word(element: ElementTree.Element, key: str, what: str) -> str:
+    """A text attribute.
+
+    Raises
+    ------
+    RobotDescriptionError
+        It is absent or empty.
+    """
+    value = element.get(key)
+    if not value:
+        raise RobotDescriptionError(f"The <{element.tag}> of {what} has no {key}; add {key}=...")
+    return value
+
+
+def numbers(
+    element: ElementTree.Element,
+    key: str,
+    count: int,
+    what: str,
+    default: tuple[float, ...] | None = None,
+) -> np.ndarray:
+    """Finite numbers of an attribute.
+
+    Parameters
+    ----------
+    element : Element
+    key : str
+        Name of the attribute.
+    count : int
+        How many numbers.
+    what : str
+        Whose they are, for the message.
+    default : tuple of float or None
+        Values of an absent attribute; None where it must be there.
+
+    Returns
+    -------
+    ndarray of shape (count,)
+
+    Raises
+    ------
+    RobotDescriptionError
+        Absent, not that many, or not finite numbers.
+    """
+    text = element.get(key)
+    if text is None:
+        if default is None:
+            raise RobotDescriptionError(f"{what[0].upper()}{what[1:]} has no {key}; add {key}=...")
+        return np.array(default)
+    return numbers_of(text, count, f"{what} ({key})")
+
+
+def numbers_of(text: str, count: int, what: str) -> np.ndarray:
+    """As many finite numbers, separated by white space.
+
+    Raises
+    ------
+    RobotDescriptionError
+        Not that many, or not finite numbers.
+    """
+    expected = "a finite number" if count == 1 else f"{count} finite numbers"
+    try:
+        values = np.array([float(part) for part in text.split()])
+    except ValueError:
+        values = np.empty(0)
+    if len(values) != count or not np.all(np.isfinite(values)):
+        raise RobotDescriptionError(
+            f"{what[0].upper()}{what[1:]} is {text[:80]!r}; expected {expected}."
+        )
+    return values
+
+
+def parse_xml(data: bytes) -> ElementTree.Element:
+    """Root element, free of anything a parser could expand.
+
+    Raises
+    ------
+    RobotDescriptionError
+        Not well-formed XML, or a document type or entity declaration.
+    """
+    _refuse_declarations(data)
+    try:
+        return ElementTree.fromstring(data)
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        raise RobotDescriptionError(f"The description is not well-formed XML: {error}.") from error
 
 
 def _refuse_declarations(data: bytes) -> None:

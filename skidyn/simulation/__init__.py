@@ -1,6 +1,28 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Simulation of a fitted model in a control loop."""
+"""Forward simulation of fitted models: their motion, how far it is from a log, in a loop or not."""
 
+from skidyn.forward import Controller, fit_controller
 from skidyn.simulation._closed_loop import simulate_closed_loop
+from skidyn.simulation._score import (
+    SimulationErrors,
+    SimulationVerdict,
+    judge_by_simulation,
+    neg_simulation_error,
+    simulation_errors,
+)
+from skidyn.simulation._servo import fit_servo, servo_torque
+from skidyn.simulation._simulate import simulate
 
-__all__ = ["simulate_closed_loop"]
+__all__ = [
+    "Controller",
+    "SimulationErrors",
+    "SimulationVerdict",
+    "fit_controller",
+    "fit_servo",
+    "judge_by_simulation",
+    "neg_simulation_error",
+    "servo_torque",
+    "simulate",
+    "simulate_closed_loop",
+    "simulation_errors",
+]

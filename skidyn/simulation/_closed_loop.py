@@ -13,9 +13,9 @@ from scipy.interpolate import CubicHermiteSpline
 from skidyn._columns import Columns, resolve_columns, with_columns
 from skidyn._exceptions import ColumnError, SkidynError
 from skidyn._signals import Array, find_segments
-from skidyn.export._model import name_term, static_model
-from skidyn.rigid_body import RBDRegressor
-from skidyn.rigid_body._scalar import ScalarFunction
+from skidyn.dynamics import ScalarFunction
+from skidyn.export import name_term, static_model
+from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
 
 #: Local error of a step, relative and in rad or m. It leaves some 1e-4 rad; ten times less takes
@@ -78,8 +78,8 @@ def simulate_closed_loop(
 
     See Also
     --------
-    skidyn.rigid_body.RBDRegressor : ``fit(X, y, instruments=...)``.
-    skidyn.rigid_body.repetition_instruments : Instruments from repeated runs, without a simulation.
+    skidyn.identification.RBDRegressor : ``fit(X, y, instruments=...)``.
+    skidyn.identification.repetition_instruments : Instruments from repeated runs.
 
     References
     ----------

@@ -7,7 +7,7 @@ pandas = pytest.importorskip("pandas", reason="needs skidyn[io]")
 pytest.importorskip("jinja2", reason="needs skidyn[report]")
 
 from skidyn import cli, load_model, save_model  # noqa: E402
-from skidyn.rigid_body import RBDRegressor  # noqa: E402
+from skidyn.identification import RBDRegressor  # noqa: E402
 from skidyn.robots import Robot  # noqa: E402
 
 LOG = ("log.csv", "--urdf", "arm.urdf")
@@ -46,7 +46,7 @@ def test_two_reports(here, capsys, tmp_path):
     capsys.readouterr()
     assert cli.main(["compare", str(tmp_path / "a.json"), str(tmp_path / "b.json")]) == cli.DONE
     told = capsys.readouterr().out
-    assert "A = a, B = b" in told and "two logs" in told
+    assert "A = a, B = b" in told and "two different recordings" in told
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from skidyn._commands._terminal import fit
 from skidyn._progress import listening
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
 
 pty = pytest.importorskip("pty", reason="no terminals here")
 ESCAPE = re.compile(r"\x1b\[[0-9;?]*[a-zA-Z]")

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from skidyn._exceptions import LogError
 from skidyn.datasets import (
     fetch_double_pendulum,
     fetch_emps,
@@ -21,6 +20,7 @@ from skidyn.datasets import (
     fetch_screw_drive,
     fetch_xl330,
 )
+from skidyn.exceptions import LogError
 
 pytest.importorskip("pooch")
 

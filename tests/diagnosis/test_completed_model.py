@@ -6,7 +6,7 @@ import pytest
 from skidyn.datasets import load_planar_arm, load_ur5, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
 from skidyn.explorer import Session
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
 
 
 @pytest.mark.parametrize(

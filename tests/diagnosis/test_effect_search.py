@@ -4,7 +4,7 @@ from sklearn.base import clone
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import EffectSearchCV
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
 
 
 def test_finds_adds_and_predicts_better():

@@ -4,9 +4,9 @@
 import numpy as np
 import pytest
 
-from skidyn.datasets import load_ur5, make_hidden_effect_log
+from skidyn.datasets import load_planar_arm, load_ur5, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
 
 #: Torque on a joint (from 1), its size in N m, the signals, and the formula if it is a short one.
 FORMS = {
@@ -40,3 +40,19 @@ def test_a_form_in_no_catalogue_is_unknown_and_its_signals_are_named(form):
     if formula is not None:
         assert proposal.expressions == (formula,)
         assert proposal.coefficients[0] == pytest.approx(size, rel=0.1)
+
+
+def test_a_joint_that_rests_in_some_trajectories_is_diagnosed_all_the_same():
+    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=8, duration=8.0)
+    X = log.X.copy()
+    rests = X["trajectory"].isin([3, 7])  # every fourth: a quarter of the folds is empty
+    X.loc[rests, ["q2", "dq2", "ddq2"]] = [0.3, 0.0, 0.0]
+    signals = [X[[f"{s}{j}" for j in (1, 2)]].to_numpy() for s in ("q", "dq", "ddq")]
+    y = log.robot.inverse_dynamics(*signals) + 0.5 * np.sign(signals[1])
+    y += 0.02 * np.random.default_rng(1).normal(size=y.shape)
+    y[:, 1] += np.where(X["q1"] > X["q1"].median(), 1.0, -1.0)
+
+    diagnosis = diagnose(RBDRegressor(log.robot, ("viscous", "coulomb")), X, y)
+
+    assert diagnosis.verdict != "complete"
+    assert any(2 in finding.joints for finding in diagnosis.findings)

@@ -8,7 +8,7 @@ import pytest
 
 from skidyn.datasets import load_planar_arm, load_ur5, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
 
 ROBOTS = {"ur5": load_ur5, "planar arm": load_planar_arm}
 #: Parameter of the truth whose interval is checked.

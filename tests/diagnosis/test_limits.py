@@ -10,7 +10,7 @@ import pytest
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
 
 
 def limits_of(log, X=None, effects=None):
@@ -56,7 +56,7 @@ def test_the_sentence_holds_name_size_and_unit(limits):
     limit = limits["spring", 1]
 
     assert f"{limit.largest_hidden:.3g} N m/rad" in limit.sentence
-    assert "absent, or k below" in limit.sentence
+    assert "not detected; k above" in limit.sentence
 
 
 def test_a_temperature_that_is_not_logged_shows_nothing(log):

@@ -7,12 +7,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from skidyn._exceptions import LogError, SkidynError
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import diagnose_parquet
 from skidyn.diagnosis._out_of_core import _confirm, _sample
 from skidyn.evidence import evidence_from_parquet
-from skidyn.rigid_body import RBDRegressor
+from skidyn.exceptions import LogError, SkidynError
+from skidyn.identification import RBDRegressor
 
 ROBOT = load_planar_arm()
 TRIED = ["stribeck", "spring"]

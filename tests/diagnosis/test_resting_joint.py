@@ -10,7 +10,7 @@ import pandas as pd
 
 from skidyn.datasets import load_planar_arm
 from skidyn.diagnosis import diagnose
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
 
 
 def test_an_effect_is_found_beside_a_joint_that_rests():

@@ -12,7 +12,7 @@ from skidyn.diagnosis import Settings, diagnose
 from skidyn.diagnosis._reversals import look_at_reversals
 from skidyn.diagnosis._search import search
 from skidyn.effects import dahl_state
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
 
 
 @pytest.fixture(scope="module")

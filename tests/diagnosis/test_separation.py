@@ -6,10 +6,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from skidyn._exceptions import EffectError
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import design_separating_motion, diagnose
-from skidyn.rigid_body import RBDRegressor
+from skidyn.exceptions import EffectError
+from skidyn.identification import RBDRegressor
 
 
 def diagnosis_of(kind):

@@ -4,20 +4,21 @@
 import numpy as np
 import pytest
 
-from skidyn._exceptions import EffectError
 from skidyn._signals import Signals
 from skidyn.datasets import load_planar_arm, load_scara
 from skidyn.effects import (
     Coefficient,
     Effect,
+    Term,
     dahl_state,
     get_effect,
     list_effects,
     make_terms,
     register_effect,
     stop_state,
+    unregister_effect,
 )
-from skidyn.effects._catalogue import unregister_effect
+from skidyn.exceptions import EffectError
 
 ROBOT = load_planar_arm()
 
@@ -121,7 +122,7 @@ def test_springs(signals):
     cubic = columns("nonlinear_spring", signals, q_middle=0.1) @ [1.0, 2.0, 3.0, 4.0]
     x = q - 0.1
     np.testing.assert_allclose(cubic, x + 2 * x**2 + 3 * x**3 + 4)
-    one = columns("offset", signals, trajectory=1)[:, 0]
+    one = Term("offset", (0,), {"trajectories": (1,)}).torque_columns(signals)[0][:, 0]
     np.testing.assert_array_equal(one, signals.trajectory == 1)
 
 
@@ -166,7 +167,7 @@ def test_payload_is_a_heavier_last_link(signals):
     heavier[-1] += body
     state = signals.q, signals.dq, signals.ddq
     change = ROBOT.inverse_dynamics(*state, parameters=heavier) - ROBOT.inverse_dynamics(*state)
-    blocks = get_effect("payload").torque_columns(signals, (0, 1), trajectories=(1,))
+    blocks = Term("payload", (0, 1), {"trajectories": (1,)}).torque_columns(signals)
     for j in range(2):
         np.testing.assert_allclose(blocks[j][300:] @ body, change[300:, j], atol=1e-10)
         assert not blocks[j][:300].any()
@@ -251,7 +252,7 @@ def test_terms_that_cannot_be(spec, words):
 def test_diagnosis_finds_a_users_effect():
     from skidyn.datasets import make_hidden_effect_log
     from skidyn.diagnosis import diagnose
-    from skidyn.rigid_body import RBDRegressor
+    from skidyn.identification import RBDRegressor
 
     class Magnet(Effect):
         kind = "magnet"

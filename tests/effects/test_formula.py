@@ -7,14 +7,13 @@ import pickle
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
-from skidyn._exceptions import EffectError
 from skidyn._signals import Signals
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.effects import formula, get_effect, list_effects
-from skidyn.rigid_body import RBDRegressor
+from skidyn.exceptions import EffectError
+from skidyn.identification import RBDRegressor
 
 
 @pytest.fixture

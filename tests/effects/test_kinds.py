@@ -14,7 +14,7 @@ import pytest
 from skidyn.datasets import load_planar_arm, load_srs_arm, load_ur5, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
 from skidyn.effects import list_effects
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
 
 HYSTERESIS = {"dahl", "lugre", "maxwell_slip"}
 #: Kind: robot, and the parameter of the truth that must be met, with its tolerance.

@@ -7,8 +7,8 @@ from sklearn.pipeline import make_pipeline
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from skidyn._columns import Columns
-from skidyn._exceptions import ColumnError, EffectError
 from skidyn.effects import FrictionTransformer, Term
+from skidyn.exceptions import ColumnError, EffectError
 
 
 class AnyColumns(FrictionTransformer):

@@ -6,11 +6,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from skidyn._exceptions import LogWarning
 from skidyn._signals import Signals
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
-from skidyn.evidence._broken import TORQUE_SHARE, broken_notes, leaps, reversals
-from skidyn.rigid_body import RBDRegressor
+from skidyn.evidence import broken_notes
+from skidyn.evidence._broken import TORQUE_SHARE, leaps, reversals
+from skidyn.exceptions import LogWarning
+from skidyn.identification import RBDRegressor
 
 
 def swing(n=2000, rate=200.0):

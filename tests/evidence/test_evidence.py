@@ -8,7 +8,7 @@ import pytest
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.evidence import Evidence
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
 
 NAMES = ("a", "b", "c")
 

@@ -8,15 +8,11 @@ from importlib import resources
 import numpy as np
 import pytest
 
-from skidyn._exceptions import SkidynError
 from skidyn.datasets import load_panda, load_planar_arm, load_scara
 from skidyn.evidence import _from_motion, evidence_from_motion
-from skidyn.rigid_body import (
-    RBDRegressor,
-    find_base_parameters,
-    is_consistent,
-    regressor_from_evidence,
-)
+from skidyn.exceptions import SkidynError
+from skidyn.identification import RBDRegressor, is_consistent, regressor_from_evidence
+from skidyn.robots import find_base_parameters
 
 FRICTION = ("viscous", "coulomb")
 

@@ -5,7 +5,7 @@ import pytest
 from skidyn._signals import Signals
 from skidyn.datasets import load_planar_arm
 from skidyn.effects import make_terms
-from skidyn.evidence._problem import make_problem
+from skidyn.evidence import make_problem
 
 
 def problem(n_trajectories, rate=100.0):

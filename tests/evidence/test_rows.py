@@ -3,7 +3,8 @@ import numpy as np
 import pytest
 
 from skidyn._signals import Signals
-from skidyn.evidence._rows import every_sample, sliding_samples, window_rows
+from skidyn.evidence import sliding_samples, window_rows
+from skidyn.evidence._rows import every_sample
 
 
 @pytest.fixture

@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Evidence from files, trajectory by trajectory, and on a cluster that loses a worker."""
 
+import subprocess
+import sys
 import tracemalloc
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from skidyn._exceptions import LogError, SkidynError
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
-from skidyn.evidence import Evidence, evidence_from_parquet
-from skidyn.evidence._problem import make_problem
-from skidyn.evidence._streaming import linear_terms
-from skidyn.rigid_body import RBDRegressor, regressor_from_evidence
+from skidyn.evidence import Evidence, evidence_from_parquet, linear_terms, make_problem
+from skidyn.exceptions import LogError, SkidynError
+from skidyn.identification import RBDRegressor, regressor_from_evidence
 
 ROBOT = load_planar_arm()
 LOG = make_hidden_effect_log(ROBOT, None, n_trajectories=8, duration=4.0, random_state=3)
@@ -163,3 +163,22 @@ def test_text_in_place_of_numbers_is_refused(tmp_path):
     frame.to_parquet(tmp_path / "log.parquet")
     with pytest.raises(LogError, match=r"column tau1 holds .*string, numbers in SI units"):
         evidence_from_parquet(tmp_path, ROBOT)
+
+
+def test_a_killed_worker_of_loky_is_a_clear_error(folder):
+    """Other than on a cluster nothing runs again; nothing is added up without it either."""
+    files = sorted(folder.glob("*.parquet")) * 2
+    code = (
+        "import os, signal, sys, threading, time\n"
+        "from skidyn.datasets import load_planar_arm\n"
+        "from skidyn.evidence import evidence_from_parquet, _streaming\n"
+        "def die(chunk, *_):\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+        "_streaming._of_files = die\n"
+        "evidence_from_parquet(sys.argv[1:], load_planar_arm(), n_jobs=2)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, *map(str, files)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode != 0
+    assert "worker" in done.stderr.strip().splitlines()[-1] or "terminated" in done.stderr

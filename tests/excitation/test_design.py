@@ -6,10 +6,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from skidyn._exceptions import SkidynError
 from skidyn.datasets import load_planar_arm, load_scara, load_ur5, make_hidden_effect_log
+from skidyn.exceptions import SkidynError
 from skidyn.excitation import MotionLimits, design_excitation
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
 
 FAST = {"duration": 6.0, "iterations": 4}
 

@@ -4,8 +4,9 @@
 import numpy as np
 import pandas as pd
 
-from skidyn.datasets import load_planar_arm, read_log
+from skidyn.datasets import load_planar_arm
 from skidyn.excitation import design_excitation
+from skidyn.logs import read_log
 
 
 def test_the_file_with_measured_torques_is_a_log(tmp_path):

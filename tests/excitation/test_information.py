@@ -5,12 +5,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from skidyn._exceptions import SkidynError
 from skidyn.datasets import load_planar_arm
 from skidyn.effects import Term
+from skidyn.exceptions import SkidynError
 from skidyn.excitation import design_excitation
 from skidyn.excitation._information import make_model, recorded_information
-from skidyn.rigid_body._base_parameters import base_parameter_index
+from skidyn.robots import base_parameter_index
 
 ROBOT = load_planar_arm()
 

@@ -4,8 +4,8 @@
 import numpy as np
 import pytest
 
-from skidyn._exceptions import SkidynError
 from skidyn.datasets import load_planar_arm
+from skidyn.exceptions import SkidynError
 from skidyn.excitation import MotionLimits
 
 ROBOT = load_planar_arm()

@@ -7,7 +7,7 @@ import pytest
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.explorer import Session
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
 
 
 @pytest.fixture(scope="session")

@@ -15,7 +15,7 @@ from skidyn.datasets import load_planar_arm
 from skidyn.effects import Term, get_effect
 from skidyn.explorer._script import script
 from skidyn.explorer._server import Explorer
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
 
 pandas = pytest.importorskip("pandas", reason="needs skidyn[io]")
 

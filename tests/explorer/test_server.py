@@ -6,7 +6,10 @@ from __future__ import annotations
 import http.client
 import json
 import shutil
+import signal
 import socket
+import subprocess
+import sys
 import threading
 import time
 import warnings
@@ -15,10 +18,10 @@ from contextlib import contextmanager
 import pytest
 
 from skidyn import load_model
-from skidyn.datasets import load_recording
 from skidyn.explorer import Session
 from skidyn.explorer._server import Explorer, make_app, page
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
+from skidyn.logs import load_recording
 from skidyn.robots import Robot
 
 pytest.importorskip("starlette", reason="needs skidyn[explore]")
@@ -108,11 +111,61 @@ def test_bad_questions_get_an_error_and_change_nothing(port, explorer):
         ("curves", {}),
         ("ranked", {"joint": 1, "trajectory": 99, "time": 1.0}),
         ("state", [1]),
+        ("add", {"kind": "spring", "joint": 2, "trajectory": 99}),
+        ("ranked", {"joint": 1, "trajectory": 0, "time": float("inf")}),
+        ("ranked", {"joint": 1, "trajectory": 0, "time": float("nan")}),
     ):
         status, content = ask(port, f"/api/{question}", words, explorer.token)
         assert status == 400, question
         assert content["error"]
     assert len(explorer.session.history) == 1
+
+
+@pytest.mark.parametrize(
+    ("body", "expected"),
+    [
+        (b"[" * 50_000, 400),
+        (b'{"joint": 1e999, "trajectory": 0}', 400),
+        (b'{"joint": 1, "trajectory": 0, "time": 1e308}', 400),
+        (b'{"joint": "\xff"}', 400),
+        (b" " * 300_000, 413),
+    ],
+)
+def test_bodies_that_break_parsers_are_refused(port, explorer, body, expected):
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
+    connection.request("POST", "/api/ranked", body=body, headers={"X-Token": explorer.token})
+    answer = connection.getresponse()
+    assert answer.status == expected
+    assert json.loads(answer.read())["error"]
+    connection.close()
+
+
+def test_a_token_of_other_letters_is_wrong_and_no_crash(port):
+    assert ask(port, "/?token=%C3%A9%E2%82%AC")[0] == 403
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C is another thing there")
+def test_ctrl_c_does_not_wait_for_a_report(tmp_path):
+    code = (
+        "import json, signal, sys, threading, time, urllib.request\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "from skidyn.explorer import _server\n"
+        "def answer(self, question, words):\n"
+        "    print('working', flush=True)\n"
+        "    time.sleep(60)\n"
+        "_server.Explorer.answer = answer\n"
+        "def ready(address):\n"
+        "    token, base = address.partition('=')[2], address.partition('?')[0]\n"
+        "    ask = urllib.request.Request(base + 'api/report', b'{}', {'X-Token': token})\n"
+        "    call = lambda: (time.sleep(0.5), urllib.request.urlopen(ask))\n"
+        "    threading.Thread(target=call, daemon=True).start()\n"
+        "_server.serve(None, sys.argv[1], ready=ready)\n"
+    )
+    words = [sys.executable, "-c", code, str(tmp_path)]
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+    assert process.stdout.readline() == b"working\n"
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=30)  # half of what the answer takes
 
 
 def test_the_page_holds_all_it_needs():
@@ -145,7 +198,7 @@ def opened(explorer, **look):
         tab.on("console", lambda message: complaints.append(message.text))
         tab.on("pageerror", lambda error: complaints.append(str(error)))
         tab.goto(f"http://127.0.0.1:{port}/?token={explorer.token}")
-        tab.wait_for_selector("body[data-ranked='1 all 1']")
+        tab.wait_for_selector("body[data-ranked$='all 1']")
         yield tab
         browser.close()
     assert complaints == []
@@ -160,9 +213,7 @@ def errors_shown(tab, joint):
 def test_the_loop_click_by_click(explorer, tmp_path):
     with opened(explorer) as tab:
         tab.reload()  # the address holds all that the page needs
-        tab.wait_for_selector("body[data-ranked='1 all 1']")
-        # choose the joint, look at another trajectory
-        tab.select_option("#joint", "2")
+        # it opens on the joint whose error is largest over its noise; look at another trajectory
         tab.wait_for_selector("body[data-ranked='2 all 1']")
         tab.select_option("#trajectory", "1")
         tab.wait_for_selector("body[data-drawn='2 1 1']")
@@ -176,8 +227,10 @@ def test_the_loop_click_by_click(explorer, tmp_path):
         tab.wait_for_selector("body[data-ranked='2 span 2']")
         given, now = errors_shown(tab, 2)
         assert now < 0.2 * given
-        assert tab.text_content("#added li") == "spring on joint 2"
-        assert now == pytest.approx(explorer.session.history[-1]["rmse"][1], rel=0.01)
+        assert tab.text_content("#added li span") == "spring on joint 2"
+        tab.wait_for_selector("#added small:not(:empty)")
+        assert "±" in tab.text_content("#added small")
+        assert now == pytest.approx(explorer.session.history[-1]["rmse"][1], rel=0.05)
         # undo, and again
         tab.click("#undo")
         tab.wait_for_selector("body[data-ranked='2 span 1']")
@@ -192,6 +245,10 @@ def test_the_loop_click_by_click(explorer, tmp_path):
         tab.wait_for_selector("body[data-ranked='1 all 2']")
         tab.wait_for_selector("#save:enabled", timeout=240_000)
         assert tab.text_content("#saved").startswith("saved: ")
+        for link in tab.locator("#saved a").all():
+            assert tab.request.get(tab.evaluate("(a) => a.href", link.element_handle())).ok
+        forbidden = tab.evaluate("location.origin") + "/saved/..%2Fsecret?token=" + explorer.token
+        assert tab.request.get(forbidden).status == 404
     model = load_model(tmp_path / "model.skops")
     assert any(t.kind == "spring" for t in model.effect_terms_)
     assert "session.add('spring', joint=2)" in (tmp_path / "explored.py").read_text("utf-8")
@@ -201,6 +258,8 @@ def test_the_loop_click_by_click(explorer, tmp_path):
 def test_the_loop_by_keyboard_alone(explorer):
     with opened(explorer) as tab:
         tab.focus("#joint")
+        tab.keyboard.press("ArrowUp")
+        tab.wait_for_selector("body[data-ranked='1 all 1']")
         tab.keyboard.press("ArrowDown")
         tab.wait_for_selector("body[data-ranked='2 all 1']")
         tab.keyboard.press("Tab")  # trajectory
@@ -228,7 +287,7 @@ def test_the_clicked_time_is_marked_and_nothing_overflows(explorer, scheme, widt
     look = {"color_scheme": scheme, "viewport": {"width": width, "height": 860}}
     with opened(explorer, **look) as tab:
         tab.click("#residual .u-over", position={"x": 100, "y": 60})
-        tab.wait_for_selector("body[data-ranked='1 span 1']")
+        tab.wait_for_selector("body[data-ranked='2 span 1']")
         marked = [tab.evaluate(GREEN, plot) for plot in ("torque", "residual")]
         overflow = tab.evaluate("document.documentElement.scrollWidth - innerWidth")
     # a band with a line of stronger colour in it, where it was clicked
@@ -278,5 +337,5 @@ def test_load_dependent_friction_of_a_real_robot_is_ticked_and_the_error_falls(u
     assert "</html>" in (tmp_path / "report.html").read_text("utf-8")
     assert first == "load_dependent_friction"
     assert first_step[1] < 0.9 * first_step[0]
-    assert second_step[1] < 0.98 * second_step[0]
+    assert second_step[1] < second_step[0]  # the table shows two digits
     assert undone[0] == undone[1]

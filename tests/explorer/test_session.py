@@ -6,11 +6,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from skidyn._exceptions import EffectError
 from skidyn.diagnosis import Settings, diagnose
 from skidyn.effects import get_effect
+from skidyn.exceptions import EffectError
 from skidyn.explorer import Session
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
 
 
 def test_the_missing_effect_is_ranked_first_and_its_addition_lowers_the_error(session):
@@ -127,3 +127,35 @@ def test_what_cannot_be_done_is_refused(session):
     session.add("spring", joint=2)
     with pytest.raises(EffectError, match="spring cannot be added to joint 2"):
         session.add("spring", joint=2)
+
+
+def test_what_was_added_is_told_with_its_interval(session):
+    session.add("spring", joint=2)
+    (told,) = session.sizes()
+    assert told.startswith("k = ") and "±" in told and "N m/rad" in told
+
+
+def test_an_addition_is_removed_whatever_came_after_it(session):
+    session.add("spring", joint=2)
+    alone = session.history[-1]["rmse"]
+    session.undo()
+    session.add("offset", joint=1)
+    session.add("spring", joint=2)
+
+    entry = session.remove(1)
+
+    assert [h["added"] for h in session.history] == [None, "spring"]
+    assert entry["rmse"] == pytest.approx(alone, rel=1e-6)
+    with pytest.raises(EffectError, match="no addition 2"):
+        session.remove(2)
+
+
+def test_it_opens_on_the_joint_with_the_largest_error_over_its_noise(session):
+    assert session.worst == 2
+    assert (session.noise > 0).all()
+    assert (session.noise <= 1.2 * np.array(session.history[0]["rmse"])).all()
+
+
+def test_nothing_is_offered_where_nothing_helps(session):
+    session.add("spring", joint=2)
+    assert session.ranked(joint=1) == []

@@ -8,7 +8,7 @@ import pytest
 
 from skidyn.datasets import load_panda, load_planar_arm, load_scara, load_ur5
 from skidyn.effects import Term
-from skidyn.rigid_body import RBDRegressor
+from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
 
 INERTIA = '<inertia ixx="0.3" iyy="0.2" izz="0.2" ixy="0.01" ixz="0" iyz="0"/>'

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from skidyn.datasets import load_planar_arm
+from skidyn.dynamics._compiled import compile_library, find_compiler
 from skidyn.export import c_source, write_c
-from skidyn.rigid_body._compiled import compile_library, find_compiler
 from skidyn.robots import Robot
 
 STRICT = ("-O2", "-std=c99", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC")

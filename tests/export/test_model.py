@@ -7,11 +7,17 @@ import numpy as np
 import pytest
 
 from skidyn.datasets import load_planar_arm
-from skidyn.effects import Coefficient, Effect, Term, register_effect
-from skidyn.effects._catalogue import unregister_effect
-from skidyn.export import python_source, write_c, write_mjcf, write_onnx, write_python, write_urdf
-from skidyn.export._model import static_model
-from skidyn.rigid_body import RBDRegressor
+from skidyn.effects import Coefficient, Effect, Term, register_effect, unregister_effect
+from skidyn.export import (
+    python_source,
+    static_model,
+    write_c,
+    write_mjcf,
+    write_onnx,
+    write_python,
+    write_urdf,
+)
+from skidyn.identification import RBDRegressor
 
 MEMORY = [
     Term("dahl", (0,), {"presliding": 0.02}),

@@ -4,8 +4,8 @@
 import numpy as np
 import pytest
 
-from skidyn._exceptions import SkidynError
 from skidyn.evidence import Evidence
+from skidyn.exceptions import SkidynError
 from skidyn.fleet import compare_fleet
 
 COLUMNS = ("m_link1", "viscous.Fv[1]", "coulomb.Fc[1]", "coulomb.Fc[2]")

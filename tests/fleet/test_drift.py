@@ -6,8 +6,8 @@ from datetime import date, timedelta
 import numpy as np
 import pytest
 
-from skidyn._exceptions import SkidynError
 from skidyn.evidence import Evidence
+from skidyn.exceptions import SkidynError
 from skidyn.fleet import monitor_drift
 
 COLUMNS = ("m_link1", "coulomb.Fc[1]", "coulomb.Fc[3]")

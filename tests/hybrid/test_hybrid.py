@@ -7,7 +7,14 @@ import pytest
 from sklearn.base import clone
 from sklearn.ensemble import ExtraTreesRegressor
 from sklearn.linear_model import LinearRegression, Ridge
-from sklearn.model_selection import GridSearchCV, KFold, ShuffleSplit, cross_val_predict
+from sklearn.model_selection import (
+    GridSearchCV,
+    GroupKFold,
+    KFold,
+    LeaveOneGroupOut,
+    ShuffleSplit,
+    cross_val_predict,
+)
 from sklearn.neighbors import KNeighborsRegressor
 from sklearn.pipeline import Pipeline
 from sklearn.preprocessing import FunctionTransformer
@@ -18,22 +25,16 @@ from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.hybrid import HybridRegressor
 from skidyn.hybrid._gate import learned_weights
 from skidyn.hybrid._hybrid import _honest_residuals
+from skidyn.identification import RBDRegressor
 from skidyn.model_selection import PhaseKFold, TrajectoryKFold
 from skidyn.neural_network import LSTMRegressor
-from skidyn.rigid_body import RBDRegressor
 
 QUIET = FitProgress(None, None)
+FEATURES = ["q1", "q2", "dq1", "dq2"]  # what learners without key columns see
 TREES = ExtraTreesRegressor(15, min_samples_leaf=5, random_state=0)
 
 
-@parametrize_with_checks(
-    [HybridRegressor(Ridge(), ExtraTreesRegressor(10, random_state=0), cv=3)],
-    expected_failed_checks=lambda estimator: {
-        "check_sample_weight_equivalence_on_dense_data": (
-            "removing rows changes folds, reference samples and the draws of the learner"
-        )
-    },
-)
+@parametrize_with_checks([HybridRegressor(Ridge(), ExtraTreesRegressor(10, random_state=0), cv=3)])
 def test_scikit_learn_contract(estimator, check):
     check(estimator)
 
@@ -65,11 +66,11 @@ def test_learns_the_joint_that_hides_something_and_leaves_the_other_alone():
     assert hybrid.learned_weight_[0] > 0.8 and hybrid.learned_weight_[1] == 0
     assert hybrid.gain_[0] > 0.5 and hybrid.p_value_[0] < 0.01
     held_out, truth = make_log(seed=1)
-    before = rmse(truth, hybrid.physics_.predict(held_out))
+    before = rmse(truth, hybrid.physics_.predict(held_out[FEATURES]))
     after = rmse(truth, hybrid.predict(held_out))
     assert after[0] < 0.5 * before[0] and after[1] == before[1]
     np.testing.assert_allclose(
-        hybrid.predict(held_out) - hybrid.physics_.predict(held_out),
+        hybrid.predict(held_out) - hybrid.physics_.predict(held_out[FEATURES]),
         hybrid.learned_torque(held_out),
     )
 
@@ -115,7 +116,7 @@ def test_fades_out_of_range_and_says_so():
     far = X.copy()
     far[["q1", "q2"]] += 10.0
     assert hybrid.outside_range(far).all()
-    np.testing.assert_array_equal(hybrid.predict(far), hybrid.physics_.predict(far))
+    np.testing.assert_array_equal(hybrid.predict(far), hybrid.physics_.predict(far[FEATURES]))
 
 
 def test_one_recording_proves_nothing():
@@ -124,7 +125,7 @@ def test_one_recording_proves_nothing():
     with pytest.warns(UserWarning, match="fewer than three trajectories"):
         hybrid.fit(X, y)
     assert not hybrid.learned_weight_.any() and (hybrid.p_value_ == 1).all()
-    np.testing.assert_array_equal(hybrid.predict(X), hybrid.physics_.predict(X))
+    np.testing.assert_array_equal(hybrid.predict(X), hybrid.physics_.predict(X[FEATURES]))
     assert hybrid.set_params(alpha=1.0).fit(X, y).learned_weight_[0] > 0.5  # as the user asks
     with pytest.raises(ValueError, match="exactly once"):
         hybrid.set_params(cv=ShuffleSplit(2)).fit(X, y)
@@ -240,3 +241,35 @@ def test_weights_need_learners_that_take_them():
     hybrid = HybridRegressor(LinearRegression(), KNeighborsRegressor(), cv=2)
     with pytest.raises(ValueError, match="KNeighborsRegressor takes no sample_weight"):
         hybrid.fit(X, y, sample_weight=np.ones(len(X)))
+
+
+class Reads(Ridge):
+    """Remembers how many columns it was shown."""
+
+    def fit(self, X, y, sample_weight=None):
+        self.shown_ = np.shape(X)[1]
+        return super().fit(X, y, sample_weight)
+
+
+def test_learners_do_not_see_key_columns():
+    X, y = make_log(6, 60)
+    hybrid = HybridRegressor(Reads(), Reads(), alpha=1).fit(X, y)
+    assert hybrid.physics_.shown_ == 4
+    assert hybrid.learner_ is None or hybrid.learner_.shown_ == 4
+    array = X.to_numpy()
+    by_position = HybridRegressor(Reads(), Reads(), alpha=1, trajectory=4, time=5).fit(array, y)
+    np.testing.assert_allclose(by_position.predict(array), hybrid.predict(X))
+
+
+def test_groups_and_lists_of_splits_make_the_folds():
+    X, y = make_log(6, 60)
+    groups = X["trajectory"].to_numpy()
+    by_group = HybridRegressor(Ridge(), Ridge(), cv=GroupKFold(3), alpha=1)
+    expected = by_group.fit(X, y, groups=groups).gain_
+    splits = list(GroupKFold(3).split(X, y, groups))
+    given = HybridRegressor(Ridge(), Ridge(), cv=splits, alpha=1).fit(X, y)
+    np.testing.assert_allclose(given.gain_, expected)
+    each = HybridRegressor(Ridge(), Ridge(), cv=LeaveOneGroupOut(), alpha=1)
+    assert each.fit(X, y, groups=groups).predict(X).shape == y.shape
+    with pytest.raises(ValueError, match="exactly once"):
+        HybridRegressor(Ridge(), Ridge(), cv=splits[:2]).fit(X, y)

@@ -6,7 +6,7 @@ from sklearn.ensemble import ExtraTreesRegressor
 from sklearn.linear_model import Ridge
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
-from skidyn.effects._hysteresis import dahl_state
+from skidyn.effects import dahl_state
 from skidyn.hybrid import OwnJointRegressor
 
 
@@ -68,3 +68,12 @@ def test_a_learner_without_memory_sees_hysteresis():
         np.abs(m.predict(X[test])[100:] - y[test][100:]).mean() for m in (with_memory, without)
     ]
     assert error[0] < 0.3 * error[1]
+
+
+def test_rows_have_weights():
+    X = np.random.default_rng(0).normal(size=(120, 6))
+    y = X[:, 2:4].copy()
+    y[:60] += 10.0
+    weight = np.r_[np.zeros(60), np.ones(60)]
+    model = OwnJointRegressor(Ridge(), presliding=()).fit(X, y, sample_weight=weight)
+    np.testing.assert_allclose(model.predict(X)[60:], y[60:], atol=0.1)

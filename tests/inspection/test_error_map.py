@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from skidyn._exceptions import ColumnError
 from skidyn._signals import Signals
+from skidyn.exceptions import ColumnError
 from skidyn.inspection import ErrorMapDisplay
 
 

@@ -16,7 +16,7 @@ def finding(joints=(1, 2)):
         for j in joints
     ]  # fmt: skip
     return Finding(
-        "viscous", "Viscous friction", joints, {}, (), 0.5, 0.0, (), "", "", "", (), curves
+        "viscous", "Viscous friction", joints, {}, (), 0.5, 0.0, (), "", "", "", (), curves=curves
     )
 
 

@@ -3,9 +3,11 @@ import pickle
 
 import numpy as np
 import pytest
+import skorch
+import torch
 from sklearn.base import clone
 from sklearn.linear_model import LinearRegression, Ridge
-from sklearn.model_selection import GridSearchCV, cross_val_score
+from sklearn.model_selection import GridSearchCV, GroupKFold, cross_val_score
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from skidyn.model_selection import TrajectoryKFold
@@ -98,3 +100,38 @@ def test_paper_head_and_weights(log):
 def test_members_that_cannot_draw_trajectories(log):
     with pytest.raises(ValueError, match="use resample='window'"):
         BLLRegressor(Ridge(), resample="trajectory").fit(*log)
+
+
+@pytest.mark.parametrize("one", [False, True])
+def test_any_skorch_network_is_a_member(one):
+    rng = np.random.default_rng(0)
+    X = np.c_[np.repeat(np.arange(6), 50), rng.normal(size=(300, 4))]
+    y = X[:, 1:3] if not one else X[:, 1]
+    member = skorch.NeuralNetRegressor(
+        torch.nn.Linear,  # any module; workers must be able to import it
+        module__in_features=4,
+        module__out_features=1 if one else 2,
+        max_epochs=20,
+        lr=0.1,
+        train_split=None,
+        verbose=0,
+    )
+    bll = BLLRegressor(member, n_estimators=2, trajectory=0, random_state=0).fit(X, y)
+    assert bll.score(X, y) > 0.95
+    again = clone(bll).set_params(n_jobs=2).fit(X, y)
+    np.testing.assert_array_equal(again.predict(X), bll.predict(X))
+
+
+def test_members_without_keys_do_not_see_them(log):
+    X, y = log
+    bll = BLLRegressor(Ridge(), n_estimators=2, random_state=0).fit(X, y)
+    assert bll.bagging_.estimators_[0].n_features_in_ == X.shape[1] - 2
+
+
+def test_groups_and_lists_of_splits(log):
+    X, y = log
+    groups = X["trajectory"].to_numpy()
+    cv = GroupKFold(2)
+    bll = BLLRegressor(Ridge(), n_estimators=2, cv=cv, random_state=0).fit(X, y, groups=groups)
+    given = BLLRegressor(Ridge(), n_estimators=2, cv=list(cv.split(X, y, groups)), random_state=0)
+    np.testing.assert_allclose(given.fit(X, y).predict(X), bll.predict(X))

@@ -9,8 +9,9 @@ import warnings
 import numpy as np
 import pytest
 
-from skidyn._exceptions import SkidynError
-from skidyn.datasets import load_recording, load_ur5, make_hidden_effect_log
+from skidyn.datasets import load_ur5, make_hidden_effect_log
+from skidyn.exceptions import SkidynError
+from skidyn.logs import load_recording
 from skidyn.payload import estimate_drive_gains
 from skidyn.robots import Robot
 

@@ -10,10 +10,11 @@ from importlib import resources
 import numpy as np
 import pytest
 
-from skidyn._exceptions import SkidynError
-from skidyn.datasets import load_planar_arm, load_recording, load_ur5, make_hidden_effect_log
+from skidyn.datasets import load_planar_arm, load_ur5, make_hidden_effect_log
+from skidyn.exceptions import SkidynError
+from skidyn.identification import RBDRegressor, is_consistent
+from skidyn.logs import load_recording
 from skidyn.payload import identify_payload
-from skidyn.rigid_body import RBDRegressor, is_consistent
 from skidyn.robots import Robot
 
 FRICTION = ("viscous", "coulomb")
@@ -131,3 +132,48 @@ def test_real_payload(data_dir):
     )
     assert found.mass == pytest.approx(2.805, rel=0.02)
     assert found.mass_interval[0] < 2.805 < found.mass_interval[1]
+
+
+PENDULUM = """<robot name="pendulum"><link name="base"/><link name="rod"><inertial>
+<origin xyz="0 0 -0.1"/><mass value="0.2"/>
+<inertia ixx="0.002" iyy="0.002" izz="0.0001" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="swing" type="revolute"><axis xyz="0 1 0"/><parent link="base"/><child link="rod"/>
+<limit effort="9" velocity="9" lower="-3" upper="3"/></joint></robot>"""
+
+
+def pendulum_runs(seed=0):
+    """Runs of one joint without a load, and with 0.5 kg at 0.2 m below it."""
+    log = make_hidden_effect_log(
+        Robot.from_urdf(PENDULUM), None, base=FRICTION, n_trajectories=6, random_state=seed
+    )
+    loaded = log.frame["trajectory"] < 3
+    q, ddq = log.frame["q1"].to_numpy(), np.gradient(log.frame["dq1"], log.frame["time"])
+    moved = log.frame.assign(tau1=log.frame["tau1"] + 0.5 * 0.2 * (9.81 * np.sin(q) + 0.2 * ddq))
+    return log.robot, moved[loaded], log.frame[~loaded]
+
+
+def test_mass_that_does_not_show_is_told_by_its_first_moment_and_weighed_by_it():
+    robot, loaded, unloaded = pendulum_runs()
+    found = identify_payload(robot, loaded, unloaded, effects=FRICTION)
+    assert np.isnan(found.mass) and "its first moment" in found.text
+    assert found.first_moment[2] == pytest.approx(-0.1, rel=0.02)
+    low, high = found.first_moment_interval[2]
+    assert low < -0.1 < high
+    weighed = identify_payload(robot, loaded, unloaded, effects=FRICTION, com=[0, 0, -0.2])
+    assert weighed.mass == pytest.approx(0.5, rel=0.02)
+    assert weighed.mass_interval[0] < 0.5 < weighed.mass_interval[1]
+    json.dumps(weighed.to_dict())
+    with pytest.raises(SkidynError, match="com is"):
+        identify_payload(robot, loaded, unloaded, com=[0.1])
+
+
+def test_joint_with_another_drive_gain_is_named(runs, found):
+    log, loaded, unloaded = runs
+    felt = np.isfinite(found.by_joint) & (found.by_joint_std < 0.05)
+    assert felt.sum() >= 2
+    np.testing.assert_allclose(found.by_joint[felt], 1.0, atol=0.1)
+    assert not any("drive gain before" in note for note in found.notes)
+    loaded, unloaded = (frame.assign(tau2=frame["tau2"] * 1.3) for frame in (loaded, unloaded))
+    wrong = identify_payload(log.robot, loaded, unloaded, effects=FRICTION)
+    assert "as every joint weighs it" in wrong.text
+    assert any("drive gain" in note and "Joint" in note for note in wrong.notes)

@@ -5,9 +5,9 @@ import pytest
 from sklearn.pipeline import make_pipeline
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
-from skidyn.preprocessing import SmoothDerivatives
+from skidyn.identification import RBDRegressor
+from skidyn.preprocessing import SmoothDerivatives, TimeDerivative
 from skidyn.preprocessing._smoothers import SMOOTHERS
-from skidyn.rigid_body import RBDRegressor
 
 W = 2 * np.pi * np.array([0.3, 0.7, 1.1])
 
@@ -71,7 +71,7 @@ def test_velocities_are_differentiated_once_and_columns_named():
     log = record(1e-4).assign(dq1=lambda f: motion(f["time"].to_numpy(), 1), trajectory=0)
     table = SmoothDerivatives(cutoff=5.0).set_output(transform="pandas").fit_transform(log)
     assert list(table.columns) == [*log.columns, "ddq1"]
-    positions = SmoothDerivatives(["q1"], cutoff=5.0).fit(log)
+    positions = SmoothDerivatives(["q1"], cutoff=5.0).fit(log.drop(columns="dq1"))
     assert positions.get_feature_names_out().tolist()[-2:] == ["dq1", "ddq1"]
 
 
@@ -100,3 +100,10 @@ def test_messages():
         SmoothDerivatives(cutoff=5.0).fit_transform(
             log[:2003].assign(trajectory=lambda f: (f.index >= 2000).astype(int))
         )
+
+
+def test_derivatives_that_are_there_are_not_appended_again():
+    frame = pd.DataFrame({"time": np.arange(50) * 0.01, "dq1": 0.0, "ddq1": 0.0})
+    for transformer in (SmoothDerivatives(), TimeDerivative()):
+        with pytest.raises(ValueError, match="ddq1 already"):
+            transformer.fit(frame)

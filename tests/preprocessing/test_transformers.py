@@ -9,6 +9,7 @@ from sklearn.utils.estimator_checks import (
     parametrize_with_checks,
 )
 
+from skidyn.exceptions import ColumnError
 from skidyn.preprocessing import (
     ButterworthFilter,
     CurrentToTorque,
@@ -67,8 +68,10 @@ def test_derivative_is_named_and_stays_within_trajectories(log):
     assert np.abs(table["ddq1"] - exact)[inner].max() < 5e-3
     array = TimeDerivative(trajectory=0, time=1).fit_transform(log.to_numpy())
     np.testing.assert_array_equal(array, table)
-    both = TimeDerivative(["q1", "dq1"]).fit(pl.from_pandas(log))
-    assert both.get_feature_names_out()[-2:].tolist() == ["dq1", "ddq1"]
+    own = TimeDerivative(["q1"]).fit(pl.from_pandas(log.drop(columns="dq1")))
+    assert own.get_feature_names_out()[-1:].tolist() == ["dq1"]
+    with pytest.raises(ColumnError, match="X has dq1 already"):
+        TimeDerivative(["q1", "dq1"]).fit(pl.from_pandas(log))
 
 
 def test_cutoff_tames_noise_and_keys_pass_untouched(log):

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 
 from skidyn._signals import Signals
-from skidyn.diagnosis import Comparison, Diagnosis, Finding, Limit
-from skidyn.diagnosis._failures import REGIMES, error_map, find_failures
+from skidyn.diagnosis import REGIMES, Comparison, Diagnosis, Finding, Limit, error_map
+from skidyn.diagnosis._failures import find_failures, find_rest_errors
 from skidyn.effects import Term
 
 HOSTILE = "<img src=x onerror=alert(1)>"
@@ -99,14 +99,17 @@ def make_diagnosis(verdict="missing", joint_names=("shoulder", "elbow", "slider"
     share = {"noise": 1.0} if complete else {"dahl": 0.6, "spring": 0.1, "noise": 0.3}
     result = SimpleNamespace(
         verdict=verdict, joint_names=tuple(joint_names), comparison=comparison,
-        comparison_after=after, failures=find_failures(comparison), findings=findings,
+        comparison_after=after, failures=find_failures(comparison, np.full(n, 0.2)),
+        rest_errors=find_rest_errors(comparison), noise=np.full(n, 0.2), findings=findings,
         unexplained=unexplained, limits=limits, history=history, noise_floor=np.full(n, 0.2),
         rmse_before=np.array(history[0]["rmse"]), rmse_after=np.array(history[-1]["rmse"]),
         budget=[dict(share) for _ in range(n)], warnings=["one trajectory has 3 repeated rows"],
-        regimes=REGIMES, base_model=None, data=(),
+        regimes=REGIMES, base_model=None, data=(), checks=[], parts=None,
+        sensor_noise=np.full(n, 0.2), remainder=np.zeros(n),
     )  # fmt: skip
     result.error_map = lambda after=False: error_map(
         result.comparison_after if after else result.comparison
     )
+    result.story = lambda: Diagnosis.story(result)
     result.to_dict = lambda: Diagnosis.to_dict(result)
     return result

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from skidyn._exceptions import SkidynError
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import Settings, diagnose
+from skidyn.exceptions import SkidynError
+from skidyn.identification import RBDRegressor
 from skidyn.report import render_comparison, summarize_comparison, write_comparison
-from skidyn.rigid_body import RBDRegressor
 
 
 def two_models(fakes):

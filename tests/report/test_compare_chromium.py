@@ -30,9 +30,13 @@ def test_numbers_are_those_of_the_file(compared):
 
 def test_both_logs_are_read_under_one_cursor(compared):
     page, _, summary = compared
-    box = page.locator("#panels .u-over").first.bounding_box()
+    over = page.locator("#panels .u-over").first
+    over.scroll_into_view_if_needed()
+    box = over.bounding_box()
     page.mouse.move(box["x"] + 0.2 * box["width"], box["y"] + 40)
-    page.wait_for_function("document.querySelector('#panels .u-value').textContent.endsWith(' s')")
+    page.wait_for_function(  # a function: the page forbids that a string is evaluated
+        "() => document.querySelector('#panels .u-value').textContent.endsWith(' s')"
+    )
     values = page.locator(".panel:first-child .u-value").all_inner_texts()
     assert all(text.endswith((" s", " N m", " N")) for text in values)
     time = float(values[0].split()[0])

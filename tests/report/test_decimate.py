@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import numpy as np
 
-from skidyn.report._decimate import rows_with_peaks
+from skidyn.report import rows_with_peaks
 
 
 def test_keeps_every_peak_and_the_ends():

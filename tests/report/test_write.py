@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import pytest
 
+from skidyn._writing import write_text
 from skidyn.report import summarize, write_html, write_json
-from skidyn.report._write import write_text
 
 
 def test_an_interrupted_write_leaves_the_old_file(tmp_path, monkeypatch):
@@ -12,7 +12,7 @@ def test_an_interrupted_write_leaves_the_old_file(tmp_path, monkeypatch):
     def interrupt(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("skidyn.report._write.os.replace", interrupt)
+    monkeypatch.setattr("skidyn._writing.os.replace", interrupt)
     with pytest.raises(KeyboardInterrupt):
         write_text(target, "new")
     assert target.read_text() == "old"

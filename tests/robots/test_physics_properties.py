@@ -7,13 +7,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.spatial.transform import Rotation
 
 from skidyn.datasets import load_panda, load_planar_arm, load_scara, load_srs_arm
-from skidyn.rigid_body import find_base_parameters
-from skidyn.robots import Robot
+from skidyn.robots import Robot, find_base_parameters
 
 ROBOTS = {
     "panda": load_panda(),

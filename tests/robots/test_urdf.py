@@ -66,9 +66,25 @@ WRONG = {
     ),
     "short axis": (
         robot(TWO, joint("j", "a", "b", inside=LIMIT + '<axis xyz="0 1"/>')),
-        "at joint 'j'",
+        "axis of joint 'j'",
     ),
     "text number": (robot(link("a"), link("b", "heavy"), joint("j", "a", "b")), "b.*heavy"),
+    "missing mass": (
+        robot(link("a"), link("b", 1).replace('<mass value="1"/>', ""), joint("j", "a", "b")),
+        "link 'b' has no <mass>",
+    ),
+    "missing inertia entry": (
+        robot(link("a"), link("b", 1, '<inertia ixx="1"/>'), joint("j", "a", "b")),
+        "inertia of link 'b' has no ixy",
+    ),
+    "two axes": (
+        robot(TWO, joint("j", "a", "b", inside=LIMIT + "<axis/><axis/>")),
+        "joint 'j' has 2 <axis> elements",
+    ),
+    "no parent": (
+        robot(TWO, f'<joint name="j" type="revolute"><child link="b"/>{LIMIT}</joint>'),
+        "joint 'j' has no <parent>",
+    ),
     "missing limit": (robot(TWO, joint("j", "a", "b", inside="")), "joint 'j' has no <limit>"),
     "crossed limits": (
         robot(TWO, joint("j", "a", "b", inside=LIMIT.replace("-1", "5"))),

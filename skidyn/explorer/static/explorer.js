@@ -7,6 +7,8 @@
   const words = (kind) => kind.replaceAll("_", " ");
   const joint = () => Number(el("joint").value);
   const trajectory = () => Number(el("trajectory").value);
+  const short = (x) => (x == null ? "–" : Number(x.toPrecision(2)).toString());
+  const on = (joints) => (joints.length === state.joints.length && joints.length > 1 ? "all joints" : `joint${joints.length > 1 ? "s" : ""} ${joints.join(", ")}`);
   const unit = () => state.units[joint() - 1];
   let state = null, curves = null, plots = [];
   let chosen = null, span = null;  // the moment that was clicked, and the stretch it stands for
@@ -111,16 +113,26 @@
     const first = state.history[0].rmse, last = state.history.at(-1).rmse;
     el("unit").textContent = [...new Set(state.units)].join(" or ");
     el("errors").tBodies[0].replaceChildren(...state.joints.map((name, j) => {
-      const share = first[j] > 0 ? last[j] / first[j] : 1;
-      const row = node("tr"), cell = node("td"), bar = node("span", undefined, "bar"), fill = node("i");
+      const share = first[j] > 0 ? last[j] / first[j] : 1, worse = share > 1.02;
+      const row = node("tr"), cell = node("td"), bar = node("span", undefined, "bar"), fill = node("i"), mark = node("b");
+      row.classList.toggle("worse", worse);
+      mark.style.left = 100 * Math.min(1, first[j] > 0 ? state.noise[j] / first[j] : 1) + "%";
       row.classList.toggle("this", j === joint() - 1);
       fill.style.width = 100 * Math.min(1, share) + "%";
       bar.title = percent(share) + " of the error as given";
-      bar.append(fill); cell.append(bar);
-      row.append(node("td", `${j + 1} ${name.replaceAll("_", "_\u200b")}`), node("td", first[j].toPrecision(3)), node("td", last[j].toPrecision(3)), cell);
+      bar.append(fill, mark); cell.append(bar);
+      const now = node("td", short(last[j]) + (worse ? " ▲" : ""));
+      if (worse) now.title = "worse than the model as given";
+      row.append(node("td", `${j + 1} ${name.replaceAll("_", "_\u200b")}`), node("td", short(first[j])), now, node("td", short(state.noise[j])), cell);
       return row;
     }));
-    el("added").replaceChildren(...state.history.slice(1).map((h) => node("li", `${words(h.added)} on joint ${h.joints.join(", ")}`)));
+    el("added").replaceChildren(...state.history.slice(1).map((h, k) => {
+      const item = node("li"), off = node("button", "Remove");
+      off.setAttribute("aria-label", `Remove ${words(h.added)}`);
+      off.addEventListener("click", () => remove(k + 1));
+      item.append(node("span", `${words(h.added)} on ${on(h.joints)}`), off, node("small", ""));
+      return item;
+    }));
     if (state.history.length < 2) el("added").append(node("li", "nothing yet"));
     el("undo").disabled = state.history.length < 2;
   }
@@ -129,8 +141,7 @@
     const share = span ? e.drop_here : e.drop;
     button.dataset.kind = e.kind;
     button.append(node("span", e.title), node("span", percent(share)));
-    const on = e.joints.length === state.joints.length && e.joints.length > 1 ? "all joints" : `joint ${e.joints.join(", ")}`;
-    button.append(node("small", `on ${on}: takes ${percent(e.drop)} of the squared residual of joint ${joint()}`
+    button.append(node("small", `on ${on(e.joints)}: takes ${percent(e.drop)} of the squared residual of joint ${joint()}`
       + (span ? ` in the whole log, ${percent(e.drop_here)} in the chosen time` : "")));
     fill.style.width = 100 * Math.max(0, Math.min(1, share)) + "%";
     bar.append(fill); button.append(bar);
@@ -155,7 +166,7 @@
     el("where").textContent = `(joint ${joint()}, ${place})`;
     el("whole").hidden = el("chosen").hidden = !span;
     el("effects").replaceChildren(...answer.effects.map(effect));
-    if (!answer.effects.length) el("effects").append(node("li", "Nothing of the catalogue lowers the held-out error noticeably."));
+    if (!answer.effects.length) el("effects").append(node("li", `Nothing more helps joint ${joint()}: no effect on offer lowers its held-out error by 1 %.`));
     el("effects").removeAttribute("aria-busy");
     redraw();
     document.body.dataset.ranked = `${joint()} ${span ? "span" : "all"} ${state.history.length}`;
@@ -184,9 +195,17 @@
       await rank();
       document.body.dataset.refined = state.history.length;
     }
+    await sizes();
+  }
+  async function sizes() {  // what was added in numbers, once the fit is settled
+    const mine = asked, answer = await ask("sizes");
+    if (mine === asked) el("added").querySelectorAll("small").forEach((place, k) => { place.textContent = answer.sizes[k] || ""; });
+  }
+  async function remove(step) {
+    if (await change("remove", { step })) { say("removed, the rest fitted again"); await rank(); await sizes(); }
   }
   async function undo() {
-    if (await change("undo")) { say("taken back"); await rank(); }
+    if (await change("undo")) { say("taken back"); await rank(); await sizes(); }
   }
   async function save() {
     el("save").disabled = true;
@@ -201,9 +220,14 @@
         if (!done) el("saved").textContent = `saved: ${saved.join(", ")}; report: ${text}${share === null ? "" : " " + percent(share)}`;
       }, 1000);
       try { saved.push(...(await report).saved); } finally { done = true; clearInterval(timer); }
-      el("saved").textContent = "saved: " + saved.join(", ");
+      el("saved").replaceChildren("saved: ", ...saved.flatMap((path, k) => [k ? ", " : "", link(path)]));
       say("");
     } finally { el("save").disabled = false; }
+  }
+  function link(path) {  // opened or downloaded from the program that wrote it
+    const made = node("a", path), name = path.split(/[\\/]/).at(-1);
+    made.href = `/saved/${name}?token=${token}`; made.target = "_blank"; made.rel = "noopener";
+    return made;
   }
   async function choose(time) {
     chosen = moment = time; span = null; asked += 1;
@@ -258,6 +282,7 @@
     state = await ask("state");
     el("joint").replaceChildren(...state.joints.map((name, j) => new Option(`${j + 1} ${name}`, j + 1)));
     el("trajectory").replaceChildren(...state.trajectories.map((k) => new Option(k, k)));
+    el("joint").value = state.worst;
     for (const id of ["joint", "trajectory"]) el(id).addEventListener("change", look);
     el("undo").addEventListener("click", undo);
     el("save").addEventListener("click", save);
@@ -266,6 +291,7 @@
     addEventListener("resize", () => plots.forEach((p) => p.setSize({ width: el("torque").clientWidth, height: p.height })));
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
     await look();
+    if (state.history.length > 1) await sizes();
   }
   // what failed was said in the status line already
   addEventListener("unhandledrejection", (e) => { if (el("status").textContent) e.preventDefault(); });

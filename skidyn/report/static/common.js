@@ -76,7 +76,14 @@ const common = (() => {
     if (waiting.length > 1) { waiting.shift().draw(); idle(drawRest); } else drawAll();
   }
   window.addEventListener("load", () => { drawShown(); idle(drawRest); });
-  window.addEventListener("beforeprint", drawAll);
+  // Paper has no clicks: what is folded is printed too, and folded again afterwards.
+  let unfolded = [];
+  window.addEventListener("beforeprint", () => {
+    unfolded = [...document.querySelectorAll("details:not([open])")].filter((d) => !d.matches(".numbers-of, .all-joints"));
+    unfolded.forEach((d) => { d.open = true; });
+    drawAll();
+  });
+  window.addEventListener("afterprint", () => { unfolded.forEach((d) => { d.open = false; }); unfolded = []; });
 
   const redraw = () => plots.forEach((u) => u.redraw(false));
 

@@ -54,10 +54,11 @@
       ctx.font = `${12 * ratio}px system-ui, sans-serif`; ctx.textAlign = "center";
       figure.values.forEach((v, k) => {
         if (v == null || u.bbox.width / n < 34 * ratio) return;
-        const y = u.valToPos(v, "y", true), foot = u.valToPos(0, "y", true), inside = foot - y > 40 * ratio;
-        // inside the bar, clear of the floor's line, which tends to lie at its top
-        ctx.fillStyle = colour(inside && k ? "paper" : "ink");
-        ctx.fillText(Number(v.toPrecision(3)), u.valToPos(k, "x", true), inside ? (y + foot) / 2 : y - 5 * ratio);
+        // above the bar, and above the line of the noise where that lies just over it
+        const top = u.valToPos(v, "y", true), line = figure.floor == null ? top : u.valToPos(figure.floor, "y", true);
+        const y = line < top && top - line < 18 * ratio ? line : top;
+        ctx.fillStyle = colour("ink");
+        ctx.fillText(Number(v.toPrecision(2)), u.valToPos(k, "x", true), y - 5 * ratio);
       });
       if (figure.floor != null) {
         const y = u.valToPos(figure.floor, "y", true);

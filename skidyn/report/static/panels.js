@@ -2,7 +2,7 @@
 // Torque and residual over time: one panel per joint, zoom and cursor linked over all of them.
 "use strict";
 (() => {
-  const { numbers, colour, digits, unpack, xAxis, yAxis, legend, plot, later, drawShown, drawAll } = common;
+  const { numbers, colour, faint, digits, unpack, xAxis, yAxis, legend, plot, later, drawShown, drawAll } = common;
   const host = document.getElementById("plots"), place = document.getElementById("panels");
   if (!host) return;
   const { joints, starts, end: last, shown: first } = numbers.panels;
@@ -61,6 +61,19 @@
     ctx.restore();
   };
 
+  // What is not judged lies in the shade: rest, and a lighter one around reversals.
+  const shade = (joint) => (u) => {
+    const { ctx, bbox } = u;
+    ctx.save();
+    for (const [from, to, reason] of joint.apart || []) {
+      if (to < view[0] || from > view[1]) continue;
+      const left = Math.max(bbox.left, u.valToPos(from, "x", true)), right = Math.min(bbox.left + bbox.width, u.valToPos(to, "x", true));
+      ctx.fillStyle = faint("soft", reason === "rest" ? 0.24 : 0.11);
+      ctx.fillRect(left, bbox.top, Math.max(right - left, 1), bbox.height);
+    }
+    ctx.restore();
+  };
+
   function clock(u, t) {
     if (t == null) return "–";
     const part = starts.filter((s) => s.time <= t + 1e-6).pop();
@@ -72,7 +85,7 @@
     joint.drawn = joint.plots.map((wanted, k) => {
       const bottom = k === joint.plots.length - 1, order = joint.tables.flatMap((_, t) => wanted.series.filter((s) => s.of[0] === t));
       const series = order.map((s) => ({
-        label: s.label, stroke: () => colour(s.colour), width: 1.3, dash: s.dash ? [6, 4] : undefined,
+        label: s.label, stroke: () => (s.wide ? faint(s.colour, 0.4) : colour(s.colour)), width: s.wide ? 3.2 : 1.3, dash: s.dash ? [6, 4] : undefined,
         points: { show: false }, value: (u, v) => (v == null ? "–" : `${digits(v)} ${joint.unit}`),
       }));
       const part = document.createElement("div");
@@ -80,7 +93,7 @@
       const u = plot(part, {
         height: wanted.height + (bottom ? 34 : 0), padding: [k ? 8 : 18, 12, bottom ? 0 : 8, 0],
         series: [{ label: "time", value: clock }, ...series], legend: legend(order.map((s) => s.colour)),
-        scales: { x: { time: false, range: (_, low, high) => [low, high] } },
+        scales: { x: { time: false, range: (_, low, high) => [low, high] }, y: wanted.range ? { range: () => wanted.range } : {} },
         axes: [xAxis("time in s, trajectories one after another", bottom ? {} : { label: undefined, size: 4, values: (_, s) => s.map(() => "") }),
           yAxis(wanted.label)],
         cursor: { drag: { x: true, y: false, setScale: true }, y: false, sync: {
@@ -88,8 +101,13 @@
           // other plots follow the cursor; they follow the zoom through setView
           filters: { pub: (type) => type === "mousemove" || type === "mouseleave" },
         } },
-        hooks: { drawAxes: [borders(k === 0)], setScale: [follow] },
+        hooks: { drawClear: [shade(joint)], drawAxes: [borders(k === 0)], setScale: [follow] },
       }, table(order));
+      if (wanted.note) {
+        const note = document.createElement("p");
+        note.className = "note"; note.textContent = wanted.note;
+        part.append(note);
+      }
       u.setScale("x", { min: view[0], max: view[1] });
       u.over.addEventListener("wheel", (event) => {
         if (!event.ctrlKey) return;  // the wheel alone scrolls the page
@@ -113,7 +131,7 @@
     joint.box = document.createElement("div");
     joint.box.className = "panel"; joint.box.tabIndex = 0;
     joint.box.setAttribute("role", "group");
-    joint.box.setAttribute("aria-label", `Torque of joint ${joint.name} over time, with the residual`);
+    joint.box.setAttribute("aria-label", `Residual and torque of joint ${joint.name} over time`);
     joint.box.setAttribute("aria-describedby", "keys");
     const title = document.createElement("h4");
     title.textContent = joint.name;

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A diagnosis on one screen of a terminal: verdict, joints, findings, what is left."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from skidyn._text import digits
+
+#: Columns of a bar.
+BAR = 24
+
+
+def story_lines(story: Mapping[str, Any], failures: Sequence[Any] = ()) -> Iterator[str]:
+    """What ``skidyn diagnose`` prints.
+
+    Parameters
+    ----------
+    story : mapping
+        From :meth:`skidyn.diagnosis.Diagnosis.story`.
+    failures : sequence of Failure, default=()
+        Joints whose error exceeds the noise.
+
+    Yields
+    ------
+    str
+        Lines, the most important first.
+    """
+    for doubt in story["doubts"]:
+        yield f"Check the log first: {doubt}"
+    yield story["headline"] + "."
+    if not story["findings"]:
+        yield story["text"]
+    for note in story["warnings"]:
+        yield f"  ! {note}"
+    yield ""
+    yield from joint_lines(story)
+    if story["findings"]:
+        yield ""
+        yield "What is missing"
+    for k, line in enumerate(story["findings"], 1):
+        size = f": {line['size']}" if line["size"] else ""
+        yield f"  {k}. {line['what']} on {line['where']}{size}"
+        when = f"; it acts {line['when']}" if line.get("when") else ""
+        yield f"     {line['change']}; {line['sure']}{when}"
+    if failures:
+        yield ""
+        yield "Where it fails"
+    for failure in failures[:3]:
+        yield f"  {failure.sentence}"
+    yield ""
+    yield story["left"]
+
+
+def joint_lines(story: Mapping[str, Any]) -> Iterator[str]:
+    """A row per joint that has something to say, the worst first; the others in one line."""
+    rows = [row for row in story["joints"] if row["speaks"]] or list(story["joints"])
+    rows.sort(key=lambda row: -row["ratios"][0] if row["ratios"][0] == row["ratios"][0] else 0.0)
+    known = [ratio for row in rows for ratio in row["ratios"] if ratio == ratio]
+    largest = max([1.5, *known])
+    names = [f"{row['joint']} {row['name']}" for row in rows]
+    width = min(max(map(len, names), default=5), 28)
+    added = bool(story["findings"])
+    heads = ["before", "after", "noise"] if added else ["error", "noise"]
+    wide = shutil.get_terminal_size().columns >= width + 10 * len(heads) + BAR + 10
+    picture = "   error over noise" if wide else ""
+    yield f"  {'joint':{width}s}{''.join(f'{head:>9s}' for head in heads)}{picture}"
+    for name, row in zip(names, rows, strict=True):
+        values = [row["before"], *([row["after"]] if added else []), row["noise"]]
+        cells = "".join(f"{digits(value):>9s}" for value in values)
+        drawn = f"   {bar(row['ratios'], largest)}" if wide else ""
+        worse = "  worse" if row["state"] == "worse" else ""
+        yield f"  {name[:width]:{width}s}{cells} {row['unit']:3s}{drawn}{worse}"
+    if story["quiet"] and rows != list(story["joints"]):
+        yield f"  {story['quiet']}"
+
+
+def bar(ratios: Sequence[float], largest: float) -> str:
+    """Error over noise as a bar: full after, light before, and a mark at the noise.
+
+    Parameters
+    ----------
+    ratios : sequence of two float
+        Error before and after over the noise.
+    largest : float
+        Ratio at the end of the bar.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> len(bar([4.0, 1.0], 4.0))
+    24
+    """
+    try:
+        "█░│".encode(sys.stdout.encoding or "ascii")
+        full, light, mark = "█░│"
+    except (UnicodeEncodeError, LookupError):
+        full, light, mark = "#-|"
+    before, after, noise = (
+        round(BAR * min(r, largest) / largest) if r == r else 0 for r in (*ratios, 1.0)
+    )
+    cells = [full if k < after else light if k < before else " " for k in range(BAR)]
+    cells[min(noise, BAR - 1)] = mark
+    return "".join(cells).rstrip()

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Key columns (trajectory, time) of a table whose other columns are features of any kind."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidyn._columns import ColumnSpec, _key_column, column_names
+from skidyn._exceptions import ColumnError
+from skidyn._signals import find_segments
+
+
+@dataclass(frozen=True)
+class Keys:
+    """Positions of the key columns and of the features.
+
+    Attributes
+    ----------
+    trajectory, time : int or None
+        Key columns.
+    features : tuple of int
+        All other columns.
+    """
+
+    trajectory: int | None
+    time: int | None
+    features: tuple[int, ...]
+
+    def trajectories(self, X: NDArray[Any]) -> NDArray[Any]:
+        """Trajectory number of every row; zeros where there is no such column."""
+        return np.zeros(len(X), dtype=int) if self.trajectory is None else X[:, self.trajectory]
+
+    def segments(self, X: NDArray[Any]) -> list[slice]:
+        """Contiguous runs of rows that no window, filter or state may leave."""
+        time = None if self.time is None else X[:, self.time]
+        return find_segments(self.trajectories(X), time)
+
+    def for_learner(self, X: Any, learner: Any) -> Any:
+        """What a learner gets to see: no key columns, unless it has parameters for them.
+
+        A learner that does not know what a trajectory or a time is takes them for features, and
+        learns the log by heart.
+
+        Parameters
+        ----------
+        X : DataFrame or array of shape (n_samples, n_features)
+            Table with key columns.
+        learner : estimator
+            Whose parameters, or those of its parts, may name key columns.
+
+        Returns
+        -------
+        DataFrame or array
+            ``X`` itself, or its features.
+        """
+        parameters = learner.get_params() if hasattr(learner, "get_params") else {}
+        if any(name.rpartition("__")[2] == "trajectory" for name in parameters):
+            return X
+        if self.trajectory is None and self.time is None:
+            return X
+        from sklearn.utils import _safe_indexing
+
+        return _safe_indexing(X, list(self.features), axis=1)
+
+
+def resolve_keys(
+    names: Sequence[str] | None,
+    n_features: int,
+    *,
+    trajectory: ColumnSpec = "auto",
+    time: ColumnSpec = "auto",
+) -> Keys:
+    """Find the key columns; what is left are features.
+
+    Parameters
+    ----------
+    names : sequence of str or None
+        Column names, None for an array.
+    n_features : int
+        Number of columns.
+    trajectory, time : int, str or None, default="auto"
+        ``"auto"`` takes the column of that name if there is one.
+
+    Returns
+    -------
+    Keys
+
+    Examples
+    --------
+    >>> resolve_keys(["time", "q1", "dq1"], 3)
+    Keys(trajectory=None, time=0, features=(1, 2))
+    """
+    names = None if names is None else [str(name) for name in names]
+    found = [
+        _key_column(what, spec, names, n_features)
+        for what, spec in (("trajectory", trajectory), ("time", time))
+    ]
+    features = tuple(i for i in range(n_features) if i not in found)
+    if not features:
+        raise ColumnError(
+            f"0 feature(s) are left of the {n_features} column(s) of X without the key columns; "
+            "at least one is required."
+        )
+    return Keys(found[0], found[1], features)
+
+
+def keys_of(X: Any, *, trajectory: ColumnSpec = "auto", time: ColumnSpec = "auto") -> Keys:
+    """Key columns of a table or array as the user gave it."""
+    return resolve_keys(column_names(X), X.shape[1], trajectory=trajectory, time=time)

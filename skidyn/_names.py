@@ -1,0 +1,402 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""From the column names that recorders write to ``q1 .. qn, dq1 .. dqn, tau1 .. taun``."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from skidyn._exceptions import LogError
+from skidyn._limits import LONGEST_NAME, MOST_COLUMNS
+from skidyn._units import split_unit
+
+#: A joint beyond, and beyond the number of columns, is a damaged name: a list of as many joints
+#: as it says could fill the memory.
+MANY_JOINTS = 1000
+
+#: Spellings of each quantity in recordings, compared in lower case without separators.
+SPELLINGS: dict[str, tuple[str, ...]] = {
+    "q": ("q", "pos", "position", "positions", "jointposition", "jointpositions", "angle")
+    + ("actualq", "qactual", "qmeas", "qmeasured", "measuredq", "jointangle", "theta", "qpos")
+    + ("jointpos", "observationstate"),
+    "dq": ("dq", "qd", "qdot", "vel", "velocity", "velocities", "jointvelocity", "jointvelocities")
+    + ("speed", "actualqd", "dqactual", "qdmeas", "dqmeas", "dqmeasured", "omega", "qvel")
+    + ("jointvel", "observationvelocity"),
+    "ddq": ("ddq", "qdd", "qddot", "acc", "acceleration", "accelerations", "jointacceleration")
+    + ("qacc",),
+    "tau": ("tau", "torque", "torques", "effort", "efforts", "jointtorque", "jointtorques", "trq")
+    + ("tauj", "jointeffort", "actualtorque", "taumeas", "taumeasured", "measuredtorque")
+    + ("qtorque", "qtau", "observationeffort", "observationtorque"),
+    "i": ("i", "current", "currents", "motorcurrent", "actualcurrent", "jointcurrent")
+    + ("observationcurrent",),
+    "temp": ("temp", "temperature", "temperatures", "jointtemperature", "motortemperature"),
+    "cmd": ("cmd", "command", "commands", "commandedposition", "positioncommand", "qcmd", "qdes")
+    + ("qdesired", "desiredposition", "targetposition", "setpoint", "qref", "action", "control"),
+    "time": ("time", "t", "timestamp", "stamp", "times", "timesec", "timeseconds")
+    + ("elapsed", "elapsedtime", "timefromstart"),
+    "trajectory": ("trajectory", "traj", "run", "episode", "trajectoryid", "episodeindex"),
+}
+#: Quantities with one column per joint, in the order of the columns of a log.
+PER_JOINT = ("q", "dq", "ddq", "tau", "i", "temp", "cmd")
+KEYS = ("time", "trajectory")
+_QUANTITY_OF = {word: quantity for quantity, words in SPELLINGS.items() for word in words}
+
+
+@dataclass
+class NameMatch:
+    """Which source column is which signal.
+
+    Attributes
+    ----------
+    columns : dict of str to str
+        Name in the log (``q1``) to name in the source.
+    joint_names : list of str
+        Joints in column order.
+    notes : list of str
+        What was decided on the way and deserves telling.
+    units : dict of str to (str, str)
+        Column of the source and the unit that its header states, per name in the log.
+    """
+
+    columns: dict[str, str] = field(default_factory=dict)
+    joint_names: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    units: dict[str, tuple[str, str]] = field(default_factory=dict)
+
+
+def match_names(
+    names: Sequence[str],
+    *,
+    robot_joints: Sequence[str] | None = None,
+    columns: Mapping[str, str | int | Sequence[str | int]] | None = None,
+    source: str = "the log",
+) -> NameMatch:
+    """Decide which columns hold which signals.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Column names of the source, each once.
+    robot_joints : sequence of str, optional
+        Joint names of the robot; columns are put in this order.
+    columns : mapping, optional
+        What the user says, which goes before any guess: ``{"q1": "pos_a"}``,
+        ``{"q": ["pos_a", "pos_b"]}``, ``{"q": "pos_{joint}"}`` or ``{"q": "pos_{i}"}``
+        (from 0 or 1, as the columns are); a number is the position of a column.
+    source : str
+        Name of the file for messages.
+
+    Returns
+    -------
+    NameMatch
+
+    Raises
+    ------
+    LogError
+        A column that ``columns`` names is absent, or joints do not match the robot.
+    """
+    _refuse_too_many(names, source)
+    match = NameMatch()
+    spoken = _said(names, columns or {}, robot_joints, source)
+    taken = set(spoken.values())
+    by_index, by_joint = _guess([name for name in names if name not in taken])
+    for key in KEYS:
+        if key not in spoken and key in by_index:
+            match.columns[key] = by_index[key][0]
+            if others := by_index[key].others.get(0):
+                taken_from = f"taken from {by_index[key][0]!r}, not from {_listed(others)}"
+                match.notes.append(f"{source}: {key} is {taken_from}")
+    said_quantities = {re.sub(r"\d+$", "", name) for name in spoken}
+    match.columns.update(spoken)
+    for quantity in PER_JOINT:
+        if quantity in said_quantities:
+            continue
+        indexed, named = by_index.get(quantity, _Found()), by_joint.get(quantity, _Found())
+        if indexed:
+            indexed.refuse_choice(quantity, source)
+            _place_by_index(match, quantity, indexed)
+        elif named and (robot_joints is not None or "q" not in by_index):
+            named.refuse_choice(quantity, source)
+            _place_by_joint(match, quantity, named, robot_joints, source)
+    n = _number_of_joints(match)
+    if robot_joints is not None and n and n != len(robot_joints):
+        raise LogError(
+            f"{source} has {n} joints ({_listed(match.joint_names) or 'by number'}), the robot has "
+            f"{len(robot_joints)} ({_listed(robot_joints)}). If the log covers part of the robot, "
+            "load it with Robot.from_urdf(..., joints=[...]); if it has further joints, say which "
+            "columns to take with columns={'q': [...], 'dq': [...], 'tau': [...]}."
+        )
+    if n > max(len(names), MANY_JOINTS):
+        raise LogError(
+            f"{source} has a column of joint {n}, but only {len(names)} columns. Is its name "
+            "damaged? Rename it, or say which columns to take with columns={'q': [...]}."
+        )
+    if not match.joint_names:
+        match.joint_names = list(robot_joints or [str(k + 1) for k in range(n)])
+    for target, name in match.columns.items():
+        unit = split_unit(str(name))[1]
+        if unit is not None:
+            match.units[target] = (str(name), unit)
+    return match
+
+
+def _refuse_too_many(names: Sequence[str], source: str) -> None:
+    """Logs have some hundred columns; more, or names without end, are an accident or an attack."""
+    if len(names) > MOST_COLUMNS:
+        raise LogError(
+            f"{source} has {len(names)} columns; at most {MOST_COLUMNS} are read. Store the "
+            "columns that are needed."
+        )
+    long = next((name for name in names if len(name) > LONGEST_NAME), None)
+    if long is not None:
+        raise LogError(
+            f"{source} has a column whose name has {len(long)} letters; at most {LONGEST_NAME} "
+            f"are read. It begins with {long[:40]!r}; rename it."
+        )
+
+
+def _said(
+    names: Sequence[str],
+    columns: Mapping[str, str | int | Sequence[str | int]],
+    robot_joints: Sequence[str] | None,
+    source: str,
+) -> dict[str, str]:
+    """What the user's mapping says, as log name to source name."""
+    said: dict[str, str] = {}
+    for target, value in columns.items():
+        if re.sub(r"\d+$", "", target) not in SPELLINGS:
+            raise LogError(
+                f"columns: {target!r} is no signal of a log; use "
+                f"{', '.join((*KEYS, *PER_JOINT))}, or one joint of them such as 'q1'."
+            )
+        if target in PER_JOINT:
+            for k, name in enumerate(_expand(value, names, robot_joints)):
+                said[f"{target}{k + 1}"] = _existing(name, names, target, source)
+        else:
+            if not isinstance(value, (str, int)):
+                raise LogError(f"columns: {target!r} takes one column, not {value!r}.")
+            said[target] = _existing(value, names, target, source)
+    return said
+
+
+def _expand(
+    value: str | int | Sequence[str | int],
+    names: Sequence[str],
+    robot_joints: Sequence[str] | None,
+) -> list[str | int]:
+    if isinstance(value, int):
+        return [value]
+    if not isinstance(value, str):
+        return list(value)
+    if "{joint}" in value:
+        if robot_joints is not None:
+            return [value.replace("{joint}", joint) for joint in robot_joints]
+        around = "(.+)".join(map(re.escape, value.split("{joint}")))
+        found = [name for name in names if re.fullmatch(around, name)]
+        if not found:
+            raise LogError(f"columns: no column is like {value!r}. There are: {_listed(names)}.")
+        return list(found)
+    value = value.replace("{i}", "{index}")
+    if "{index}" in value:
+        first = 0 if value.replace("{index}", "0") in names else 1
+        if robot_joints is not None:
+            count = len(robot_joints)
+        else:
+            count = 0
+            while value.replace("{index}", str(count + first)) in names:
+                count += 1
+        return [value.replace("{index}", str(k + first)) for k in range(max(count, 1))]
+    return [value]
+
+
+def _existing(value: str | int, names: Sequence[str], target: str, source: str) -> str:
+    if isinstance(value, int) and not isinstance(value, bool):
+        if not -len(names) <= value < len(names):
+            raise LogError(
+                f"columns: {target!r} is to be column {value}, but {source} has {len(names)}."
+            )
+        return names[value]
+    if value in names:
+        return str(value)
+    close = difflib.get_close_matches(str(value), list(names), n=1)
+    hint = f" Did you mean {close[0]!r}?" if close else ""
+    raise LogError(
+        f"columns: {target!r} is to be {value!r}, which is not in {source}.{hint} "
+        f"It has: {_listed(names)}."
+    )
+
+
+def _guess(names: Sequence[str]) -> tuple[dict[str, _Found], dict[str, _Found]]:
+    """Candidates by number and by joint name, per quantity, in the order of the columns."""
+    by_index: dict[str, _Found] = {}
+    by_joint: dict[str, _Found] = {}
+    for name in names:
+        quantity, index, joint = _parse(name)
+        if quantity is None:
+            continue
+        if joint is not None:
+            by_joint.setdefault(quantity, _Found()).add(joint, name)
+        elif index is not None:
+            by_index.setdefault(quantity, _Found()).add(index, name)
+        elif quantity in KEYS:
+            by_index.setdefault(quantity, _Found()).add(0, name)
+    return by_index, by_joint
+
+
+class _Found(dict[Any, str]):
+    """Column of every joint, and further ones that speak of the same."""
+
+    def __init__(self) -> None:
+        self.others: dict[Any, list[str]] = {}
+
+    def add(self, joint: int | str, name: str) -> None:
+        """Take a column; the first counts until a choice is needed."""
+        if self.setdefault(joint, name) != name:
+            self.others.setdefault(joint, []).append(name)
+
+    def refuse_choice(self, quantity: str, source: str) -> None:
+        """Raise if two columns are the same signal of one joint."""
+        for joint, names in self.others.items():
+            both = _listed([self[joint], *names])
+            raise LogError(
+                f"{source}: {both} are all {quantity} of joint {joint}. Say which to take with "
+                f"columns={{'{quantity}': [...]}}, or remove the surplus ones."
+            )
+
+
+def _parse(name: str) -> tuple[str | None, int | None, str | None]:
+    """Quantity, number and joint that a column name speaks of.
+
+    >>> _parse("q1"), _parse("dq_elbow"), _parse("/joint_states/effort[0]")
+    (('q', 1, None), ('dq', None, 'elbow'), ('tau', 0, None))
+    >>> _parse("panda_joint1/position"), _parse("volts")
+    (('q', None, 'panda_joint1'), (None, None, None))
+    """
+    parts = [part for part in re.split(r"[/.]", split_unit(name.strip())[0]) if part]
+    if len(parts) > 1 and parts[-2].lower() == "observation":  # LeRobot: observation.state3
+        parts = [*parts[:-2], f"{parts[-2]}_{parts[-1]}"]
+    tail = parts[-1] if parts else ""
+    words = tail.strip("[]")
+    if _plain(words) in _QUANTITY_OF and not words[-1:].isdigit():
+        quantity = _QUANTITY_OF[_plain(words)]
+        # "panda_joint1/position" of flattened ROS messages: the joint stands before the quantity
+        if quantity not in KEYS and len(parts) > 1:
+            return quantity, None, parts[-2]
+        return quantity, None, None
+    # what cannot end in a number is not searched for one, letter by letter
+    ends = tail[:-1] if tail.endswith(("]", ")")) else tail
+    numbered = ends[-1:].isdigit() and re.fullmatch(r"(.*?)[ _\-\[(]*(\d+)[\])]?", tail)
+    if numbered and _plain(numbered[1]) in _QUANTITY_OF:
+        quantity = _QUANTITY_OF[_plain(numbered[1])]
+        return (quantity, int(numbered[2]), None) if quantity not in KEYS else (None, None, None)
+    # "q_elbow", then "elbow_pos": the quantity is the longest known beginning or end
+    pieces = re.split(r"([ _\-])", tail)
+    for cut in range(len(pieces) - 2, 0, -2):
+        head, rest = "".join(pieces[:cut]), "".join(pieces[cut + 1 :])
+        quantity = _QUANTITY_OF.get(_plain(head), "time")
+        if quantity not in KEYS and rest:
+            return quantity, None, rest
+    for cut in range(1, len(pieces) - 1, 2):
+        head, rest = "".join(pieces[:cut]), "".join(pieces[cut + 1 :])
+        quantity = _QUANTITY_OF.get(_plain(rest), "time")
+        if quantity not in KEYS and head:
+            return quantity, None, head
+    return None, None, None
+
+
+def quantity_of(name: str) -> str | None:
+    """Quantity that a column, or a file of one signal, is named after; None if none.
+
+    >>> quantity_of("effort_3"), quantity_of("commands"), quantity_of("volts")
+    ('tau', 'cmd', None)
+    """
+    return _parse(name)[0]
+
+
+def _plain(text: str) -> str:
+    return re.sub(r"[^a-z0-9]", "", text.lower())
+
+
+def _place_by_index(match: NameMatch, quantity: str, found: Mapping[int, str]) -> None:
+    """Number columns from 1; a recorder that counts from 0 is told by its 0."""
+    shift = 1 if 0 in found else 0
+    for index, name in sorted(found.items()):
+        match.columns[f"{quantity}{index + shift}"] = name
+
+
+def _place_by_joint(
+    match: NameMatch,
+    quantity: str,
+    found: Mapping[str, str],
+    robot_joints: Sequence[str] | None,
+    source: str,
+) -> None:
+    if robot_joints is None:
+        if not match.joint_names:
+            match.joint_names = list(found)
+        for joint in match.joint_names:
+            if joint in found:
+                match.columns[f"{quantity}{match.joint_names.index(joint) + 1}"] = found[joint]
+        return
+    located = {joint: _locate(joint, found) for joint in robot_joints}
+    missing = [joint for joint, hit in located.items() if hit is None]
+    # a name such as "tau_cmd" speaks of no joint
+    if len(missing) == len(robot_joints) and quantity != "q":
+        return
+    if missing:
+        close = difflib.get_close_matches(missing[0], list(found), n=1, cutoff=0.5)
+        hint = f" (did you mean {close[0]!r}?)" if close else ""
+        raise LogError(
+            f"{source} has no {quantity} of the joint(s) {_listed(missing)}{hint}; it has "
+            f"{_listed(found)}. If the log covers part of the robot, load it with "
+            "Robot.from_urdf(..., joints=[...]); if joints have other names, give "
+            f"columns={{'{quantity}': [...]}} in the order of the robot."
+        )
+    match.joint_names = list(robot_joints)
+    for k, joint in enumerate(robot_joints):
+        hit = located[joint]
+        assert hit is not None
+        match.columns[f"{quantity}{k + 1}"] = found[hit]
+        if hit != joint:
+            match.notes.append(f"{quantity}: column {found[hit]!r} taken for joint {joint!r}")
+    for joint in found:
+        if joint not in located.values():
+            match.notes.append(
+                f"{quantity}: column {found[joint]!r} belongs to no joint of the robot and is kept "
+                "under its own name"
+            )
+
+
+def _locate(joint: str, found: Mapping[str, str]) -> str | None:
+    """The name in ``found`` that is this joint, if only one is; "joint" and case do not matter."""
+    if joint in found:
+        return joint
+    alike = [name for name in found if _core(name) == _core(joint)]
+    return alike[0] if len(alike) == 1 else None
+
+
+def _core(joint: str) -> str:
+    """Joint name without case, separators and the word joint, which recorders add or leave out.
+
+    >>> _core("shoulder_pan_joint") == _core("Shoulder-Pan")
+    True
+    """
+    return _plain(joint).replace("joint", "")
+
+
+def _number_of_joints(match: NameMatch) -> int:
+    numbers = [
+        int(hit[2])
+        for name in match.columns
+        if (hit := re.fullmatch(r"(q|dq|ddq|tau|i)(\d+)", name))
+    ]
+    return max(numbers, default=0)
+
+
+def _listed(names: Sequence[str] | Mapping[str, str], limit: int = 12) -> str:
+    names = [str(name) for name in names]
+    more = f", ... ({len(names)} in all)" if len(names) > limit else ""
+    return ", ".join(names[:limit]) + more

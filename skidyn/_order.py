@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The order of rows in time, which random splits of rows destroy."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidyn._signals import Array
+
+#: Share of steps that go back in time, or to another trajectory, from which rows count as shuffled.
+SHUFFLED = 0.1
+
+
+def order_in_time(trajectory: NDArray[Any], time: Array | None) -> NDArray[np.intp] | None:
+    """Order of shuffled rows by trajectory and time.
+
+    A log has as many borders as recordings, or a few more where clocks start again. In shuffled
+    rows every second step goes back.
+
+    Parameters
+    ----------
+    trajectory : ndarray of shape (n_samples,)
+        Trajectory number of every row.
+    time : ndarray of shape (n_samples,), s, or None
+        Time; without it no order can be known.
+
+    Returns
+    -------
+    ndarray of shape (n_samples,) of int or None
+        Rows in order of time; None where they are already.
+    """
+    if time is None or len(time) < 3:
+        return None
+    switches = trajectory[1:] != trajectory[:-1]
+    back = (np.diff(time) < 0) & ~switches
+    recordings = len(np.unique(trajectory))
+    surplus = int(switches.sum()) - (recordings - 1) + int(back.sum())
+    if surplus <= SHUFFLED * len(time):
+        return None
+    return np.lexsort((time, trajectory))
+
+
+def has_one_motion(trajectory: NDArray[Any], time: Array) -> bool:
+    """Whether ordered rows are of one motion each: hardly any moment occurs twice."""
+    same = trajectory[1:] == trajectory[:-1]
+    return bool(np.sum(same & (np.diff(time) == 0)) <= SHUFFLED * len(time))

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How numbers, errors, units and joints are written wherever a user reads them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+#: Titles that begin with the name of a person or a model.
+NAMES = ("Dahl", "LuGre", "Maxwell", "Stribeck")
+
+
+def fall(before: float, after: float, noise: float, unit: str, added: bool = True) -> str:
+    """An error before and after, with its noise, such as ``"0.63 → 0.16 N m (noise 0.16)"``.
+
+    Parameters
+    ----------
+    before, after, noise : float
+        Errors and noise in the same unit.
+    unit : str
+        Their unit.
+    added : bool, default=True
+        False leaves the second error out.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> fall(0.6346, 0.1620, 0.1617, "N m")
+    '0.63 → 0.16 N m (noise 0.16)'
+    """
+    steps = " → ".join(digits(x) for x in ((before, after) if added else (before,)))
+    return f"{steps} {unit} (noise {digits(noise)})"
+
+
+def digits(value: float) -> str:
+    """Two significant digits without an exponent where the number is of a usual size."""
+    if not math.isfinite(value):
+        return "–"
+    if value == 0 or not 1e-4 <= abs(value) < 1e4:
+        return f"{value:.2g}"
+    decimals = max(0, 1 - math.floor(math.log10(abs(value))))
+    return f"{value:.{decimals}f}"
+
+
+def raised(unit: str) -> str:
+    """Unit with its powers as they are printed."""
+    return unit.replace("^2", "²").replace("^3", "³")
+
+
+def inside(title: str) -> str:
+    """A title inside a sentence: names of people and models keep their capital."""
+    return title if title.startswith(NAMES) else title[:1].lower() + title[1:]
+
+
+def joints_told(joints: Iterable[int]) -> str:
+    """Joints in words, such as ``"joints 1 and 2"``."""
+    numbers = [str(j) for j in joints]
+    return f"joint{'s' if len(numbers) > 1 else ''} {listed(numbers)}"
+
+
+def listed(parts: Sequence[str], word: str = "and") -> str:
+    """Parts of a sentence, the last one after a word."""
+    return f" {word} ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else list(parts))
+
+
+def measure(name: str, value: object, unit: str = "") -> str:
+    """A parameter with half its interval, such as ``"k = 3.5 ± 0.40 N m/rad"``.
+
+    Parameters
+    ----------
+    name : str
+        Symbol.
+    value : (value, low, high), float or anything else
+        What is known of it.
+    unit : str, default=""
+        Unit; ``"1"`` for none.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> measure("k", (3.5, 3.1, 3.9), "N m/rad")
+    'k = 3.5 ± 0.40 N m/rad'
+    """
+    if isinstance(value, tuple) and len(value) == 3:
+        middle, low, high = value
+        text = digits(middle) if low == high else f"{digits(middle)} ± {digits((high - low) / 2)}"
+    else:
+        text = digits(value) if isinstance(value, float) else str(value)
+    return f"{name} = {text.replace('-', '−')}{'' if unit in ('', '1') else f' {raised(unit)}'}"

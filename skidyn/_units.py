@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Conversion of the units of a log to SI."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from skidyn._exceptions import LogError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_ANGLE = {"rad": 1.0, "deg": np.pi / 180, "rev": 2 * np.pi, "mrad": 1e-3}
+_LENGTH = {"m": 1.0, "mm": 1e-3, "cm": 1e-2}
+_TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
+_TORQUE = {"Nm": 1.0, "N m": 1.0, "N*m": 1.0, "mNm": 1e-3, "Ncm": 1e-2, "Nmm": 1e-3, "kNm": 1e3}
+_FORCE = {"N": 1.0, "kN": 1e3, "mN": 1e-3}
+_MOTION = {**_ANGLE, **_LENGTH}
+#: Factor to SI of each unit, per quantity. Temperatures are handled apart (they shift).
+FACTORS: dict[str, dict[str, float]] = {
+    "q": _MOTION,
+    "dq": {f"{unit}/s": factor for unit, factor in _MOTION.items()} | {"rpm": 2 * np.pi / 60},
+    "ddq": {f"{unit}/s^2": factor for unit, factor in _MOTION.items()},
+    "tau": {**_TORQUE, **_FORCE},
+    "cmd": _MOTION,
+    "i": {"A": 1.0, "mA": 1e-3},
+    "time": _TIME,
+    "temp": {"C": 1.0, "K": 1.0, "F": 5 / 9},
+}
+#: Other spellings of units in the headers of tables, compared in lower case without blanks.
+_SPELLED = {
+    **{"°": "deg", "degree": "deg", "degrees": "deg", "radian": "rad", "radians": "rad"},
+    **{"°/s": "deg/s", "rad/sec": "rad/s", "deg/sec": "deg/s"},
+    **{"rad/s2": "rad/s^2", "rad/s²": "rad/s^2", "deg/s2": "deg/s^2", "m/s2": "m/s^2"},
+    **{"n·m": "Nm", "n.m": "Nm", "sec": "s", "secs": "s", "second": "s", "seconds": "s"},
+    **{"msec": "ms", "millisecond": "ms", "milliseconds": "ms", "µs": "us", "usec": "us"},
+    **{"amp": "A", "amps": "A", "ampere": "A", "°c": "C", "celsius": "C", "kelvin": "K"},
+}
+_KNOWN = {unit.lower().replace(" ", ""): unit for units in FACTORS.values() for unit in units}
+_TEMPERATURE_ZERO = {"C": 0.0, "K": 273.15, "F": 32.0}
+
+
+def split_unit(name: str) -> tuple[str, str | None]:
+    """Name of a column without the unit that stands behind it in brackets, and that unit.
+
+    >>> split_unit("q1 [deg]"), split_unit("Time (ms)"), split_unit("q[1]"), split_unit("q (raw)")
+    (('q1', 'deg'), ('Time', 'ms'), ('q[1]', None), ('q (raw)', None))
+    """
+    if not name.rstrip().endswith((")", "]")):
+        return name, None
+    hit = re.fullmatch(r"(.*?)[ _]*[\[(]([^\[\]()]*)[\])] *", name)
+    if hit is None or not hit[1]:
+        return name, None
+    plain = hit[2].strip()
+    word = plain.lower().replace(" ", "")
+    # mNm and MNm differ by case alone, so the unit as it is written goes first
+    exact = next((u for units in FACTORS.values() for u in units if u == plain), None)
+    unit = exact or _SPELLED.get(word) or _KNOWN.get(word)
+    return (hit[1], unit) if unit else (name, None)
+
+
+def refuse_stated_units(
+    stated: Mapping[str, tuple[str, str]], units: Mapping[str, str], source: str
+) -> None:
+    """Refuse columns whose header states a unit that is not SI, until it is asked to convert them.
+
+    Parameters
+    ----------
+    stated : mapping
+        Column of the source and its unit, per column of the log.
+    units : mapping of str to str
+        What is to be converted.
+    source : str
+        Name of the file for messages.
+
+    Raises
+    ------
+    LogError
+        With the ``units`` to pass.
+    """
+    wanted: dict[str, str] = {}
+    example = ""
+    for target, (name, unit) in stated.items():
+        quantity = re.sub(r"\d+$", "", target)
+        factor = FACTORS.get(quantity, {}).get(unit)
+        if factor is None or (factor == 1 and unit != "K") or {target, quantity} & set(units):
+            continue
+        wanted[quantity if wanted.get(quantity, unit) == unit else target] = unit
+        example = example or f"column {name!r} states {unit}"
+    if wanted:
+        raise LogError(
+            f"{source}: {example}; a log is in SI units. To convert it, pass units={wanted}."
+        )
+
+
+def convert_units(frame: pd.DataFrame, units: Mapping[str, str]) -> pd.DataFrame:
+    """Convert columns of a log to SI.
+
+    Parameters
+    ----------
+    frame : DataFrame
+        Columns ``time, q1 .., dq1 .., tau1 ..``.
+    units : mapping of str to str
+        Unit of a quantity (``{"q": "deg", "time": "ms"}``) or of one column (``{"q3": "mm"}``),
+        which goes before its quantity.
+
+    Returns
+    -------
+    DataFrame
+        A copy with the columns converted.
+
+    Raises
+    ------
+    LogError
+        An unknown quantity or unit, or a quantity that the log does not have.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> convert_units(pd.DataFrame({"q1": [180.0]}), {"q": "deg"}).q1.round(4).tolist()
+    [3.1416]
+    """
+    frame = frame.copy()
+    for target, unit in units.items():
+        quantity = re.sub(r"\d+$", "", target)
+        if quantity not in FACTORS:
+            raise LogError(f"units: {target!r} is no quantity; use one of {', '.join(FACTORS)}.")
+        if unit not in FACTORS[quantity]:
+            raise LogError(
+                f"units: {unit!r} is no unit of {quantity}; use {', '.join(FACTORS[quantity])}."
+            )
+        chosen = [target] if target in frame.columns else _columns_of(target, frame, units)
+        if not chosen:
+            raise LogError(f"units: the log has no {target}.")
+        for name in chosen:
+            values = frame[name].to_numpy(dtype=float)
+            zero = _TEMPERATURE_ZERO[unit] if quantity == "temp" else 0.0
+            frame[name] = (values - zero) * FACTORS[quantity][unit]
+    return frame
+
+
+def _columns_of(quantity: str, frame: pd.DataFrame, units: Mapping[str, str]) -> list[str]:
+    """Columns of a quantity for which ``units`` says nothing of their own."""
+    return [
+        name
+        for name in frame.columns
+        if re.fullmatch(rf"{quantity}\d+", str(name)) and name not in units
+    ]

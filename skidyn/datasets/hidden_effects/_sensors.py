@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What sensors do to signals: noise, quantisation, and the derivative a user takes afterwards."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+#: Share of the variance of torque noise that is coloured, and its time constant in s.
+COLOURED_SHARE, TIME_CONSTANT = 0.4, 0.03
+
+
+def sensor_noise(
+    shape: tuple[int, int, int], std: Array, step: float, rng: np.random.Generator
+) -> Array:
+    """White noise plus first-order coloured noise, per trajectory.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        ``(n_trajectories, n_samples, n_joints)``.
+    std : ndarray of shape (n_joints,)
+        Standard deviation of the sum.
+    step : float, s
+        Time between samples.
+    rng : Generator
+        Source of chance.
+
+    Returns
+    -------
+    ndarray of shape ``shape``
+    """
+    from scipy.signal import lfilter  # a second of imports: only where a log is made
+
+    pole = np.exp(-step / TIME_CONSTANT)
+    drive = rng.standard_normal(shape)
+    start = rng.standard_normal((shape[0], 1, shape[2]))
+    coloured, _ = lfilter([np.sqrt(1 - pole**2)], [1, -pole], drive, axis=1, zi=pole * start)
+    white = rng.standard_normal(shape)
+    mixed = np.sqrt(1 - COLOURED_SHARE) * white + np.sqrt(COLOURED_SHARE) * coloured
+    noise: Array = std * mixed
+    return noise
+
+
+def quantise(values: Array, resolution: Array | float) -> Array:
+    """Round to whole steps of a sensor."""
+    return np.round(values / resolution) * resolution
+
+
+def filtered_derivative(velocity: Array, step: float, cutoff: float = 10.0) -> Array:
+    """Acceleration from measured velocity, as a user derives it.
+
+    Parameters
+    ----------
+    velocity : ndarray of shape (n_trajectories, n_samples, n_joints)
+        Measured velocity.
+    step : float, s
+        Time between samples.
+    cutoff : float, default=10.0, Hz
+        Cut-off of the zero-phase Butterworth low-pass.
+
+    Returns
+    -------
+    ndarray of the same shape
+    """
+    from scipy.signal import butter, sosfiltfilt
+
+    nyquist = 0.5 / step
+    if cutoff < 0.9 * nyquist and velocity.shape[1] > 30:
+        low_pass = butter(2, cutoff / nyquist, output="sos")
+        velocity = sosfiltfilt(low_pass, velocity, axis=1)
+    return np.gradient(velocity, step, axis=1)

@@ -1,0 +1,259 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The simulated robot: its true parameters, its motion and the torques it takes without effects."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidyn.datasets.hidden_effects._motion import Motion
+
+if TYPE_CHECKING:
+    from skidyn.robots import Robot
+
+Array = NDArray[np.float64]
+#: Travel (rad, m) over which dry friction turns round: less than an encoder sees, so that it is a
+#: sign that a joint at rest keeps.
+SLIP = 1e-6
+#: A joint whose torque spreads less than this share of the largest spread carries next to nothing.
+LOADED_SHARE = 0.05
+
+
+@dataclass
+class World:
+    """A robot in motion, as the simulator knows it.
+
+    Signals have the shape (n_trajectories, n_samples, n_joints) on the clock of the log; those
+    with ``fine`` in their name are on the finer clock of the integration.
+
+    Attributes
+    ----------
+    robot : Robot
+        Nominal robot.
+    parameters : ndarray of shape (n_bodies, 10)
+        True inertial parameters.
+    motion : Motion
+        Motion of the links on the clock of the log.
+    fine : Motion
+        Motion of the motors (joint side of the gear) on the fine clock.
+    step : float, s
+        Fine time step.
+    stride : int
+        Fine steps per sample.
+    time : ndarray of shape (n_trajectories, n_samples), s
+        Clock of the session.
+    temperature : ndarray, degrees Celsius
+        Joint temperatures.
+    rigid : ndarray, N m or N
+        Torque of the rigid body.
+    scale : ndarray of shape (n_joints,), N m or N
+        Size of the torque of each joint: what effects are measured by.
+    rng : Generator
+        Source of chance for the effects.
+    """
+
+    robot: Robot
+    parameters: Array
+    motion: Motion
+    fine: Motion
+    step: float
+    stride: int
+    time: Array
+    temperature: Array
+    rigid: Array
+    scale: Array
+    rng: np.random.Generator
+
+    @property
+    def n_joints(self) -> int:
+        """Number of joints."""
+        return self.robot.n_joints
+
+    @property
+    def n_trajectories(self) -> int:
+        """Number of trajectories."""
+        return len(self.time)
+
+    @cached_property
+    def prismatic(self) -> NDArray[np.bool_]:
+        """Which joints slide."""
+        return np.array([kind == "prismatic" for kind in self.robot.joint_types])
+
+    @cached_property
+    def unit(self) -> Array:
+        """Moderate motion of each joint: 1 rad or 0.1 m."""
+        return np.where(self.prismatic, 0.1, 1.0)
+
+    @cached_property
+    def sign(self) -> Array:
+        """Direction of dry friction, which a joint at rest keeps from its last motion."""
+        return self.dry_sign(self.fine.q)
+
+    def dry_sign(self, travel: Array) -> Array:
+        """Direction of dry friction of any fine travel (n_trajectories, n_fine, ...) in rad."""
+        return slip(np.diff(travel, axis=1) / SLIP)[:, :: self.stride][:, : self.n_samples]
+
+    @property
+    def n_samples(self) -> int:
+        """Samples per trajectory."""
+        return int(self.time.shape[1])
+
+    def torque(self, **changes: Any) -> Array:
+        """Rigid-body torque with other ``parameters``, ``gravity`` or accelerations."""
+        m = self.motion
+        arguments: dict[str, Any] = {"parameters": self.parameters} | changes
+        n = self.n_joints
+        flat = (a.reshape(-1, n) for a in (m.q, m.dq, m.ddq))
+        return self.robot.inverse_dynamics(*flat, **arguments).reshape(m.q.shape)
+
+    def zeros(self) -> Array:
+        """Torque of nothing."""
+        return np.zeros_like(self.rigid)
+
+
+@dataclass
+class Outcome:
+    """What an effect does to a log.
+
+    Attributes
+    ----------
+    joints : list of int
+        Joints it acts on, from 0.
+    parameters : dict
+        True parameters in SI units; lists hold one value per joint.
+    formula : str
+        What was simulated.
+    torque : ndarray or None
+        Torque that it adds.
+    variables : tuple of str
+        For unknown effects: the signals it depends on.
+    gain : float
+        Factor on the logged torque of its joints.
+    delay : float, s
+        Delay of the logged torque of its joints.
+    limit : ndarray or None
+        Limit of the logged torque of its joints.
+    uses_temperature : bool
+        Whether the log holds temperatures.
+    replaces_coulomb : bool
+        Whether it takes the place of the dry friction that its joints have anyway.
+    motor : tuple of ndarray or None
+        Departure of the fine motor position and velocity from those of the links (transmissions).
+    """
+
+    joints: list[int]
+    parameters: dict[str, Any]
+    formula: str
+    torque: Array | None = None
+    variables: tuple[str, ...] = ()
+    gain: float = 1.0
+    delay: float = 0.0
+    limit: Array | None = None
+    uses_temperature: bool = False
+    replaces_coulomb: bool = False
+    motor: tuple[Array, Array] | None = None
+
+
+#: An effect: world, joints from 0, size of its torque relative to the scale of each joint.
+Simulate = Callable[[World, Sequence[int], float], Outcome]
+
+
+def slip(travel: Array) -> Array:
+    """Elastic-perfectly-plastic element: states in [-1, 1] that follow steps of travel.
+
+    Parameters
+    ----------
+    travel : ndarray of shape (n_trajectories, n_steps, ...)
+        Steps in units of the travel from rest to slip.
+
+    Returns
+    -------
+    ndarray of shape (n_trajectories, n_steps + 1, ...)
+    """
+    moved = np.moveaxis(travel, 1, 0)
+    states = np.empty((len(moved) + 1, *moved.shape[1:]))
+    # the direction in which it first slips, so that no transient is left at the start
+    total = np.cumsum(moved, axis=0)
+    first = np.argmax(np.abs(total) > 1, axis=0)
+    states[0] = np.sign(np.take_along_axis(total, first[None], axis=0)[0])
+    state = states[0].copy()
+    for k, step in enumerate(moved, start=1):
+        np.add(state, step, out=state)
+        np.minimum(state, 1.0, out=state)
+        np.maximum(state, -1.0, out=state)
+        states[k] = state
+    return np.moveaxis(states, 0, 1)
+
+
+def relax(target: Array, decay: Array, start: Array) -> Array:
+    """States of ``z_k = z_(k-1) decay_k + target_k (1 - decay_k)`` along axis 1.
+
+    This is the exact step of ``dz/ds = (target - z) / length`` with both held during the step, so
+    stiff friction states need no smaller steps.
+    """
+    decays = np.moveaxis(decay, 1, 0)
+    pulls = np.moveaxis(target * (1 - decay), 1, 0)
+    states = np.empty((len(decays) + 1, *start.shape))
+    states[0] = state = start.copy()
+    for k in range(len(decays)):
+        state = state * decays[k] + pulls[k]
+        states[k + 1] = state
+    return np.moveaxis(states, 0, 1)
+
+
+def true_parameters(robot: Robot, rng: np.random.Generator) -> Array:
+    """Inertial parameters that differ from the nominal ones by 10 to 20 % and stay physical.
+
+    The pseudo-inertia matrix of each body is changed by a congruence, which keeps it positive
+    definite [1]_.
+
+    Parameters
+    ----------
+    robot : Robot
+        Nominal robot.
+    rng : Generator
+        Source of chance.
+
+    Returns
+    -------
+    ndarray of shape (n_bodies, 10)
+
+    References
+    ----------
+    .. [1] P. M. Wensing, S. Kim, J.-J. E. Slotine, "Linear matrix inequalities for physically
+       consistent inertial parameter identification", IEEE RA-L 3(1), 2018.
+    """
+    nominal = np.asarray(robot.inertial_parameters, dtype=float)
+    changed = np.empty_like(nominal)
+    for k, row in enumerate(nominal):
+        P = pseudo_inertia(row)
+        length = np.linalg.norm(row[1:4]) / row[0] if row[0] > 0 else 0.0
+        A = np.eye(4)
+        A[:3, :3] += 0.06 * rng.standard_normal((3, 3))
+        A[:3, 3] = 0.12 * length * rng.standard_normal(3)
+        mass = 1 + rng.choice([-1, 1]) * rng.uniform(0.1, 0.2)
+        changed[k] = from_pseudo_inertia(mass * A @ P @ A.T)
+    return changed
+
+
+def pseudo_inertia(row: Array) -> Array:
+    """4 x 4 pseudo-inertia matrix of ``(m, m c, Ixx, Ixy, Ixz, Iyy, Iyz, Izz)``."""
+    m, hx, hy, hz, xx, xy, xz, yy, yz, zz = row
+    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    P = np.empty((4, 4))
+    P[:3, :3] = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    P[:3, 3] = P[3, :3] = hx, hy, hz
+    P[3, 3] = m
+    return P
+
+
+def from_pseudo_inertia(P: Array) -> Array:
+    """Inverse of :func:`pseudo_inertia`."""
+    inertia = np.trace(P[:3, :3]) * np.eye(3) - P[:3, :3]
+    upper = inertia[[0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
+    return np.concatenate([[P[3, 3]], P[:3, 3], upper])

@@ -1,0 +1,291 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Torques that come and go in time: a push, something that drags, a collision.
+
+No function of the motion describes them, and a robust measure of the residual does not see them. An
+episode is a run of rows whose squared residual, in units of the noise of the quiet rows, exceeds
+what noise has there; the run with the largest sum of the excess is found first (the maximum-sum
+interval), then the next, until the sum is no more than that of noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidyn._signals import Array
+from skidyn.diagnosis._noise import MEDIAN
+from skidyn.evidence import Problem
+
+#: Squared residual, in units of the noise, above which a row counts as excess, and the least sum of
+#: the excess of an episode: several rows in a row far beyond what quiet rows show.
+EXCESS, LEAST_SUM = 4.0, 60.0
+#: Largest share of a joint's rows in episodes, and least share of its excess that they hold: with
+#: more it does not come and go.
+MOST_ROWS, LEAST_EXCESS = 0.4, 0.6
+#: An episode must reach this share of the range of the joint's torque, and so many times its noise.
+LEAST_RANGE, LEAST_NOISE = 0.01, 2.0
+#: Share of the squared residual of a joint that its episodes must hold: what remains of a torque
+#: that follows the motion is large in places, too.
+LEAST_HELD = 0.6
+#: Share of a row's weight that falls on sliding samples: dry friction at reversals is no episode.
+SLIDING = 0.9
+#: A force at one link must explain this share of the squared torque of all joints.
+FORCE_SHARE = 0.8
+
+
+@dataclass(frozen=True)
+class Episode:
+    """A torque that is there for some time only.
+
+    Parameters
+    ----------
+    trajectory : int
+        Number of the recording.
+    start, end : float
+        Time in it, s.
+    joints : tuple of int
+        Joints that show it, counted from 1.
+    size : tuple of float
+        Root mean square of the torque on each of them, N m or N.
+    link : str or None
+        Link on which one force explains the torque of all joints.
+    force : tuple of float or None
+        This force on the robot in the base frame, mean over the episode, N.
+
+    Examples
+    --------
+    >>> Episode(0, 2.0, 2.5, (3,), (1.2,), None, None).joints
+    (3,)
+    """
+
+    trajectory: int
+    start: float
+    end: float
+    joints: tuple[int, ...]
+    size: tuple[float, ...]
+    link: str | None
+    force: tuple[float, ...] | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """As in the report file.
+
+        Returns
+        -------
+        dict
+            JSON types only.
+        """
+        return {
+            "trajectory": self.trajectory,
+            "start": self.start,
+            "end": self.end,
+            "joints": list(self.joints),
+            "size": list(self.size),
+            "link": self.link,
+            "force": None if self.force is None else list(self.force),
+        }
+
+
+def find_episodes(
+    problem: Problem, residual: Sequence[Array], least: Array, share: Array
+) -> tuple[list[Episode], list[NDArray[np.bool_]]]:
+    """Episodes in the residual of a model.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows.
+    residual : sequence of ndarray of shape (n_rows_j,)
+        What the completed model leaves of every joint's rows, N m or N.
+    least : ndarray of shape (n_joints,)
+        Torque that an episode must reach, N m or N.
+    share : ndarray of shape (n_joints,)
+        Share of the squared residual that the episodes of a joint must hold.
+
+    Returns
+    -------
+    episodes : list of Episode
+        In the order of trajectories and time, joints put together where they overlap.
+    inside : list of ndarray of shape (n_rows_j,) of bool
+        Rows of every joint in one of its episodes.
+    """
+    spans: list[tuple[int, float, float, int]] = []
+    inside = []
+    for j, r in enumerate(residual):
+        chosen = _rows_of_episodes(problem, j, r, float(least[j]), float(share[j]))
+        inside.append(chosen)
+        spans += [(k, a, b, j) for k, a, b in _spans(problem, j, chosen)]
+    episodes = []
+    for trajectory, start, end, joints in _overlapping(spans):
+        size = tuple(_size(problem, j, residual[j], trajectory, start, end) for j in joints)
+        link, force = _force(problem, residual, trajectory, start, end, joints)
+        numbers = tuple(j + 1 for j in joints)
+        episodes.append(Episode(trajectory, start, end, numbers, size, link, force))
+    return episodes, inside
+
+
+def away_from_reversals(
+    problem: Problem, residual: Sequence[Array], sliding: NDArray[np.bool_]
+) -> list[Array]:
+    """Residual rows, 0 where a row holds samples close to rest and reversals.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows, which may reach up to the reversals.
+    residual : sequence of ndarray of shape (n_rows_j,)
+        Of every joint.
+    sliding : ndarray of shape (n_samples, n_joints) of bool
+        Samples away from rest and reversals.
+
+    Returns
+    -------
+    list of ndarray of shape (n_rows_j,)
+    """
+    ones = np.ones(problem.signals.n_samples)
+    kept = []
+    for j, r in enumerate(residual):
+        share = problem.rows.average(sliding[:, j].astype(float), j) / problem.rows.average(ones, j)
+        kept.append(np.where(share >= SLIDING, r, 0.0))
+    return kept
+
+
+def _rows_of_episodes(
+    problem: Problem, joint: int, residual: Array, least: float, share: float
+) -> NDArray[np.bool_]:
+    """Rows of a joint in its episodes; none if they are too many to come and go."""
+    chosen = np.zeros(len(residual), dtype=bool)
+    if len(residual) < 40:
+        return chosen
+    quiet = float(np.median(np.abs(residual))) / MEDIAN
+    if quiet <= 0:
+        return chosen
+    excess = (residual / quiet) ** 2 - EXCESS
+    weight = problem.rows.average(np.ones(problem.signals.n_samples), joint)
+    for order in _runs(problem, joint):
+        _take(excess[order], order, chosen)
+    # A row holds the torque times its weight.
+    large = np.abs(residual[chosen] / weight[chosen])
+    if not len(large) or np.quantile(large, 0.9) < least:
+        return np.zeros_like(chosen)
+    total = float(np.maximum(excess, 0.0).sum())
+    held = float(np.maximum(excess[chosen], 0.0).sum())
+    fits = chosen.mean() <= MOST_ROWS and held >= LEAST_EXCESS * total
+    fits &= float(np.sum(residual[chosen] ** 2)) >= share * float(np.sum(residual**2))
+    return chosen if fits else np.zeros_like(chosen)
+
+
+def _runs(problem: Problem, joint: int) -> list[NDArray[np.int64]]:
+    """Rows of a joint, trajectory by trajectory, in the order of time."""
+    trajectory, time = problem.rows.trajectory[joint], problem.rows.time[joint]
+    order = np.lexsort((time, trajectory))
+    return np.split(order, np.flatnonzero(np.diff(trajectory[order])) + 1)
+
+
+def _take(excess: Array, order: NDArray[np.int64], chosen: NDArray[np.bool_]) -> None:
+    """Mark the intervals of largest sum, one after the other."""
+    left = excess.copy()
+    while len(left):
+        total = np.concatenate([[0.0], np.cumsum(left)])
+        lowest = np.minimum.accumulate(total)
+        end = int(np.argmax(total - lowest))
+        if total[end] - lowest[end] < LEAST_SUM:
+            return
+        start = int(np.argmin(total[: end + 1]))
+        chosen[order[start:end]] = True
+        left[start:end] = -EXCESS
+
+
+def _spans(
+    problem: Problem, joint: int, chosen: NDArray[np.bool_]
+) -> list[tuple[int, float, float]]:
+    """Trajectory, start and end of the runs of chosen rows."""
+    spans = []
+    for order in _runs(problem, joint):
+        marked = np.concatenate([[False], chosen[order], [False]])
+        edges = np.flatnonzero(np.diff(marked.astype(int)))
+        time = problem.rows.time[joint][order]
+        name = int(problem.rows.trajectory[joint][order[0]]) if len(order) else 0
+        spans += [
+            (name, float(time[a]), float(time[b - 1]))
+            for a, b in zip(edges[::2], edges[1::2], strict=True)
+        ]
+    return spans
+
+
+def _overlapping(
+    spans: list[tuple[int, float, float, int]],
+) -> list[tuple[int, float, float, list[int]]]:
+    """Spans of several joints put together where they overlap."""
+    merged: list[tuple[int, float, float, list[int]]] = []
+    for k, start, end, j in sorted(spans):
+        if merged and merged[-1][0] == k and start <= merged[-1][2] + 0.1:
+            _, first, last, joints = merged[-1]
+            merged[-1] = (k, first, max(last, end), sorted({*joints, j}))
+        else:
+            merged.append((k, start, end, [j]))
+    return merged
+
+
+def _between(
+    problem: Problem, j: int, trajectory: int, start: float, end: float
+) -> NDArray[np.int64]:
+    time = problem.rows.time[j]
+    here = (problem.rows.trajectory[j] == trajectory) & (time >= start) & (time <= end)
+    return np.flatnonzero(here)
+
+
+def _size(
+    problem: Problem, j: int, residual: Array, trajectory: int, start: float, end: float
+) -> float:
+    """Root mean square of the torque in an episode, N m or N."""
+    here = _between(problem, j, trajectory, start, end)
+    weight = problem.rows.average(np.ones(problem.signals.n_samples), j)[here]
+    return float(np.sqrt(np.mean((residual[here] / weight) ** 2))) if len(here) else 0.0
+
+
+def _force(
+    problem: Problem,
+    residual: Sequence[Array],
+    trajectory: int,
+    start: float,
+    end: float,
+    joints: Sequence[int],
+) -> tuple[str | None, tuple[float, ...] | None]:
+    """The link and the mean force on it that explain the torque of all joints, if one does.
+
+    One force in each of three parts of the episode, on the origin of the frame of one link; of
+    links that do equally well the one farthest out is named.
+    """
+    robot = problem.robot
+    if robot is None or len(joints) < 2:
+        return None, None
+    s = problem.signals
+    samples = (s.trajectory == trajectory) & (s.clock >= start) & (s.clock <= end)
+    if samples.sum() < 6:
+        return None, None
+    rows = [_between(problem, j, trajectory, start, end) for j in range(problem.n_joints)]
+    best: tuple[float, str | None, tuple[float, ...] | None] = (FORCE_SHARE, None, None)
+    total = sum(float(residual[j][rows[j]] @ residual[j][rows[j]]) for j in range(problem.n_joints))
+    third = np.minimum((s.clock - start) / max(end - start, 1e-9) * 3, 2.999).astype(int)
+    for name in robot.body_names[max(joints) :]:
+        jacobian = np.zeros((s.n_samples, 3, problem.n_joints))
+        jacobian[samples] = robot.jacobian(s.q[samples], name)[:, :3]
+        columns, target = [], []
+        for j in range(problem.n_joints):
+            spread = np.column_stack(
+                [-jacobian[:, :, j] * (samples & (third == part))[:, None] for part in range(3)]
+            )
+            columns.append(problem.rows.average(spread, j)[rows[j]])
+            target.append(residual[j][rows[j]])
+        a, y = np.vstack(columns), np.concatenate(target)
+        if len(y) < 3 * a.shape[1]:
+            continue
+        solution = np.linalg.lstsq(a, y, rcond=1e-8)[0]
+        share = 1 - float(np.sum((y - a @ solution) ** 2)) / max(total, 1e-300)
+        if share >= best[0]:
+            best = (share, name, tuple(map(float, solution.reshape(3, 3).mean(0))))
+    return best[1], best[2]

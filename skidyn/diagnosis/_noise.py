@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Noise of the torque sensor: what changes faster than any motion does.
+
+Third differences of the residual take away whatever is smooth over four samples, the motion and
+every torque that follows it, and leave the sensor's noise. Their median size is taken, so that few
+disturbed samples do not count. Noise that is correlated over several samples is not in it: the
+figure is a lower bound, and the remainder is compared with a multiple of it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from skidyn._signals import Array, Signals
+
+#: Variance of the third difference of white noise of unit variance: 1 + 9 + 9 + 1.
+GAIN = 20.0
+#: Median of the absolute value of a normal variable.
+MEDIAN = 0.6744897501960817
+
+
+def sensor_noise(signals: Signals, residual: Array) -> Array:
+    """Standard deviation of the torque sensor's fast noise.
+
+    Parameters
+    ----------
+    signals : Signals
+        Motion, which says where segments end.
+    residual : ndarray of shape (n_samples, n_joints), N m or N
+        Torque that a model leaves.
+
+    Returns
+    -------
+    ndarray of shape (n_joints,), N m or N
+        0 where a torque is constant or repeats; NaN with fewer than four samples in a row.
+    """
+    parts = [
+        np.diff(residual[rows], n=3, axis=0)
+        for rows in signals.segments
+        if rows.stop - rows.start > 3
+    ]
+    if not parts:
+        return np.full(residual.shape[1], np.nan)
+    size: Array = np.median(np.abs(np.concatenate(parts)), axis=0) / MEDIAN / np.sqrt(GAIN)
+    return size

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Effects that some recordings have and others do not: friction that rose, a sensor zeroed anew.
+
+Leaving whole trajectories out cannot judge them: what one trajectory has is seen in it alone. They
+are judged on interleaved quarters of every trajectory instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+
+from skidyn.diagnosis._candidates import Candidate
+from skidyn.diagnosis._rule import Tester
+from skidyn.effects import Term, get_effect
+from skidyn.evidence import Problem
+
+#: Candidates tested in full in every step, those with the largest drop beside nothing else.
+TESTED = 8
+#: Terms of one kind at most.
+MOST_TERMS = 24
+
+
+def groups_of_recordings(problem: Problem) -> list[tuple[int, ...]]:
+    """Every recording by itself, and all from one of them on.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows.
+
+    Returns
+    -------
+    list of tuple of int
+        Numbers of trajectories; empty with fewer than two.
+    """
+    names = [int(n) for n in np.unique(np.concatenate(problem.rows.trajectory))]
+    if len(names) < 2:
+        return []
+    later = [tuple(names[k:]) for k in range(1, len(names) - 1)]
+    return [(n,) for n in names] + later
+
+
+def recording_candidates(problem: Problem, kinds: Iterable[str]) -> list[Candidate]:
+    """Terms of some recordings for every effect that may change from one to the next.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows.
+    kinds : iterable of str
+        Kinds that may be named.
+
+    Returns
+    -------
+    list of Candidate
+    """
+    candidates = []
+    for kind in kinds:
+        effect = get_effect(kind)
+        if not effect.by_recording:
+            continue
+        for joints in effect.sites(problem.signals):
+            if effect.not_shown(problem.signals, joints[0]):
+                continue
+            if not all(_mostly_both_ways(problem, j) for j in joints):
+                continue
+            whole = problem.term_rows(Term(kind, joints))
+            for group in groups_of_recordings(problem):
+                term = Term(kind, joints, {"trajectories": group})
+                rows = {
+                    j: np.where(np.isin(problem.rows.trajectory[j], group)[:, None], block, 0.0)
+                    for j, block in whole.items()
+                }
+                candidates.append(Candidate(kind, term, rows))
+    return candidates
+
+
+def choose(
+    candidates: Sequence[Candidate],
+    tester_beside: Callable[[Sequence[Candidate]], Tester],
+    significant: Callable[[float], bool],
+) -> list[Candidate]:
+    """Terms of one kind added one by one while each is more than chance.
+
+    Parameters
+    ----------
+    candidates : sequence of Candidate
+        Of one kind.
+    tester_beside : callable
+        Gives the tester of the model with some candidates.
+    significant : callable
+        Whether a chance is small enough.
+
+    Returns
+    -------
+    list of Candidate
+    """
+    chosen = _zeroed_anew(candidates, tester_beside([]), significant)
+    left = [c for c in candidates if not any(c is other for other in chosen)]
+    while left and len(chosen) < MOST_TERMS:
+        tester = tester_beside(chosen)
+        drops = np.array([_drop_alone(tester, c) for c in left])
+        tests = [(left[i], tester.test(left[i].rows)) for i in np.argsort(-drops)[:TESTED]]
+        found = [(t.drop, c) for c, t in tests if significant(t.chance)]
+        if not found:
+            break
+        best = max(found, key=lambda item: item[0])[1]
+        chosen.append(best)
+        left = [c for c in left if c is not best]
+    return chosen
+
+
+def _zeroed_anew(
+    candidates: Sequence[Candidate], tester: Tester, significant: Callable[[float], bool]
+) -> list[Candidate]:
+    """Terms of every single recording of a joint, where only all of them together stand out.
+
+    Where every recording differs, each is lost in what the others leave.
+    """
+    chosen: list[Candidate] = []
+    for joints in dict.fromkeys(c.joints for c in candidates):
+        own = [c for c in candidates if c.joints == joints and len(c.term.trajectories or ()) == 1]
+        if not 1 < len(own) <= MOST_TERMS or own[0].width > 1:
+            continue
+        rows = {j: np.hstack([c.rows[j] for c in own]) for j in own[0].rows}
+        if significant(tester.test(rows).chance):
+            chosen += own
+    return chosen
+
+
+def _drop_alone(tester: Tester, candidate: Candidate) -> float:
+    """Squared error that a candidate would remove if the model stayed as it is."""
+    drop = 0.0
+    for j, rows in candidate.rows.items():
+        block = rows / tester.sigma[j]
+        gram = block.T @ block
+        if np.trace(gram) > 0:
+            score = block.T @ tester.residual[j]
+            drop += float(score @ np.linalg.lstsq(gram, score, rcond=1e-9)[0])
+    return drop
+
+
+def _mostly_both_ways(problem: Problem, joint: int) -> bool:
+    """Whether most recordings hold motion of a joint both ways: else an offset is friction."""
+    direction = problem.rows.average(problem.signals.sign[:, joint], joint)
+    trajectory = problem.rows.trajectory[joint]
+    shares = [float(np.mean(direction[trajectory == n] > 0)) for n in np.unique(trajectory)]
+    return bool(shares) and float(np.mean([0.1 < s < 0.9 for s in shares])) > 0.5

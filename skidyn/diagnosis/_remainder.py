@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a completed model leaves, in figures that are never mixed.
+
+Noise is what the sensors make: the torque sensor's fast noise, and what the noise of the encoders
+becomes on its way through differentiation and inertia. Predictable is what the logged signals still
+tell of the residual. The remainder is neither.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidyn._signals import Array
+from skidyn.diagnosis._noise import MEDIAN, sensor_noise
+from skidyn.evidence import Problem, smooth_motion
+
+#: Times the noise, and share of the torque's range, above which a remainder is material: smoothing
+#: and coloured noise leave up to half as much again as the fast noise, and robots that move well
+#: leave some hundredths of the range.
+TIMES_NOISE, SHARE_OF_RANGE = 3.0, 0.05
+#: Share of the torque's range above which something predictable is material if it exceeds noise.
+PREDICTABLE_SHARE = 0.01
+#: Quantiles between which the range of the torque lies.
+RANGE = (0.005, 0.995)
+#: Samples on which the noise of the positions is followed to the torque.
+MOST_SAMPLES = 4000
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """Error of the completed model on the samples judged, by what it is made of.
+
+    Parameters
+    ----------
+    sensor_noise : ndarray of shape (n_joints,), N m or N
+        Of the torque sensor: what changes faster than any motion does.
+    position_noise : ndarray of shape (n_joints,), N m or N
+        What the noise of the logged positions becomes in the torque of the model.
+    predictable : ndarray of shape (n_joints,), N m or N
+        What a function of the logged signals would still take away.
+    left : ndarray of shape (n_joints,), N m or N
+        What is none of these.
+    material : ndarray of shape (n_joints,) of bool
+        Whether the error is more than noise, and more than what a healthy robot leaves; or what
+        is predictable exceeds the noise.
+
+    Examples
+    --------
+    >>> diagnosis.remainder.left  # doctest: +SKIP
+    array([0.02, 0.41])
+    """
+
+    sensor_noise: Array
+    position_noise: Array
+    predictable: Array
+    left: Array
+    material: NDArray[np.bool_]
+
+    @property
+    def noise(self) -> Array:
+        """Noise of torque and position sensors together, (n_joints,), N m or N."""
+        total: Array = np.hypot(np.nan_to_num(self.sensor_noise), self.position_noise)
+        return total
+
+    @property
+    def coarse(self) -> NDArray[np.bool_]:
+        """Joints on which the noise of positions outweighs that of the torque twice."""
+        return np.asarray(self.position_noise > 2 * np.nan_to_num(self.sensor_noise))
+
+
+def torque_range(torque: Array) -> Array:
+    """Range of the measured torque of every joint without its outliers, (n_joints,)."""
+    low, high = np.quantile(torque, RANGE, axis=0)
+    return np.asarray(high - low)
+
+
+def find_remainder(
+    problem: Problem, residual: Array, torque: Array, rmse: Array, share: Array
+) -> Remainder:
+    """Take the error of the completed model apart.
+
+    Parameters
+    ----------
+    problem : Problem
+        Motion and rows.
+    residual : ndarray of shape (n_samples, n_joints), N m or N
+        Held-out residual of the completed model.
+    torque : ndarray of shape (n_samples, n_joints), N m or N
+        Measured torque.
+    rmse : ndarray of shape (n_joints,), N m or N
+        Held-out error on the samples judged.
+    share : ndarray of shape (n_joints,)
+        Share of the squared error of averaged rows that is predictable.
+
+    Returns
+    -------
+    Remainder
+    """
+    sensor = sensor_noise(problem.signals, residual)
+    position = position_noise(problem)
+    noise = np.hypot(np.nan_to_num(sensor), position)
+    excess = np.maximum(rmse**2 - noise**2, 0.0)
+    predictable = np.sqrt(np.minimum(share * rmse**2, excess))
+    left = np.sqrt(np.maximum(excess - predictable**2, 0.0))
+    span = torque_range(torque)
+    material = (rmse > TIMES_NOISE * noise) & (left > SHARE_OF_RANGE * span)
+    material |= (predictable > noise) & (predictable > PREDICTABLE_SHARE * span)
+    return Remainder(sensor, position, predictable, left, material)
+
+
+def position_noise(problem: Problem) -> Array:
+    """Torque that the noise of the logged positions makes in the rigid body, (n_joints,).
+
+    The noise is what the smoother takes off the positions. As much of it, drawn at random, is put
+    on the smoothed positions and followed through the smoother and the inverse dynamics.
+    """
+    signals, motion, robot = problem.logged, problem.motion, problem.robot
+    quiet = np.zeros(problem.n_joints)
+    if robot is None or signals is None or motion.half_width == 0:
+        return quiet
+    taken = np.median(np.abs(signals.q - motion.signals.q), axis=0) / MEDIAN
+    part = slice(0, min(signals.n_samples, MOST_SAMPLES))
+    smooth = motion.signals.take(part)
+    noise = np.random.default_rng(0).normal(size=smooth.q.shape) * taken
+    shaken = smooth_motion(smooth.with_(q=smooth.q + noise))
+    again = smooth_motion(smooth)
+    use = shaken.valid & again.valid
+    torques = [
+        robot.inverse_dynamics(m.signals.q, m.signals.dq, m.signals.ddq) for m in (shaken, again)
+    ]
+    change = np.where(use, torques[0] - torques[1], 0.0)
+    counts = np.maximum(use.sum(0), 1)
+    return np.asarray(np.sqrt(np.sum(change**2, axis=0) / counts))

@@ -1,0 +1,345 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The rule: what is tested, with which variance, at which level, and what is withdrawn.
+
+Every explanation of the residual, named or nameless, of all recordings or of some, passes
+:meth:`Rule.accepts` before it becomes a finding and :meth:`Rule.withdrawn` after each later one.
+
+**What is tested.** The coefficients of one candidate beside everything else in the model, all
+refitted. The residual whose size and correlation enter the test is the one that is left *after* the
+candidate: a smooth torque that is missing makes the residual of the model without it large and
+correlated, and would hide itself [1]_.
+
+**Which variance.** Two chances are computed, and the larger one decides. The first takes the sums
+of the score over blocks of time as independent, whatever happens within a block and at whatever
+size (a sandwich estimate by blocks, Hotelling's law for their finite number [2]_). Blocks are
+several correlation times long and never cross the border of a trajectory; each holds the rows of
+all joints. The second takes the residual as stationary and inflates its variance by its
+autocorrelation. The first knows nothing of an effect that acts in one block alone, the second
+nothing of noise that changes; a finding must be more than chance to both.
+
+**Which level.** ``Settings.level`` over everything that was tried (Bonferroni): the printed q-value
+is the chance times the number of candidates.
+
+References
+----------
+.. [1] W. K. Newey, K. D. West (1987), A simple, positive semi-definite, heteroskedasticity and
+   autocorrelation consistent covariance matrix, Econometrica 55(3).
+.. [2] R. Ibragimov, U. K. Mueller (2010), t-statistic based correlation and heterogeneity robust
+   inference, J. Business & Economic Statistics 28(4); C. B. Hansen (2007), J. Econometrics 141.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import f as fisher
+
+from skidyn._signals import Array
+from skidyn.evidence import RIDGE, Problem
+
+#: A block is at least so long in s, and at least so many correlation times of the residual.
+SHORTEST_BLOCK, CORRELATION_TIMES = 0.5, 8.0
+#: Autocorrelations are added up to this lag in rows, or to the first one below this value.
+MOST_LAGS, SMALL = 12, 0.05
+#: Blocks needed beyond the coefficients that are tested; and blocks, beyond twice the coefficients,
+#: that are made at least where the residual stays alike for long.
+FEWEST_BLOCKS, ENOUGH_BLOCKS = 6, 8
+#: A column of which less than this share is new to the model is not tested.
+NEW_SHARE = 1e-6
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Thresholds of the search; the defaults are what is shipped, for every robot and effect.
+
+    Parameters
+    ----------
+    level : float
+        Chance of a false finding over everything that is tried.
+    least_gain : float
+        Twice the log-likelihood, held out, less the price of its parameters, that a finding must
+        gain: smoothing and coarse positions leave torques that are no chance, but small.
+    least_share : float
+        Share of the squared error of averaged rows that a finding must remove on its joints, held
+        out.
+    least_drop : float
+        Share of the squared error of single samples that it must remove, held out.
+    form_tolerance : float
+        Share of the squared error that an effect removes which its imperfect formula may leave, a
+        tenth of its size. A nameless function that does better by no more than this does not take
+        the place of a name, and a later finding that removes no more on the same joints is the
+        shadow of the earlier ones.
+    simpler_share : float
+        A simpler kind is named if it falls behind by less than this share.
+    family_share : float
+        Within a family of effects (hysteresis), the simplest one with this share of the best
+        one's score is named.
+    ripple_share : float
+        Torque ripple must do this share of what a function of the signals does on averaged rows.
+    max_findings : int
+        Kinds added at most.
+    finalists : int
+        Kinds compared with noise re-estimated.
+    refined : int
+        So many of them with their shape parameters refined.
+
+    Examples
+    --------
+    >>> Settings(max_findings=1).max_findings
+    1
+    """
+
+    level: float = 0.001
+    least_gain: float = 30.0
+    least_share: float = 0.006
+    least_drop: float = 0.002
+    form_tolerance: float = 0.015
+    simpler_share: float = 0.05
+    family_share: float = 0.95
+    ripple_share: float = 0.8
+    max_findings: int = 4
+    finalists: int = 8
+    refined: int = 4
+
+
+@dataclass(frozen=True)
+class Test:
+    """Whether a candidate is more than chance beside a model.
+
+    Attributes
+    ----------
+    chance : float
+        The larger one of the two chances.
+    coefficients : ndarray of shape (n_coefficients,)
+        Of the candidate, the model refitted.
+    drop : float
+        Squared error removed, in units of the noise.
+    """
+
+    __test__ = False
+
+    chance: float
+    coefficients: Array
+    drop: float
+
+
+class Tester:
+    """Tests of candidates beside one model.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows.
+    blocks : sequence of dict
+        Columns of the model beside the rigid body.
+    sigma : ndarray of shape (n_joints,)
+        Noise of one row, by which joints are weighted.
+    target : sequence of ndarray
+        Averaged torque of every joint.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        blocks: Sequence[dict[int, Array]],
+        sigma: Array,
+        target: Sequence[Array],
+    ) -> None:
+        self.problem, self.sigma = problem, sigma
+        design = [a / s for a, s in zip(problem.design(blocks), sigma, strict=True)]
+        gram = np.asarray(sum(a.T @ a for a in design))
+        scale = np.sqrt(np.diag(gram))
+        scale[scale == 0] = 1.0
+        self._design = [a / scale for a in design]
+        normal = gram / scale[:, None] / scale + RIDGE * np.eye(len(scale))
+        self._inverse = np.linalg.inv(normal)
+        y = [t / s for t, s in zip(target, sigma, strict=True)]
+        right = np.asarray(sum(a.T @ t for a, t in zip(self._design, y, strict=True)))
+        solution = self._inverse @ right
+        self.residual = [t - a @ solution for a, t in zip(self._design, y, strict=True)]
+        self._duration = _duration(problem)
+        self._free = max(1, int(problem.rows.counts.sum()) - len(scale))
+
+    def test(self, rows: dict[int, Array]) -> Test:
+        """Test the coefficients of some columns together.
+
+        Parameters
+        ----------
+        rows : dict of int to ndarray of shape (n_rows_j, n_coefficients)
+            Averaged columns, per joint they reach.
+
+        Returns
+        -------
+        Test
+        """
+        k = next(iter(rows.values())).shape[1]
+        new = self._swept(rows)
+        own = np.asarray(sum(np.sum((b / self.sigma[j]) ** 2, axis=0) for j, b in rows.items()))
+        gram = np.asarray(sum(z.T @ z for z in new))
+        # Columns that the model can do by itself say nothing.
+        told = np.diag(gram) > np.maximum(NEW_SHARE * own, 0.0)
+        if not told.any():
+            return Test(1.0, np.zeros(k), 0.0)
+        new, gram, k = [z[:, told] for z in new], gram[np.ix_(told, told)], int(told.sum())
+        size = np.sqrt(np.diag(gram))
+        new, gram = [z / size for z in new], gram / size[:, None] / size
+        score = np.asarray(sum(z.T @ e for z, e in zip(new, self.residual, strict=True)))
+        b = np.linalg.solve(gram + RIDGE * np.eye(k), score)
+        left = [e - z @ b for e, z in zip(self.residual, new, strict=True)]
+        drop = float(score @ b)
+        chance = max(self._stationary(new, left, drop, k), self._by_blocks(rows, new, left, score))
+        coefficients = np.zeros(len(told))
+        coefficients[told] = b / size
+        return Test(chance, coefficients, drop)
+
+    def _swept(self, rows: dict[int, Array]) -> list[Array]:
+        """Columns less what the model can do of them, on the rows of every joint."""
+        scaled = {j: b / self.sigma[j] for j, b in rows.items()}
+        cross = np.asarray(sum(self._design[j].T @ z for j, z in scaled.items()))
+        mimic = self._inverse @ cross
+        return [
+            (scaled[j] - a @ mimic) if j in scaled else -(a @ mimic)
+            for j, a in enumerate(self._design)
+        ]
+
+    def _stationary(self, new: list[Array], left: list[Array], drop: float, k: int) -> float:
+        """Chance of such a drop if the residual were stationary."""
+        # The joint on which the column weighs most, and as slow a column as can be.
+        joint = int(np.argmax([float(np.sum(z**2)) for z in new]))
+        factor = float(variance_inflation(self.problem, [left[joint]], [joint])[0])
+        mean = sum(float(r @ r) for r in left) / self._free
+        free = max(2.0, self._free / factor)
+        return float(fisher.sf(drop / k / factor / max(mean, 1e-300), k, free))
+
+    def _by_blocks(
+        self, rows: dict[int, Array], new: list[Array], left: list[Array], score: Array
+    ) -> float:
+        """Chance of such coefficients if the scores of blocks were independent."""
+        length = correlation_time(self.problem, left, list(rows)) * CORRELATION_TIMES
+        k = len(score)
+        longest = self._duration / (2 * k + ENOUGH_BLOCKS)
+        block, count = time_blocks(self.problem, min(max(SHORTEST_BLOCK, length), longest))
+        sums = np.zeros((count, k))
+        for index, z, r in zip(block, new, left, strict=True):
+            for c in range(k):
+                sums[:, c] += np.bincount(index, z[:, c] * r, count)
+        n_rows = int(self.problem.rows.counts.sum())
+        return chance_of_score(score, sums * np.sqrt(n_rows / self._free))
+
+
+def chance_of_score(score: Array, sums: Array) -> float:
+    """Chance of a score if its sums over blocks were independent (Hotelling's T-squared).
+
+    Parameters
+    ----------
+    score : ndarray of shape (n_coefficients,)
+        Of the model without the candidate, over all blocks.
+    sums : ndarray of shape (n_blocks, n_coefficients)
+        Of every block, with the residual that is left after the candidate.
+
+    Returns
+    -------
+    float
+    """
+    count, k = sums.shape
+    free = count - 1
+    if count < k + FEWEST_BLOCKS:
+        return 1.0
+    spread = sums.T @ sums * (count / free)
+    spread += 1e-12 * np.trace(spread) * np.eye(k)
+    wald = float(score @ np.linalg.solve(spread, score))
+    return float(fisher.sf(wald * (free - k + 1) / (k * free), k, free - k + 1))
+
+
+def time_blocks(problem: Problem, length: float) -> tuple[list[NDArray[np.int64]], int]:
+    """Blocks of time within the trajectories, common to all joints.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows.
+    length : float, s
+        Length wanted; blocks of a trajectory are equally long, near to it.
+
+    Returns
+    -------
+    index : list of ndarray of shape (n_rows_j,)
+        Block of every row, per joint.
+    count : int
+        Number of blocks.
+    """
+    rows = problem.rows
+    trajectory, time = np.concatenate(rows.trajectory), np.concatenate(rows.time)
+    if problem.signals.time is None:  # rows are samples: one after the other
+        length = float(len(np.unique(time))) / 50
+    names, place = np.unique(trajectory, return_inverse=True)
+    start = np.full(len(names), np.inf)
+    end = np.full(len(names), -np.inf)
+    np.minimum.at(start, place, time)
+    np.maximum.at(end, place, time)
+    span = np.maximum(end - start, 1e-9)
+    number = np.maximum(1, np.round(span / length)).astype(np.int64)
+    first = np.cumsum(number) - number
+    share = (time - start[place]) / span[place]
+    block = first[place] + np.minimum((share * number[place]).astype(np.int64), number[place] - 1)
+    edges = np.cumsum([len(t) for t in rows.time])[:-1]
+    return np.split(block, edges), int(number.sum())
+
+
+def _duration(problem: Problem) -> float:
+    """Time that the rows of the trajectories span together, in s."""
+    trajectory, time = np.concatenate(problem.rows.trajectory), np.concatenate(problem.rows.time)
+    return sum(float(np.ptp(time[trajectory == name])) for name in np.unique(trajectory))
+
+
+def correlation_time(problem: Problem, residual: Sequence[Array], joints: Sequence[int]) -> float:
+    """Time over which the residual of the most persistent one of some joints stays alike, in s."""
+    steps = np.concatenate([np.diff(t) for t in problem.rows.time if len(t) > 1] or [np.ones(1)])
+    hop = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
+    inflation = variance_inflation(problem, [residual[j] for j in joints], joints)
+    return hop * float(np.max(inflation, initial=1.0))
+
+
+def variance_inflation(
+    problem: Problem, residual: Sequence[Array], joints: Sequence[int] | range
+) -> Array:
+    """How much more a slow column's coefficient varies than with independent rows, by joint.
+
+    One plus twice the sum of the residual's autocorrelations up to the first small one.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows.
+    residual : sequence of ndarray of shape (n_rows_j,)
+        Residual rows of some joints.
+    joints : sequence of int
+        These joints, from 0.
+
+    Returns
+    -------
+    ndarray of shape (len(joints),)
+    """
+    inflation = np.ones(len(joints))
+    for i, (j, r) in enumerate(zip(joints, residual, strict=True)):
+        trajectory = problem.rows.trajectory[j]
+        order = np.lexsort((problem.rows.time[j], trajectory))
+        x, name = r[order], trajectory[order]
+        power = float(x @ x)
+        if power <= 0:
+            continue
+        for lag in range(1, min(MOST_LAGS, len(x))):
+            alike = name[:-lag] == name[lag:]
+            rho = float(x[:-lag][alike] @ x[lag:][alike]) / power
+            if rho < SMALL:
+                break
+            inflation[i] += 2 * rho
+    return inflation
+
+
+def false_discovery_rate(chance: float, n_tests: int) -> float:
+    """The printed q-value: the chance times the number of candidates, at most 1."""
+    return min(1.0, chance * max(1, n_tests))

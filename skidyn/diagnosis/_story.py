@@ -1,0 +1,331 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The first screen of a diagnosis in words and numbers: where, what, how sure, and how far."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from skidyn._text import digits, fall, inside, joints_told, listed, raised
+from skidyn.diagnosis._failures import FAILS
+from skidyn.diagnosis._findings import rival_title
+
+if TYPE_CHECKING:
+    from skidyn.diagnosis._findings import Finding
+    from skidyn.diagnosis._result import Diagnosis
+
+#: An error that changes by less than this share is the same.
+SAME = 0.02
+#: Confidence below which a name is a guess.
+SURE = 0.9
+#: Parameters in one line, by the number of joints that have their own.
+TOLD = {1: 3, 2: 2, 3: 1}
+#: Joints whose sizes stand in one line.
+LISTED = 3
+#: A headline names up to this many findings.
+SHORT = 2
+
+
+def story(diagnosis: Diagnosis) -> dict[str, Any]:
+    """What the first screen, the command line and a notebook say of a diagnosis.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        From :func:`skidyn.diagnosis.diagnose`.
+
+    Returns
+    -------
+    dict
+        ``mark`` and ``headline`` of the verdict, ``text`` below it, ``findings`` in one line per
+        kind (``what``, ``where``, ``size``, ``sure``, ``change``, ``when``), ``cards`` with the
+        same for every finding, ``joints`` (a row each, with
+        ``speaks`` where there is something to say), ``quiet`` (a sentence on the others) and
+        ``left`` (a sentence on what stays), ``doubts`` (what is suspected of the log, to be
+        looked at before a name is believed) and other ``warnings``.
+    """
+    rows = joint_rows(diagnosis)
+    cards = [_line(diagnosis, k, rows) for k in range(len(diagnosis.findings))]
+    mark, headline, text = _verdict(rows, cards)
+    doubts = [str(check) for check in diagnosis.checks if check.certainty == "suspected"]
+    return {
+        "verdict": diagnosis.verdict,
+        "mark": mark,
+        "headline": headline,
+        "text": text,
+        "findings": _grouped(cards),
+        "cards": cards,
+        "joints": rows,
+        "quiet": _quiet(rows),
+        "left": _left(diagnosis, rows),
+        "doubts": doubts,
+        "warnings": [note for note in diagnosis.warnings if note not in doubts],
+    }
+
+
+def joint_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """One row per joint: held-out error on judged samples before and after, and the noise.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        From :func:`skidyn.diagnosis.diagnose`.
+
+    Returns
+    -------
+    list of dict
+        ``joint`` (from 1), ``name``, ``unit``, ``before``, ``after``, ``noise``, ``ratios`` (of
+        before and after to the noise), ``state`` (``"fails"``, ``"better"``, ``"worse"`` or
+        ``"quiet"``), ``material`` (more is left than a healthy robot
+        leaves), ``speaks`` and ``text``.
+    """
+    parts = diagnosis.parts
+    found = {joint for finding in diagnosis.findings for joint in finding.joints}
+    rows = []
+    values = zip(
+        diagnosis.joint_names, diagnosis.comparison.units,
+        diagnosis.rmse_before, diagnosis.rmse_after, diagnosis.noise, strict=True,
+    )  # fmt: skip
+    for j, (name, unit, before, after, noise) in enumerate(values, 1):
+        floor = max(float(noise), 1e-300) if np.isfinite(noise) else np.nan
+        worse = after > (1 + SAME) * before
+        better = after < (1 - SAME) * before
+        state = "worse" if worse else "better" if better else "quiet"
+        if state == "quiet" and before > FAILS * floor:
+            state = "fails"
+        rows.append(
+            {
+                "joint": j,
+                "name": name,
+                "unit": unit,
+                "before": float(before),
+                "after": float(after),
+                "noise": float(noise),
+                "ratios": [float(before / floor), float(after / floor)],
+                "state": state,
+                "material": bool(parts.material[j - 1]) if parts is not None else False,
+                "speaks": bool(worse or before > FAILS * floor or j in found),
+                "text": fall(before, after, noise, unit, bool(diagnosis.findings)),
+            }
+        )
+    return rows
+
+
+def _verdict(
+    rows: Sequence[dict[str, Any]], cards: Sequence[dict[str, Any]]
+) -> tuple[str, str, str]:
+    """Mark, headline and text of the banner."""
+    material = [row["joint"] for row in rows if row["material"]]
+    lines = _grouped(cards)
+    if lines:
+        nameless = [line for line in lines if line["kind"] == "unknown"]
+        named = len(lines) - len(nameless)
+        mark = "?" if nameless or material else "!"
+        text = (
+            "Judged on data that the fit has not seen, adding "
+            f"{'it' if len(lines) == 1 else 'them'} changes the error as shown below."
+        )
+        if len(lines) <= SHORT:
+            told = [f"{_brief(line['what'])} on {line['where']}" for line in lines]
+            return mark, f"Missing: {listed(told)}", text
+        worst = max(rows, key=lambda row: row["ratios"][0] if row["ratios"][0] > 0 else 0.0)
+        what = [f"{named} known effect{'s' if named > 1 else ''}"] if named else []
+        what += ["something without a name"] if nameless else []
+        verb = "is" if named + bool(nameless) == 1 else "are"
+        headline = f"{listed(what)} {verb} missing, most of all on joint {worst['joint']}"
+        return mark, headline[:1].upper() + headline[1:], text
+    if material:
+        return (
+            "?",
+            f"Something without a name is missing on {joints_told(material)}",
+            "The error there is much larger than the noise, and no effect of the catalogue "
+            "explains it. What is known about it stands under “What is left”.",
+        )
+    if any(row["ratios"][1] > FAILS for row in rows):
+        text = (
+            "The error on data that the fit has not seen exceeds the noise of the sensors, but is "
+            "small against the torque of the joints; healthy robots leave as much."
+        )
+    else:
+        text = "On every joint the error on data that the fit has not seen is like the noise."
+    return "✓", "Nothing significant is missing", text
+
+
+def _brief(title: str) -> str:
+    """Title of a finding inside a headline: its family where the member is not certain."""
+    return inside(title.partition(", best described by ")[0])
+
+
+def _line(diagnosis: Diagnosis, k: int, rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """A finding in one line: what, where, size, how sure, and what its own step changes."""
+    finding = diagnosis.findings[k]
+    at = _step(diagnosis.history, finding)
+    steps = [diagnosis.history[i]["rmse"] for i in ((0, -1) if at is None else (at - 1, at))]
+    served = [rows[j - 1] for j in finding.joints]
+
+    def fell(row: dict[str, Any]) -> float:
+        before, after = (step[row["joint"] - 1] for step in steps)
+        return float((before - after) / row["noise"]) if row["noise"] > 0 else 0.0
+
+    best = max(served, key=fell, default=None)
+    change = ""
+    if best is not None:
+        before, after = (step[best["joint"] - 1] for step in steps)
+        change = fall(before, after, best["noise"], best["unit"])
+        change = change if len(served) == 1 else f"joint {best['joint']}: {change}"
+    return {
+        "kind": finding.kind,
+        "card": k + 1,
+        "joints": list(finding.joints),
+        "step": at,
+        "fell": 0.0 if best is None else fell(best),
+        "what": finding.title,
+        "where": where(finding.joints, len(rows)) + trajectories_told(finding),
+        "when": episodes_told(finding.when),
+        "size": sizes(finding),
+        "sure": sure(finding),
+        "doubtful": bool(finding.rivals) or (confidence(finding) or 1.0) < SURE,
+        "change": change,
+    }
+
+
+def _grouped(cards: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """One line for all joints on which one step added one effect."""
+    groups: dict[Any, list[dict[str, Any]]] = {}
+    for card in cards:
+        key = (card["kind"], card["step"]) if card["step"] is not None else card["card"]
+        groups.setdefault(key, []).append(card)
+    return [group[0] if len(group) == 1 else _together(group) for group in groups.values()]
+
+
+def _together(group: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """A line for several findings: the first parameter of each, what helped most, how sure."""
+    joints = sorted({joint for card in group for joint in card["joints"]})
+    best = max(group, key=lambda card: card["fell"])
+    sizes_told = [
+        f"{card['size'].split(', ')[0]} (joint {card['joints'][0]})"
+        for card in sorted(group, key=lambda card: card["joints"])
+        if card["size"]
+    ]
+    more = ["..."] if len(sizes_told) > LISTED else []
+    doubtful = next((card for card in group if card["doubtful"]), best)
+    change = best["change"]
+    return {
+        **best,
+        "card": group[0]["card"],
+        "joints": joints,
+        "where": joints_told(joints),
+        "size": ", ".join(sizes_told[:LISTED] + more),
+        "sure": doubtful["sure"],
+        "doubtful": doubtful["doubtful"],
+        "change": change if change.startswith("joint") else f"joint {best['joints'][0]}: {change}",
+    }
+
+
+def _step(history: Sequence[dict[str, Any]], finding: Finding) -> int | None:
+    """The step that added a finding; one step may add an effect to several joints."""
+    for k, entry in enumerate(history[1:], 1):
+        if entry["added"] == finding.kind and set(finding.joints) <= set(entry["joints"]):
+            return k
+    return None
+
+
+def confidence(finding: Finding) -> float | None:
+    """Probability of the name, where the diagnosis tells it."""
+    value = getattr(finding, "confidence", None)
+    return None if value is None else float(value)
+
+
+def sure(finding: Finding) -> str:
+    """How sure a finding is, in a few words."""
+    share = confidence(finding)
+    text = "" if share is None else f"{min(share, 0.99):.0%} sure of the name"
+    if finding.rivals:
+        rivals = listed([rival_title(kind) for kind in finding.rivals], "or")
+        text += f"{'; ' if text else ''}this data cannot separate it from {rivals}"
+    elif finding.kind == "unknown":
+        text = "no effect of the catalogue explains it"
+    elif not text:
+        text = "no other effect explains it as well"
+    return text
+
+
+def sizes(finding: Finding) -> str:
+    """The parameters of a finding with half their intervals, ``"k = 3.5 ± 0.4 N m/rad"``."""
+    parts = []
+    for name, row in finding.parameters.items():
+        if name in ("trajectories", "trajectory"):
+            continue
+        values = row["value"] if isinstance(row["value"], list) else [row["value"]]
+        lows, highs = (
+            row[key] if isinstance(row[key], list) else [row[key]] * len(values)
+            for key in ("low", "high")
+        )
+        numbers = [
+            v if low is None or low == high else f"{digits(v)} ± {digits((high - low) / 2)}"
+            for v, low, high in zip(values, lows, highs, strict=True)
+        ]
+        told = [digits(v) if isinstance(v, float) else str(v) for v in numbers]
+        unit = "" if row["unit"] in ("1", "") else f" {raised(row['unit'])}"
+        own = len(told) == len(finding.joints) > 1
+        shown = (
+            "; ".join(f"{v} (joint {j})" for v, j in zip(told, finding.joints, strict=True))
+            if own
+            else ", ".join(told)
+        )
+        parts.append(f"{name} = {shown.replace('-', '−')}{unit}")
+    apart = any(isinstance(row["value"], list) for row in finding.parameters.values())
+    return ", ".join(parts[: TOLD[min(len(finding.joints), 3) if apart else 1]])
+
+
+def where(joints: Sequence[int], n_joints: int) -> str:
+    """The joints of a finding in words."""
+    return "all joints" if len(joints) == n_joints > 2 else joints_told(joints)
+
+
+def trajectories_told(finding: Finding) -> str:
+    """The trajectories of a finding that only some of them have."""
+    which = finding.parameters.get("trajectories", {}).get("value")
+    if not which:
+        return ""
+    which = which if isinstance(which, list) else [which]
+    return f" in trajector{'y' if len(which) == 1 else 'ies'} {', '.join(map(str, which))}"
+
+
+def episodes_told(episodes: Sequence[Any]) -> str:
+    """When a torque is there that comes and goes; empty for one that is always there."""
+    times = [f"from {e.start:.1f} to {e.end:.1f} s of trajectory {e.trajectory}" for e in episodes]
+    return listed(times[:3] + (["at other times"] if len(times) > 3 else [])) if times else ""
+
+
+def _quiet(rows: Sequence[dict[str, Any]]) -> str:
+    """One sentence on the joints that have nothing to say."""
+    quiet = [row["joint"] for row in rows if not row["speaks"]]
+    if not quiet:
+        return ""
+    if len(quiet) == len(rows):
+        return "All joints are at their noise."
+    verb = "is at its" if len(quiet) == 1 else "are at their"
+    return f"{joints_told(quiet).capitalize()} {verb} noise."
+
+
+def _left(diagnosis: Diagnosis, rows: Sequence[dict[str, Any]]) -> str:
+    """One sentence on what the completed model does not explain."""
+    left = sorted(
+        (row for row in rows if row["ratios"][1] > FAILS), key=lambda row: -row["ratios"][1]
+    )
+    if not left:
+        return "What is left is like the noise on every joint."
+    parts = [
+        f"{digits(row['after'])} {row['unit']} on joint {row['joint']} "
+        f"({row['ratios'][1]:.1f} times the noise)"
+        for row in left[:3]
+    ]
+    others = [row["joint"] for row in left[3:]]
+    more = f"; {joints_told(sorted(others))} too" if others else ""
+    text = f"Still above the noise: {listed(parts)}{more}."
+    if not any(row["material"] for row in rows):
+        text += " That is small against the torque of the joint; healthy robots leave as much."
+    return text

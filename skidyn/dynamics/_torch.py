@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Run a tape with torch: differentiable, on any device."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from skidyn.dynamics._recursion import Program
+from skidyn.dynamics._tape import operands
+
+if TYPE_CHECKING:
+    import torch
+
+
+def evaluate_torch(program: Program, inputs: dict[str, torch.Tensor]) -> torch.Tensor:
+    """Outputs of a program for a batch.
+
+    Parameters
+    ----------
+    program : Program
+    inputs : dict of str to Tensor
+        Signals of shape (N, n); ``"parameter"`` has shape (n,).
+
+    Returns
+    -------
+    Tensor of shape (N, *program.shape)
+    """
+    import torch
+
+    columns = {name: tensor.unbind(-1) for name, tensor in inputs.items()}
+    reference = inputs["q"]
+    functions: dict[str, Any] = {
+        "add": torch.add,
+        "sub": torch.sub,
+        "mul": torch.mul,
+        "neg": torch.neg,
+        "sin": torch.sin,
+        "cos": torch.cos,
+        "tanh": torch.tanh,
+        "exp": torch.exp,
+        "sqrt": torch.sqrt,
+        "abs": torch.abs,
+        "sign": torch.sign,
+        "div": torch.div,
+        "pow": torch.pow,
+        "max": _maximum,
+    }
+    values: dict[int, torch.Tensor | float] = {}
+    for index in program.tape.live(program.outputs.values()):
+        node = program.tape.nodes[index]
+        if node[0] == "constant":
+            values[index] = node[1]
+        elif node[0] == "input":
+            values[index] = columns[node[1]][node[2]]
+        elif node[0] in _ORDERED and isinstance(values[node[1]], float):
+            values[index] = _ORDERED[node[0]](values[node[1]], values[node[2]])
+        else:
+            # torch's functions want their tensor first; what is left is commutative.
+            arguments = [values[i] for i in operands(node)]
+            if isinstance(arguments[0], float):
+                arguments.reverse()
+            values[index] = functions[node[0]](*arguments)
+    flat = [_position(key, program.shape) for key in program.outputs]
+    zero = reference.new_zeros(reference.shape[:-1])
+    entries = [zero] * _size(program.shape)
+    for position, scalar in zip(flat, program.outputs.values(), strict=True):
+        value = values[scalar.index]
+        entries[position] = zero + value  # a constant or a parameter fills the whole batch
+    return torch.stack(entries, dim=-1).reshape(*reference.shape[:-1], *program.shape)
+
+
+#: Operations of a number and a tensor that are not commutative.
+_ORDERED: dict[str, Callable[[Any, Any], Any]] = {"sub": operator.sub, "div": operator.truediv}
+
+
+def _maximum(a: torch.Tensor, b: torch.Tensor | float) -> torch.Tensor:
+    return a.clamp_min(b) if isinstance(b, float) else a.maximum(b)
+
+
+def _position(key: tuple[int, ...], shape: tuple[int, ...]) -> int:
+    position = 0
+    for index, size in zip(key, shape, strict=True):
+        position = position * size + index
+    return position
+
+
+def _size(shape: tuple[int, ...]) -> int:
+    size = 1
+    for length in shape:
+        size *= length
+    return size

@@ -1,0 +1,291 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A term: an effect on certain joints with its shape; and sums of terms, parts of a model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidyn._signals import Array, Signals
+from skidyn.effects._base import Coefficient, Effect
+from skidyn.effects._registry import get_effect
+
+#: Joints of the motion on which terms are tried, more than any robot here has.
+_JOINTS = 32
+
+
+@dataclass(frozen=True)
+class Term:
+    """An effect on certain joints with certain shape parameters: one block of regressor columns.
+
+    Terms add up: ``Term("viscous", (0,)) + Term("coulomb", (0,))`` is a :class:`TermSum`, a part of
+    a model.
+
+    Parameters
+    ----------
+    kind : str
+        Kind of the effect, a name of the catalogue.
+    joints : tuple of int
+        Joints, counted from 0; all joints for an effect of the whole robot.
+    shape : mapping of str to object
+        Values of the shape parameters; empty where the effect has none.
+
+    Examples
+    --------
+    >>> term = Term("dahl", (0,), {"presliding": 0.02})
+    >>> print(term)
+    dahl(joint 1, presliding=0.02)
+    >>> term.names, term.effect.title
+    (('dahl.F[1]',), 'Dahl friction (pre-sliding)')
+    """
+
+    kind: str
+    joints: tuple[int, ...]
+    shape: Mapping[str, Any] = field(default_factory=dict)
+
+    def __hash__(self) -> int:
+        return hash((self.kind, self.joints, tuple(sorted(map(str, self.shape.items())))))
+
+    def __str__(self) -> str:
+        shape = "".join(f", {k}={_short(v)}" for k, v in self.shape.items())
+        return f"{self.kind}(joint {self._numbers(', ')}{shape})"
+
+    def __add__(self, other: Term | Iterable[Term]) -> TermSum:
+        return TermSum((self,)) + other
+
+    def _numbers(self, between: str) -> str:
+        return between.join(str(j + 1) for j in self.joints)
+
+    @property
+    def trajectories(self) -> tuple[int, ...] | None:
+        """Trajectories in which the effect acts; None for all.
+
+        Any effect may act in some recordings only: a load that was carried, a sensor zeroed anew,
+        friction that rose. ``trajectories`` in the shape names them.
+        """
+        return self.shape.get("trajectories")
+
+    @property
+    def _own_shape(self) -> dict[str, Any]:
+        return {k: v for k, v in self.shape.items() if k != "trajectories"}
+
+    @property
+    def effect(self) -> Effect:
+        """The effect of this kind in the catalogue."""
+        return get_effect(self.kind)
+
+    @property
+    def coefficients(self) -> tuple[Coefficient, ...]:
+        """What is fitted linearly, one per column."""
+        return self.effect.coefficients
+
+    @property
+    def width(self) -> int:
+        """Number of columns."""
+        return len(self.coefficients)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns, such as ``"viscous.Fv[1]"``, joints counted from 1."""
+        chosen = "" if self.trajectories is None else f"@{','.join(map(str, self.trajectories))}"
+        place = f"[{self._numbers(',')}]{chosen}"
+        return tuple(f"{self.kind}.{c.name}{place}" for c in self.coefficients)
+
+    @property
+    def signs(self) -> Array:
+        """1 for every coefficient that physics forbids to be negative, else 0; (width,)."""
+        return np.array([c.sign for c in self.coefficients], dtype=float)
+
+    @property
+    def limits(self) -> Array:
+        """Largest magnitude of every coefficient at which the formula holds, (width,)."""
+        return np.array([c.limit for c in self.coefficients])
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the effect has a shape that this term leaves to be found."""
+        return self.effect.has_shape and not self._own_shape
+
+    @property
+    def is_dry(self) -> bool:
+        """Whether the torque jumps where the motion turns back, as that of dry friction does.
+
+        Found from the columns themselves: at a hundredth of a unit velocity in either direction
+        they still differ by much of what they differ by at unit velocity.
+        """
+        return _is_dry(self.effect, self)
+
+    @property
+    def is_pointwise(self) -> bool:
+        """Whether the columns at a sample depend on nothing but that sample.
+
+        Found from the columns themselves, along a motion and at every second sample of it. False
+        where the effect cannot be tried without the robot.
+        """
+        return _is_pointwise(self.effect, self)
+
+    def with_shape(self, **values: Any) -> Term:
+        """The same effect on the same joints with some shape parameters changed or added.
+
+        Parameters
+        ----------
+        **values : object
+            Shape parameters by name.
+
+        Returns
+        -------
+        Term
+            A new term.
+        """
+        return Term(self.kind, self.joints, {**self.shape, **values})
+
+    def torque_columns(self, signals: Signals) -> dict[int, Array]:
+        """Columns at every sample, in the torque row of every joint that the effect reaches.
+
+        Parameters
+        ----------
+        signals : Signals
+            Motion, with the torque of the model where the effect needs it.
+
+        Returns
+        -------
+        dict of int to ndarray of shape (n_samples, width)
+            By joint, from 0.
+        """
+        columns = self.effect.torque_columns(signals, self.joints, **self._own_shape)
+        if self.trajectories is None:
+            return columns
+        here = np.isin(signals.trajectory, self.trajectories)[:, None]
+        return {j: np.where(here, block, 0.0) for j, block in columns.items()}
+
+    def parameters(self, coefficients: Array, signals: Signals | None = None) -> dict[str, Any]:
+        """Physical parameters from fitted coefficients.
+
+        Parameters
+        ----------
+        coefficients : ndarray of shape (width,)
+            Fitted values.
+        signals : Signals, optional
+            Motion the term was fitted on.
+
+        Returns
+        -------
+        dict of str to float
+            By name.
+        """
+        return self.effect.parameters(coefficients, self._own_shape, signals)
+
+
+class TermSum(tuple[Term, ...]):
+    """Terms that add up, in order: a part of a model, with one block of coefficients.
+
+    Parameters
+    ----------
+    iterable : iterable of Term, default=()
+        The terms.
+
+    Examples
+    --------
+    >>> from skidyn.effects import Term
+    >>> friction = Term("viscous", (0,)) + Term("coulomb", (0,))
+    >>> friction.names
+    ('viscous.Fv[1]', 'coulomb.Fc[1]')
+    >>> [(term.kind, own) for term, own in friction.slices()]
+    [('viscous', slice(0, 1, None)), ('coulomb', slice(1, 2, None))]
+    """
+
+    __slots__ = ()
+
+    def __add__(self, other: Term | Iterable[Term]) -> TermSum:  # type: ignore[override]
+        return TermSum((*self, *((other,) if isinstance(other, Term) else other)))
+
+    @property
+    def width(self) -> int:
+        """Number of columns."""
+        return sum(term.width for term in self)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all columns."""
+        return tuple(name for term in self for name in term.names)
+
+    @property
+    def signs(self) -> Array:
+        """1 for every coefficient that physics forbids to be negative, else 0; (width,)."""
+        return np.concatenate([np.zeros(0), *(term.signs for term in self)])
+
+    def slices(self, start: int = 0) -> Iterator[tuple[Term, slice]]:
+        """Every term with its place among the coefficients.
+
+        Parameters
+        ----------
+        start : int, default=0
+            Where the first coefficient of the first term stands, such as after those of the rigid
+            body.
+
+        Yields
+        ------
+        (Term, slice)
+        """
+        for term in self:
+            yield term, slice(start, start + term.width)
+            start += term.width
+
+
+def _short(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _trial(term: Term, dq: Array, trajectory: NDArray[np.int64]) -> Signals:
+    """Motion on which a term is tried without robot and clock: all other signals are drawn."""
+    rng = np.random.default_rng(0)
+    shape = (len(dq), max(_JOINTS, 1 + max(term.joints)))
+    q, ddq, load, torque, temperature = rng.normal(size=(5, *shape))
+    return Signals(
+        q=q,
+        dq=dq[:, None] * np.arange(1.0, 1.0 + shape[1]),
+        ddq=ddq,
+        trajectory=trajectory,
+        temperature=30.0 + 10.0 * temperature,
+        load=load,
+        model_torque=torque,
+        smooth_torque=torque,
+    )
+
+
+def _columns(term: Term, signals: Signals) -> Array | None:
+    """Columns of a trial, None where the effect cannot be tried on it."""
+    try:
+        return np.concatenate(list(term.torque_columns(signals).values()), axis=1)
+    except Exception:  # an effect of a user may raise anything where the robot is missing
+        return None
+
+
+@lru_cache(maxsize=512)
+def _is_dry(effect: Effect, term: Term) -> bool:
+    # Every sample is a trajectory of its own: no state can remember the one before. The other
+    # signals have to be the same in both directions.
+    speeds = np.array([-1.0, -0.01, 0.01, 1.0])
+    signals = _trial(term, speeds, np.arange(4))
+    same = {
+        name: np.repeat(getattr(signals, name)[:1], 4, axis=0)
+        for name in ("q", "ddq", "load", "model_torque", "smooth_torque", "temperature")
+    }
+    columns = _columns(term, signals.with_(**same, time=np.full(4, 0.5)))
+    if columns is None:
+        return False
+    slow, fast = np.abs(columns[2] - columns[1]), np.abs(columns[3] - columns[0])
+    return bool(np.any(slow > 0.3 * fast + 1e-12))
+
+
+@lru_cache(maxsize=512)
+def _is_pointwise(effect: Effect, term: Term) -> bool:
+    rows = np.arange(40)
+    signals = _trial(term, np.cos(0.7 * rows), 0 * rows)
+    whole, part = _columns(term, signals), _columns(term, signals.take(rows[::2]))
+    return whole is not None and part is not None and np.array_equal(whole[::2], part)

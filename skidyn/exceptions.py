@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Errors and warnings of skidyn; every error is a ValueError that says how to mend the input."""
+
+from skidyn._exceptions import (
+    ColumnError,
+    EffectError,
+    LogError,
+    LogWarning,
+    RobotDescriptionError,
+    RobotDescriptionWarning,
+    SkidynError,
+)
+
+__all__ = [
+    "ColumnError",
+    "EffectError",
+    "LogError",
+    "LogWarning",
+    "RobotDescriptionError",
+    "RobotDescriptionWarning",
+    "SkidynError",
+]

@@ -1,0 +1,371 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Identified numbers in a user's own URDF or MJCF, the rest of the file byte for byte."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from skidyn._exceptions import SkidynError
+from skidyn._optional import import_optional
+from skidyn.dynamics import transform_inertial
+from skidyn.export._bodies import CentralInertia, central_inertia, described, numbers
+from skidyn.export._edits import Edits, Element
+from skidyn.export._files import PathLike, write_files
+from skidyn.identification import RBDRegressor
+from skidyn.robots import Robot
+
+#: Poses at which the kinematics of two descriptions are compared, and what may differ (m, rad).
+_POSES, _ALIKE = 7, 1e-5
+#: Relative change of a number below which it is left as it is written.
+_SAME = 1e-12
+
+
+def merge_urdf(
+    model: RBDRegressor, source: str | os.PathLike[str], path: PathLike
+) -> tuple[str, ...]:
+    """Write the identified numbers into a copy of the robot's own URDF.
+
+    Changed are the ``<inertial>`` of links that a joint moves, and ``<dynamics>`` of their joints;
+    pictures, collision shapes, comments, transmissions and every other byte stay. What was
+    identified of links that are fixed to each other goes to the one that the joint moves; the
+    others keep theirs.
+
+    Parameters
+    ----------
+    model : RBDRegressor
+        Fitted model.
+    source : path
+        The URDF from which its robot was read.
+    path : path
+        File to write; may be the same.
+
+    Returns
+    -------
+    tuple of str
+        Names of the effects that a URDF does not hold, which go to ``<path>.skidyn.json``.
+
+    Raises
+    ------
+    SkidynError
+        The file is not that of the model's robot, or a link would get an inertia that no body has.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from importlib.resources import files
+    >>> from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+    >>> from skidyn.export import merge_urdf
+    >>> from skidyn.identification import RBDRegressor
+    >>> log = make_hidden_effect_log(load_planar_arm(), None)
+    >>> model = RBDRegressor(log.robot, consistent=True).fit(log.X, log.y)
+    >>> own = files("skidyn.datasets").joinpath("robots", "planar_arm.urdf")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     merge_urdf(model, own, pathlib.Path(folder) / "arm.urdf")
+    ()
+    """
+    own = described(model, ("viscous", "coulomb"))
+    robot, edits = own.robot, Edits(source)
+    given = Robot.from_urdf(edits.data, joints=robot.joint_names, gravity=tuple(robot.gravity))
+    if given.joint_names != robot.joint_names or not np.allclose(
+        given.inertial_parameters, robot.inertial_parameters, rtol=1e-9, atol=1e-12
+    ):
+        raise SkidynError(
+            f"{edits.path} is not the URDF from which the model's robot was read: joints or "
+            "inertial parameters differ"
+        )
+    links = {e.attributes.get("name"): e for e in edits.root.children if e.tag == "link"}
+    joints = {e.attributes.get("name"): e for e in edits.root.children if e.tag == "joint"}
+    for body, name in enumerate(robot.body_names):
+        change = own.parameters[body] - robot.inertial_parameters[body]
+        if np.abs(change).max() <= _SAME * (np.abs(own.parameters[body]).max() + 1e-300):
+            continue
+        link = links[name]
+        inertial = link.find("inertial")
+        central = central_inertia(_urdf_inertial(inertial) + change, name)
+        text = "" if central is None else _urdf_text(central)
+        if inertial is not None:
+            edits.replace(inertial, text)
+        elif text:
+            edits.insert_first(link, text)
+    for j, name in enumerate(robot.joint_names):
+        values = {
+            "damping": float(own.joints["viscous"][j, 0]),
+            "friction": float(own.joints["coulomb"][j, 0]),
+        }
+        given_values = {k: float(robot.joint_dynamics[k][j]) for k in values}
+        new = {k: numbers(v) for k, v in values.items() if v != given_values[k]}
+        dynamics = joints[name].find("dynamics")
+        if new and dynamics is not None:
+            edits.set_attributes(dynamics, new)
+        elif new:
+            written = " ".join(f'{k}="{v}"' for k, v in new.items())
+            edits.insert_first(joints[name], f"<dynamics {written}/>")
+    return write_files(path, edits.text(), model, own.left)
+
+
+def _urdf_inertial(element: Element | None) -> np.ndarray:
+    """Parameters of an ``<inertial>`` in the frame of its link."""
+    if element is None:
+        return np.zeros(10)
+
+    def read(tag: str, name: str, default: str) -> np.ndarray:
+        child = element.find(tag)
+        text = default if child is None else child.attributes.get(name, default)
+        return np.array([float(x) for x in text.split()])
+
+    mass = read("mass", "value", "0")[0]
+    center, angles = read("origin", "xyz", "0 0 0"), read("origin", "rpy", "0 0 0")
+    xx, xy, xz, yy, yz, zz = (
+        read("inertia", name, "0")[0] for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    )
+    turn = Rotation.from_euler("xyz", angles).as_matrix()
+    inertia = turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.T
+    return _about_origin(mass, center, inertia)
+
+
+def _about_origin(mass: float, center: np.ndarray, central: np.ndarray) -> np.ndarray:
+    """The ten parameters from mass, centre of mass and the inertia about it."""
+    inertia = central + mass * (center @ center * np.eye(3) - np.outer(center, center))
+    return np.asarray(np.r_[mass, mass * center, inertia[np.triu_indices(3)]])
+
+
+def _urdf_text(central: CentralInertia) -> str:
+    names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    entries = central.inertia[np.triu_indices(3)]
+    moments = " ".join(f'{k}="{numbers(v)}"' for k, v in zip(names, entries, strict=True))
+    return (
+        f'<inertial><origin xyz="{numbers(central.center)}" rpy="0 0 0"/>'
+        f'<mass value="{numbers(central.mass)}"/><inertia {moments}/></inertial>'
+    )
+
+
+def merge_mjcf(
+    model: RBDRegressor, source: str | os.PathLike[str], path: PathLike
+) -> tuple[str, ...]:
+    """Write the identified numbers into a copy of the user's own MJCF.
+
+    Changed are, for the joints of the model's robot, found by name: ``damping``, ``frictionloss``,
+    ``armature``, ``stiffness`` and ``springref``, where the file says something else; and the
+    ``<inertial>`` of the bodies that they move. Actuators, sensors, geoms, defaults, comments and
+    every other byte stay. Frames of bodies may differ from those of the URDF; that the joints turn
+    about the same axes is checked at several poses. Needs MuJoCo (``pip install skidyn[mujoco]``).
+
+    Parameters
+    ----------
+    model : RBDRegressor
+        Fitted model.
+    source : path
+        An MJCF with the joints of the model's robot in this one file.
+    path : path
+        File to write. Files that it names by relative paths have to be reachable from there.
+
+    Returns
+    -------
+    tuple of str
+        Names of the effects that MJCF does not hold, which go to ``<path>.skidyn.json``.
+
+    Raises
+    ------
+    SkidynError
+        A joint is not in the file, the kinematics differ, or a body would get an inertia that no
+        body has.
+    ImportError
+        MuJoCo is not installed.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+    >>> from skidyn.export import merge_mjcf, write_mjcf
+    >>> from skidyn.identification import RBDRegressor
+    >>> log = make_hidden_effect_log(load_planar_arm(), None)
+    >>> model = RBDRegressor(log.robot, consistent=True).fit(log.X, log.y)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     own = pathlib.Path(folder, "own.xml")
+    ...     _ = write_mjcf(log.robot, own)
+    ...     merge_mjcf(model, own, pathlib.Path(folder, "identified.xml"))
+    ()
+    """
+    mujoco = import_optional("mujoco", extra="mujoco")
+    own = described(model, ("viscous", "coulomb", "rotor_inertia", "spring"))
+    robot, edits = own.robot, Edits(source)
+    compiler = edits.root.find("compiler")
+    settings = {} if compiler is None else compiler.attributes
+    if settings.get("inertiafromgeom") == "true":
+        raise SkidynError(
+            f'{edits.path} says <compiler inertiafromgeom="true"/>, by which MuJoCo overlooks '
+            'every <inertial>; change it to "auto"'
+        )
+    world = mujoco.MjModel.from_xml_path(str(edits.path))
+    joints, bodies = _joints_in_bodies(edits.root)
+    lost = [name for name in robot.joint_names if name not in joints]
+    if lost:
+        raise SkidynError(
+            f"{edits.path} has no joint {lost[0]!r} with this name in the file itself; the robot "
+            f"has {', '.join(robot.joint_names)}"
+        )
+    frames = _frames(mujoco, world, robot, edits.path)
+    stiffness, torque = own.joints["spring"].T
+    wanted = {
+        "damping": own.joints["viscous"][:, 0],
+        "frictionloss": own.joints["coulomb"][:, 0],
+        "armature": own.joints["rotor_inertia"][:, 0],
+        "stiffness": stiffness,
+        "springref": -torque / np.where(stiffness > 0.0, stiffness, np.inf),
+    }
+    degrees = settings.get("angle", "degree") == "degree"
+    for j, name in enumerate(robot.joint_names):
+        index = mujoco.mj_name2id(world, mujoco.mjtObj.mjOBJ_JOINT, name)
+        dof, place = world.jnt_dofadr[index], world.jnt_qposadr[index]
+        given = {
+            "damping": np.ravel(world.dof_damping[dof])[0],
+            "frictionloss": world.dof_frictionloss[dof],
+            "armature": world.dof_armature[dof],
+            "stiffness": np.ravel(world.jnt_stiffness[index])[0],
+            "springref": world.qpos_spring[place] if stiffness[j] > 0 else 0.0,
+        }
+        new = {}
+        for key, values in wanted.items():
+            if abs(values[j] - given[key]) > _SAME * (1.0 + abs(given[key])):
+                turns = key == "springref" and degrees and robot.joint_types[j] != "prismatic"
+                new[key] = numbers(np.rad2deg(values[j]) if turns else values[j])
+        if new:
+            edits.set_attributes(joints[name], new)
+    for body, name in enumerate(robot.body_joints):
+        index = mujoco.mj_name2id(world, mujoco.mjtObj.mjOBJ_JOINT, name)
+        carrier = int(world.jnt_bodyid[index])
+        # The body's own share is what is left of the identified parameters without the bodies that
+        # are welded to it; those keep theirs.
+        rotation, translation = frames[body]
+        moved = transform_inertial(own.parameters[body], rotation, translation)
+        rest = _welded(mujoco, world, carrier)
+        text = _mjcf_text(moved - rest, world.body(carrier).name or name)
+        element = bodies[name]
+        inertial = element.find("inertial")
+        if inertial is not None:
+            edits.replace(inertial, text)
+        else:
+            edits.insert_first(element, text)
+    data = edits.text()
+    _check_loads(mujoco, data, edits.path)
+    return write_files(path, data, model, own.left)
+
+
+def _joints_in_bodies(root: Element) -> tuple[dict[str, Element], dict[str, Element]]:
+    """Elements of the named joints, and of the bodies that hold them, by name of the joint."""
+    joints, bodies = {}, {}
+    world = [element for element in root.children if element.tag == "worldbody"]
+    for element in (e for w in world for e in w.walk()):
+        if element.tag != "body":
+            continue
+        for child in element.children:
+            if child.tag == "joint" and "name" in child.attributes:
+                joints[child.attributes["name"]] = child
+                bodies[child.attributes["name"]] = element
+    return joints, bodies
+
+
+def _frames(
+    mujoco: Any, world: Any, robot: Robot, path: Path
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Pose of every body of the robot in the frame of the MJCF's body, the same at all poses."""
+    index = [
+        mujoco.mj_name2id(world, mujoco.mjtObj.mjOBJ_JOINT, name) for name in robot.body_joints
+    ]
+    lost = [n for n, i in zip(robot.body_joints, index, strict=True) if i < 0]
+    if lost:
+        raise SkidynError(f"{path} has no joint {lost[0]!r}, which the robot has")
+    carriers = [int(world.jnt_bodyid[i]) for i in index]
+    own = [mujoco.mj_name2id(world, mujoco.mjtObj.mjOBJ_JOINT, name) for name in robot.joint_names]
+    rng, data = np.random.default_rng(0), mujoco.MjData(world)
+    poses = rng.uniform(-1.0, 1.0, (_POSES, robot.n_joints))
+    base = int(world.body_parentid[carriers[0]])
+    found = []
+    for q in poses:
+        mujoco.mj_resetData(world, data)
+        data.qpos[world.jnt_qposadr[own]] = q
+        for body, follower in enumerate(index):  # joints that mimic another
+            j = int(robot.tree.coordinates[body])
+            data.qpos[world.jnt_qposadr[follower]] = (
+                robot.tree.multipliers[body] * q[j] + robot.tree.offsets[body]
+            )
+        mujoco.mj_kinematics(world, data)
+        turn, shift = data.xmat[base].reshape(3, 3), data.xpos[base]
+        relative = []
+        for name, carrier in zip(robot.body_names, carriers, strict=True):
+            position, rotation = (x[0] for x in robot.forward_kinematics(q[None], name))
+            there = data.xmat[carrier].reshape(3, 3)
+            # The base of the robot is the body that carries its first joint.
+            relative.append(
+                (
+                    there.T @ turn @ rotation,
+                    there.T @ (turn @ position + shift - data.xpos[carrier]),
+                )
+            )
+        found.append(relative)
+    for body, name in enumerate(robot.body_names):
+        first = found[0][body]
+        apart = max(
+            max(np.abs(r - first[0]).max(), np.abs(t - first[1]).max())
+            for r, t in (poses[body] for poses in found)
+        )
+        if apart > _ALIKE:
+            raise SkidynError(
+                f"{path}: joint {robot.body_joints[body]!r} does not move its body as that of the "
+                f"robot moves {name!r} (apart by {apart:.2g} rad or m). Axis, zero position, and "
+                "the frame of the body below the first joint have to be those of the URDF's base"
+            )
+    return found[0]
+
+
+def _welded(mujoco: Any, world: Any, carrier: int) -> np.ndarray:
+    """Parameters of all bodies that are welded to a body, in its frame, without its own."""
+    total = np.zeros(10)
+    data = mujoco.MjData(world)
+    mujoco.mj_kinematics(world, data)
+    turn, origin = data.xmat[carrier].reshape(3, 3), data.xpos[carrier]
+    for other in range(world.nbody):
+        if other == carrier or int(world.body_weldid[other]) != carrier:
+            continue
+        own = np.zeros(9)
+        mujoco.mju_quat2Mat(own, world.body_iquat[other])
+        axes = turn.T @ data.xmat[other].reshape(3, 3) @ own.reshape(3, 3)
+        here = data.xmat[other].reshape(3, 3) @ world.body_ipos[other] + data.xpos[other]
+        center = turn.T @ (here - origin)
+        inertia = axes @ np.diag(world.body_inertia[other]) @ axes.T
+        total += _about_origin(float(world.body_mass[other]), center, inertia)
+    return total
+
+
+def _mjcf_text(parameters: np.ndarray, name: str) -> str:
+    central = central_inertia(parameters, name)
+    if central is None:
+        raise SkidynError(
+            f"Body {name!r} would have no mass; MuJoCo refuses moving bodies without."
+        )
+    I = central.inertia
+    full = numbers([I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]])
+    return (
+        f'<inertial pos="{numbers(central.center)}" mass="{numbers(central.mass)}" '
+        f'fullinertia="{full}"/>'
+    )
+
+
+def _check_loads(mujoco: Any, data: bytes, source: Path) -> None:
+    """Let MuJoCo read what would be written, beside the source, whose files it may name."""
+    with tempfile.NamedTemporaryFile(suffix=".xml", dir=source.parent) as trial:
+        trial.write(data)
+        trial.flush()
+        try:
+            mujoco.MjModel.from_xml_path(trial.name)
+        except ValueError as error:
+            raise SkidynError(
+                f"MuJoCo refuses {source} with the identified numbers: {error}. Identify "
+                "physically consistent parameters: RBDRegressor(..., consistent=True)"
+            ) from None

@@ -1,0 +1,266 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Pieces of a log, simulated side by side."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidyn._columns import column_names, resolve_columns
+from skidyn._exceptions import SkidynError
+from skidyn._signals import Array, Signals, signals_from
+from skidyn.evidence import smooth_motion
+from skidyn.forward._controller import Controller
+from skidyn.forward._model import Conditions, ForwardModel
+from skidyn.forward._stepper import LOST, State, Stepper
+from skidyn.forward._windows import Windows, make_windows
+
+Rows = NDArray[np.int64]
+
+#: Longest step, s. The error of a step is some 0.04 h^2 times the third derivative: 2e-5 rad over
+#: a second of fast motion.
+STEP = 2e-3
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is to be simulated.
+
+    Attributes
+    ----------
+    signals : Signals
+        Motion from which the pieces start.
+    windows : Windows
+        The pieces.
+    torque : ndarray of shape (n_samples, n_joints) or None
+        What drives the model without a controller.
+    controller : Controller or None
+        What drives it with one.
+    reference, rate : ndarray of shape (n_samples, n_joints) or None
+        Its reference and the velocity of this.
+    """
+
+    signals: Signals
+    windows: Windows
+    torque: Array | None = None
+    controller: Controller | None = None
+    reference: Array | None = None
+    rate: Array | None = None
+
+
+def read_task(
+    model: Any, X: Any, y: Any, controller: Controller | None, horizon: float | None
+) -> Task:
+    """Signals, pieces and drive of a log."""
+    n = model.robot_.n_joints
+    if (y is None) == (controller is None):
+        raise SkidynError("give either the torque y or a controller, which follows q_ref1..")
+    signals = motion_of(model, X)
+    windows = make_windows(signals, horizon)
+    if controller is None:
+        torque = np.asarray(y, dtype=float).reshape(len(signals.q), -1)
+        if torque.shape[1] != n:
+            raise SkidynError(f"y has {torque.shape[1]} column(s); the robot has {n} joints")
+        _refuse_gaps(torque, "torques")
+        return Task(signals, windows, torque)
+    reference = _reference(X, model)
+    rate = np.zeros_like(reference)
+    assert signals.time is not None
+    for rows in signals.segments:
+        if rows.stop - rows.start > 1:
+            rate[rows] = np.gradient(reference[rows], signals.time[rows], axis=0)
+    return Task(signals, windows, None, controller.checked(n), reference, rate)
+
+
+def motion_of(model: Any, X: Any) -> Signals:
+    """Signals of a log; smoothed where the model smooths or the log has no accelerations."""
+    names = column_names(X)
+    if names is None:
+        raise SkidynError("X is no table; give a DataFrame with the columns time, q1.., dq1..")
+    robot = model.robot_
+    columns = resolve_columns(
+        names,
+        len(names),
+        robot.joint_names,
+        trajectory=model.trajectory,
+        time=model.time,
+        require_acceleration=False,
+    )
+    if columns.time is None:
+        raise SkidynError("the log has no column 'time' (s); a simulation needs it")
+    used = [*columns.state(), columns.time, *(columns.temperature or ())]
+    used += [] if columns.trajectory is None else [columns.trajectory]
+    table = np.full((len(X), len(names)), np.nan)
+    for k in used:
+        table[:, k] = np.asarray(X[names[k]], dtype=float)
+    given = columns.ddq is not None
+    signals = signals_from(table, replace(columns, ddq=columns.ddq or columns.dq), robot)
+    for values, what in ((signals.q, "positions"), (signals.dq, "velocities")):
+        _refuse_gaps(values, what)
+    if model._smooths() or not given:
+        signals = smooth_motion(signals).signals
+    return signals.with_(robot=robot)
+
+
+def _refuse_gaps(values: Array, what: str) -> None:
+    broken = np.flatnonzero(~np.isfinite(values).all(axis=1))
+    if len(broken):
+        raise SkidynError(
+            f"{what} of the log are no numbers in row {broken[0]} ({len(broken)} row(s)); leave "
+            "these rows out of X and y"
+        )
+
+
+def _reference(X: Any, model: Any) -> Array:
+    names = column_names(X) or []
+    n = model.robot_.n_joints
+    for wanted in (
+        [f"q_ref{j + 1}" for j in range(n)],
+        [f"q_ref_{name}" for name in model.robot_.joint_names],
+    ):
+        if all(name in names for name in wanted):
+            reference = np.column_stack([np.asarray(X[name], dtype=float) for name in wanted])
+            _refuse_gaps(reference, "references")
+            return reference
+    lost = [f"q_ref{j + 1}" for j in range(n) if f"q_ref{j + 1}" not in names]
+    raise SkidynError(f"X lacks the reference column(s) {', '.join(lost)} of the controller")
+
+
+def run(
+    forward: ForwardModel,
+    task: Task,
+    step: float = STEP,
+    theta: tuple[Array, Array] | None = None,
+) -> tuple[Array, Array]:
+    """Positions and velocities of the motors, shape (n_rows, n_samples, n_joints).
+
+    With ``theta`` every piece is simulated once for each model, models first.
+    """
+    n, windows = forward.n, task.windows
+    models = 1 if theta is None else len(theta[0])
+    rows: Rows = np.tile(windows.rows, (models, 1))
+    time = np.tile(windows.time, (models, 1))
+    if theta is not None:
+        pieces = len(windows.rows)
+        theta = (np.repeat(theta[0], pieces, axis=0), np.repeat(theta[1], pieces, axis=0))
+    signals = task.signals
+    conditions = Conditions(
+        signals.trajectory[rows[:, 0]],
+        time[:, 0],
+        None if signals.temperature is None else signals.temperature[rows[:, 0]],
+    )
+    drive, feed = _drive(forward, task, rows, time)
+    stepper = Stepper(forward, drive, feed, conditions, theta)
+    state = _start(forward, signals, rows[:, 0], stepper)
+    _check_inertia(stepper, state, time[:, 0])
+    n_samples = rows.shape[1]
+    q, dq = (np.full((len(rows), n_samples, n), np.nan) for _ in range(2))
+    q[:, 0], dq[:, 0] = state.q[:, :n], state.dq[:, :n]
+    lost = np.zeros(len(rows), dtype=bool)
+    safe = State(state.q.copy(), state.dq.copy(), state.direction.copy(), state.memory.copy())
+    for k in range(n_samples - 1):
+        span = time[:, k + 1] - time[:, k]
+        parts = max(1, int(np.ceil(span.max() / step - 1e-9)))
+        if signals.temperature is not None:
+            conditions.temperature = signals.temperature[rows[:, k]]
+        for part in range(parts):
+            state = stepper.step(state, time[:, k] + span * part / parts, span / parts)
+        away = ~np.isfinite(state.q).all(axis=1) | (np.abs(state.dq) > LOST).any(axis=1)
+        if away.any():
+            lost |= away
+            state.put(np.flatnonzero(away), safe)
+        q[:, k + 1], dq[:, k + 1] = state.q[:, :n], state.dq[:, :n]
+        q[lost, k + 1] = dq[lost, k + 1] = np.nan
+    return q, dq
+
+
+def _start(forward: ForwardModel, signals: Signals, first: Rows, stepper: Stepper) -> State:
+    """The logged state; links hang where their springs carry them."""
+    q, dq = signals.q[first], signals.dq[first]
+    memory = forward.starting_states(signals)[first]
+    direction = np.sign(dq)
+    # At rest the direction is that in which friction holds: found by the first step.
+    direction[np.abs(dq) < 1e-6 * forward.unit] = 0.0
+    for spring in forward.springs:
+        ddq = signals.ddq[first]
+        given = q[None, :, : forward.n], dq[None, :, : forward.n], ddq[None], direction[None]
+        _, rigid = forward.torque(*given, memory[None], stepper.conditions, stepper.theta)[:, 0]
+        load = rigid[:, spring.joint]
+        twist = load / spring.stiffness + np.sign(load) * spring.gap / 2
+        q = np.column_stack([q, q[:, spring.joint] - twist])
+        dq = np.column_stack([dq, dq[:, spring.joint]])
+    return State(q.copy(), dq.copy(), direction, memory)
+
+
+def _drive(forward: ForwardModel, task: Task, rows: Rows, time: Array) -> Any:
+    """Torque of the drive at times near those of the log."""
+    n_rows, n_samples = rows.shape
+    place = np.arange(n_rows)
+    at = np.zeros(n_rows, dtype=int)
+
+    def between(values: Array, moment: Array) -> Array:
+        """Linear interpolation of (n_samples, n) values of the log at a time of every piece."""
+        nonlocal at
+        while True:
+            later = (at < n_samples - 2) & (moment > time[place, at + 1] + 1e-12)
+            if not later.any():
+                break
+            at = at + later
+        while True:
+            sooner = (at > 0) & (moment < time[place, at])
+            if not sooner.any():
+                break
+            at = at - sooner
+        a, b = rows[place, at], rows[place, at + 1]
+        share = (moment - time[place, at]) / (time[place, at + 1] - time[place, at])
+        share = np.clip(share, 0.0, 1.0)[:, None]
+        return np.asarray(values[a] + share * (values[b] - values[a]))
+
+    def logged(moment: Array) -> Array:
+        assert task.torque is not None
+        if not forward.delay.any():
+            return between(task.torque, moment)
+        # The logged torque is late: what acts now is logged later.
+        late = [moment + delay for delay in forward.delay]
+        return np.column_stack(
+            [between(task.torque[:, [j]], at)[:, 0] for j, at in enumerate(late)]
+        )
+
+    def controlled(moment: Array, q: Array, dq: Array) -> Array:
+        assert task.controller is not None and task.reference is not None
+        assert task.rate is not None
+        late = moment - task.controller.delay
+        return task.controller.torque(
+            q, dq, between(task.reference, late), between(task.rate, late)
+        )
+
+    return (None, logged) if task.controller is None else (controlled, None)
+
+
+def _check_inertia(stepper: Stepper, state: State, time: Array) -> None:
+    """Refuse a model whose inertia is not positive definite: it would run away at once."""
+    n, rows = stepper.n, len(state.q)
+    shape = (n + 1, rows, n)
+    ddq = np.zeros(shape)
+    ddq[1:] = np.eye(n)[:, None]
+    values = stepper.forward.torque(
+        np.broadcast_to(state.q[:, :n], shape),
+        np.zeros(shape),
+        ddq,
+        np.zeros(shape),
+        np.broadcast_to(state.memory, (n + 1, *state.memory.shape)),
+        stepper.conditions,
+        stepper.theta,
+    )[0].copy()
+    inertia = np.moveaxis(values[1:] - values[0], 0, -1)
+    least = np.linalg.eigvalsh((inertia + inertia.swapaxes(1, 2)) / 2)[:, 0]
+    if not np.all(least > 0.0):
+        row = int(np.argmin(least))
+        raise SkidynError(
+            f"the inertia matrix of the model has the eigenvalue {least[row]:.3g} at the start of "
+            f"piece {row}: such bodies cannot move. Fit with consistent=True, or give the links an "
+            "<inertial>."
+        )

@@ -1,0 +1,267 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Least squares over bodies that can exist, by a primal-dual interior-point method.
+
+Every body has, beside its pseudo-inertia P, a dual matrix Z; both stay positive definite and
+``P Z`` is driven to a multiple ``mu`` of the identity, ``mu`` to zero. In the scaling of Nesterov
+and Todd, in which P and Z are the same diagonal matrix, each step is ordinary least squares.
+
+References
+----------
+Y. Nesterov, M. Todd (1997), Self-scaled barriers and interior-point methods for convex programming,
+Mathematics of Operations Research 22(1), 1-42.
+S. Boyd, L. Vandenberghe (2004), Convex Optimization, chapter 11.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import block_diag, solve_triangular
+
+from skidyn._signals import Array
+from skidyn.identification._log_det import (
+    BASIS,
+    SYMMETRIC,
+    Linear,
+    from_pseudo_inertia,
+    local_units,
+    pseudo_inertia,
+    taken_inside,
+)
+
+#: Steps at most; some 20 are taken.
+MOST_STEPS = 80
+#: Gap to the optimum at which the steps end, for targets of unit size per row.
+GAP = 1e-11
+#: Pull toward the nominal bodies, in units of the data, where the data says nothing.
+PULL = 1e-5
+#: Share of the way to the border of what exists that one step may go.
+TOWARD_BORDER = 0.95
+#: Least share of the present gap that a step aims at.
+LEAST_CENTRING = 1e-4
+#: Steps shorter than this end the search; full steps after which a minimum is settled.
+SHORTEST, SETTLED = 1e-8, 4
+
+
+@dataclass
+class _Point:
+    """Unknowns and their duals."""
+
+    x: Array
+    bodies: Array
+    slack: Array
+    duals: Array
+    multipliers: Array
+
+    @property
+    def gap(self) -> float:
+        """How far the error can be from its optimum, per eigenvalue."""
+        products = float(np.einsum("nij,nji->", self.bodies, self.duals))
+        count = 4 * len(self.bodies) + len(self.slack)
+        return (products + float(self.slack @ self.multipliers)) / count
+
+    @property
+    def exists(self) -> bool:
+        """Whether rounding has left P and Z positive definite; else nothing is to be gained."""
+        try:
+            np.linalg.cholesky(np.concatenate([self.bodies, self.duals]))
+        except np.linalg.LinAlgError:
+            return False
+        return True
+
+
+@dataclass(frozen=True)
+class _Data:
+    """The objective ``|factor x - target|^2 / 2 + cost x``."""
+
+    factor: Array
+    target: Array
+    cost: Array
+
+
+@dataclass
+class _Direction:
+    """A step: of the unknowns, of P and Z in the common scaling, of slacks and multipliers."""
+
+    step: Array
+    change: Array
+    answer: Array
+    slack: Array
+    multipliers: Array
+
+
+def solve_interior_point(
+    factor: Array, target: Array, start: Array, nominal: Array, linear: Linear
+) -> Array:
+    """Least squares over bodies that can exist.
+
+    Parameters
+    ----------
+    factor, target : ndarray of shape (k, n), (k,)
+        Columns and torque, of unit size.
+    start : ndarray of shape (n,)
+        Bodies and coefficients that strictly keep everything that is known.
+    nominal : ndarray of shape (n_bodies, 10)
+        Bodies toward which open directions are pulled.
+    linear : Linear
+        Limits and equations.
+
+    Returns
+    -------
+    ndarray of shape (n,)
+        Strictly inside all limits.
+    """
+    n, p = nominal.size, len(start)
+    whole, _ = local_units(nominal, nominal)
+    pull = PULL * np.eye(p)
+    pull[:n, :n] = PULL * np.linalg.inv(block_diag(*whole))
+    rest = start.copy()
+    rest[:n] = nominal.ravel()
+    data = _Data(*_triangular(np.vstack([factor, pull]), np.r_[target, pull @ rest]), np.zeros(p))
+    point = _start(data, start, nominal, linear, GAP)
+    for _ in range(MOST_STEPS):
+        if point.gap < GAP or not point.exists:
+            break
+        point, length = _step(point, data, linear, 0.0)
+        if length < SHORTEST:
+            break
+    return taken_inside(point.x, start, n, linear)
+
+
+def minimise_with_divergence(
+    factor: Array, target: Array, start: Array, nominal: Array, weight: float
+) -> Array:
+    """Minimum of ``|factor x - target|^2 / 2 + weight divergence(bodies, nominal)``.
+
+    Parameters
+    ----------
+    factor, target : ndarray of shape (k, n), (k,)
+        Columns and torque.
+    start : ndarray of shape (n,)
+        Bodies that exist, then coefficients.
+    nominal : ndarray of shape (n_bodies, 10)
+        Bodies that exist.
+    weight : float
+        Weight of the log-det divergence.
+
+    Returns
+    -------
+    ndarray of shape (n,)
+        Bodies that exist, then coefficients.
+    """
+    n, p = nominal.size, len(start)
+    held = np.diag(np.r_[np.zeros(n), np.full(p - n, PULL)])
+    # The divergence is a linear cost, the trace, and the barrier that the method itself keeps.
+    cost = np.zeros(p)
+    inverse = np.linalg.inv(pseudo_inertia(nominal))
+    cost[:n] = weight * np.einsum("nij,aji->na", inverse, BASIS).ravel()
+    data = _Data(*_triangular(np.vstack([factor, held]), np.r_[target, held @ start]), cost)
+    linear = Linear.none(p)
+    point = _start(data, start, nominal, linear, weight)
+    settled = 0
+    for _ in range(MOST_STEPS):
+        point, length = _step(point, data, linear, weight)
+        settled = settled + 1 if length == 1.0 and abs(point.gap / weight - 1) < 0.01 else 0
+        if settled == SETTLED or length < SHORTEST or not point.exists:
+            break
+    return taken_inside(point.x, start, n, linear)
+
+
+def _start(data: _Data, start: Array, nominal: Array, linear: Linear, least: float) -> _Point:
+    """Duals large enough to answer the gradient: else the steps crawl along the border."""
+    n = nominal.size
+    bodies = pseudo_inertia(start[:n].reshape(-1, 10))
+    slack = linear.b - linear.C @ start
+    own, _ = local_units(start[:n].reshape(-1, 10), nominal)
+    gradient = data.factor.T @ (data.target - data.factor @ start) - data.cost
+    gradient[:n] = block_diag(*own).T @ gradient[:n]
+    mu = max(least, float(np.linalg.norm(gradient)))
+    duals = np.asarray(mu * np.linalg.inv(bodies))
+    return _Point(start.copy(), bodies, slack, duals, mu / slack)
+
+
+def _triangular(factor: Array, target: Array) -> tuple[Array, Array]:
+    q, triangle = np.linalg.qr(factor)
+    return triangle, q.T @ target
+
+
+def _step(point: _Point, data: _Data, linear: Linear, least: float) -> tuple[_Point, float]:
+    """One step of Mehrotra's predictor and corrector, toward products of at least ``least``."""
+    n, p = 10 * len(point.bodies), len(point.x)
+    roots, inverse_roots, scaled = _scaling(point.bodies, point.duals)
+    changes = np.einsum("nij,ajk,nlk->nail", roots, SYMMETRIC, roots)
+    own = from_pseudo_inertia(changes.reshape(-1, 4, 4)).reshape(-1, 10, 10)
+    units = block_diag(*own.transpose(0, 2, 1), np.eye(p - n))
+    stiffness = np.sqrt(point.multipliers / point.slack)
+    held = np.eye(p)[:n]
+    rows = np.vstack([data.factor @ units, held, stiffness[:, None] * (linear.C @ units)])
+    free = _null_space(linear.E @ units) if len(linear.e) else np.eye(p)
+    q, triangle = np.linalg.qr(rows @ free)
+    left = data.target - data.factor @ point.x
+    price = solve_triangular(triangle, free.T @ (units.T @ data.cost), trans="T")
+    sums = (scaled[:, :, None] + scaled[:, None]) / 2
+
+    def direction(mu: float, second: Array, third: Array) -> _Direction:
+        # What the products P Z and slack times multiplier shall become, less what they are.
+        lacking = (mu * np.eye(4) - _diagonal(scaled**2) - second) / sums
+        answer = _diagonal(scaled) + lacking
+        wanted_multipliers = (mu - third) / point.slack
+        wanted = np.r_[
+            left,
+            np.einsum("nij,aji->na", answer, SYMMETRIC).ravel(),
+            -wanted_multipliers / stiffness,
+        ]
+        own_step = free @ solve_triangular(triangle, q.T @ wanted - price)
+        step = units @ own_step
+        change = np.einsum("na,aij->nij", own_step[:n].reshape(-1, 10), SYMMETRIC)
+        ds = -linear.C @ step
+        dm = wanted_multipliers - point.multipliers - stiffness**2 * ds
+        return _Direction(step, change, lacking - change, ds, dm)
+
+    def reach(d: _Direction) -> float:
+        """Longest step that stays inside."""
+        root = 1 / np.sqrt(scaled)
+        rates = [
+            np.linalg.eigvalsh(root[:, :, None] * m * root[:, None]) for m in (d.change, d.answer)
+        ]
+        rates += [d.slack / point.slack, d.multipliers / point.multipliers]
+        worst = min(float(np.min(rate, initial=0.0)) for rate in rates)
+        return -1 / min(worst, -1e-6)
+
+    ahead = direction(least, np.zeros_like(point.bodies), np.zeros_like(point.slack))
+    share = max((1 - min(1.0, reach(ahead))) ** 3, LEAST_CENTRING)
+    mu = max(least, share * point.gap)
+    bent = ahead.change @ ahead.answer
+    found = direction(mu, (bent + bent.transpose(0, 2, 1)) / 2, ahead.slack * ahead.multipliers)
+    length = min(1.0, TOWARD_BORDER * reach(found))
+    x = point.x + length * found.step
+    duals = _diagonal(scaled) + length * found.answer
+    return (
+        _Point(
+            x,
+            pseudo_inertia(x[:n].reshape(-1, 10)),
+            linear.b - linear.C @ x,
+            np.einsum("nji,njk,nkl->nil", inverse_roots, duals, inverse_roots),
+            point.multipliers + length * found.multipliers,
+        ),
+        length,
+    )
+
+
+def _scaling(bodies: Array, duals: Array) -> tuple[Array, Array, Array]:
+    """G with ``G^-1 P G^-T = G^T Z G`` diagonal, its inverse, and the diagonals."""
+    first, second = np.linalg.cholesky(bodies), np.linalg.cholesky(duals)
+    _, values, right = np.linalg.svd(second.transpose(0, 2, 1) @ first)
+    shrink = 1 / np.sqrt(values)
+    roots = first @ right.transpose(0, 2, 1) * shrink[:, None]
+    inverse = np.linalg.solve(first, np.broadcast_to(np.eye(4), first.shape))
+    return roots, (1 / shrink)[:, :, None] * (right @ inverse), values
+
+
+def _diagonal(values: Array) -> Array:
+    return np.asarray(values[:, :, None] * np.eye(4))
+
+
+def _null_space(rows: Array) -> Array:
+    return np.asarray(np.linalg.qr(rows.T, mode="complete")[0][:, len(rows) :])

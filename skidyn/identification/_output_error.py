@@ -1,0 +1,243 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The output error estimator: coefficients for which the simulated motion is that of the log.
+
+Least squares of the torque sees the motion as exact and errs by what is wrong with it; here the
+torque drives the model and the motion is what is compared [1]_. Gauss-Newton steps from the
+least-squares solution; the sensitivities are differences of models that are simulated together,
+in the same steps and with the same exchanges of sticking and sliding.
+
+References
+----------
+.. [1] A. Janot, P.-O. Vandanjon, M. Gautier (2014), A generic instrumental variable approach for
+   industrial robot identification, IEEE Trans. Control Systems Technology 22(1), 132-145.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+
+from skidyn._exceptions import SkidynError
+from skidyn._progress import tell
+from skidyn._signals import Array, Signals
+from skidyn.effects import TermSum
+from skidyn.forward import ForwardModel, Task, make_windows, run
+from skidyn.identification._regression import Regression, Solution
+
+#: Step of the simulation, s; logs that are faster are thinned, their torque averaged.
+STEP = 5e-3
+#: Gauss-Newton steps at most, and the relative fall of the error that ends them.
+ROUNDS, SMALL = 12, 1e-3
+#: Damping of a step, as shares of the curvature; all are tried at once.
+DAMPING = (0.0, 1e-2, 1e-1, 1.0, 10.0)
+#: Directions that hardly move the motion, relative to the best seen one, stay as they are.
+WEAK = 1e-3
+
+
+def refine_by_simulation(
+    model: Any,
+    regression: Regression,
+    solution: Solution,
+    signals: Signals,
+    torque: Array,
+    horizon: float | None,
+) -> Solution:
+    """Coefficients that simulate best, from those of a fitted model.
+
+    Parameters
+    ----------
+    model : RBDRegressor
+        Fitted by least squares.
+    regression : Regression
+        Its rows.
+    solution : Solution
+        Its coefficients.
+    signals : Signals
+        Motion with time.
+    torque : ndarray of shape (n_samples, n_joints), N m or N
+        Logged torque.
+    horizon : float, s, or None
+        Length of the pieces; None for whole trajectories.
+
+    Returns
+    -------
+    Solution
+
+    Raises
+    ------
+    SkidynError
+        No time, or a model that cannot be simulated.
+    """
+    if signals.time is None:
+        raise SkidynError("estimator='output_error' simulates and needs the column 'time' (s) in X")
+    error = _OutputError.of(model, regression, solution, signals, torque, horizon)
+    theta = np.zeros(len(error.free))
+    residual = error.residuals(theta[None])[0]
+    # Every joint counts by the size of its errors at the start.
+    size = np.sqrt(np.mean(residual**2, axis=(0, 1), keepdims=True)) + 1e-12
+    cost = float(np.mean((residual / size) ** 2))
+    for round_ in range(ROUNDS):
+        tell("Refining by simulation", round_ / ROUNDS)
+        moved = error.residuals(np.vstack([theta, theta + np.diag(error.steps)])) / size
+        slopes = (moved[1:] - moved[0]) / error.steps[:, None, None, None]
+        slope = slopes.reshape(len(theta), -1).T
+        steps = _steps(slope, moved[0].ravel())
+        tried = error.residuals(theta + steps) / size
+        costs = np.mean(tried**2, axis=(1, 2, 3))
+        best = int(np.argmin(costs))
+        if not costs[best] < cost:
+            break
+        fall, cost, theta = 1 - costs[best] / cost, float(costs[best]), theta + steps[best]
+        if fall < SMALL:
+            break
+    left = error.left_out(theta, slopes, (error.residuals(theta[None])[0] / size))
+    coefficients = error.coefficients(theta)
+    others = solution.left_out - solution.coefficients
+    spread = coefficients + others  # what no simulation changes keeps its own spread
+    spread[:, error.free] = left
+    return replace(solution, coefficients=coefficients, left_out=spread, parameters=None)
+
+
+def _steps(slope: Array, residual: Array) -> Array:
+    """Gauss-Newton steps with every damping, shape (n_dampings, n_free)."""
+    size = np.linalg.norm(slope, axis=0)
+    size[size == 0] = 1.0
+    left, values, right = np.linalg.svd(slope / size, full_matrices=False)
+    seen = values > WEAK * values[0]
+    along = left.T @ -residual
+    steps = []
+    for damping in DAMPING:
+        share = values / (values**2 + damping * values[0] ** 2)
+        steps.append(right.T @ np.where(seen, share * along, 0.0) / size)
+    return np.array(steps)
+
+
+@dataclass
+class _OutputError:
+    """Simulated minus logged motion as a function of changes of the coefficients."""
+
+    forward: ForwardModel
+    task: Task
+    start: Array
+    free: Array
+    steps: Array
+    parameters: Array
+    rigid_index: NDArray[np.int64]
+    inside: Array
+    fold: NDArray[np.int64]
+    n_folds: int
+    derived: bool
+
+    @classmethod
+    def of(
+        cls,
+        model: Any,
+        regression: Regression,
+        solution: Solution,
+        signals: Signals,
+        torque: Array,
+        horizon: float | None,
+    ) -> _OutputError:
+        forward = ForwardModel(model, free=True)
+        thin, driven = _thinned(signals, torque)
+        windows = make_windows(thin, horizon)
+        task = Task(thin, windows, driven)
+        n_rigid = regression.n_rigid
+        places = dict(TermSum(regression.terms).slices(n_rigid))
+        inside = [np.arange(places[t].start, places[t].stop) for t in forward.inside]
+        inside_index = np.concatenate([np.zeros(0, dtype=int), *inside])
+        identified = model.parameters == "identified"
+        free = np.concatenate([np.arange(n_rigid if identified else 0), inside_index]).astype(int)
+        scale = np.abs(solution.coefficients[free])
+        spread = np.nan_to_num(solution.std[free])
+        steps = np.maximum(1e-2 * spread, 1e-4 * scale)
+        steps = np.where(steps > 0, steps, 1e-6)
+        return cls(
+            forward,
+            task,
+            solution.coefficients.copy(),
+            free,
+            steps,
+            model.robot_.inertial_parameters,
+            regression.rigid_index,
+            inside_index,
+            _folds(thin, regression.n_folds)[windows.rows],
+            regression.n_folds,
+            model._smooths(),
+        )
+
+    def coefficients(self, theta: Array) -> Array:
+        """All coefficients with the free ones changed."""
+        whole = self.start.copy()
+        whole[self.free] += theta
+        return whole
+
+    def residuals(self, thetas: Array) -> Array:
+        """Errors of the motion, shape (n_models, n_pieces, n_samples, n_joints or twice that)."""
+        wholes = np.array([self.coefficients(theta) for theta in thetas])
+        change = np.zeros((len(wholes), self.parameters.size))
+        change[:, self.rigid_index] = wholes[:, : len(self.rigid_index)]
+        parameters = self.parameters + change.reshape(-1, *self.parameters.shape)
+        rows = self.forward.parameter_rows(parameters, wholes[:, self.inside])
+        q, dq = run(self.forward, self.task, 2 * STEP, rows)
+        signals, windows = self.task.signals, self.task.windows
+        logged = np.concatenate([signals.q[windows.rows], signals.dq[windows.rows]], axis=2)
+        motion = np.concatenate([q, dq], axis=2).reshape(len(thetas), *logged.shape)
+        if self.derived:  # velocities that were derived from the positions say nothing more
+            n = self.forward.n
+            motion, logged = motion[..., :n], logged[..., :n]
+        error = motion - logged
+        # A motion that runs away is as wrong as can be, but has to stay a number.
+        bound = 10.0 * (np.ptp(logged, axis=(0, 1)) + 1e-9)
+        error = np.clip(np.where(np.isfinite(error), error, bound), -bound, bound)
+        return np.asarray(error * windows.valid[..., None])
+
+    def left_out(self, theta: Array, slopes: Array, residual: Array) -> Array:
+        """Free coefficients after one Gauss-Newton step without each fold."""
+        p = len(theta)
+        grams, sides = [], []
+        for k in range(self.n_folds):
+            own = self.fold == k
+            a = slopes[:, own].reshape(p, -1)
+            grams.append(a @ a.T)
+            sides.append(a @ residual[own].ravel())
+        gram, side = np.array(grams), np.array(sides)
+        size = np.sqrt(np.diag(gram.sum(0)))
+        size[size == 0] = 1.0
+        found = []
+        for k in range(len(gram)):
+            whole = (gram.sum(0) - gram[k]) / np.outer(size, size)
+            inverse = np.linalg.pinv(whole, rcond=WEAK**2, hermitian=True)
+            step = inverse @ ((side.sum(0) - side[k]) / size) / size
+            found.append(self.start[self.free] + theta - step)
+        return np.array(found)
+
+
+def _folds(signals: Signals, n_folds: int) -> NDArray[np.int64]:
+    """Fold of every sample: whole trajectories, or stretches of few of them."""
+    names, label = np.unique(signals.trajectory, return_inverse=True)
+    if len(names) >= n_folds:
+        return np.asarray(label * n_folds // len(names))
+    blocks = n_folds // len(names)
+    fold = np.empty(len(label), dtype=np.int64)
+    for k in range(len(names)):
+        own = np.flatnonzero(label == k)
+        fold[own] = k * blocks + np.arange(len(own)) * blocks // len(own)
+    return fold
+
+
+def _thinned(signals: Signals, torque: Array) -> tuple[Signals, Array]:
+    """Samples some :data:`STEP` apart; the torque is averaged over what lies between them."""
+    rows, smooth = [], torque.copy()
+    for own in signals.segments:
+        step = float(np.median(np.diff(signals.clock[own]))) if own.stop - own.start > 1 else STEP
+        every = max(1, round(STEP / step))
+        rows.append(np.arange(own.start, own.stop)[::every])
+        if every > 1:
+            smooth[own] = uniform_filter1d(torque[own], every, axis=0, mode="nearest")
+    index = np.concatenate(rows)
+    return signals.take(index), smooth[index]

@@ -1,0 +1,738 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Rigid-body dynamics with physical effects, identified from data, as a scikit-learn regressor."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Iterable, Iterator, Sequence
+from numbers import Real
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.utils.metaestimators import available_if
+from sklearn.utils.validation import _check_sample_weight, check_is_fitted, validate_data
+
+from skidyn._checks import warn_about_log
+from skidyn._columns import Columns, ColumnSpec, resolve_columns, trajectory_numbers
+from skidyn._exceptions import ColumnError
+from skidyn._order import has_one_motion, order_in_time
+from skidyn._signals import Array, Signals, signals_from
+from skidyn.effects import Term, TermSum, make_terms
+from skidyn.evidence import (
+    Evidence,
+    Problem,
+    broken_notes,
+    evidence_of_rows,
+    evidence_of_signals,
+    hysteresis_joints,
+    independent_columns,
+    linear_terms,
+    make_problem,
+    renumbered,
+    sample_blocks,
+    smooth_motion,
+)
+from skidyn.identification._constraints import BodyConstraints
+from skidyn.identification._estimators import ESTIMATORS, Estimator, find_estimator
+from skidyn.identification._identifiability import condition_number
+from skidyn.identification._instrumental import instrument_rows
+from skidyn.identification._output_error import refine_by_simulation
+from skidyn.identification._recordings import named_recordings, recognise, remember
+from skidyn.identification._regression import Regression, Solution
+from skidyn.identification._results import Results
+from skidyn.identification._terms import find_terms
+from skidyn.identification._uncertainty import PredictionBands, find_bands
+from skidyn.identification._weak_directions import keep_weak_directions
+from skidyn.robots import Robot, find_base_parameters
+
+#: Groups of trajectories whose evidence partial_fit keeps apart, for standard errors.
+GROUPS = 20
+
+
+def _keeps_no_rows(model: RBDRegressor) -> bool:
+    """Whether evidence is enough for the estimator of a model."""
+    if getattr(ESTIMATORS.get(model.estimator), "rows", False):
+        raise AttributeError(
+            f"estimator={model.estimator!r} looks at single rows, which partial_fit does not keep; "
+            "use fit, or another estimator"
+        )
+    return True
+
+
+class RBDRegressor(Results, RegressorMixin, BaseEstimator):
+    """Inverse dynamics of a robot: rigid body plus effects, identified together.
+
+    Parameters
+    ----------
+    robot : Robot, str or path
+        Robot, or its URDF.
+    effects : sequence of str, (str, joints) or Term, default=("viscous", "coulomb")
+        Effects beside the rigid body: ``"viscous"`` on all joints, ``("dahl", [1, 4])`` on some
+        (counted from 1), or a :class:`~skidyn.effects.Term` with its shape parameters. Shape
+        parameters that are not given are searched.
+    parameters : {"identified", "nominal"}, default="identified"
+        Whether inertial parameters are identified, or those of the URDF kept.
+    estimator : str, default="weighted"
+        How coefficients are found: ``"weighted"`` (least squares, joints weighted by their noise,
+        iterated), ``"ordinary"`` (all rows alike), ``"robust"`` (rows that the majority
+        contradicts lose their weight), ``"ridge"`` and ``"entropic"`` (pulled toward the bodies
+        of the URDF), ``"instrumental"`` (for noisy motion; fit needs instruments),
+        ``"output_error"`` (for simulation: refined until the simulated motion is that of the log).
+    prior_std : float or None, default=None
+        How far the true bodies may be from those of the URDF, relative, for ``"ridge"`` and
+        ``"entropic"``: 0.3 is 30 %. None takes what predicts left-out folds best.
+    consistent : bool or BodyConstraints, default=False
+        Demand bodies that can exist (positive definite pseudo-inertia), coefficients without
+        forbidden signs, and what else is known about the bodies.
+    horizon : float or None, default=1.0
+        Seconds that ``"output_error"`` simulates from each measured state; None for whole
+        trajectories, which only a log without drift allows.
+    forgetting : float, default=1.0
+        Weight of all earlier rows at each call of ``partial_fit``; 1 forgets nothing.
+    smooth : bool or None, default=None
+        Derive velocity and acceleration from the positions by a zero-phase smoother. None does so
+        where X has no accelerations. Needs time.
+    trajectory, time : int, str or None, default="auto"
+        Key columns of X; ``"auto"`` takes the columns of these names.
+
+    Attributes
+    ----------
+    coef_ : ndarray of shape (n_coefficients,)
+        Base parameters, then the effects' coefficients.
+    coef_names_ : list of str
+        Their names.
+    coef_std_ : ndarray of shape (n_coefficients,)
+        Standard errors by the jackknife over trajectories (or blocks of time), which
+        autocorrelation within a trajectory does not fool; where the data says nothing, how far the
+        URDF may be off.
+    base_parameters_ : dict of str to float
+        Base parameters by the combination of inertial parameters they stand for.
+    inertial_parameters_ : ndarray of shape (n_bodies, 10)
+        Parameters that give the same torque; what the data leaves open is as in the URDF.
+    effect_terms_ : list of Term
+        Effects with their shape parameters.
+    effect_coefficients_ : dict of Term to ndarray
+        Coefficients of every term.
+    evidence_ : Evidence
+        Triangular factors of [columns | torque] of every trajectory and joint; the torque is that
+        beyond the URDF's rigid body.
+    prior_std_ : float
+        The relative uncertainty of the URDF's bodies that was used; estimators with a prior only.
+    row_weights_ : list of ndarray of shape (n_rows_j,)
+        Weight of every averaged row by joint, 1.25 at most; the robust estimator only.
+    bands_ : PredictionBands
+        What :meth:`predict_interval` knows about the errors of left-out folds.
+    condition_number_ : float
+        Condition number of the weighted columns that the data shows at all, scaled to equal length:
+        how well the motion excites the model. Below 100 is good, beyond 1,000 a part of the
+        coefficients is chance.
+    noise_std_ : ndarray of shape (n_joints,)
+        Standard deviation of one averaged residual row, N m or N.
+    recordings_ : list of (int, ndarray of uint64)
+        By what the recordings are known again to which effects of single recordings belong.
+    robot_ : Robot
+        The robot.
+    columns_ : Columns
+        Which column of X means what.
+    n_features_in_ : int
+        Number of columns of X.
+    feature_names_in_ : ndarray of str
+        Column names of X where it has them.
+
+    See Also
+    --------
+    skidyn.diagnosis.diagnose : Which effect is missing.
+
+    Notes
+    -----
+    :doc:`/user_guide/identification` explains when to use which estimator.
+
+    Directions of the inertial parameters that the data hardly shows stay as in the URDF; those that
+    it knows ten times better than the URDF change by less than one part in a million. How far the
+    URDF is trusted is found from the data (empirical Bayes). Estimators with a prior have their own
+    way.
+
+    With a time column, torque and all regressor columns are averaged over the same short windows
+    (parallel filtering), without samples at rest and around reversals. Joints are weighted by their
+    noise, iterated.
+
+    References
+    ----------
+    M. Gautier (1997), Dynamic identification of robots with power model, ICRA, 1922-1927.
+
+    Examples
+    --------
+    >>> from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+    >>> log = make_hidden_effect_log(load_planar_arm(), None)
+    >>> model = RBDRegressor(log.robot).fit(log.X, log.y)
+    >>> model.predict(log.X).shape == log.y.shape
+    True
+    """
+
+    def __init__(
+        self,
+        robot: Robot | str | os.PathLike[str],
+        effects: Iterable[Any] = ("viscous", "coulomb"),
+        parameters: Literal["identified", "nominal"] = "identified",
+        *,
+        estimator: str = "weighted",
+        prior_std: float | None = None,
+        consistent: bool | BodyConstraints = False,
+        horizon: float | None = 1.0,
+        forgetting: float = 1.0,
+        smooth: bool | None = None,
+        trajectory: ColumnSpec = "auto",
+        time: ColumnSpec = "auto",
+    ) -> None:
+        self.robot = robot
+        self.effects = effects
+        self.parameters = parameters
+        self.estimator = estimator
+        self.prior_std = prior_std
+        self.consistent = consistent
+        self.horizon = horizon
+        self.forgetting = forgetting
+        self.smooth = smooth
+        self.trajectory = trajectory
+        self.time = time
+
+    def __getstate__(self) -> dict[str, Any]:
+        """State without dictionaries whose keys are objects, which skops cannot store."""
+        state = dict(super().__getstate__())
+        if "effect_coefficients_" in state:
+            evidence = state["evidence_"]
+            state["effect_coefficients_"] = list(state["effect_coefficients_"].items())
+            state["evidence_"] = [
+                evidence.columns,
+                list(evidence.factors.items()),
+                list(evidence.counts.items()),
+            ]
+        return state
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Restore what ``__getstate__`` gave."""
+        state = dict(state)
+        if "effect_coefficients_" in state:
+            columns, factors, counts = state["evidence_"]
+            state["effect_coefficients_"] = dict(state["effect_coefficients_"])
+            state["evidence_"] = Evidence(columns, dict(factors), dict(counts))
+        super().__setstate__(state)
+
+    def __sklearn_tags__(self) -> Any:
+        tags = super().__sklearn_tags__()
+        tags.target_tags.multi_output = True
+        return tags
+
+    # ------------------------------------------------------------------ public
+    def fit(
+        self, X: Any, y: Any, sample_weight: Any = None, instruments: Any = None
+    ) -> RBDRegressor:
+        """Identify the model.
+
+        Parameters
+        ----------
+        X : DataFrame or array of shape (n_samples, n_features)
+            Motion, following the X contract.
+        y : array-like of shape (n_samples, n_joints) or (n_samples,) for one joint
+            Torque, N m or N.
+        sample_weight : array-like of shape (n_samples,), default=None
+            Weight of every sample. An averaged row has the mean weight of its samples; those of
+            weight 0 are left out.
+        instruments : DataFrame or array of shape (n_samples, n_features), optional
+            The columns of X along a motion whose errors have nothing to do with those of X, such
+            as the reference of the controller; for ``estimator="instrumental"`` only.
+
+        Returns
+        -------
+        RBDRegressor
+            The model itself.
+
+        Raises
+        ------
+        ColumnError
+            X does not follow the contract, or y has the wrong number of joints.
+        ValueError
+            A parameter has no meaning, or instruments are missing, not wanted or of other rows.
+        """
+        method = self._method()
+        if instruments is not None and self.estimator != "instrumental":
+            raise ValueError(
+                f"estimator={self.estimator!r} takes no instruments; 'instrumental' does"
+            )
+        self.__dict__.pop("recordings_", None)
+        signals, torque, order = self._begin(X, y, first=True)
+        weight = None
+        if sample_weight is not None:
+            weight = _check_sample_weight(sample_weight, torque, dtype=np.float64)[order]
+            if np.any(weight < 0) or not np.any(weight > 0):
+                raise ValueError(
+                    "sample_weight must not be negative, and not zero for all samples; "
+                    f"it lies between {weight.min():g} and {weight.max():g}"
+                )
+        terms = make_terms(self.effects, self.robot_.n_joints)
+        self.recordings_ = remember(signals, terms)
+        identified = self.parameters == "identified"
+        plain = identified and instruments is None and weight is None and not method.rows
+        needs_fit = any(t.effect.needs_fit or t.is_open for t in terms)
+        if signals.time is None and plain and not needs_fit:
+            return self._fit_samples(signals, torque, terms, method)
+        problem = self._problem(signals, torque, terms, weight)
+        fit = find_terms(problem)
+        whole = problem.with_base_columns()
+        others = None
+        if instruments is not None:
+            Z = validate_data(self, instruments, reset=False, dtype=np.float64)
+            Z = Z[order] if len(Z) == len(order) else Z
+            others = instrument_rows(problem, fit, self._read(Z), self._smooths())
+        self.evidence_ = Evidence.from_problem(whole, fit.terms)
+        self.n_parts_ = 0
+        every = Regression.from_problem(whole, fit, others if whole is problem else None)
+        kept = np.searchsorted(whole.rigid_index, problem.rigid_index)
+        shown = every if whole is problem else Regression.from_problem(problem, fit, others)
+        if weight is not None:
+            # Rows have the weight 1 in the mean; the samples have another.
+            mean = float(weight[weight > 0].mean())
+            every, shown = every.copied(mean), shown.copied(mean)
+        solution = self._solve(method, every, shown, kept)
+        self._store(every, solution)
+        if method.simulates:
+            solution = refine_by_simulation(
+                self, every, solution, problem.signals, torque, self.horizon
+            )
+            self._store(every, solution)
+        joints = range(problem.n_joints)
+        self.bands_ = PredictionBands.calibrate(
+            self,
+            problem.signals,
+            torque,
+            every,
+            solution,
+            lambda rows: np.column_stack([problem.sample_folds(j, rows) for j in joints]),
+        )
+        return self
+
+    def _problem(
+        self, signals: Signals, torque: Array, terms: Sequence[Term], weight: Array | None
+    ) -> Problem:
+        """Averaged rows; every sample a row where the log has too few of them."""
+
+        def made(signals: Signals, smooth: bool) -> Problem:
+            return make_problem(
+                signals,
+                torque,
+                robot=self.robot_,
+                rigid_body=self.parameters == "identified",
+                terms=terms,
+                smooth=smooth,
+                reversals=hysteresis_joints(terms),
+                weight=weight,
+            )
+
+        problem = made(signals, self._smooths())
+        unknowns = len(problem.rigid_index) + sum(t.width for t in terms)
+        if signals.time is None or problem.rows.counts.sum() >= max(unknowns, 1):
+            return problem
+        warn_about_log(
+            f"{signals.n_samples} samples make {int(problem.rows.counts.sum())} rows when they are "
+            "averaged over short windows of motion, too few to fit a model: the log is short, "
+            "scattered in time, or at rest. Every sample is taken as a row instead, without care "
+            "for noise, rest and reversals. Use a longer log of motion."
+        )
+        if self._smooths():
+            signals = smooth_motion(signals).signals
+        return made(signals.with_(time=None), False)
+
+    def _solve(
+        self, method: Estimator, every: Regression, shown: Regression, kept: NDArray[np.int64]
+    ) -> Solution:
+        """Coefficients of all base parameters, by the data or, where it is silent, by the URDF."""
+        if method.whole:
+            return method.solve(every, self.prior_std)
+        solution = method.solve(shown, self.prior_std)
+        if "row_weights_" in solution.attributes:
+            every = every.weighted(solution.attributes["row_weights_"])
+        return keep_weak_directions(solution, kept, every)
+
+    def _fit_samples(
+        self, signals: Signals, torque: Array, terms: Sequence[Term], method: Estimator
+    ) -> RBDRegressor:
+        """Without a clock every sample is a row: their evidence says all that the rows do."""
+        block, owner, fold = sample_blocks(signals.trajectory)
+        parts = evidence_of_rows(signals, torque, self.robot_, terms, block)
+        folds = renumbered(parts, fold)
+        self.evidence_ = renumbered(parts, owner)
+        self.n_parts_ = 0
+        regression, solution = self._solve_evidence(method, folds, terms)
+        self._store(regression, solution)
+        self.bands_ = PredictionBands.calibrate(
+            self,
+            signals,
+            torque,
+            regression,
+            solution,
+            lambda rows: np.repeat(fold[block[rows], None], self.robot_.n_joints, axis=1),
+        )
+        return self
+
+    @available_if(_keeps_no_rows)
+    def partial_fit(self, X: Any, y: Any) -> RBDRegressor:
+        """Add a part of the data, and identify the model from all parts so far.
+
+        Only the evidence is kept, not the data: memory does not grow. The order of the parts does
+        not matter, and the result is that of ``fit`` on all of them, where these are trajectories
+        that are whole in one part and more than six, or data without time (``fit`` leaves out rows
+        at the borders of the blocks of time into which it cuts few trajectories).
+
+        Parameters
+        ----------
+        X : DataFrame or array of shape (n_samples, n_features)
+            Motion, following the X contract. Without a column of trajectories each part is one.
+        y : array-like of shape (n_samples, n_joints) or (n_samples,) for one joint
+            Torque, N m or N.
+
+        Returns
+        -------
+        RBDRegressor
+            The model itself.
+
+        Raises
+        ------
+        ColumnError
+            X does not follow the contract, or y has the wrong number of joints.
+        SkidynError
+            An effect with open shape parameters, or one whose columns depend on the fitted model.
+            After a ``fit`` its shape parameters are kept.
+        ValueError
+            A parameter has no meaning.
+        AttributeError
+            The estimator, such as the robust one, looks at single rows, which are not kept.
+        """
+        self._method()
+        first = not hasattr(self, "evidence_")
+        signals, torque, _ = self._begin(X, y, first=first)
+        given = self.effects if first else self.effect_terms_
+        terms = linear_terms(given, self.robot_.n_joints)
+        part = evidence_of_signals(
+            signals,
+            torque,
+            self.robot_,
+            terms,
+            rigid_body=self.parameters == "identified",
+            smooth=self._smooths(),
+        )
+        if first:
+            self.recordings_ = remember(signals, terms)
+        self.n_parts_ = 1 if first else self.n_parts_ + 1
+        if self.columns_.trajectory is None:
+            part = part.shifted(self.n_parts_)
+        if not first:
+            part = self.evidence_.scaled(self.forgetting) + part
+        self._store_evidence(part.shifted(0, GROUPS), terms)
+        # Evidence holds no single samples, from whose errors bands are made.
+        self.__dict__.pop("bands_", None)
+        return self
+
+    def predict(self, X: Any, return_std: bool = False) -> Any:
+        """Torque of the model.
+
+        Effects of single recordings (an offset of one run, a payload in some) act in those
+        recordings, which are known again by their motion, and in no other.
+
+        Parameters
+        ----------
+        X : DataFrame or array of shape (n_samples, n_features)
+            Motion. Effects with memory run along each trajectory.
+        return_std : bool, default=False
+            Also return the standard deviation of a measured torque from the prediction: errors of
+            left-out folds, and what the spread of the coefficients makes of this motion.
+
+        Returns
+        -------
+        torque : ndarray of shape (n_samples, n_joints) or (n_samples,), N m or N
+            Predicted torque.
+        std : ndarray of the same shape, N m or N
+            If asked for.
+        """
+        signals, back = self._motion(X)
+        torque = self._shaped_like_y(self._torque(signals)[back])
+        if not return_std:
+            return torque
+        return torque, self._shaped_like_y(find_bands(self).std(self, signals)[back])
+
+    def predict_interval(self, X: Any, level: float = 0.95) -> tuple[Array, Array]:
+        """Band around the prediction that holds a share of the measured torques.
+
+        Parameters
+        ----------
+        X : DataFrame or array of shape (n_samples, n_features)
+            Motion.
+        level : float, default=0.95
+            Share of the samples, of motion and rest each, that lies in the band.
+
+        Returns
+        -------
+        low, high : ndarray of shape (n_samples, n_joints) or (n_samples,), N m or N
+            Borders of the band.
+
+        Raises
+        ------
+        SkidynError
+            The model was not fitted by ``fit``, so that no errors of left-out folds are known.
+        ValueError
+            ``level`` is not between 0 and 1.
+        """
+        signals, back = self._motion(X)
+        half = find_bands(self).half_width(self, signals, level)[back]
+        torque = self._torque(signals)[back]
+        return self._shaped_like_y(torque - half), self._shaped_like_y(torque + half)
+
+    def _motion(self, X: Any) -> tuple[Signals, NDArray[np.intp]]:
+        """Motion in the order of time, and where the rows of X are in it."""
+        check_is_fitted(self)
+        X = validate_data(self, X, reset=False, dtype=np.float64)
+        order = self._order(X)
+        signals = self._read(X[order])
+        if named_recordings(self.effect_terms_):
+            signals = recognise(signals, self.recordings_)
+        if self._smooths():
+            signals = smooth_motion(signals).signals
+        return signals.with_(robot=self.robot_), np.argsort(order)
+
+    def _order(self, X: Array) -> NDArray[np.intp]:
+        """Rows of X in the order of time."""
+        columns = self.columns_
+        time = None if columns.time is None else X[:, columns.time]
+        order = order_in_time(trajectory_numbers(X, columns), time)
+        return np.arange(len(X)) if order is None else order
+
+    def _shaped_like_y(self, torque: Array) -> Array:
+        return torque[:, 0] if self._one_output else torque
+
+    def _torque(self, signals: Signals) -> Array:
+        """Torque of all joints; exporters call it with symbols in place of numbers."""
+        torque = self.rigid_body_torque(signals.q, signals.dq, signals.ddq)
+        for _ in self._effects(signals, torque):
+            pass
+        return torque
+
+    def _effects(self, signals: Signals, torque: Array) -> Iterator[tuple[Term, dict[int, Array]]]:
+        """Columns of every effect, each seeing the torque of those before it.
+
+        Effects on the transmission see the rigid body's torque, given as ``torque``; those on the
+        sensor come last and see the model's. The torque of each is added to ``torque`` on the way.
+        """
+        order = sorted(self.effect_terms_, key=lambda term: term.effect.needs_fit)
+        on_sensor = any(term.effect.sees_model for term in order)
+        smooth = torque.copy()
+        signals = signals.with_(load=torque.copy(), inertial_parameters=self.inertial_parameters_)
+        for term in order:
+            state = signals
+            if term.effect.sees_model:
+                state = signals.with_(model_torque=torque.copy(), smooth_torque=smooth.copy())
+            blocks = term.torque_columns(state)
+            for j, block in blocks.items():
+                own = block @ self.effect_coefficients_[term]
+                torque[:, j] += own
+                if on_sensor and not term.is_dry:
+                    smooth[:, j] += own
+            yield term, blocks
+
+    def rigid_body_torque(self, q: Array, dq: Array, ddq: Array) -> Array:
+        """Torque of the identified rigid body alone.
+
+        Parameters
+        ----------
+        q, dq, ddq : ndarray of shape (n_samples, n_joints)
+            Position, velocity and acceleration, SI units.
+
+        Returns
+        -------
+        ndarray of shape (n_samples, n_joints), N m or N
+            Torque without the effects.
+        """
+        check_is_fitted(self)
+        return self.robot_.inverse_dynamics(q, dq, ddq, parameters=self.inertial_parameters_)
+
+    def with_effects(self, effects: Iterable[Any]) -> RBDRegressor:
+        """An unfitted copy with more effects; those it has already are not added twice.
+
+        Parameters
+        ----------
+        effects : iterable of str, (str, joints) or Term
+            Effects to add.
+
+        Returns
+        -------
+        RBDRegressor
+            Not fitted.
+        """
+        more = [e for e in effects if e not in list(self.effects)]
+        parameters = self.get_params(deep=False) | {"effects": [*self.effects, *more]}
+        return type(self)(**parameters)
+
+    # ------------------------------------------------------------------ hooks for tests
+    def _resolve(self, n_features: int) -> Columns:
+        names = getattr(self, "feature_names_in_", None)
+        return resolve_columns(
+            None if names is None else list(names),
+            n_features,
+            self.robot_.joint_names,
+            trajectory=self.trajectory,
+            time=self.time,
+            require_acceleration=self.smooth is False,
+        )
+
+    def _check_targets(self, torque: Array) -> None:
+        n = self.robot_.n_joints
+        if torque.shape[1] != n:
+            raise ColumnError(
+                f"y has {torque.shape[1]} column(s); the robot has {n} joints "
+                f"({', '.join(self.robot_.joint_names)})"
+            )
+
+    # ------------------------------------------------------------------ reading
+    def _method(self) -> Estimator:
+        """The estimator; parameters without a meaning are refused."""
+        if self.parameters not in ("identified", "nominal"):
+            raise ValueError(f"parameters={self.parameters!r}; expected 'identified' or 'nominal'")
+        if not isinstance(self.consistent, bool | np.bool_ | BodyConstraints):
+            raise ValueError(
+                f"consistent={self.consistent!r}; expected True, False or BodyConstraints(...)"
+            )
+        if not (self.smooth is None or isinstance(self.smooth, bool | np.bool_)):
+            raise ValueError(f"smooth={self.smooth!r}; expected True, False or None")
+        for name in ("forgetting", "prior_std"):
+            value = getattr(self, name)
+            if not (isinstance(value, Real) or (value is None and name == "prior_std")):
+                raise ValueError(f"{name}={value!r}; expected a number")
+        if not 0 < self.forgetting <= 1:
+            raise ValueError(f"forgetting={self.forgetting!r}; expected a weight above 0, up to 1")
+        if self.prior_std is not None and not self.prior_std > 0:
+            raise ValueError(f"prior_std={self.prior_std!r}; expected a number above 0, or None")
+        return find_estimator(self.estimator)
+
+    def _begin(self, X: Any, y: Any, first: bool) -> tuple[Signals, Array, NDArray[np.intp]]:
+        """Motion and torque of validated data in the order of time, and that order."""
+        X, y = validate_data(
+            self, X, y, reset=first, multi_output=True, y_numeric=True, dtype=np.float64
+        )
+        if first:
+            self._one_output = y.ndim == 1
+            given = self.robot
+            self.robot_ = given if isinstance(given, Robot) else Robot.from_urdf(given)
+            self.columns_ = self._resolve(X.shape[1])
+        torque = y.reshape(len(y), -1)
+        self._check_targets(torque)
+        order = self._order(X)
+        signals, torque = self._read(X[order]), torque[order]
+        if signals.time is not None and np.any(np.diff(order) != 1):
+            _warn_of_leakage()
+            if not has_one_motion(signals.trajectory, signals.time):
+                # Recordings that nothing tells apart: no row has a neighbour.
+                signals = self._without_clock(signals)
+        if not first and named_recordings(self.effect_terms_):
+            signals = recognise(signals, self.recordings_)
+        for note in broken_notes(signals, torque, self.robot_.joint_names):
+            warn_about_log(note)
+        return signals, torque, order
+
+    def _without_clock(self, signals: Signals) -> Signals:
+        if self._smooths():
+            raise ColumnError(
+                "rows of X at the same time belong to several recordings, so that accelerations "
+                "cannot be derived from them; number the recordings in a column 'trajectory', or "
+                "give ddq1.. and smooth=False"
+            )
+        return signals.with_(time=None)
+
+    def _smooths(self) -> bool:
+        if self.smooth is not None:
+            return self.smooth
+        return self.columns_.ddq is None
+
+    def _read(self, X: Array) -> Signals:
+        if self.columns_.ddq is None and self.columns_.time is None:
+            raise ColumnError(
+                "X has neither accelerations nor time to derive them from; add ddq1.. or time"
+            )
+        signals = signals_from(X, self.columns_, self.robot_, to_derive=True)
+        if self.columns_.ddq is not None:
+            return signals
+        return signals.with_(ddq=_differences(signals))
+
+    # ------------------------------------------------------------------ fitting
+    def _store_evidence(self, evidence: Evidence, terms: Sequence[Term]) -> None:
+        """Identify from evidence alone."""
+        method = self._method()
+        regression, solution = self._solve_evidence(method, evidence, terms)
+        self.evidence_ = evidence
+        self._store(regression, solution)
+
+    def _solve_evidence(
+        self, method: Estimator, evidence: Evidence, terms: Sequence[Term]
+    ) -> tuple[Regression, Solution]:
+        every = Regression.from_evidence(evidence, self.robot_, terms, whole=True)
+        shown = Regression.from_evidence(evidence, self.robot_, terms, whole=False)
+        kept = np.searchsorted(every.rigid_index, shown.rigid_index)
+        return every, self._solve(method, every, shown, kept)
+
+    def _store(self, regression: Regression, solution: Solution) -> None:
+        robot, n_rigid = self.robot_, regression.n_rigid
+        base = find_base_parameters(robot)
+        effects = solution.coefficients[n_rigid:]
+        parameters = solution.parameters
+        if parameters is None:
+            change = np.zeros(10 * robot.n_bodies)
+            change[regression.rigid_index] = solution.coefficients[:n_rigid]
+            parameters = robot.inertial_parameters + change.reshape(-1, 10)
+        self.effect_terms_ = list(regression.terms)
+        if self.consistent:
+            parameters, effects = self._consistent(parameters, effects, solution)
+        self.inertial_parameters_ = parameters
+        self.effect_coefficients_ = {}
+        terms = TermSum(regression.terms)
+        for term, own in terms.slices():
+            self.effect_coefficients_[term] = effects[own]
+        values = base.values(parameters)
+        self.base_parameters_ = dict(zip(base.expressions, map(float, values), strict=True))
+        where = np.searchsorted(base.index, regression.rigid_index)
+        self.coef_names_ = [*(base.expressions[i] for i in where), *terms.names]
+        self.coef_ = np.r_[values[where], effects]
+        self.coef_std_ = solution.std
+        self.noise_std_ = solution.noise
+        rows = self._weighted_rows()[:, :-1]
+        shown = np.arange(rows.shape[1])
+        if self.parameters == "identified" and not find_estimator(self.estimator).whole:
+            # What the data does not show at all is as in the URDF, and not estimated.
+            n_base = len(base.index)
+            shown = np.r_[independent_columns(rows[:, :n_base]), shown[n_base:]]
+        self.condition_number_ = condition_number(rows[:, shown])
+        for name, value in solution.attributes.items():
+            setattr(self, name, value)
+
+
+def _differences(signals: Signals) -> Array:
+    """Accelerations by differences, for pieces that are too short for the smoother."""
+    ddq = np.zeros_like(signals.dq)
+    for rows in signals.segments:
+        if rows.stop - rows.start > 1:
+            times = signals.clock[rows]
+            if np.all(np.diff(times) > 0):
+                ddq[rows] = np.gradient(signals.dq[rows], times, axis=0)
+    return ddq
+
+
+def _warn_of_leakage() -> None:
+    from skidyn.model_selection import LeakageWarning
+
+    warnings.warn(
+        "the rows of X are not in the order of time, as after train_test_split or "
+        "KFold(shuffle=True). They are sorted by trajectory and time and the fit is sound, but a "
+        "score on the rows between them promises too much. Hold out whole "
+        "trajectories: TrajectoryKFold, GroupKFold, or GroupShuffleSplit",
+        LeakageWarning,
+        stacklevel=4,
+    )

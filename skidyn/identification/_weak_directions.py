@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the data hardly shows stays as in the URDF.
+
+Least squares gives every direction of the inertial parameters whatever fits the noise best. Where
+a motion hardly excites a direction, that is a number without bound, which cancels on the rows of
+the fit and nowhere else. Here every direction is weighed by how well the data knows it, compared
+with how well the URDF does.
+
+Directions are those in which both are independent: with ``S`` the information of the data about the
+base parameters beside the effects, and ``C`` the spread of the base parameters when all bodies
+change relatively by 1, the eigenvectors of ``S`` with respect to ``C^-1``. An eigenvalue ``l`` says
+that the data knows the direction to ``1/sqrt(l)``, relatively. How far the URDF is off, ``t``, and
+how much more than white noise the rows scatter, ``f``, maximise the likelihood of the least-squares
+coordinates ``z ~ N(0, t^2 + f / l)`` times weak priors (empirical Bayes). With ``x = l t^2 / f`` a
+direction keeps the share ``x^3 / (1 + x^3)`` of its distance from the URDF. The third power draws
+the line sharply: what the data knows ten times better than the URDF changes by one part in a
+million.
+
+References
+----------
+B. Efron, C. Morris (1973), Stein's estimation rule and its competitors: an empirical Bayes
+approach, J. American Statistical Association 68, 117-130.
+P. C. Hansen (1998), Rank-Deficient and Discrete Ill-Posed Problems, chapter 4 (filter factors).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag
+from scipy.optimize import minimize
+
+from skidyn._signals import Array
+from skidyn.evidence import solve_left_out
+from skidyn.identification._log_det import existing_bodies, local_units
+from skidyn.identification._regression import Regression, Solution
+from skidyn.robots import Robot, find_base_parameters
+
+#: Power that draws the line between what the data knows and what it does not.
+POWER = 3
+#: The bodies of a URDF are trusted to between 10 % and a factor of 1,000, and rows scatter by up to
+#: 1,000 times the white noise.
+LEAST_SPREAD, MOST_SPREAD, MOST_EXCESS = 0.1, 1e3, 1e6
+#: Noise of a joint counts as this share of the largest torque at least.
+LEAST_NOISE = 1e-9
+#: Share of the largest eigenvalue below which rounding decides.
+ROUNDING = 1e-13
+#: Share of it below which least squares does not resolve a direction, so that its coordinate says
+#: nothing about scatter.
+RESOLVED = 1e-8
+#: How far URDFs are off and how much more than white noise rows scatter, usually, and the factors
+#: by which both differ from robot to robot.
+USUAL, FACTOR = (0.3, 1.0), (3.0, 10.0)
+#: Largest pull on a direction relative to its information; keeps the left-out sums finite.
+MOST_PULL = 1e12
+
+
+def keep_weak_directions(
+    solution: Solution, kept: NDArray[np.int64], whole: Regression
+) -> Solution:
+    """A solution whose weak directions are those of the URDF.
+
+    Parameters
+    ----------
+    solution : Solution
+        Of an estimator without a prior.
+    kept : ndarray of shape (n_rigid_kept,)
+        Which of the rigid-body columns of ``whole`` the solution has coefficients of.
+    whole : Regression
+        With the columns of all base parameters, rows weighted as the estimator weighted them.
+
+    Returns
+    -------
+    Solution
+        Coefficients of all columns of ``whole``.
+    """
+    n, p = whole.n_rigid, whole.design[0].shape[1]
+    if not n:
+        return solution
+    place = np.r_[kept, np.arange(n, p)]
+    coefficients = np.zeros(p)
+    coefficients[place] = solution.coefficients
+    left = np.zeros((len(solution.left_out), p))
+    left[:, place] = solution.left_out
+
+    # Without any noise the numbers would not be finite.
+    torque = [np.sqrt(np.mean(y**2)) if len(y) else 1.0 for y in whole.target]
+    noise = np.maximum(solution.noise, LEAST_NOISE * max(torque) or 1.0)
+    grams, cross = whole.products(noise)
+    total = grams.sum(0)
+    # Effects follow the rigid body as the data wants it.
+    size = np.sqrt(np.diag(total)[n:])
+    size[size == 0] = 1.0
+    inner = total[n:, n:] / size[:, None] / size
+    follow = np.linalg.lstsq(inner, total[n:, :n] / size[:, None], rcond=1e-10)[0] / size[:, None]
+    root = _prior_root(whole.robot)
+    information = total[:n, :n] - total[:n, n:] @ follow
+    values, vectors = np.linalg.eigh(root.T @ information @ root)
+    values = np.where(values > ROUNDING * values[-1], values, 0.0)
+    directions = root @ vectors
+    into = vectors.T @ np.linalg.inv(root)
+
+    z = into @ coefficients[:n]
+    spread, excess = _spreads(z, values)
+    known = values * spread**2 / excess
+    share = known**POWER / (1 + known**POWER)
+    if whole.instruments is not None:
+        # Instruments undo a bias that the information does not tell of: only what is open is held.
+        share = (values > 0).astype(float)
+    moved = directions @ ((share - 1) * z)
+    coefficients[:n] += moved
+    coefficients[n:] -= follow @ moved
+
+    if whole.instruments is None:
+        # The same pull on the fits without a fold, in coordinates in which it is diagonal.
+        change = block_diag(directions, np.eye(p - n))
+        pull = np.zeros(p)
+        floor = np.maximum(values, ROUNDING * max(values[-1], 1e-300))
+        pull[:n] = np.minimum((1 - share) / np.maximum(share, 1 / MOST_PULL), MOST_PULL) * floor
+        _, left = solve_left_out(
+            change.T @ grams @ change, cross @ change, (np.diag(pull), np.zeros(p))
+        )
+        left = left @ change.T
+    else:
+        shift = left[:, :n] @ (directions @ ((share - 1)[:, None] * into)).T
+        left = left + np.hstack([shift, -shift @ follow.T])
+    open_ = directions * (np.sqrt(1 - share) * spread)
+    return replace(
+        solution,
+        coefficients=coefficients,
+        left_out=left,
+        open=np.hstack([open_.T, -open_.T @ follow.T]),
+    )
+
+
+def _prior_root(robot: Robot) -> Array:
+    """Root of the base parameters' covariance when all bodies change relatively by 1."""
+    units, _ = local_units(*2 * (existing_bodies(robot.inertial_parameters),))
+    spread = find_base_parameters(robot).regrouping @ block_diag(*units)
+    size = np.linalg.norm(spread, axis=1)
+    root = np.linalg.cholesky((spread / size[:, None]) @ (spread / size[:, None]).T)
+    return np.asarray(size[:, None] * root)
+
+
+def _spreads(z: Array, values: Array) -> tuple[float, float]:
+    """How far the URDF is off, and excess of the rows' scatter, both most likely."""
+    seen = values > RESOLVED * max(values.max(initial=0.0), 1e-300)
+    if not seen.any():
+        return LEAST_SPREAD, 1.0
+    squares, noise = z[seen] ** 2, 1 / values[seen]
+
+    def loss(at: Array) -> tuple[float, Array]:
+        parts = np.exp(2 * at[0]), np.exp(at[1]) * noise
+        variance = parts[0] + parts[1]
+        slope = (1 - squares / variance) / variance
+        doubt = (at - np.log(USUAL)) / np.log(FACTOR)
+        value = float(np.sum(np.log(variance) + squares / variance) + doubt @ doubt)
+        gradient = np.array([2 * parts[0] * slope.sum(), parts[1] @ slope])
+        return value, gradient + 2 * doubt / np.log(FACTOR)
+
+    limits = [np.log([LEAST_SPREAD, MOST_SPREAD]), np.log([1.0, MOST_EXCESS])]
+    starts = [(a, b) for a in np.log([0.1, 1.0, 10.0]) for b in np.log([1.0, 100.0])]
+    found = [minimize(loss, start, jac=True, bounds=limits) for start in starts]
+    best = min(found, key=lambda each: float(each.fun)).x
+    return float(np.exp(best[0])), float(np.exp(best[1]))

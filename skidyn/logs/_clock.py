@@ -1,0 +1,410 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Time in logs: clocks, alignment of channels, and where one trajectory ends."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from skidyn._exceptions import LogError
+from skidyn._optional import import_optional
+from skidyn._signals import GAP_STEPS, find_segments
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+#: A clock whose step is longer than so many of a channel's is slower.
+SLOWER = 1.75
+
+
+def seconds(table: pd.DataFrame, rate: float | None, source: str) -> np.ndarray:
+    """Clock of a table as float64: its time column, or row number over rate.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Columns of one channel; ``time`` may hold numbers, dates or text of either.
+    rate : float or None, Hz
+        Sampling rate where there is no time column.
+    source : str
+        Name for messages.
+
+    Returns
+    -------
+    ndarray of shape (n_samples,)
+        Numbers in the unit of the source; dates become seconds from the first row.
+
+    Raises
+    ------
+    LogError
+        No clock at all, or one that cannot be read.
+    """
+    pandas = import_optional("pandas", extra="io")
+    if "time" not in table.columns:
+        if rate is None:
+            raise LogError(
+                f"{source} has no time column. Name it with columns={{'time': ...}}, or pass rate= "
+                f"(Hz) if sampling is regular. It has: {', '.join(map(str, table.columns))}."
+            )
+        return np.arange(len(table)) / rate
+    column = table["time"]
+    if column.dtype.kind in "iu" and len(column) and abs(int(column.iloc[0])) > 2**53:
+        # nanoseconds since 1970 do not fit a float64 to the nanosecond; differences do
+        since: np.ndarray = column.to_numpy() - column.iloc[0]
+        return since.astype(np.float64)
+    if column.dtype.kind == "m":
+        since = (column - column.iloc[0]).dt.total_seconds().to_numpy()
+        return np.asarray(since, dtype=np.float64)
+    if column.dtype.kind in "fiu":
+        return np.asarray(column, dtype=np.float64)
+    if not _is_date(column):  # pandas takes dates for numbers of its own unit
+        try:
+            return np.asarray(pandas.to_numeric(column), dtype=np.float64)
+        except (TypeError, ValueError):
+            pass
+    try:
+        stamps = pandas.to_datetime(
+            column, utc=True, format=None if _is_date(column) else "ISO8601"
+        )
+    except (TypeError, ValueError) as error:
+        raise LogError(
+            f"{source}: the time column holds neither numbers nor dates: {error}"
+        ) from None
+    return np.asarray((stamps - stamps.iloc[0]).dt.total_seconds(), dtype=np.float64)
+
+
+def _is_date(column: pd.Series) -> bool:
+    return column.dtype.kind == "M"
+
+
+def align_channels(
+    tables: Sequence[pd.DataFrame],
+    names: Sequence[str],
+    rate: float | None,
+    notes: list[str],
+) -> pd.DataFrame:
+    """Bring channels with clocks of their own to one clock.
+
+    The clock is that of the channel with the positions, or regular at ``rate``; other signals are
+    interpolated linearly, never beyond their first and last sample and never across a gap.
+
+    Parameters
+    ----------
+    tables : sequence of DataFrame
+        Channels with a ``time`` column in seconds.
+    names : sequence of str
+        Names of the channels for messages.
+    rate : float or None, Hz
+        Rate of the common clock.
+    notes : list of str
+        What was done is appended here.
+
+    Returns
+    -------
+    DataFrame
+        One table with the rows that all channels cover.
+
+    Raises
+    ------
+    LogError
+        A signal occurs in two channels, a clock starts anew in one of several channels, or the
+        channels do not overlap in time.
+    """
+    pandas = import_optional("pandas", extra="io")
+    if len(tables) == 1 and rate is None:
+        return tables[0]
+    for table, name in zip(tables, names, strict=True):
+        unread = np.flatnonzero(~np.isfinite(table["time"].to_numpy()))
+        if len(unread):
+            raise LogError(
+                f"the clock of {name} is no number in row {unread[0]} ({len(unread)} such rows); "
+                "remove these rows before signals are interpolated."
+            )
+    if len(tables) == 1:
+        assert rate is not None
+        return _resampled(tables[0], rate, notes)
+    owner: dict[str, str] = {}
+    for table, name in zip(tables, names, strict=True):
+        for column in table.columns:
+            if column != "time" and owner.setdefault(column, name) != name:
+                raise LogError(
+                    f"{column} is in {owner[column]} and in {name}; choose one with topics=[...]."
+                )
+        restarts = np.flatnonzero(np.diff(table["time"].to_numpy()) < 0)
+        if len(restarts):
+            raise LogError(
+                f"the clock of {name} goes back in row {restarts[0] + 1}: which rows of the other "
+                "channels belong to it cannot be told. Store every run in a file of its own."
+            )
+    begin = max(table["time"].min() for table in tables)
+    end = min(table["time"].max() for table in tables)
+    if not end > begin:
+        spans = ", ".join(
+            f"{name}: {t['time'].min():.3f}..{t['time'].max():.3f} s"
+            for t, name in zip(tables, names, strict=True)
+        )
+        raise LogError(f"the channels do not overlap in time ({spans}).")
+    base = next((k for k, table in enumerate(tables) if "q1" in table.columns), 0)
+    clock = tables[base]["time"].to_numpy() if rate is None else np.arange(begin, end, 1 / rate)
+    common = (clock >= begin) & (clock <= end)
+    covered = common.copy()
+    for table in tables:
+        covered &= ~_in_gap(table["time"].to_numpy(), clock)
+    rows = clock[covered]
+    parts = [pandas.DataFrame({"time": rows})]
+    for k, table in enumerate(tables):
+        if k == base and rate is None:
+            parts.append(table.loc[covered].drop(columns="time").reset_index(drop=True))
+        else:
+            parts.append(_interpolate(table, rows))
+    grid = f"{rate:g} Hz" if rate is not None else names[base]
+    step = float(np.median(np.diff(rows))) if len(rows) > 1 else 0.0
+    faster = [n for t, n in zip(tables, names, strict=True) if _slower(step, t["time"].to_numpy())]
+    if faster:
+        grid += f" ({', '.join(faster)} averaged over its steps)"
+    notes.append(
+        f"channels {', '.join(names)} interpolated to the clock of {grid}; {int((~common).sum())} "
+        f"row(s) outside their common time and {int((common & ~covered).sum())} in gaps left out"
+    )
+    joined: pd.DataFrame = pandas.concat(parts, axis=1)
+    return joined
+
+
+def _resampled(table: pd.DataFrame, rate: float, notes: list[str]) -> pd.DataFrame:
+    """One table on a regular clock within each of its runs."""
+    pandas = import_optional("pandas", extra="io")
+    time = table["time"].to_numpy()
+    run = np.zeros(len(time), dtype=np.int64)
+    run[1:] = np.cumsum(np.diff(time) < 0)
+    if "trajectory" in table.columns:
+        number = table["trajectory"].to_numpy()
+        run[1:] += np.cumsum(number[1:] != number[:-1])
+    parts, lonely = [], 0
+    for rows in find_segments(run, time):
+        part = table.iloc[rows]
+        first, last = time[rows][0], time[rows][-1]
+        if not last > first:
+            lonely += len(part)
+            continue
+        # a last sample that is a rounding error short of the grid is on the grid
+        clock = first + np.arange(int((last - first) * rate + 1e-6) + 1) / rate
+        parts.append(_interpolate(part, np.minimum(clock, last)).assign(time=clock))
+    if not parts:
+        raise LogError("no two samples of the log belong together, so it cannot be resampled.")
+    alone = f"; {lonely} row(s) that stand alone left out" if lonely else ""
+    how = "averaged" if _slower(1 / rate, time) else "interpolated"
+    notes.append(f"{how} to {rate:g} Hz within {len(parts)} run(s) without a gap{alone}")
+    regular: pd.DataFrame = pandas.concat(parts, ignore_index=True)
+    return regular
+
+
+def _in_gap(time: np.ndarray, clock: np.ndarray) -> np.ndarray:
+    """Which times of a clock lie in a gap of a channel."""
+    steps = np.diff(time)
+    moving = steps[steps > 0]
+    if not len(moving):
+        return np.zeros(len(clock), dtype=bool)
+    longest = GAP_STEPS * float(np.median(moving))
+    right = np.clip(np.searchsorted(time, clock), 1, len(time) - 1)
+    near = np.minimum(np.abs(clock - time[right]), np.abs(clock - time[right - 1]))
+    return np.asarray((steps[right - 1] > longest) & (near > 1e-6 * longest))
+
+
+def _interpolate(table: pd.DataFrame, clock: np.ndarray) -> pd.DataFrame:
+    """Columns of a channel at other times; numbers of trajectories are not mixed.
+
+    On a slower clock a value is the mean over one of its steps: single samples would carry noise
+    and vibration that are faster than the clock, and look slow there.
+    """
+    pandas = import_optional("pandas", extra="io")
+    time = table["time"].to_numpy()
+    before = np.clip(np.searchsorted(time, clock, side="right") - 1, 0, len(time) - 1)
+    half = _half_step(time, clock)
+    columns = {}
+    for name in table.columns:
+        if name == "trajectory":
+            columns[name] = table[name].to_numpy()[before]
+        elif name != "time":
+            values = table[name].to_numpy(dtype=float)
+            columns[name] = np.interp(clock, time, values)
+            if half is not None:
+                wide = half > 0
+                columns[name][wide] = _mean_around(time, values, clock[wide], half[wide])
+    then: pd.DataFrame = pandas.DataFrame(columns)
+    return then
+
+
+def _slower(step: float, time: np.ndarray) -> bool:
+    """Whether a clock of such steps is slower than that of a channel."""
+    return len(time) > 1 and step > SLOWER * float(np.median(np.diff(time)))
+
+
+def _half_step(time: np.ndarray, clock: np.ndarray) -> np.ndarray | None:
+    """Half the span to average over, short of ends and gaps; None unless the clock is slower."""
+    step = float(np.median(np.diff(clock))) if len(clock) > 1 else 0.0
+    if not _slower(step, time):
+        return None
+    parts = find_segments(np.zeros(len(time)), time)
+    begins = np.array([time[part.start] for part in parts])
+    ends = np.array([time[part.stop - 1] for part in parts])
+    own = np.clip(np.searchsorted(begins, clock, side="right") - 1, 0, None)
+    room = np.minimum(clock - begins[own], ends[own] - clock)
+    half: np.ndarray = np.clip(room, 0.0, 0.5 * step)
+    return half
+
+
+def _mean_around(
+    time: np.ndarray, values: np.ndarray, clock: np.ndarray, half: np.ndarray
+) -> np.ndarray:
+    """Mean of the line through the samples over ``clock - half`` to ``clock + half``."""
+    missing = ~np.isfinite(values)
+    line = np.where(missing, 0.0, values)
+    steps = np.diff(time)
+    area = np.r_[0.0, np.cumsum(steps * (line[1:] + line[:-1]) / 2)]
+    slope = np.divide(np.diff(line), steps, out=np.zeros(len(steps)), where=steps > 0)
+
+    def until(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        k = np.clip(np.searchsorted(time, t, side="right") - 1, 0, len(steps) - 1)
+        on = t - time[k]
+        return k, area[k] + on * (line[k] + on * slope[k] / 2)
+
+    (first, low), (last, high) = until(clock - half), until(clock + half)
+    mean = (high - low) / (2 * half)
+    count = np.r_[0, np.cumsum(missing)]
+    touched = count[np.minimum(last + 2, len(values))] > count[first]
+    return np.where(touched, np.nan, mean)
+
+
+def split_at_restarts(time: np.ndarray) -> tuple[np.ndarray, int]:
+    """Trajectory numbers for a log whose clock starts anew with every run.
+
+    A step back to the beginning (within 5 % of what has passed) is a new run; a smaller step back
+    is left for :func:`skidyn._checks.check_time_order` to refuse.
+
+    Returns
+    -------
+    trajectory : ndarray of shape (n_samples,)
+    restarts : int
+        Number of times the clock started anew.
+    """
+    number = np.zeros(len(time), dtype=np.int64)
+    begin = 0
+    for row in np.flatnonzero(np.diff(time) < 0) + 1:
+        passed = time[row - 1] - time[begin]
+        if time[row] <= time[begin] + 0.05 * passed:
+            number[row:] += 1
+            begin = int(row)
+    return number, int(number[-1]) if len(number) else 0
+
+
+def split_trajectories(
+    time: np.ndarray,
+    trajectory: np.ndarray,
+    position: np.ndarray,
+    gap: float | Literal["auto"] | None,
+    dwell: float | None,
+) -> np.ndarray:
+    """Cut trajectories at gaps in time and in the middle of long rests.
+
+    Parameters
+    ----------
+    time : ndarray of shape (n_samples,), s
+        Strictly increasing within each trajectory.
+    trajectory : ndarray of shape (n_samples,)
+        Numbers so far.
+    position : ndarray of shape (n_samples, n_joints)
+        Joint positions.
+    gap : float, s, "auto" or None
+        Longest step within a trajectory; ``"auto"``: 20 median steps, at least 0.2 s.
+    dwell : float, s, or None
+        Shortest rest that is cut.
+
+    Returns
+    -------
+    ndarray of shape (n_samples,)
+        New numbers from 0 in row order.
+    """
+    n = len(time)
+    cut = np.zeros(n, dtype=bool)
+    cut[1:] = trajectory[1:] != trajectory[:-1]
+    steps = np.diff(time)
+    if gap is not None and n > 1:
+        inside = steps[~cut[1:]]
+        longest = max(20 * float(np.median(inside)), 0.2) if gap == "auto" and len(inside) else gap
+        if longest != "auto":
+            cut[1:] |= steps > longest
+    if dwell is not None:
+        cut[_rest_middles(time, np.cumsum(cut), position, dwell)] = True
+    return np.cumsum(cut)
+
+
+#: A rest: all positions stay within this share of their range for as long as a rest is long.
+STILL = 2e-3
+
+
+def _rest_middles(
+    time: np.ndarray, trajectory: np.ndarray, position: np.ndarray, dwell: float
+) -> list[int]:
+    """Rows in the middle of rests: for at least ``dwell`` s no joint leaves its band of noise.
+
+    The band, and not the step from row to row, tells a rest with a noisy encoder from slow motion.
+    """
+    if len(time) < 3:
+        return []
+    # second differences are nearly all noise: their median size is 1.65 of its deviation
+    noise = np.median(np.abs(np.diff(position, n=2, axis=0)), axis=0) / 1.65
+    band = STILL * np.ptp(position, axis=0) + 8 * noise + 1e-12
+    middles = []
+    borders = np.flatnonzero(np.diff(trajectory)) + 1
+    for first, last in zip(np.r_[0, borders], np.r_[borders, len(time)], strict=True):
+        t, q = time[first:last], position[first:last]
+        ends = np.searchsorted(t, t + dwell - 1e-9)  # first row that is a rest away from each
+        still = np.zeros(len(t) + 1, dtype=np.int64)
+        for begin in np.flatnonzero(_stays(q, ends, band)):
+            still[begin] += 1
+            still[ends[begin] + 1] -= 1
+        resting = np.cumsum(still)[:-1] > 0
+        edges = np.flatnonzero(np.diff(np.r_[0, resting.astype(int), 0]))
+        middles += [
+            int(first + (begin + end) // 2)
+            for begin, end in zip(edges[::2], edges[1::2], strict=True)
+            if begin > 0 and end < len(t)  # a rest at the border cuts nothing
+        ]
+    return middles
+
+
+def _stays(q: np.ndarray, ends: np.ndarray, band: np.ndarray) -> np.ndarray:
+    """Whether all joints stay in their bands from each row to the row where its rest would end."""
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d  # only a log in one piece needs it
+
+    stays = ends < len(q)
+    length = np.minimum(ends, len(q) - 1) - np.arange(len(q)) + 1
+    size = int(np.median(length)) if len(length) else 1
+    for j in range(q.shape[1]):
+        # windows of the usual length; uneven clocks make a rest a little shorter or longer
+        high = maximum_filter1d(q[:, j], size, origin=-((size - 1) // 2))
+        low = minimum_filter1d(q[:, j], size, origin=-((size - 1) // 2))
+        stays &= high - low <= band[j]
+    return stays
+
+
+def derive_velocity(position: np.ndarray, time: np.ndarray, trajectory: np.ndarray) -> np.ndarray:
+    """Central differences of the positions, within each segment.
+
+    Raises
+    ------
+    LogError
+        A segment of a single row, which has no velocity.
+    """
+    velocity = np.empty_like(position)
+    for rows in find_segments(trajectory, time):
+        if rows.stop - rows.start < 2:
+            raise LogError(
+                f"row {rows.start} stands alone between gaps, so no velocity can be derived for "
+                "it; remove it or supply dq."
+            )
+        velocity[rows] = np.gradient(position[rows], time[rows], axis=0)
+    return velocity

@@ -1,0 +1,354 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Readers of tables: text and NumPy archives. Each gives channels of named columns."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import zipfile
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from skidyn._checks import refuse_duplicates, warn_about_log
+from skidyn._exceptions import LogError
+from skidyn._names import PER_JOINT, quantity_of
+from skidyn._optional import import_optional
+from skidyn.logs._bounds import MAX_BYTES, check_size
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+#: Names of fields that are left out: those of rows, and what stands behind the last separator.
+_ROW_NAMES, _NOTHING = "names of rows", "behind the last separator"
+
+
+@dataclass
+class Channel:
+    """Columns that share one clock, as a file holds them.
+
+    Parameters
+    ----------
+    name : str
+        Topic, group or file name, for messages.
+    table : DataFrame
+        The columns under the names of the source.
+    attributes : dict
+        What the file says about itself, such as ``joint_names``.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> from skidyn.logs import Channel
+    >>> Channel("arm", pd.DataFrame({"q1": [0.0]}), {"joint_names": ["elbow"]}).name
+    'arm'
+    """
+
+    name: str
+    table: pd.DataFrame
+    attributes: dict[str, Any] = field(default_factory=dict)
+
+
+def read_csv_channels(path: Path, max_bytes: int) -> list[Channel]:
+    """Read a text table; the separator, a decimal comma and a missing header are recognised."""
+    pandas = import_optional("pandas", extra="io")
+    check_size(path, _unpacked(path, max_bytes), max_bytes)
+    with _open_text(path) as file:
+        lines = [line for _, line in zip(range(200), file, strict=False)]
+    skip = next(
+        (k for k, line in enumerate(lines) if line.strip() and not line.startswith(("#", "%"))), 0
+    )
+    if not lines or not lines[skip].strip():
+        raise LogError(f"{path}: the file is empty.")
+    separator = _separator(lines[skip])
+    first_row = next(csv.reader([lines[skip]], delimiter=separator or " ", skipinitialspace=True))
+    cells = [cell.strip() for cell in first_row if separator or cell]
+    decimal = "," if separator == ";" and any("," in line for line in lines[skip + 1 :]) else "."
+    headless = all(_is_number(cell.replace(decimal, ".")) for cell in cells if cell)
+    if not headless:
+        refuse_duplicates(cells, str(path))
+    shape = _shape_of_rows(path, separator, skip + (not headless), max_bytes)
+    names = _names_of_fields(path, cells, headless, shape)
+    table = pandas.read_csv(
+        path,
+        sep=separator or r"\s+",
+        decimal=decimal,
+        header=None,
+        names=names,
+        usecols=[name for name in names if name not in (_ROW_NAMES, _NOTHING)],
+        skiprows=skip + (not headless),
+        skipinitialspace=True,
+        comment="#",
+        encoding="utf-8-sig",
+        index_col=False,
+        low_memory=False,
+    )
+    table.columns = [str(name) for name in table.columns]
+    lists = {str(name): list_cells(table[name], str(name), str(path)) for name in table.columns}
+    if any(block is not None for block in lists.values()):
+        pieces = [
+            table[[name]] if block is None else table_from_arrays({name: block})
+            for name, block in lists.items()
+        ]
+        table = pandas.concat(pieces, axis=1)
+    return [Channel(path.name, table)]
+
+
+@dataclass
+class _Shape:
+    """How many fields the rows of a text have, and whether the last is always empty."""
+
+    width: int = 0
+    n_rows: int = 0
+    open_end: bool = True
+
+
+def _shape_of_rows(path: Path, separator: str | None, skip: int, max_bytes: int) -> _Shape:
+    """Refuse rows of different lengths, which pandas would fill or cut, and too many of them."""
+    shape = _Shape()
+    for number, width, last in _rows_of_text(path, separator, skip):
+        if shape.n_rows and width != shape.width:
+            raise LogError(
+                f"{path}: line {number} has {width} fields, the lines before {shape.width}. "
+                "Was the recording cut off, or does a field hold the separator? Mend or remove "
+                "the line."
+            )
+        shape.width = width
+        shape.n_rows += 1
+        shape.open_end &= not last.strip()
+        if not shape.n_rows % 1000:
+            check_size(path, 8 * shape.width * shape.n_rows, max_bytes)
+    check_size(path, 8 * shape.width * shape.n_rows, max_bytes)
+    return shape
+
+
+def _rows_of_text(
+    path: Path, separator: str | None, skip: int
+) -> Iterator[tuple[int, int, bytes | str]]:
+    """Number of the line, of its fields, and the last, without comments and empty lines."""
+    mark = None if separator is None else separator.encode()
+    with gzip.open(path) if path.suffix.lower() == ".gz" else path.open("rb") as file:
+        lines = enumerate(file, 1)
+        for number, line in lines:
+            if number <= skip:
+                continue
+            while line.count(b'"') % 2 and (more := next(lines, None)):  # a line end in quotes
+                line += more[1]
+            quoted = b'"' in line
+            line = line.rstrip(b"\r\n") if quoted else line.partition(b"#")[0].rstrip(b"\r\n")
+            if not line.strip():
+                continue
+            if not quoted and mark is None:
+                yield number, len(line.split()), b"1"
+            elif not quoted and mark is not None:
+                yield number, line.count(mark) + 1, line[line.rfind(mark) + 1 :]
+            else:
+                text = [line.decode("utf-8", errors="replace")]
+                (row,) = csv.reader(text, delimiter=separator or " ", skipinitialspace=True)
+                row = row if separator else [cell for cell in row if cell]
+                yield number, len(row), row[-1]
+
+
+def _names_of_fields(path: Path, cells: Sequence[str], headless: bool, shape: _Shape) -> list[str]:
+    """A name for every field of a row."""
+    if headless:
+        return [str(k) for k in range(len(cells))]
+    if not shape.n_rows or shape.width == len(cells):
+        return list(cells)
+    if shape.width == len(cells) + 1 and shape.open_end:
+        return [*cells, _NOTHING]
+    if shape.width == len(cells) + 1:
+        warn_about_log(
+            f"{path}: rows have one field more than the header. The first is taken for the names "
+            "of rows, as R writes them, and left out."
+        )
+        return [_ROW_NAMES, *cells]
+    raise LogError(
+        f"{path}: rows have {shape.width} fields, the header {len(cells)} "
+        f"({', '.join(cells[:6])}{', ...' if len(cells) > 6 else ''}). Give each column a name."
+    )
+
+
+def _open_text(path: Path) -> Any:
+    """A text file, or one that is compressed, for reading."""
+    if path.suffix.lower() == ".gz":
+        return gzip.open(path, "rt", encoding="utf-8-sig", errors="replace", newline="")
+    return path.open(encoding="utf-8-sig", errors="replace", newline="")
+
+
+def _unpacked(path: Path, most: int) -> int:
+    """Bytes of a file once unpacked; of a compressed one no further than the most allowed."""
+    if path.suffix.lower() != ".gz":
+        return path.stat().st_size
+    size = 0
+    with gzip.open(path, "rb") as file:
+        while size <= most and (block := file.read(2**20)):
+            size += len(block)
+    return size
+
+
+def list_cells(column: Any, name: str, source: str) -> np.ndarray | None:
+    """Block (n, joints) of a text column of lists such as ``"[0.1, 0.2]"``; None if it is none.
+
+    Raises
+    ------
+    LogError
+        A cell among lists that is none, or lists of differing length.
+    """
+    if column.dtype.kind not in "OUT" or not len(column):
+        return None
+    first = str(column.iloc[0]).strip()
+    if len(first) < 2 or first[0] + first[-1] not in ("[]", "()"):
+        return None
+    rows = []
+    for k, cell in enumerate(column):
+        text = str(cell).strip()
+        try:
+            if text[:1] + text[-1:] not in ("[]", "()"):
+                raise ValueError
+            rows.append([float(word) for word in text[1:-1].replace(",", " ").split()])
+        except ValueError:
+            raise LogError(
+                f"{source}: {name} holds {text[:40]!r} in row {k}, where a list of numbers such as "
+                f"{first[:40]} is expected."
+            ) from None
+    return stack_rows(rows, name, source)
+
+
+def read_npz_channels(path: Path, max_bytes: int) -> list[Channel]:
+    """Read a NumPy archive of columns ``(n,)`` and blocks ``(n, joints)``; never unpickles."""
+    arrays = load_npz(path, max_bytes)
+    attributes = {}
+    if "joint_names" in arrays:
+        attributes["joint_names"] = [str(name) for name in arrays.pop("joint_names")]
+    return [Channel(path.name, table_from_arrays(of_one_length(arrays, str(path))), attributes)]
+
+
+def of_one_length(arrays: Mapping[str, np.ndarray], source: str) -> dict[str, np.ndarray]:
+    """Numeric arrays with one row per sample: those of the most common length.
+
+    Others are constants and settings, and are left out with a warning.
+
+    Raises
+    ------
+    LogError
+        There is no numeric array of one or two dimensions, or a signal of another length.
+    """
+    numeric = {k: a for k, a in arrays.items() if a.ndim in (1, 2) and a.dtype.kind in "fiub"}
+    lengths = Counter(len(a) for a in numeric.values())
+    if not lengths:
+        raise LogError(f"{source}: holds no numeric columns.")
+    n = max(lengths, key=lambda length: (lengths[length], length))
+    others = {name: len(a) for name, a in numeric.items() if len(a) != n}
+    for name, length in others.items():
+        # a vector such as q0, of one number a joint, is no signal
+        if 2 * length > n and quantity_of(name) is not None:
+            like = next(name for name, a in numeric.items() if len(a) == n)
+            raise LogError(
+                f"{source}: {name} has {length} rows, {like} has {n}. Which rows belong together "
+                "cannot be known; store signals of one length."
+            )
+    if left := [f"{name} ({length})" for name, length in others.items() if length > 1]:
+        warn_about_log(f"{source}: of other lengths than {n} rows and left out: {', '.join(left)}")
+    return {name: a for name, a in numeric.items() if len(a) == n}
+
+
+def load_npz(path: Path, max_bytes: int = MAX_BYTES) -> dict[str, np.ndarray]:
+    """All arrays of an npz file, refusing pickles and archives that unpack to too much.
+
+    Raises
+    ------
+    LogError
+        Not an archive, a pickled member, a header that promises other sizes than the member
+        holds, or more than ``max_bytes`` once unpacked.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            members = archive.infolist()
+            check_size(path, sum(member.file_size for member in members), max_bytes)
+            for member in members:
+                _check_npy_header(archive, member, path)
+        with np.load(path, allow_pickle=False) as data:
+            return {name: data[name] for name in data.files}
+    except zipfile.BadZipFile as error:
+        raise LogError(f"{path}: not a NumPy archive (.npz): {error}") from error
+    except ValueError as error:
+        if isinstance(error, LogError):
+            raise
+        raise LogError(
+            f"{path}: {error}. Arrays of objects are pickles and are not read; store numbers and "
+            "strings."
+        ) from error
+
+
+def _check_npy_header(archive: zipfile.ZipFile, member: zipfile.ZipInfo, path: Path) -> None:
+    """Refuse a member whose header promises more than the member holds, before memory is taken."""
+    if not member.filename.endswith(".npy"):
+        return
+    with archive.open(member) as file:
+        version = np.lib.format.read_magic(file)
+        read = np.lib.format.read_array_header_1_0
+        if version != (1, 0):
+            read = np.lib.format.read_array_header_2_0
+        shape, _, dtype = read(file)
+    if (
+        not dtype.hasobject
+        and int(np.prod(shape, dtype=object)) * dtype.itemsize > member.file_size
+    ):
+        raise LogError(
+            f"{path}: {member.filename} promises an array of shape {shape} but is short."
+        )
+
+
+def table_from_arrays(columns: Mapping[str, np.ndarray]) -> pd.DataFrame:
+    """Table of one-dimensional columns; a block ``q`` of shape (n, 3) becomes ``q1, q2, q3``.
+
+    A single column ``q`` is the position of the only joint and becomes ``q1``.
+    """
+    pandas = import_optional("pandas", extra="io")
+    flat: dict[str, Any] = {}
+    for name, values in columns.items():
+        single = values.ndim == 1 or values.shape[1] == 1
+        if single and name not in PER_JOINT:
+            column = values.reshape(len(values))
+            # as objects: pandas would write out each text, however often it is named
+            text = column.dtype == object
+            flat[name] = pandas.Series(column, dtype=object) if text else column
+        else:
+            block = values.reshape(len(values), -1)
+            for k in range(block.shape[1]):
+                flat[f"{name}{k + 1}"] = block[:, k]
+    table: pd.DataFrame = pandas.DataFrame(flat)
+    return table
+
+
+def stack_rows(rows: Sequence[Any], name: str, source: str) -> np.ndarray:
+    """Block (n, joints) of a column of lists, which must all be equally long."""
+    lengths = Counter(len(row) for row in rows)
+    if len(lengths) > 1:
+        common = lengths.most_common(1)[0][0]
+        row = next(k for k, values in enumerate(rows) if len(values) != common)
+        raise LogError(
+            f"{source}: {name} has {len(rows[row])} values in row {row}, {common} in most others."
+        )
+    return np.array([np.asarray(row, dtype=float) for row in rows])
+
+
+def _separator(line: str) -> str | None:
+    """The most frequent separator of a line; None for blanks."""
+    counts = {mark: line.count(mark) for mark in (",", ";", "\t", "|")}
+    best = max(counts, key=lambda mark: counts[mark])
+    return best if counts[best] else None
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

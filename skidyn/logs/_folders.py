@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Recordings of several files: folders, globs, one file per signal, LeRobot data sets."""
+
+from __future__ import annotations
+
+import glob
+import json
+import os
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from skidyn._exceptions import LogError
+from skidyn._names import quantity_of
+from skidyn._optional import import_optional
+from skidyn.logs._files import Channel
+from skidyn.logs._formats import known_suffixes, suffix_of
+
+#: A list of names beside the tables of a recording.
+NAMES = re.compile(r".*joints?[_-]?(list|names?)?\.(txt|csv)", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Run:
+    """Files of one recording.
+
+    Attributes
+    ----------
+    name : str
+        Path for messages.
+    files : list of Path
+        One file, or one per signal.
+    joints : list of str
+        Names of the joints, where a file beside the tables lists them.
+    """
+
+    name: str
+    files: list[Path]
+    joints: list[str] = field(default_factory=list)
+
+
+def find_runs(path: str | os.PathLike[str]) -> list[Run]:
+    """Recordings that a path stands for: itself, the matches of a pattern, or those of a folder.
+
+    Parameters
+    ----------
+    path : path
+        A file, a pattern such as ``"runs/*.csv"``, or a folder.
+
+    Returns
+    -------
+    list of Run
+        In the order of their names.
+
+    Raises
+    ------
+    LogError
+        A pattern without matches, or a folder without logs.
+    """
+    given = Path(path)
+    if not given.exists() and glob.has_magic(str(path)):
+        matches = sorted(glob.glob(str(path), recursive=True))
+        if not matches:
+            raise LogError(f"{path}: no file matches this pattern.")
+        return [run for match in matches for run in find_runs(match)]
+    if not given.is_dir() or (given / "metadata.yaml").exists():
+        return [Run(str(given), [given])]
+    if (given / "meta" / "info.json").exists():
+        return _lerobot_runs(given)
+    names = [f for f in sorted(given.iterdir()) if f.is_file() and NAMES.fullmatch(f.name)]
+    files = [
+        f
+        for f in sorted(given.iterdir())
+        if f.is_file() and f not in names and suffix_of(f) in known_suffixes()
+    ]
+    if files:
+        joints = names[0].read_text(encoding="utf-8").split() if names else []
+        return [Run(str(given), files, joints)]
+    inside = [folder for folder in sorted(given.iterdir()) if folder.is_dir()]
+    runs = [run for folder in inside if _holds_logs(folder) for run in find_runs(folder)]
+    if not runs:
+        raise LogError(
+            f"{given}: the folder holds no log. Known are {' '.join(known_suffixes())}, "
+            "LeRobot data sets and ROS 2 bags."
+        )
+    return runs
+
+
+def _holds_logs(folder: Path) -> bool:
+    files = [*folder.iterdir(), *folder.glob("*/*")]
+    return any(suffix_of(f) in known_suffixes() or f.name == "metadata.yaml" for f in files)
+
+
+def _lerobot_runs(folder: Path) -> list[Run]:
+    """Files of a LeRobot data set, and the names of its motors."""
+    try:
+        info = json.loads((folder / "meta" / "info.json").read_text(encoding="utf-8"))
+        names = info.get("features", {}).get("observation.state", {}).get("names") or []
+    except (ValueError, AttributeError, RecursionError) as error:
+        raise LogError(f"{folder / 'meta' / 'info.json'}: cannot be read: {error}") from None
+    if isinstance(names, dict):  # {"motors": [...]} in older versions
+        names = next(iter(names.values()), [])
+    joints = [str(name).removesuffix(".pos") for name in names if isinstance(name, str)]
+    files = sorted((folder / "data").rglob("*.parquet"))
+    if not files:
+        raise LogError(
+            f"{folder}: a LeRobot data set without data/**/*.parquet; download its data too."
+        )
+    return [Run(str(file), [file], joints) for file in files]
+
+
+def read_runs(run: Run, read: Callable[[Path], list[Channel]]) -> list[tuple[str, list[Channel]]]:
+    """Channels of every recording in the files of a run.
+
+    Files that hold positions and torques each are recordings of their own; others are channels of
+    one recording, and a file that is named after a signal holds that signal.
+
+    Parameters
+    ----------
+    run : Run
+        Files.
+    read : callable
+        Reads the channels of one file.
+
+    Returns
+    -------
+    list of (str, list of Channel)
+        Name for messages, and channels.
+    """
+    channels = [[_named(c, run) for c in read(file)] for file in run.files]
+    if len(run.files) == 1:
+        return [(run.name, channels[0])]
+    pairs = list(zip(run.files, channels, strict=True))
+    if all(_is_whole(own) and not _of_one_signal(file) for file, own in pairs):
+        return [(str(file), own) for file, own in pairs]
+    return [(run.name, _side_by_side([_as_signal(c, f) for f, own in pairs for c in own]))]
+
+
+def _named(channel: Channel, run: Run) -> Channel:
+    joints = run.joints or channel.attributes.get("joint_names", [])
+    attributes = channel.attributes | ({"joint_names": joints} if joints else {})
+    return replace(channel, attributes=attributes)
+
+
+def _is_whole(channels: Sequence[Channel]) -> bool:
+    """Whether positions and torques, or currents, are in these channels."""
+    found = {quantity_of(str(name)) for c in channels for name in c.table.columns}
+    return "q" in found and bool({"tau", "i"} & found)
+
+
+def _of_one_signal(file: Path) -> str | None:
+    """Quantity that a file is named after."""
+    return quantity_of(file.name.partition(".")[0])
+
+
+def _as_signal(channel: Channel, file: Path) -> Channel:
+    """A channel of a file that is named after a signal, its columns named so too."""
+    quantity = _of_one_signal(file)
+    if quantity is None or quantity == "trajectory":
+        return channel
+    columns = list(channel.table.columns)
+    found = {name: quantity_of(str(name)) for name in columns}
+    # positions in "commands.csv" are commanded ones; every other column keeps its own name
+    foreign = [n for n in columns if found[n] not in ("time", "trajectory", quantity)]
+    if quantity == "time":
+        return replace(channel, table=channel.table.rename(columns={columns[0]: "time"}))
+    numeric = [n for n in foreign if channel.table[n].dtype.kind in "fiub"]
+    if any(found[n] == quantity for n in columns):
+        return channel
+    ahead = numeric[0] if numeric and found.get(numeric[0]) is None else None
+    if ahead is not None and str(ahead).lower() in ("", "index", "unnamed: 0"):
+        numeric = numeric[1:]
+    names = {name: f"{quantity}{k + 1}" for k, name in enumerate(numeric)}
+    return replace(channel, table=channel.table.rename(columns=names))
+
+
+def _side_by_side(channels: Sequence[Channel]) -> list[Channel]:
+    """Channels without a clock put beside the one of as many rows that has one."""
+    pandas = import_optional("pandas", extra="io")
+
+    def has_clock(channel: Channel) -> bool:
+        return any(quantity_of(str(name)) == "time" for name in channel.table.columns)
+
+    clocked = [c for c in channels if has_clock(c)] or list(channels[:1])
+    joined: dict[int, list[Any]] = {id(c): [c.table] for c in clocked}
+    for channel in channels:
+        if channel in clocked:
+            continue
+        partner = next((c for c in clocked if len(c.table) == len(channel.table)), None)
+        if partner is None:
+            raise LogError(
+                f"{channel.name} has no time column and {len(channel.table)} rows, other than "
+                f"{', '.join(f'{c.name} ({len(c.table)})' for c in clocked)}: which rows belong "
+                "together cannot be told."
+            )
+        joined[id(partner)].append(channel.table.reset_index(drop=True))
+    return [
+        replace(
+            c, table=pandas.concat(joined[id(c)], axis=1) if len(joined[id(c)]) > 1 else c.table
+        )
+        for c in clocked
+    ]

@@ -1,0 +1,352 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How good a log is: clock, resolution, consistency and excitation, before any model is fitted."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from skidyn._checks import as_numbers, check_time_order, count_joints, require_columns
+from skidyn._exceptions import LogError
+from skidyn._signals import Signals
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from skidyn.measurement import Measurement, Suspicion
+    from skidyn.robots import Robot
+
+
+@dataclass(frozen=True)
+class JointQuality:
+    """Quality of the signals of one joint.
+
+    Parameters
+    ----------
+    name : str
+        Joint.
+    resolution : float, rad or m
+        Step of the position sensor; NaN where positions are not visibly quantised.
+    position_range : tuple of float, rad or m
+        Smallest and largest position.
+    position_coverage : float
+        Share of the range between the limits that was visited; NaN without limits.
+    largest_velocity : float, rad/s or m/s
+        Largest absolute velocity.
+    reversals : int
+        How often the direction of motion changes.
+    rest_share : float
+        Share of rows in which the joint does not move.
+    torque_range : tuple of float, N m or N
+        Smallest and largest torque.
+    saturated_share : float
+        Share of rows in which the torque stays at its extreme value.
+    velocity_slope, velocity_correlation : float
+        Velocity against differentiated position; both are 1 in a consistent log.
+    torque_delay : float, s
+        Time by which torque lags motion (positive: torque is late); NaN where it cannot be told.
+        Pre-sliding friction looks like a lag of its joint; a delay is alike in all joints.
+    excited : bool
+        Whether the joint moves enough for its own parameters to be identified.
+
+    Examples
+    --------
+    >>> from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+    >>> from skidyn.logs import check_log
+    >>> log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=2, duration=2.0)
+    >>> joint = check_log(log.frame).joints[0]
+    >>> joint.name, joint.excited, round(joint.velocity_slope, 2)
+    ('joint1', True, 1.0)
+    """
+
+    name: str
+    resolution: float
+    position_range: tuple[float, float]
+    position_coverage: float
+    largest_velocity: float
+    reversals: int
+    rest_share: float
+    torque_range: tuple[float, float]
+    saturated_share: float
+    velocity_slope: float
+    velocity_correlation: float
+    torque_delay: float
+    excited: bool
+
+
+@dataclass(frozen=True)
+class LogQuality:
+    """What :func:`check_log` found.
+
+    Parameters
+    ----------
+    n_samples, n_trajectories : int
+        Size of the log.
+    duration : float, s
+        Recorded time, gaps left out.
+    rate : float, Hz
+        Median sampling rate.
+    jitter : float
+        Spread of the time steps: half the width between their 5 % and 95 % quantiles, relative to
+        the median step; median over trajectories.
+    gaps : int
+        Steps longer than 5 median steps inside a trajectory.
+    largest_gap : float, s
+        Longest step inside a trajectory.
+    repeated_rows : int
+        Rows in which no position changes although joints move: the recorder polled faster than
+        the robot reported.
+    joints : tuple of JointQuality
+        One per joint.
+    checks : tuple of Suspicion
+        What looks wrong, what matters most first, with its evidence and the option that mends it.
+    faults : tuple of str
+        Rows that this report leaves out.
+    notes : tuple of str
+        What the log cannot give although nothing is wrong with it.
+
+    Examples
+    --------
+    >>> from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+    >>> from skidyn.logs import check_log
+    >>> log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=1, duration=2.0)
+    >>> print(check_log(log.frame).notes[0].partition(":")[0])
+    there is a single trajectory
+    """
+
+    n_samples: int
+    n_trajectories: int
+    duration: float
+    rate: float
+    jitter: float
+    gaps: int
+    largest_gap: float
+    repeated_rows: int
+    joints: tuple[JointQuality, ...]
+    checks: tuple[Suspicion, ...] = field(default=())
+    faults: tuple[str, ...] = field(default=())
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Every fault and suspicion as a sentence."""
+        return (*self.faults, *map(str, self.checks))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Contents as plain numbers, lists and text for JSON; NaN becomes None.
+
+        Returns
+        -------
+        dict
+            The fields of this report, ``joints`` as a list of dicts.
+        """
+        told = {
+            "checks": [check.to_dict() for check in self.checks],
+            "warnings": list(self.warnings),
+        }
+        plain = _plain(asdict(self) | told)
+        assert isinstance(plain, dict)
+        return plain
+
+    def __str__(self) -> str:
+        lines = [
+            f"{self.n_samples} samples in {self.n_trajectories} "
+            f"{'trajectory' if self.n_trajectories == 1 else 'trajectories'}, "
+            f"{self.duration:.1f} s at {self.rate:.4g} Hz (jitter {100 * self.jitter:.2g} %)",
+            f"gaps: {self.gaps} (longest step {self.largest_gap:.3g} s), "
+            f"repeated rows: {self.repeated_rows}",
+            "",
+        ]
+        width = max([len(joint.name) for joint in self.joints] + [5])
+        # two tables, so that a terminal of 80 columns holds them
+        lines.append(f"{'joint':{width}s}{_MOTION_HEAD}")
+        lines += [f"{joint.name:{width}s}{_motion_cells(joint)}" for joint in self.joints]
+        lines += ["", f"{'joint':{width}s}{_TORQUE_HEAD}"]
+        lines += [f"{joint.name:{width}s}{_torque_cells(joint)}" for joint in self.joints]
+        lines += ["", *self.notes]
+        return "\n".join([*self._told(), *lines]).rstrip()
+
+    def _told(self) -> list[str]:
+        """What looks wrong, one paragraph each."""
+        lines = [f"! {fault}" for fault in self.faults]
+        for check in self.checks:
+            mark = {"certain": "!!", "suspected": "! ", "noted": "- "}[check.certainty]
+            lines.append(f"{mark} {check.suspicion} ({check.certainty})")
+            lines.append(f"   {check.evidence}")
+            if check.remedy is not None:
+                lines.append(f"   mend it with: {check.remedy.option}")
+        return [*lines, ""] if lines else []
+
+
+def check_log(frame: pd.DataFrame, robot: Robot | None = None) -> LogQuality:
+    """Judge the quality of a log.
+
+    Parameters
+    ----------
+    frame : DataFrame
+        ``time`` (s), ``trajectory`` (optional), ``q1 ..`` (rad or m), ``dq1 ..``, ``tau1 ..`` (N m
+        or N), as :func:`read_log` returns it.
+    robot : Robot, optional
+        For its limits (coverage, units) and its dynamics: signs, order, gravity, scale and delay of
+        what was recorded are tested by fitting the robot to it.
+
+    Returns
+    -------
+    LogQuality
+        Numbers per log and joint, and what looks wrong with the evidence. Nothing is changed in
+        ``frame``.
+
+    Raises
+    ------
+    LogError
+        Columns are missing, hold no numbers, or do not fit the robot; time goes backwards.
+
+    Examples
+    --------
+    >>> from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+    >>> from skidyn.logs import check_log
+    >>> log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=2, duration=2.0)
+    >>> quality = check_log(log.frame, log.robot)
+    >>> quality.n_samples, round(quality.rate), quality.gaps
+    (400, 100, 0)
+    """
+    from skidyn.measurement import Measurement, check_measurement  # with them come the fits
+
+    n = count_joints(frame)
+    if robot is not None and robot.n_joints != n:
+        raise LogError(
+            f"the log has {n} joints, the robot has {robot.n_joints} "
+            f"({', '.join(robot.joint_names)}). If the log covers part of the robot, load it with "
+            "Robot.from_urdf(..., joints=[...])."
+        )
+    require_columns(frame, n, ("q", "dq", "tau"))
+    if "time" not in frame.columns:
+        raise LogError("the log has no time column.")
+    blocks = {name: [f"{name}{k + 1}" for k in range(n)] for name in ("q", "dq", "tau")}
+    numbers = as_numbers(frame, ["time", *blocks["q"], *blocks["dq"], *blocks["tau"]])
+    time = numbers["time"].to_numpy()
+    q, dq, tau = (numbers[blocks[name]].to_numpy() for name in ("q", "dq", "tau"))
+    trajectory = (
+        frame["trajectory"].to_numpy() if "trajectory" in frame else np.zeros(len(frame), int)
+    )
+    finite = np.isfinite(np.column_stack([time, q, dq, tau])).all(axis=1)
+    messages = []
+    if not finite.all():
+        messages.append(
+            f"{int((~finite).sum())} of {len(frame)} rows hold NaN or infinite values and are left "
+            "out of this report."
+        )
+        time, q, dq, tau, trajectory = (a[finite] for a in (time, q, dq, tau, trajectory))
+    if len(time) < 2:
+        raise LogError(f"the log has {len(time)} finite row(s); at least two are needed.")
+    unique = check_time_order(time, trajectory)
+    if not unique.all():
+        messages.append(f"{int((~unique).sum())} row(s) repeat the time of the row before.")
+        time, q, dq, tau, trajectory = (a[unique] for a in (time, q, dq, tau, trajectory))
+    names = list(frame.attrs.get("joint_names", ())) if robot is None else list(robot.joint_names)
+    if len(names) != n:
+        names = [f"joint {k + 1}" for k in range(n)]
+    prismatic = np.zeros(n, dtype=bool)
+    if robot is not None:
+        prismatic = np.array([kind == "prismatic" for kind in robot.joint_types])
+    motion = Signals(q, dq, np.zeros_like(q), trajectory, time, prismatic=prismatic)
+    measurement = Measurement(motion, tau, robot, names)
+    if len(measurement.steps) == 0:
+        raise LogError("every trajectory of the log has a single row; nothing moves in it.")
+    n_trajectories = len(np.unique(trajectory))
+    return LogQuality(
+        n_samples=len(time),
+        n_trajectories=n_trajectories,
+        duration=float(measurement.steps.sum() - measurement.gaps.sum()),
+        rate=measurement.rate,
+        jitter=measurement.jitter,
+        gaps=len(measurement.gaps),
+        largest_gap=float(measurement.steps.max()),
+        repeated_rows=measurement.repeated,
+        joints=tuple(_joints(measurement)),
+        checks=tuple(check_measurement(measurement)),
+        faults=tuple(messages),
+        notes=(_SINGLE,) if n_trajectories == 1 else (),
+    )
+
+
+def _joints(measurement: Measurement) -> list[JointQuality]:
+    from skidyn.measurement import measured_delay, position_step, rest_share, reversals
+
+    signals, robot = measurement.signals, measurement.robot
+    found = measured_delay(measurement)
+    joints = []
+    for k, name in enumerate(measurement.joint_names):
+        q, dq, tau = signals.q[:, k], signals.dq[:, k], measurement.torque[:, k]
+        span = float(np.ptp(q))
+        coverage = np.nan
+        if robot is not None:
+            low, high = robot.position_limits[k]
+            coverage = span / (high - low) if np.isfinite(high - low) and high > low else np.nan
+        slope, correlation = measurement.velocities[k]
+        joints.append(
+            JointQuality(
+                name=name,
+                resolution=position_step(q),
+                position_range=(float(q.min()), float(q.max())),
+                position_coverage=float(coverage),
+                largest_velocity=float(np.abs(dq).max()),
+                reversals=reversals(dq, signals.segments),
+                rest_share=rest_share(dq),
+                torque_range=(float(tau.min()), float(tau.max())),
+                saturated_share=measurement.at_limit[k],
+                velocity_slope=slope,
+                velocity_correlation=correlation,
+                torque_delay=np.nan if found is None else float(found.joints[k]),
+                excited=measurement.excited[k],
+            )
+        )
+    return joints
+
+
+_SINGLE = (
+    "there is a single trajectory: errors on held-out trajectories cannot be had, only on held-out "
+    "stretches of it (split_gaps, split_dwells or several files give more)."
+)
+_MOTION_HEAD = "  position range  coverage     step   speed reversals"
+_TORQUE_HEAD = "      torque range  at limit  at rest     dq/q'  delay ms"
+
+
+def _motion_cells(joint: JointQuality) -> str:
+    """How one joint was moved, as a row of the printed report."""
+    low, high = joint.position_range
+    step = f"{joint.resolution:8.2g}" if np.isfinite(joint.resolution) else "       -"
+    return (
+        f" {low:6.3f} ..{high:7.3f} {_percent(joint.position_coverage)} {step} "
+        f"{joint.largest_velocity:7.3f} {joint.reversals:9d}"
+    )
+
+
+def _torque_cells(joint: JointQuality) -> str:
+    """Torque of one joint, as a row of the printed report."""
+    weak, strong = joint.torque_range
+    slope, delay = _number(joint.velocity_slope, 9), _number(1e3 * joint.torque_delay, 9, 1)
+    return (
+        f" {weak:8.2f} ..{strong:7.2f} {_percent(joint.saturated_share)}"
+        f"{_percent(joint.rest_share)} {slope} {delay}"
+    )
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:6.0f} %" if np.isfinite(share) else "       -"
+
+
+def _number(value: float, width: int, digits: int = 3) -> str:
+    return f"{value:{width}.{digits}f}" if np.isfinite(value) else "-".rjust(width)

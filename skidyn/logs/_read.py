@@ -1,0 +1,264 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reading a log: one function for all formats."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from skidyn._checks import warn_about_log
+from skidyn._exceptions import LogError
+from skidyn._optional import import_optional
+from skidyn._progress import track
+from skidyn.logs._bounds import MAX_BYTES
+from skidyn.logs._folders import find_runs, read_runs
+from skidyn.logs._formats import decode
+from skidyn.logs._quality import check_log
+from skidyn.logs._remedies import REMEDIES, Remedies
+from skidyn.logs._table import ColumnMap, TableOptions, build_table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from skidyn.robots import Robot
+
+PathLike = str | os.PathLike[str]
+
+
+def read_log(
+    path: PathLike | Sequence[PathLike],
+    *,
+    robot: Robot | None = None,
+    columns: ColumnMap | None = None,
+    units: Mapping[str, str] | None = None,
+    drive_gains: Sequence[float] | None = None,
+    topics: Sequence[str] | None = None,
+    rate: float | None = None,
+    resample_rate: float | None = None,
+    missing: Literal["error", "drop"] = "error",
+    split_gaps: float | Literal["auto"] | None = "auto",
+    split_dwells: float | None = None,
+    order: Sequence[int] | Mapping[str, Sequence[int]] | None = None,
+    flip: Sequence[str | int] = (),
+    gain: Mapping[str, float] | None = None,
+    zero: Mapping[str, float] | None = None,
+    late: Mapping[str, float] | None = None,
+    unwrap: bool = False,
+    torque_sign: Literal["recorded", "command"] = "recorded",
+    clock: Literal["recorded", "regular"] = "recorded",
+    drop_repeated: bool = False,
+    check: bool = True,
+    max_bytes: int = MAX_BYTES,
+) -> pd.DataFrame:
+    """Read recordings of a robot into one table in SI units.
+
+    Parameters
+    ----------
+    path : path or sequence of paths
+        CSV or text (``.csv .tsv .txt .dat``), Parquet (``.parquet``), Feather, NumPy (``.npz``),
+        HDF5 (``.h5 .hdf5``), MATLAB (``.mat``), MCAP (``.mcap``), ROS 1 bag (``.bag``), ROS 2 bag
+        (its folder, or ``.db3``); text may be compressed (``.csv.gz``) and hold lists in columns.
+        Several files become several trajectories. A pattern (``"runs/*.csv"``) or a folder stands
+        for the logs in it; files of a folder that hold one signal each (``q.csv``, ``tau.csv``,
+        ``commands.csv``) are one recording. A LeRobot data set is its folder.
+    robot : Robot, optional
+        Its joint names are looked for and order the columns; the log is checked against its
+        limits and its gravity.
+    columns : mapping, optional
+        Which columns hold which signals, where names do not tell: ``{"q1": "pos_a"}``,
+        ``{"q": ["pos_a", "pos_b"]}``, ``{"tau": "effort_{joint}"}``, ``{"time": 0}``.
+    units : mapping, optional
+        Units that are not SI, per quantity or column: ``{"q": "deg", "time": "ms", "q3": "mm"}``.
+    drive_gains : sequence of float, N m/A or N/A, optional
+        Torque per ampere and joint, to read a log of currents (``i1 .. in``) as torques.
+    topics : sequence of str, optional
+        Topics of a bag or groups of an HDF5 file to read; all that hold joint states if None.
+    rate : float, Hz, optional
+        Sampling rate of logs without a time column.
+    resample_rate : float, Hz, optional
+        Rate of a regular clock; None takes the recorded one, that of the positions where signals of
+        one file have several. Signals that are faster are averaged over one step of it.
+    missing : {"error", "drop"}, default="error"
+        Rows with NaN or infinite values: refuse the log, or leave them out with a warning.
+    split_gaps : float, s, "auto" or None, default="auto"
+        A time step longer than this begins a new trajectory; ``"auto"``: longer than 20 median
+        steps and 0.2 s, in logs that have no trajectory column of their own.
+    split_dwells : float, s, optional
+        Cut a trajectory in the middle of each rest longer than this.
+    order : sequence of int or mapping, optional
+        For each joint of the robot the number, from 1, of the column that holds it:
+        ``[2, 1, 3]``; of one quantity only: ``{"tau": [2, 1, 3]}``.
+    flip : sequence of str or int, default=()
+        Whose sign is to be changed: a joint, by name or number, means its torque; ``"q3"`` its
+        position with velocity and acceleration; ``"dq3"`` or ``"tau3"`` one column.
+    gain : mapping, optional
+        Factors of columns or quantities: ``{"tau3": 0.02}``.
+    zero : mapping of str to float, rad or m, optional
+        What positions read at the robot's zero, which is taken off: ``{"q2": 1.5708}``.
+    late : mapping of str to float, s, optional
+        Delays of columns or quantities, which are taken out: ``{"tau": 0.008}``.
+    unwrap : bool, default=False
+        Take leaps by a turn out of positions.
+    torque_sign : {"recorded", "command"}, default="recorded"
+        ``"command"``: magnitudes get the sign of commanded minus measured position.
+    clock : {"recorded", "regular"}, default="recorded"
+        ``"regular"``: samples were taken at even steps, and only the stamps jitter.
+    drop_repeated : bool, default=False
+        Leave out rows that repeat all positions of the row before while joints move.
+    check : bool, default=True
+        Judge the quality of the log (:func:`check_log`) and warn of what looks wrong.
+    max_bytes : int
+        Largest size of one file once unpacked.
+
+    Returns
+    -------
+    DataFrame
+        ``time`` (s), ``trajectory``, ``q1 .. qn`` (rad or m), ``dq1 .. dqn``, ``ddq1 .. ddqn``
+        where recorded, ``tau1 .. taun`` (N m or N), ``temp1 .. tempn`` (degrees Celsius) where
+        recorded, commanded positions ``cmd1 .. cmdn`` (rad or m) where recorded, then further
+        numeric columns under their own names. ``attrs`` holds
+        ``joint_names``, ``files`` (one per trajectory) and ``notes``.
+
+    Raises
+    ------
+    LogError
+        The log cannot be used as it is; the message says why and what to do.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from skidyn.logs import read_log
+    >>> folder = tempfile.TemporaryDirectory()
+    >>> file = pathlib.Path(folder.name, "log.csv")
+    >>> rows = ["t;pos 1;vel 1;torque 1", "0,0;0,1;1;2,0", "0,1;0,2;1;2,1"]
+    >>> _ = file.write_text(chr(10).join(rows))
+    >>> read_log(file, check=False).columns.tolist()
+    ['time', 'trajectory', 'q1', 'dq1', 'tau1']
+    >>> folder.cleanup()
+    """
+    pandas = import_optional("pandas", extra="io")
+    paths = [path] if isinstance(path, (str, os.PathLike)) else list(path)
+    if not paths:
+        raise LogError("no file to read: the list of paths is empty.")
+    _check_mapping("columns", columns, (str, int))
+    _check_mapping("units", units, (str,))
+    options = TableOptions(
+        robot,
+        columns,
+        units,
+        drive_gains,
+        rate,
+        resample_rate,
+        missing,
+        split_gaps,
+        split_dwells,
+        Remedies(order, flip, gain, zero, unwrap, torque_sign, clock, drop_repeated, late),
+    )
+    tables: list[pd.DataFrame] = []
+    files: list[str] = []
+    notes: list[str] = []
+    joints: list[str] = []
+    found = [run for item in paths for run in find_runs(item)]
+    recordings = (
+        recording
+        for run in track(found, "Reading")
+        for recording in read_runs(run, lambda file: decode(file, topics, max_bytes))
+    )
+    for name, channels in recordings:
+        file = Path(name)
+        table, match = build_table(channels, name, options)
+        if tables:
+            _refuse_other_columns(table, match.joint_names, tables[0], joints, file)
+        joints = match.joint_names
+        notes += [note.removeprefix(f"{file}: ") for note in match.notes]
+        _, number = np.unique(table["trajectory"], return_inverse=True)
+        table["trajectory"] = number + len(files) if tables else table["trajectory"]
+        if not tables and (len(found) > 1 or found[0].files[1:]):
+            table["trajectory"] = number
+        files += [str(file)] * (int(number.max()) + 1)
+        tables.append(table)
+    frame = pandas.concat(tables, ignore_index=True) if len(tables) > 1 else tables[0]
+    notes = _told_once(notes, len(tables))
+    frame.attrs = {"joint_names": joints, "files": files, "notes": notes}
+    for note in notes:
+        warn_about_log(note)
+    if check:
+        for message in check_log(frame, robot).warnings:
+            warn_about_log(message)
+    return frame
+
+
+def _check_mapping(name: str, value: Any, kinds: tuple[type, ...]) -> None:
+    """Refuse anything but an object of names; a report or an option may hold any JSON."""
+    example = '{"q": ["pos_a", "pos_b"]}' if name == "columns" else '{"q": "deg"}'
+    expected = LogError(f"{name} is {value!r}; expected an object such as {example}.")
+    if value is None:
+        return
+    if not isinstance(value, Mapping):
+        raise expected
+    for target, content in value.items():
+        several = name == "columns" and isinstance(content, (list, tuple))
+        parts = content if several else [content]
+        good = [isinstance(part, kinds) and not isinstance(part, bool) for part in parts]
+        if not isinstance(target, str) or not all(good):
+            raise expected
+
+
+#: How many of how many, as the notes of remedies say it.
+_OF = re.compile(r"(\d+) of (\d+)")
+
+
+def _summed(notes: Sequence[str]) -> list[str]:
+    """Notes of remedies that differ by their counts alone, as one with the sums.
+
+    >>> _summed(["flip: 1 of 3 rows", "cut", "flip: 2 of 4 rows"])
+    ['flip: 3 of 7 rows', 'cut']
+    """
+    sums: dict[str, list[int]] = {}
+    for note in notes:
+        told = _OF.search(note) if note.startswith(REMEDIES) else None
+        here = [int(told[1]), int(told[2])] if told else [0, 0]
+        key = _OF.sub("\0", note, count=1) if told else note
+        sums[key] = [a + b for a, b in zip(sums.get(key, [0, 0]), here, strict=True)]
+    kept = [n for n in notes if not (n.startswith(REMEDIES) and _OF.search(n))]
+    summed = [key.replace("\0", f"{a} of {b}") for key, (a, b) in sums.items() if key not in kept]
+    return [*summed, *kept]
+
+
+def _told_once(notes: Sequence[str], n_files: int) -> list[str]:
+    """Each note once, with the number of files that it holds for.
+
+    >>> _told_once(["no velocities", "cut", "no velocities"], 3)
+    ['no velocities (2 of 3 files)', 'cut (1 of 3 files)']
+    """
+    notes = _summed(notes)
+    counts = Counter(notes)
+    if n_files == 1:
+        return list(counts)
+    return [f"{note} ({count} of {n_files} files)" for note, count in counts.items()]
+
+
+def _refuse_other_columns(
+    table: pd.DataFrame,
+    joints: Sequence[str],
+    first: pd.DataFrame,
+    first_joints: Sequence[str],
+    file: Path,
+) -> None:
+    """Files of one log must hold the same signals of the same joints."""
+    if list(joints) != list(first_joints):
+        raise LogError(
+            f"{file}: its joints ({', '.join(joints)}) are not those of the first file "
+            f"({', '.join(first_joints)}). Pass robot= or columns= to say which belong together."
+        )
+    differing = sorted(set(map(str, table.columns)) ^ set(map(str, first.columns)))
+    if differing:
+        raise LogError(
+            f"{file}: {', '.join(differing)} is in this file or in the first one but not in both."
+        )

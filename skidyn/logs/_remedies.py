@@ -1,0 +1,264 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What mends a log that is not what its owner thought: each is asked for, counted and noted."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from skidyn._exceptions import LogError
+from skidyn._signals import find_segments
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: Quantities that turn with the position of a joint.
+MOTION = ("q", "dq", "ddq", "cmd")
+QUANTITIES = (*MOTION, "tau", "temp")
+#: How the notes of remedies begin.
+REMEDIES = ("flip:", "gain:", "zero:", "clock:", "late:", "drop_repeated:", "torque_sign:")
+
+
+@dataclass(frozen=True)
+class Remedies:
+    """What the caller of ``read_log`` asked to be mended; see there."""
+
+    order: Sequence[int] | Mapping[str, Sequence[int]] | None = None
+    flip: Sequence[str | int] = ()
+    gain: Mapping[str, float] | None = None
+    zero: Mapping[str, float] | None = None
+    unwrap: bool = False
+    torque_sign: Literal["recorded", "command"] = "recorded"
+    clock: Literal["recorded", "regular"] = "recorded"
+    drop_repeated: bool = False
+    late: Mapping[str, float] | None = None
+
+
+def mend_columns(
+    table: pd.DataFrame, n: int, joints: Sequence[str], remedies: Remedies, notes: list[str]
+) -> pd.DataFrame:
+    """Order, sign, scale and zero of columns.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Columns of a log.
+    n : int
+        Number of joints.
+    joints : sequence of str
+        Their names.
+    remedies : Remedies
+        What was asked for.
+    notes : list of str
+        What was done is appended here.
+
+    Returns
+    -------
+    DataFrame
+
+    Raises
+    ------
+    LogError
+        A joint or column that the log lacks, an order that is none, a gain that is not finite or
+        zero, or no commanded positions to take the sign from.
+    """
+    table = table.copy()
+    if remedies.order is not None:
+        _reorder(table, n, remedies.order, notes)
+    if remedies.torque_sign not in ("recorded", "command"):
+        raise LogError(
+            f"torque_sign is {remedies.torque_sign!r}; expected 'recorded' or 'command'."
+        )
+    if remedies.torque_sign == "command":
+        _sign_from_command(table, n, notes)
+    for item in remedies.flip:
+        columns = _flipped(item, table, joints)
+        for name in columns:
+            table[name] = -table[name]
+        notes.append(f"flip: the sign of {', '.join(columns)} was changed in {_all(table)} rows")
+    for name, value in _each(remedies.gain, table, "gain"):
+        if not np.isfinite(value) or value == 0:
+            raise LogError(f"gain: {name} is to be multiplied by {value}; expected a number.")
+        table[name] = value * table[name]
+        notes.append(f"gain: {name} was multiplied by {value:g} in {_all(table)} rows")
+    for name, value in _each(remedies.zero, table, "zero"):
+        if not np.isfinite(value):
+            raise LogError(f"zero: {name} is to read {value} at zero; expected a number.")
+        if not re.fullmatch(r"q\d+", name):
+            raise LogError(f"zero: {name} is no position; expected q1 .. q{n}.")
+        for column in (name, name.replace("q", "cmd")):
+            if column in table.columns:
+                table[column] = table[column] - value
+        notes.append(f"zero: {value:g} was taken off {name} in {_all(table)} rows")
+    return table
+
+
+def mend_rows(table: pd.DataFrame, n: int, remedies: Remedies, notes: list[str]) -> pd.DataFrame:
+    """Clock, repeated rows, delay and wrapped positions of a log in order of time.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Columns of a log with ``time`` and ``trajectory``.
+    n : int
+        Number of joints.
+    remedies : Remedies
+        What was asked for.
+    notes : list of str
+        What was done is appended here.
+
+    Returns
+    -------
+    DataFrame
+
+    Raises
+    ------
+    LogError
+        A clock of another name, or a channel that the log lacks.
+    """
+    names = [f"q{k + 1}" for k in range(n)]
+    if remedies.unwrap:
+        table = _unwrapped(table, names, notes)
+    if remedies.drop_repeated:
+        table = _without_repeated(table, n, notes)
+    if remedies.clock not in ("recorded", "regular"):
+        raise LogError(f"clock is {remedies.clock!r}; expected 'recorded' or 'regular'.")
+    if remedies.clock == "regular":
+        from skidyn.measurement import regular_clock
+
+        time = table["time"].to_numpy()
+        even = regular_clock(time, table["trajectory"].to_numpy())
+        table = table.assign(time=even)
+        notes.append(
+            f"clock: {int(np.sum(np.abs(even - time) > 1e-9))} of {len(time)} stamps were moved to "
+            "even steps"
+        )
+    if remedies.late:
+        from skidyn.preprocessing import advance_channels  # only for this: it brings scikit-learn
+
+        before = len(table)
+        _each(remedies.late, table, "late")
+        table = advance_channels(table, dict(remedies.late))
+        told = ", ".join(f"{name} by {1e3 * v:g} ms" for name, v in remedies.late.items())
+        notes.append(
+            f"late: {told} taken out; {before - len(table)} of {before} rows, at the ends of "
+            "stretches, left out"
+        )
+    return table
+
+
+def _all(table: pd.DataFrame) -> str:
+    """Count of rows where all of them are meant, as other notes count."""
+    return f"{len(table)} of {len(table)}"
+
+
+def _reorder(
+    table: pd.DataFrame,
+    n: int,
+    order: Sequence[int] | Mapping[str, Sequence[int]],
+    notes: list[str],
+) -> None:
+    orders = order if isinstance(order, Mapping) else dict.fromkeys(QUANTITIES, order)
+    for quantity, numbers in orders.items():
+        if quantity not in QUANTITIES:
+            raise LogError(f"order: {quantity!r} is none of {', '.join(QUANTITIES)}.")
+        if sorted(numbers) != list(range(1, n + 1)):
+            raise LogError(
+                f"order: {list(numbers)} is no order of {n} joints; expected every number from 1 "
+                f"to {n} once: for each joint of the robot the column that holds it."
+            )
+        columns = [f"{quantity}{k}" for k in numbers]
+        if not set(columns) <= set(table.columns):
+            if isinstance(order, Mapping):
+                raise LogError(f"order: the log has no {quantity}1 .. {quantity}{n}.")
+            continue
+        table[[f"{quantity}{k + 1}" for k in range(n)]] = table[columns].to_numpy()
+    what = ", ".join(orders) if isinstance(order, Mapping) else "all signals"
+    numbers = list(next(iter(orders.values())))
+    notes.append(f"order: columns of {what} were put in the order {numbers}")
+
+
+def _flipped(item: str | int, table: pd.DataFrame, joints: Sequence[str]) -> list[str]:
+    """Columns whose sign changes: of one column, of the motion of a joint, or its torque."""
+    name = str(item)
+    if name in joints:
+        name = f"tau{list(joints).index(name) + 1}"
+    elif name.isdigit():
+        name = f"tau{name}"
+    hit = re.fullmatch(r"(q|dq|ddq|tau|cmd)(\d+)", name)
+    if hit is None or name not in table.columns:
+        raise LogError(
+            f"flip: {item!r} is neither a joint ({', '.join(joints)}) nor a column such as q1, dq1 "
+            "or tau1."
+        )
+    if hit[1] != "q":
+        return [name]
+    return [f"{quantity}{hit[2]}" for quantity in MOTION if f"{quantity}{hit[2]}" in table.columns]
+
+
+def _each(
+    values: Mapping[str, float] | None, table: pd.DataFrame, option: str
+) -> list[tuple[str, float]]:
+    """Column and value, a quantity standing for all its joints."""
+    told: list[tuple[str, float]] = []
+    for name, value in (values or {}).items():
+        joints = [c for c in table.columns if re.fullmatch(rf"{re.escape(name)}\d+", str(c))]
+        if name not in table.columns and not joints:
+            raise LogError(
+                f"{option}: the log has no {name}; it has {', '.join(map(str, table.columns))}."
+            )
+        columns = [name] if name in table.columns else joints
+        told += [(column, float(value)) for column in columns]
+    return told
+
+
+def _sign_from_command(table: pd.DataFrame, n: int, notes: list[str]) -> None:
+    absent = [f"cmd{k + 1}" for k in range(n) if f"cmd{k + 1}" not in table.columns]
+    if absent:
+        raise LogError(
+            f"torque_sign='command' needs the commanded positions; the log has no "
+            f"{', '.join(absent)}. Name them with columns={{'cmd': [...]}}."
+        )
+    turned = 0
+    for k in range(1, n + 1):
+        sign = np.sign(table[f"cmd{k}"] - table[f"q{k}"])
+        torque = np.abs(table[f"tau{k}"]) * sign
+        turned += int(np.sum(torque < 0))
+        table[f"tau{k}"] = torque
+    notes.append(
+        "torque_sign: torques have the sign of commanded minus measured position; "
+        f"{turned} of {n * len(table)} values became negative"
+    )
+
+
+def _unwrapped(table: pd.DataFrame, names: Sequence[str], notes: list[str]) -> pd.DataFrame:
+    time, number = table["time"].to_numpy(), table["trajectory"].to_numpy()
+    changed: dict[str, np.ndarray] = {}
+    for name in names:
+        q = table[name].to_numpy(dtype=float).copy()
+        for rows in find_segments(number, time):
+            q[rows] = np.unwrap(q[rows])
+        if not np.array_equal(q, table[name]):
+            changed[name] = q
+    told = ", ".join(changed) or "no position"
+    notes.append(f"unwrap: leaps by a turn were taken out of {told}")
+    return table.assign(**changed)
+
+
+def _without_repeated(table: pd.DataFrame, n: int, notes: list[str]) -> pd.DataFrame:
+    from skidyn.measurement import is_repeated
+
+    q = table[[f"q{k + 1}" for k in range(n)]].to_numpy(dtype=float)
+    number = table["trajectory"].to_numpy()
+    velocities = [f"dq{k + 1}" for k in range(n)]
+    if set(velocities) <= set(table.columns):
+        dq = table[velocities].to_numpy(dtype=float)
+    else:
+        dq = np.gradient(q, axis=0)
+    again = is_repeated(q, dq, number)
+    notes.append(f"drop_repeated: {int(again.sum())} of {len(q)} rows left out")
+    return table[~again].reset_index(drop=True)

@@ -1,0 +1,272 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""From the channels of one file to a clean table of signals in SI units."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from skidyn._checks import (
+    SIGNAL_COLUMN,
+    as_numbers,
+    check_time_order,
+    count_joints,
+    handle_missing,
+    require_columns,
+    warn_about_log,
+)
+from skidyn._exceptions import LogError
+from skidyn._names import NameMatch, match_names
+from skidyn._units import convert_units, refuse_stated_units
+from skidyn.logs._clock import (
+    align_channels,
+    derive_velocity,
+    seconds,
+    split_at_restarts,
+    split_trajectories,
+)
+from skidyn.logs._files import Channel
+from skidyn.logs._remedies import Remedies, mend_columns, mend_rows
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from skidyn.robots import Robot
+
+ColumnMap = Mapping[str, str | int | Sequence[str | int]]
+ORDER = ("q", "dq", "ddq", "tau", "temp", "cmd")
+#: Beyond, whole numbers in floating point leave others out.
+LARGEST_NUMBER = 2**53
+
+
+@dataclass(frozen=True)
+class TableOptions:
+    """What the caller of ``read_log`` said about the table; see there."""
+
+    robot: Robot | None = None
+    columns: ColumnMap | None = None
+    units: Mapping[str, str] | None = None
+    drive_gains: Sequence[float] | None = None
+    rate: float | None = None
+    resample_rate: float | None = None
+    missing: Literal["error", "drop"] = "error"
+    split_gaps: float | Literal["auto"] | None = "auto"
+    split_dwells: float | None = None
+    remedies: Remedies = Remedies()
+
+
+def build_table(
+    channels: Sequence[Channel], source: str, options: TableOptions
+) -> tuple[pd.DataFrame, NameMatch]:
+    """Signals of one file, with the names that were matched on the way.
+
+    Parameters
+    ----------
+    channels : sequence of Channel
+        What the file holds.
+    source : str
+        Name of the file for messages.
+    options : TableOptions
+        What the caller said.
+
+    Returns
+    -------
+    table : DataFrame
+        ``time, trajectory, q1 .., dq1 .., [ddq1 ..], tau1 .., [temp1 ..]`` and further columns.
+    match : NameMatch
+        Joint names and notes.
+
+    Raises
+    ------
+    LogError
+        The log cannot be used as it is.
+    """
+    match = match_names(
+        list(dict.fromkeys(str(name) for c in channels for name in c.table.columns)),
+        robot_joints=None if options.robot is None else options.robot.joint_names,
+        columns=options.columns,
+        source=source,
+    )
+    refuse_stated_units(match.units, options.units or {}, source)
+    tables = [_renamed(channel, match, source, options) for channel in channels]
+    _refuse_unused_units(tables, options.units or {}, source)
+    table = align_channels(tables, [c.name for c in channels], options.resample_rate, match.notes)
+    n = count_joints(table, source)
+    table = _torque_from_current(table, n, options.drive_gains, source)
+    require_columns(table, n, ("q", "tau"), source)
+    stated = [c.attributes["joint_names"] for c in channels if "joint_names" in c.attributes]
+    if options.robot is None and stated and len(stated[0]) == n:
+        match.joint_names = list(stated[0])
+    table = mend_columns(table, n, match.joint_names, options.remedies, match.notes)
+    return _in_order(_clean(table, n, match, source, options), n), match
+
+
+def _renamed(
+    channel: Channel, match: NameMatch, source: str, options: TableOptions
+) -> pd.DataFrame:
+    """The numeric columns of a channel under the names of a log, in SI units."""
+    new_name = {old: new for new, old in match.columns.items()}
+    # a column that was not chosen must not bear the name of a signal
+    new_name |= {n: f"{n} of the file" for n in match.columns if n not in new_name}
+    table = channel.table.rename(columns=lambda name: new_name.get(str(name), str(name)))
+    table["time"] = seconds(table, options.rate, f"{source} ({channel.name})")
+    signals = [name for name in table.columns if _quantity(name) is not None]
+    table = as_numbers(table, signals, source)
+    kept = [name for name in table.columns if table[name].dtype.kind in "fiub"]
+    lost = [name for name in table.columns if name not in kept]
+    if lost:
+        match.notes.append(f"{source}: column(s) without numbers left out: {', '.join(lost)}")
+    names = {name: _quantity(name) for name in kept}
+    mine = {
+        target: unit
+        for target, unit in (options.units or {}).items()
+        if target in names or target in names.values()
+    }
+    return convert_units(table[kept], mine)
+
+
+def _quantity(name: str) -> str | None:
+    """Quantity of a column of a log; None for further columns.
+
+    >>> _quantity("dq3"), _quantity("time"), _quantity("volts")
+    ('dq', 'time', None)
+    """
+    if name in ("time", "trajectory"):
+        return name
+    hit = re.fullmatch(r"(q|dq|ddq|tau|temp|i|cmd)\d+", name)
+    return hit[1] if hit else None
+
+
+def _refuse_unused_units(
+    tables: Sequence[pd.DataFrame], units: Mapping[str, str], source: str
+) -> None:
+    names = {str(name) for table in tables for name in table.columns}
+    quantities = {_quantity(name) for name in names}
+    for target in units:
+        if target not in names and target not in quantities:
+            raise LogError(f"units: {source} has no {target}; it has {', '.join(sorted(names))}.")
+
+
+def _torque_from_current(
+    table: pd.DataFrame, n: int, gains: Sequence[float] | None, source: str
+) -> pd.DataFrame:
+    """Torque columns from currents and gains; currents alone are never taken for torques."""
+    currents = [f"i{k + 1}" for k in range(n)]
+    has_current = all(name in table.columns for name in currents)
+    if gains is None:
+        if has_current and "tau1" not in table.columns:
+            raise LogError(
+                f"{source} holds motor currents (i1..i{n}) and no torques. Pass drive_gains=[...] "
+                "(--drive-gains on the command line), "
+                "the torque per ampere of each joint at the joint (N m/A: torque constant times "
+                "gear ratio)."
+            )
+        return table
+    if not has_current:
+        raise LogError(
+            f"drive_gains is given, but {source} has no currents i1..i{n}. If its torque columns "
+            "are currents, say so with columns={'i': [...]}."
+        )
+    try:
+        factors = np.asarray(gains, dtype=float)
+    except (TypeError, ValueError):
+        raise LogError(f"drive_gains is {gains!r}; expected {n} numbers, one per joint.") from None
+    if factors.shape != (n,) or not np.isfinite(factors).all():
+        raise LogError(f"drive_gains needs {n} finite numbers, one per joint; got {factors}.")
+    table = table.copy()
+    for k, name in enumerate(currents):
+        table[f"tau{k + 1}"] = factors[k] * table[name]
+    return table
+
+
+def _clean(
+    table: pd.DataFrame, n: int, match: NameMatch, source: str, options: TableOptions
+) -> pd.DataFrame:
+    """Rows in order of time, finite, cut into trajectories, with velocities."""
+    own_trajectories = "trajectory" in table.columns
+    signals = [name for name in table.columns if SIGNAL_COLUMN.fullmatch(name)]
+    keys = ["time", "trajectory"] if own_trajectories else ["time"]
+    table = handle_missing(table, [*keys, *signals], options.missing, source)
+    if len(table) < 2:
+        raise LogError(f"{source} has {len(table)} row(s); a log needs at least two.")
+    time = table["time"].to_numpy()
+    if own_trajectories:
+        number = table["trajectory"].to_numpy()
+        if np.any(number != np.round(number)):
+            raise LogError(f"{source}: the trajectory column must hold whole numbers.")
+        if len(number) and np.abs(number).max() > LARGEST_NUMBER:
+            raise LogError(
+                f"{source}: the trajectory column holds {number[np.abs(number).argmax()]:g}; "
+                f"numbers up to {LARGEST_NUMBER} can be told apart. Number the trajectories from 0."
+            )
+        number = number.astype(np.int64)
+    else:
+        number, restarts = split_at_restarts(time)
+        if restarts:
+            match.notes.append(
+                f"{source}: the clock starts anew {restarts} time(s); each is a trajectory"
+            )
+    table["trajectory"] = number
+    keep = check_time_order(time, number, source)
+    if not keep.all():
+        first = int(np.argmin(keep))
+        warn_about_log(
+            f"{source}: {int((~keep).sum())} of {len(keep)} rows repeat the time of the row before "
+            f"(first in row {first}); the first of each is kept."
+        )
+        table = table[keep].reset_index(drop=True)
+    _split(table, n, own_trajectories, match, source, options)
+    table = mend_rows(table, n, options.remedies, match.notes)
+    if not any(f"dq{k + 1}" in table.columns for k in range(n)):
+        q = table[[f"q{k + 1}" for k in range(n)]].to_numpy()
+        dq = derive_velocity(q, table["time"].to_numpy(), table["trajectory"].to_numpy())
+        for k in range(n):
+            table[f"dq{k + 1}"] = dq[:, k]
+        match.notes.append(f"{source}: no velocities recorded; derived by central differences of q")
+    require_columns(table, n, ("q", "dq", "tau"), source)
+    return table
+
+
+def _split(
+    table: pd.DataFrame,
+    n: int,
+    own_trajectories: bool,
+    match: NameMatch,
+    source: str,
+    options: TableOptions,
+) -> None:
+    """Cut at gaps and rests in place, and note how many pieces came of it."""
+    for name in ("split_gaps", "split_dwells"):
+        if isinstance(value := getattr(options, name), bool):
+            raise LogError(
+                f"{name} is {value}; expected the time in s beyond which rows are split."
+            )
+    gap = options.split_gaps
+    if own_trajectories and gap == "auto":
+        gap = None
+    if gap is None and options.split_dwells is None:
+        return
+    before = table["trajectory"].to_numpy()
+    after = split_trajectories(
+        table["time"].to_numpy(),
+        before,
+        table[[f"q{k + 1}" for k in range(n)]].to_numpy(),
+        gap,
+        options.split_dwells,
+    )
+    pieces = after[-1] + 1 - len(np.unique(before))
+    if pieces > 0:
+        table["trajectory"] = after
+        match.notes.append(
+            f"{source}: cut at {pieces} gap(s) or rest(s) into {after[-1] + 1} trajectories"
+        )
+
+
+def _in_order(table: pd.DataFrame, n: int) -> pd.DataFrame:
+    signals = [f"{quantity}{k + 1}" for quantity in ORDER for k in range(n)]
+    first = ["time", "trajectory", *(name for name in signals if name in table.columns)]
+    return table[[*first, *(name for name in table.columns if name not in first)]]

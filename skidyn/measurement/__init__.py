@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Is a log what its owner thinks it is? Checks of a measurement before physics is blamed."""
+
+from skidyn.measurement._check import Check
+from skidyn.measurement._checks import check_measurement, list_checks, refuse_certain
+from skidyn.measurement._clock import regular_clock
+from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._suspicion import Remedy, Suspicion
+
+__all__ = [
+    "Check",
+    "Measurement",
+    "Remedy",
+    "Suspicion",
+    "check_measurement",
+    "list_checks",
+    "refuse_certain",
+    "regular_clock",
+]
+
+# For other packages of skidyn; no part of the public interface.
+from skidyn.measurement._measures import (
+    is_repeated as is_repeated,
+    position_step as position_step,
+    rest_share as rest_share,
+    reversals as reversals,
+)
+from skidyn.measurement._torque import measured_delay as measured_delay

@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Checks of single channels: joints that stand still, torque that is constant, held or clipped."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from skidyn.evidence import broken_notes
+from skidyn.measurement._check import Check
+from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._measures import position_step
+from skidyn.measurement._suspicion import Suspicion
+
+#: Share of rows at the extreme torque from which it is told.
+CLIPPED = 0.002
+#: Share of rows that hold the torque of the row before, while it is not coarse, to be told.
+HELD = 0.3
+
+
+class StillJoint(Check):
+    """Joints that hardly move."""
+
+    name = "still_joint"
+    suspects = "joints that hardly move"
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        q = measurement.signals.q
+        for k, moves in enumerate(measurement.excited):
+            if not moves:
+                yield self.suspicion(
+                    f"{measurement.joint(k)} hardly moves",
+                    f"from {q[:, k].min():.4g} to {q[:, k].max():.4g} without reversals, so its "
+                    "friction and inertia cannot be identified from this log",
+                    "noted",
+                    [k],
+                )
+
+
+class ConstantTorque(Check):
+    """A torque that never changes, in the log or in one of its trajectories."""
+
+    name = "constant_torque"
+    suspects = "torque that is constant, in the whole log or in some trajectories"
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        number = measurement.signals.trajectory
+        runs = np.unique(number)
+        for k in range(measurement.n_joints):
+            torque = measurement.torque[:, k]
+            if np.ptp(torque) == 0:
+                yield self.suspicion(
+                    f"the torque of {measurement.joint(k)} is constant",
+                    f"it is {torque[0]:.4g} in every row",
+                    "suspected",
+                    [k],
+                )
+                continue
+            still = [
+                int(run) for run in runs if len(runs) > 1 and np.ptp(torque[number == run]) == 0
+            ]
+            if still:
+                yield self.suspicion(
+                    f"the torque of {measurement.joint(k)} is constant in some trajectories",
+                    f"in {', '.join(map(str, still[:8]))}; leave these trajectories out",
+                    "suspected",
+                    [k],
+                )
+
+
+class ClippedTorque(Check):
+    """A torque that stays at its extreme value."""
+
+    name = "clipped_torque"
+    suspects = "torque that is clipped: sensor or drive saturates"
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        for k, share in enumerate(measurement.at_limit):
+            torque = measurement.torque[:, k]
+            if np.ptp(torque) > 0 and share > CLIPPED:
+                yield self.suspicion(
+                    f"the torque of {measurement.joint(k)} stays at its extreme value",
+                    f"in {100 * share:.1f} % of the rows (from {torque.min():.4g} to "
+                    f"{torque.max():.4g}): it is saturated there",
+                    "noted",
+                    [k],
+                )
+
+
+class HeldTorque(Check):
+    """A torque that holds its last value while joints move on."""
+
+    name = "held_torque"
+    suspects = "torque that holds its last value: reported less often than the positions"
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        s = measurement.signals
+        together = s.trajectory[1:] == s.trajectory[:-1]
+        moved = np.any(s.q[1:] != s.q[:-1], axis=1) & together
+        if moved.sum() < 50:
+            return
+        shares = np.zeros(measurement.n_joints)
+        for k in range(measurement.n_joints):
+            torque = measurement.torque[:, k]
+            # even steps are those of a coarse sensor, not of a slow one
+            if len(np.unique(torque)) > 0.1 * len(torque) and np.isnan(position_step(torque)):
+                shares[k] = np.mean(torque[1:][moved] == torque[:-1][moved])
+        held = np.flatnonzero(shares > HELD)
+        if len(held):
+            yield self.suspicion(
+                f"the torque of {', '.join(measurement.joint(int(k)) for k in held)} holds its "
+                "last value",
+                f"in {100 * shares[held].max():.0f} % of the rows in which positions change: it is "
+                "reported less often",
+                "suspected",
+                [int(k) for k in held],
+            )
+
+
+class BrokenSamples(Check):
+    """Single samples that leap away and back."""
+
+    name = "broken_samples"
+    suspects = "samples that leap away and back: lost packets, bus errors"
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        names = tuple(map(str, measurement.joint_names))
+        for note in broken_notes(measurement.signals, measurement.torque, names):
+            what, _, rest = note.rstrip(".").partition(" leaps away and back in ")
+            yield self.suspicion(
+                f"{what[0].lower()}{what[1:]} leaps away and back", f"in {rest}", "noted"
+            )

@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The checks of a measurement, in the order in which they change an answer."""
+
+from __future__ import annotations
+
+from skidyn._exceptions import LogError
+from skidyn.measurement._channels import (
+    BrokenSamples,
+    ClippedTorque,
+    ConstantTorque,
+    HeldTorque,
+    StillJoint,
+)
+from skidyn.measurement._check import Check
+from skidyn.measurement._clock import (
+    ClockJitter,
+    Gaps,
+    InterpolatedRows,
+    RepeatedRows,
+    SlowSampling,
+)
+from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._suspicion import CERTAINTIES, Suspicion
+from skidyn.measurement._torque import (
+    Bodies,
+    Columns,
+    ComputedTorque,
+    TorqueDelay,
+    TorqueScale,
+    UnsignedTorque,
+)
+from skidyn.measurement._units import ClockUnit, PositionUnit, Velocity, WrappedPosition
+
+#: Nothing else in skidyn keeps a list of checks.
+CHECKS: tuple[Check, ...] = (
+    ClockUnit(),
+    PositionUnit(),
+    Velocity(),
+    WrappedPosition(),
+    UnsignedTorque(),
+    Columns(),
+    TorqueScale(),
+    Bodies(),
+    RepeatedRows(),
+    ClockJitter(),
+    InterpolatedRows(),
+    TorqueDelay(),
+    HeldTorque(),
+    ConstantTorque(),
+    ClippedTorque(),
+    ComputedTorque(),
+    SlowSampling(),
+    Gaps(),
+    StillJoint(),
+    BrokenSamples(),
+)
+
+
+def list_checks() -> tuple[Check, ...]:
+    """All checks in the order in which they change an answer.
+
+    Returns
+    -------
+    tuple of Check
+        One of each kind.
+
+    Examples
+    --------
+    >>> from skidyn.measurement import list_checks
+    >>> [check.name for check in list_checks() if check.stage == 1]
+    ['unsigned_torque', 'reading']
+    """
+    return CHECKS
+
+
+def check_measurement(measurement: Measurement) -> list[Suspicion]:
+    """What is wrong with a measurement, what matters most first.
+
+    Checks that fit the robot are left out where columns are certainly in other units, and those
+    that presume the right joints and signs where these are suspected: their fits would mean
+    nothing.
+
+    Parameters
+    ----------
+    measurement : Measurement
+        What was recorded and the robot.
+
+    Returns
+    -------
+    list of Suspicion
+        Certain ones first, then suspected and noted ones; each in the order of the checks.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skidyn._signals import Signals
+    >>> from skidyn.measurement import Measurement, check_measurement
+    >>> t = np.arange(0, 20, 0.01)
+    >>> q = np.sin(t)[:, None]
+    >>> motion = Signals(q, 57.3 * np.cos(t)[:, None], 0 * q, np.zeros(2000, int), t)
+    >>> found = check_measurement(Measurement(motion, q + 0.1, None, ["pivot"]))
+    >>> found[0].check, found[0].remedy.option
+    ('velocity', '--units dq=deg/s')
+    """
+    found: list[Suspicion] = []
+    misread = 3  # the first stage that would fit columns that are read wrongly
+    for check in CHECKS:
+        if check.stage >= misread:
+            continue
+        told = list(check.look(measurement))
+        found += told
+        if check in _UNITS and any(s.certainty == "certain" for s in told):
+            misread = 1
+        elif check.stage == 1 and told:
+            misread = min(misread, 2)
+    return sorted(found, key=lambda s: CERTAINTIES.index(s.certainty))
+
+
+#: Checks whose certain suspicions make every fit of the robot meaningless.
+_UNITS = CHECKS[:4]
+
+
+def refuse_certain(found: list[Suspicion]) -> None:
+    """Raise if a measurement is certainly not what it claims.
+
+    Parameters
+    ----------
+    found : list of Suspicion
+        From :func:`check_measurement`.
+
+    Raises
+    ------
+    LogError
+        With the suspicions that are certain, and the option that mends each.
+
+    Examples
+    --------
+    >>> from skidyn.measurement import Suspicion, refuse_certain
+    >>> refuse_certain([Suspicion("gaps", "a gap", "of 1 s", "noted")])
+    """
+    certain = [s for s in found if s.certainty == "certain"]
+    if certain:
+        raise LogError(
+            "the log is not what it claims, so that any effect found in it would be wrong. "
+            + " ".join(map(str, certain))
+            + " To go on all the same: --force (in Python: force=True)."
+        )

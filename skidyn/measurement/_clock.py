@@ -1,0 +1,289 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Checks of the clock: stamps that jitter, rows that repeat or were made up, gaps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidyn._signals import Array, find_segments
+from skidyn.measurement._check import Check
+from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._suspicion import Suspicion
+
+#: Stamps nearer than this share of a step to a regular clock do not jitter.
+REGULAR = 1e-3
+#: Half width in samples of the polynomial that predicts a position from its neighbours.
+NEIGHBOURS = np.array([-2, -1, 1, 2])
+#: Twice the log-likelihood ratio from which the stamps are told to jitter, and surely do.
+TOLD, CERTAIN = 20.0, 60.0
+#: Steps by which stamps may be off a clock that is still regular.
+WANDERING = 1.0
+#: Share of rows that repeat, or lie on a line between their neighbours.
+REPEATED, ON_A_LINE = 0.02, 0.3
+#: Share of repeated rows from which accelerations, and with them findings, are wrong.
+MANY = 0.2
+
+
+def regular_clock(time: Array, trajectory: NDArray[np.int64]) -> Array:
+    """Time of every row if the samples were taken at even steps.
+
+    Rows are numbered by the recorded time where it leaves no doubt, so that a missing row stays
+    missing, and one after the other where stamps jitter by more than half a step. The straight
+    line through times over numbers is the clock.
+
+    Parameters
+    ----------
+    time : ndarray of shape (n_samples,), s
+        Recorded clock.
+    trajectory : ndarray of shape (n_samples,)
+        Trajectory of every row; gaps in time are kept.
+
+    Returns
+    -------
+    ndarray of shape (n_samples,), s
+        Even steps within every stretch without a gap.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skidyn.measurement import regular_clock
+    >>> regular_clock(np.array([0.0, 0.011, 0.021, 0.03]), np.zeros(4, int)).round(4).tolist()
+    [0.0, 0.01, 0.02, 0.03]
+    """
+    regular = np.array(time, dtype=float)
+    for rows in find_segments(trajectory, time):
+        own = regular[rows]
+        if len(own) < 3:
+            continue
+        # every row, or with missing rows where the steps between stamps say so: the straighter
+        step = _step(own)
+        missing = np.maximum(np.round(np.diff(own) / step), 1)
+        numbers = [np.arange(len(own)), np.r_[0, np.cumsum(missing)]]
+        lines = [np.polyval(np.polyfit(number, own, 1), number) for number in numbers]
+        regular[rows] = min(lines, key=lambda line: float(np.sum((line - own) ** 2)))
+    if len(regular):
+        regular += time[0] - regular[0]
+    return regular
+
+
+def _step(time: Array) -> float:
+    """Step of a clock whose stamps jitter: the mean without the steps over missing rows."""
+    steps = np.diff(time)
+    whole = steps[steps < 1.5 * np.median(steps)]
+    return float(np.mean(whole)) if len(whole) else float(np.median(steps))
+
+
+@dataclass(frozen=True)
+class Jitter:
+    """How far stamps are off a regular clock, and which of the two the positions follow.
+
+    Attributes
+    ----------
+    spread : float, s
+        Root mean square distance of the stamps from the regular clock.
+    margin : float
+        Twice the log-likelihood ratio of the positions for the regular clock against the stamps;
+        positive where samples were taken at even steps.
+    ratio : float
+        Error of predicted positions with the stamps over that with the regular clock.
+    """
+
+    spread: float
+    margin: float
+    ratio: float
+
+
+def find_jitter(time: Array, q: Array, trajectory: NDArray[np.int64]) -> Jitter:
+    """Whether the stamps jitter or the samples really were uneven.
+
+    Each position is predicted from its four neighbours by a cubic over time, once with the stamps
+    and once with the regular clock; the right clock predicts better.
+
+    Parameters
+    ----------
+    time : ndarray of shape (n_samples,), s
+        Recorded clock.
+    q : ndarray of shape (n_samples, n_joints), rad or m
+        Recorded positions.
+    trajectory : ndarray of shape (n_samples,)
+        Trajectory of every row.
+
+    Returns
+    -------
+    Jitter
+    """
+    regular = regular_clock(time, trajectory)
+    segments = find_segments(trajectory, time)
+    away = [time[r] - regular[r] - np.mean(time[r] - regular[r]) for r in segments]
+    spread = float(np.sqrt(np.mean(np.concatenate(away) ** 2)))
+    margin, ratios = 0.0, []
+    errors = []
+    for clock in (time, regular):
+        parts = [_prediction_errors(clock[rows], q[rows]) for rows in segments]
+        errors.append(np.concatenate(parts))
+    for k in range(q.shape[1]):
+        moving = np.ones(len(errors[0]), dtype=bool)
+        with_stamps, even = (np.abs(e[moving, k]) for e in errors)
+        # the larger half says what the clock does; the rest are rows in which a joint rests
+        sizes = [float(np.mean(np.sort(e)[len(e) // 2 :] ** 2)) for e in (with_stamps, even)]
+        if min(sizes) <= 0:
+            continue
+        # every position takes part in the prediction of four others
+        margin += len(even) / 4 * np.log(sizes[0] / sizes[1])
+        ratios.append(np.sqrt(sizes[0] / sizes[1]))
+    return Jitter(spread, float(margin), float(np.max(ratios)) if ratios else 1.0)
+
+
+def _prediction_errors(time: Array, q: Array) -> Array:
+    """Positions less their prediction by the cubic through two neighbours on either side."""
+    n = len(time)
+    if n < 8 or np.any(np.diff(time) <= 0):
+        return np.zeros((0, q.shape[1]))
+    middle = np.arange(2, n - 2)
+    around = time[middle[:, None] + NEIGHBOURS]
+    weights = np.ones(around.shape)
+    for a in range(4):
+        for b in range(4):
+            if a != b:
+                weights[:, a] *= (time[middle] - around[:, b]) / (around[:, a] - around[:, b])
+    predicted = np.einsum("ia,iak->ik", weights, q[middle[:, None] + NEIGHBOURS])
+    gain = np.sqrt(1 + np.sum(weights**2, axis=1))  # noise of the positions enters all alike
+    return np.asarray((q[middle] - predicted) / gain[:, None])
+
+
+class ClockJitter(Check):
+    """Stamps that jitter although samples were taken at even steps."""
+
+    name = "clock_jitter"
+    suspects = "stamps that jitter around samples that were taken at even steps"
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        signals = measurement.signals
+        if len(measurement.steps) < 50 or np.any(measurement.steps <= 0):
+            return
+        step = 1 / measurement.rate
+        found = find_jitter(signals.clock, signals.q, signals.trajectory)
+        if found.spread < REGULAR * step:
+            return
+        size = (
+            f"{1e3 * found.spread:.3g} ms"
+            if found.spread > 1e-4
+            else (f"{1e6 * found.spread:.3g} us")
+        )
+        if found.margin > TOLD and found.spread > WANDERING * step:
+            yield self.suspicion(
+                "the clock wanders",
+                f"its stamps lie {size} around even steps of {1e3 * step:.4g} ms, more than a "
+                "step, so that no regular clock takes its place",
+                "suspected",
+            )
+        elif found.margin > TOLD:
+            yield self.suspicion(
+                "the stamps of the clock jitter, not the samples",
+                f"they lie {size} around even steps of {1e3 * step:.4g} ms, and with even steps "
+                f"positions follow their neighbours up to {found.ratio:.3g} times as closely",
+                "certain" if found.margin > CERTAIN and found.ratio > 1.2 else "suspected",
+                remedy=("--clock regular", "clock='regular'"),
+            )
+        elif measurement.jitter > 0.25:
+            really = found.margin < -TOLD
+            yield self.suspicion(
+                "samples were taken at uneven steps" if really else "the time step varies",
+                f"by {100 * measurement.jitter:.0f} % (5 to 95 % of the steps)"
+                + ("; the positions agree with the stamps" if really else "")
+                + ", and derivatives use the recorded times",
+                "noted",
+            )
+
+
+class RepeatedRows(Check):
+    """Rows that repeat the one before although joints move."""
+
+    name = "repeated_rows"
+    suspects = "rows that repeat the one before: polled faster than the robot reports"
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        count = measurement.repeated
+        if count > REPEATED * measurement.n_samples:
+            share = count / measurement.n_samples
+            yield self.suspicion(
+                "rows repeat the one before",
+                f"in {count} of {measurement.n_samples} rows no position changes although joints "
+                "move: the recorder polled faster than the robot reports, so derivatives are too "
+                "rough",
+                "certain" if share > MANY and not _coarse(measurement) else "suspected",
+                remedy=("--drop-repeated", "drop_repeated=True"),
+            )
+
+
+def _coarse(measurement: Measurement) -> bool:
+    """Whether rows repeat because the position sensor is coarse: torque then goes on changing."""
+    s = measurement.signals
+    same = np.all(s.q[1:] == s.q[:-1], axis=1) & (s.trajectory[1:] == s.trajectory[:-1])
+    other = np.any(measurement.torque[1:] != measurement.torque[:-1], axis=1)
+    return bool(np.mean(other[same]) > 0.5) if same.any() else False
+
+
+class InterpolatedRows(Check):
+    """Rows that lie on a straight line between their neighbours: resampled from a slower clock."""
+
+    name = "interpolated_rows"
+    suspects = "rows that were interpolated from a slower clock"
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        s = measurement.signals
+        if measurement.n_joints < 2:
+            return
+        on_line, moving = 0, 0
+        for rows in s.segments:
+            q, time = s.q[rows], s.clock[rows]
+            if len(q) < 10:
+                continue
+            slope = np.diff(q, axis=0) / np.diff(time)[:, None]
+            moves = np.abs(slope[1:]) > 1e-3 * np.abs(slope).max(axis=0) + 1e-12
+            bend = np.abs(np.diff(slope, axis=0)) <= 1e-6 * np.abs(slope).max(axis=0)
+            both = moves.sum(axis=1) >= 2
+            moving += int(both.sum())
+            on_line += int((np.all(bend | ~moves, axis=1) & both).sum())
+        if moving > 50 and on_line > ON_A_LINE * moving:
+            yield self.suspicion(
+                "rows were interpolated from a slower clock",
+                f"in {100 * on_line / moving:.0f} % of the moving rows all joints lie on straight "
+                "lines between their neighbours, so accelerations are those of the interpolation",
+                "suspected",
+            )
+
+
+class Gaps(Check):
+    """Gaps in time inside trajectories."""
+
+    name = "gaps"
+    suspects = "gaps in time inside trajectories"
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        gaps = measurement.gaps
+        if len(gaps):
+            yield self.suspicion(
+                f"{len(gaps)} gap(s) in time inside trajectories",
+                f"the longest {gaps.max():.3g} s; filters and derivatives do not cross them",
+                "noted",
+            )
+
+
+class SlowSampling(Check):
+    """Too few samples a second for accelerations."""
+
+    name = "slow_sampling"
+    suspects = "a rate at which accelerations cannot be told"
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        if 2 <= measurement.rate < 20:
+            yield self.suspicion(
+                f"the log is sampled at {measurement.rate:.3g} Hz",
+                "accelerations, and with them inertias, cannot be told from it",
+                "noted",
+            )

@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Delay of the torque against the motion, from identified bodies, friction and rotor inertia."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidyn._signals import SIGN_BLUR, Array, Signals
+from skidyn.measurement._fits import FEWEST, Fits, Reading, friction
+
+#: Lags that are tried, s, and groups of rows that are left out in turn.
+LAGS = np.linspace(-0.06, 0.06, 13)
+GROUPS = 8
+#: Least velocity of rows that count, in rad/s (a tenth of it in m/s).
+SLIDING = 0.05
+#: Largest share of the torque's spread that the fit of a joint may leave for its lag to count.
+LEFT = 0.5
+
+
+@dataclass(frozen=True)
+class Delay:
+    """Lag of the torque behind the motion.
+
+    Attributes
+    ----------
+    common : float, s
+        Lag of all joints together; positive where torque is late, NaN where it cannot be told.
+    error : float, s
+        Its standard error.
+    joints : ndarray of shape (n_joints,), s
+        Lag of every joint by itself, NaN where it cannot be told.
+    gain : float
+        Log-likelihood gained by the common lag.
+    """
+
+    common: float
+    error: float
+    joints: Array
+    gain: float
+
+
+def find_delay(fits: Fits) -> Delay:
+    """Lag at which bodies, friction and rotor inertia explain the torque best.
+
+    Parameters
+    ----------
+    fits : Fits
+        Rows.
+
+    Returns
+    -------
+    Delay
+    """
+    n = fits.n_joints
+    unknown = Delay(np.nan, np.nan, np.full(n, np.nan), 0.0)
+    s = fits.motion(Reading())
+    regressor = fits.average(fits.robot.torque_regressor(s.q, s.dq, s.ddq))
+    shifted = [fits.average(fits.torque_at(lag)) for lag in LAGS]
+    tables, lags = [], np.full(n, np.nan)
+    for j in range(n):
+        use = _sliding(fits, s, j)
+        if not fits.usable(j) or use.sum() < FEWEST:
+            continue
+        own = np.column_stack([friction(s, j), _bent_friction(s, j), np.ones(len(s.q))])
+        columns = np.column_stack([regressor[use, j], fits.average(own)[use]])
+        columns = columns[:, np.abs(columns).max(axis=0) > 0]
+        columns = columns / np.linalg.norm(columns, axis=0)
+        basis, values, _ = np.linalg.svd(columns, full_matrices=False)
+        basis = basis[:, values > 1e-6 * values[0]]
+        if basis.shape[1] > 0.5 * len(basis):
+            continue
+        y = np.stack([torque[use, j] for torque in shifted], axis=1)
+        rest = y - basis @ (basis.T @ y)
+        spread = float(np.sum((y[:, len(LAGS) // 2] - y[:, len(LAGS) // 2].mean()) ** 2))
+        errors = np.stack([(part**2).sum(axis=0) for part in np.array_split(rest, GROUPS)])
+        total = errors.sum(axis=0)
+        if (
+            spread <= 0
+            or total.min() > LEFT * spread
+            or int(np.argmin(total))
+            in (
+                0,
+                len(LAGS) - 1,
+            )
+        ):
+            continue
+        tables.append((len(rest), errors))
+        lags[j] = _lowest(total)
+    if not tables:
+        return unknown
+
+    # squared errors, and not their logarithms, are a parabola of the lag
+    noise = [float(e.sum(axis=0).min()) / n for n, e in tables]
+
+    def cost(left_out: int | None) -> Array:
+        keep = [g for g in range(GROUPS) if g != left_out]
+        errors = [e[keep].sum(axis=0) / (2 * s) for s, (_, e) in zip(noise, tables, strict=True)]
+        return np.asarray(np.sum(errors, axis=0))
+
+    common = _lowest(cost(None))
+    others = np.array([_lowest(cost(g)) for g in range(GROUPS)])
+    error = float(np.sqrt((GROUPS - 1) * np.mean((others - others.mean()) ** 2)))
+    whole = sum(n / 2 * np.log(e.sum(axis=0)) for n, e in tables)
+    gain = float(whole[len(LAGS) // 2] - whole.min())
+    return Delay(common, error, lags, gain)
+
+
+def _sliding(fits: Fits, signals: Signals, joint: int) -> NDArray[np.bool_]:
+    """Rows in which a joint slides one way: friction turns while it sticks, before it moves."""
+    speed = (signals.dq[:, joint] / signals.unit[joint]).reshape(fits.n_rows, -1)
+    fast = np.abs(speed).min(axis=1) > SLIDING
+    return np.asarray(fast & (np.abs(np.sign(speed).sum(axis=1)) == speed.shape[1]))
+
+
+def _bent_friction(signals: Signals, joint: int) -> Array:
+    """Friction that falls or rises with speed: taken for viscous it would look like a lead."""
+    speed = signals.dq[:, joint] / signals.unit[joint]
+    sign = np.tanh(speed / SIGN_BLUR)
+    falling = [sign * np.exp(-np.abs(speed) / slow) for slow in (0.03, 0.1, 0.3)]
+    return np.column_stack([*falling, speed * np.abs(speed)])
+
+
+def _lowest(cost: Array) -> float:
+    """Lag of least cost, between those tried by a parabola."""
+    k = int(np.argmin(cost))
+    if k in (0, len(cost) - 1):
+        return float(LAGS[k])
+    left, middle, right = cost[k - 1 : k + 2]
+    bend = left - 2 * middle + right
+    step = float(LAGS[1] - LAGS[0])
+    return float(LAGS[k] + step * (0.5 * (left - right) / bend if bend > 0 else 0.0))

@@ -1,0 +1,427 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Averaged rows of a measurement, and how well a robot explains them in one reading or another.
+
+The torque of each joint is fitted as a multiple of the robot's own torque and its friction, rotor
+inertia and offset, all but the offset not negative: a negative friction would feed energy. Rows
+that no reading explains weigh little, because residuals are Student's t. Identified bodies are the
+second opinion: what only wrong masses in the description speak for, they do not confirm.
+
+References
+----------
+K. L. Lange, R. J. A. Little, J. M. G. Taylor (1989), Robust statistical modeling using the t
+distribution, J. American Statistical Association 84(408), 881-896.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.optimize import nnls
+from scipy.special import gammaln
+
+from skidyn._signals import SIGN_BLUR, Array, Signals
+from skidyn.evidence import REST, smooth_motion
+from skidyn.robots import Robot
+
+#: Width of a row in s and the samples in it; rows used at most, over all stretches of the log.
+WIDTH, SAMPLES, MOST_ROWS = 0.125, 6, 1200
+#: Degrees of freedom of the residuals, and rounds of the fit.
+FREEDOM, ROUNDS = 4.0, 5
+#: Largest likeness of neighbouring rows: what bodies that are a little wrong leave is alike over
+#: seconds, and would make any log too short.
+MOST_ALIKE = 0.875
+#: Fewest rows of a joint for a fit.
+FEWEST = 25
+#: What of a reading does not concern the motion.
+_PLAIN: dict[str, Any] = {"flip_torque": frozenset(), "torque_order": None}
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How the columns of a log are to be read; the default takes them as they are.
+
+    Attributes
+    ----------
+    flip_motion, flip_torque : frozenset of int
+        Joints, from 0, whose positions and velocities, or torques, have the other sign.
+    order, torque_order : tuple of int or None
+        Column that holds each joint: of all signals, and of the torque beside that.
+    zero : tuple of (int, float)
+        Joints and what their position reads at the robot's zero.
+    gravity : tuple of float or None
+        Gravity in the base frame, m/s^2; the robot's own if None.
+    """
+
+    flip_motion: frozenset[int] = frozenset()
+    flip_torque: frozenset[int] = frozenset()
+    order: tuple[int, ...] | None = None
+    torque_order: tuple[int, ...] | None = None
+    zero: tuple[tuple[int, float], ...] = ()
+    gravity: tuple[float, float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Fit of a reading, by column of the recorded torque, whichever joint it is read as.
+
+    Attributes
+    ----------
+    likelihood : ndarray of shape (n_joints,)
+        Log-likelihood.
+    gain : ndarray of shape (n_joints,)
+        Multiple of the robot's own torque; NaN of an identified fit.
+    residual : list of ndarray
+        Residual of the rows of every column, N m or N.
+    scale : ndarray of shape (n_joints,)
+        Scale of the residual.
+    """
+
+    likelihood: Array
+    gain: Array
+    residual: list[Array]
+    scale: Array
+
+    @property
+    def inflation(self) -> Array:
+        """By how much neighbouring rows that are alike make the likelihood look surer."""
+        return np.array([_inflation(r) for r in self.residual])
+
+    def margin(self, other: Outcome) -> Array:
+        """By how much this reading is more likely than another, by joint."""
+        inflation = np.maximum(self.inflation, 1.0)
+        return np.asarray((self.likelihood - other.likelihood) / inflation)
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """Torque at the full rate, averaged over as many samples as rows skip, and its clock."""
+
+    clock: Array
+    torque: Array
+    segments: Sequence[slice]
+    picked: NDArray[np.int64]
+
+
+@dataclass
+class Fits:
+    """Samples in rows of equal length, and the fits of readings to them.
+
+    Attributes
+    ----------
+    robot : Robot
+        As described.
+    signals : Signals
+        Smoothed motion, ``SAMPLES`` samples a row.
+    torque : ndarray of shape (n_samples, n_joints)
+        Torque averaged alike.
+    moving : ndarray of shape (n_rows, n_joints) of bool
+        Rows in which the joint of a column moves: at rest friction has no direction.
+    recorded : Recorded
+        Torque at the full rate, for rows at other times.
+    left_out : frozenset of int
+        Columns of the torque, from 0, that are of no use.
+    """
+
+    robot: Robot
+    signals: Signals
+    torque: Array
+    moving: NDArray[np.bool_]
+    recorded: Recorded
+    left_out: frozenset[int] = frozenset()
+    _known: dict[Reading, Outcome] = field(default_factory=dict, repr=False)
+    _moved: dict[Reading, Array] = field(default_factory=dict, repr=False)
+    _fitted: dict[tuple[Reading, int, int, float, int], RobustFit] = field(
+        default_factory=dict, repr=False
+    )
+
+    @property
+    def n_joints(self) -> int:
+        """Number of joints."""
+        return self.signals.n_joints
+
+    def without(self, joints: Sequence[int]) -> Fits:
+        """The same rows without the torque of some joints."""
+        left_out = self.left_out | frozenset(joints)
+        return Fits(self.robot, self.signals, self.torque, self.moving, self.recorded, left_out)
+
+    def scaled(self, gains: Mapping[int, float]) -> Fits:
+        """The same rows with columns of the torque divided by gains."""
+        torque = self.torque.copy()
+        for column, gain in gains.items():
+            torque[:, column] /= gain
+        return Fits(self.robot, self.signals, torque, self.moving, self.recorded, self.left_out)
+
+    @property
+    def n_rows(self) -> int:
+        """Number of rows."""
+        return len(self.moving)
+
+    def average(self, values: Array) -> Array:
+        """Mean of every row, from values at every sample."""
+        return np.asarray(values.reshape(-1, SAMPLES, *values.shape[1:]).mean(axis=1))
+
+    def motion(self, reading: Reading) -> Signals:
+        """Motion as a reading has it."""
+        order = list(reading.order or range(self.n_joints))
+        sign = np.ones(self.n_joints)
+        sign[list(reading.flip_motion)] = -1
+        zero = np.zeros(self.n_joints)
+        for joint, value in reading.zero:
+            zero[joint] = value
+        s = self.signals
+        q, dq, ddq = (values[:, order] * sign for values in (s.q, s.dq, s.ddq))
+        return s.with_(q=q - zero, dq=dq, ddq=ddq)
+
+    def torque_column(self, reading: Reading, joint: int) -> tuple[int, float]:
+        """Column that holds the torque of a joint, and its sign."""
+        column = joint if reading.torque_order is None else reading.torque_order[joint]
+        column = column if reading.order is None else reading.order[column]
+        return column, -1.0 if joint in reading.flip_torque else 1.0
+
+    def torque_at(self, lag: float) -> Array:
+        """Torque that was recorded a lag (s) after the motion of every sample."""
+        source = self.recorded
+        later = np.empty_like(source.torque)
+        for rows in source.segments:
+            clock = source.clock[rows]
+            for k in range(self.n_joints):
+                later[rows, k] = np.interp(clock + lag, clock, source.torque[rows, k])
+        return np.asarray(later[source.picked])
+
+    def _rows(self, column: int) -> tuple[Array, NDArray[np.bool_]]:
+        """Torque of a column in rows, and which rows count."""
+        return self._mean_torque[:, column], self.moving[:, column]
+
+    @cached_property
+    def _mean_torque(self) -> Array:
+        return self.average(self.torque)
+
+    def usable(self, column: int) -> bool:
+        """Whether the torque of a column is used, and its joint moves."""
+        return column not in self.left_out and int(self.moving[:, column].sum()) >= FEWEST
+
+    def nominal(self, reading: Reading, rounds: int = ROUNDS) -> Outcome:
+        """Fit with the bodies that the robot's description states."""
+        n = self.n_joints
+        likelihood, gain, scale = np.zeros(n), np.full(n, np.nan), np.ones(n)
+        residual = [np.zeros(0) for _ in range(n)]
+        for j in range(n):
+            column, sign = self.torque_column(reading, j)
+            if not self.usable(column):
+                continue
+            fit = self._joint_fit(replace(reading, **_PLAIN), j, column, sign, rounds)
+            likelihood[column], gain[column] = fit.likelihood, fit.coefficients[0]
+            scale[column], residual[column] = fit.scale, fit.residual
+        return Outcome(likelihood, gain, residual, scale)
+
+    def _joint_fit(
+        self, motion: Reading, joint: int, column: int, sign: float, rounds: int
+    ) -> RobustFit:
+        """Fit of a joint to a column of the torque; readings share most of these fits."""
+        key = (motion, joint, column, sign, rounds)
+        if key not in self._fitted:
+            y, use = self._rows(column)
+            columns = self._columns(motion)[use, :, joint]
+            self._fitted[key] = fit_admissible(columns, sign * y[use], rounds)
+        return self._fitted[key]
+
+    def _columns(self, motion: Reading) -> Array:
+        """Mean columns of every joint, shape (n_rows, 4, n_joints)."""
+        if motion not in self._moved:
+            s = self.motion(motion)
+            own = self.robot.inverse_dynamics(s.q, s.dq, s.ddq, gravity=motion.gravity)
+            sign = np.tanh(s.dq / (SIGN_BLUR * s.unit))
+            stacked = np.stack([own, s.dq, sign, s.ddq], axis=1)
+            self._moved.clear()  # readings come one after the other; only the last is needed
+            self._moved[motion] = self.average(stacked)
+        return self._moved[motion]
+
+    def identified(self, reading: Reading) -> Outcome:
+        """Fit with bodies that are identified, alike for all joints."""
+        if reading not in self._known:
+            self._known[reading] = self._identified(reading)
+        return self._known[reading]
+
+    def _identified(self, reading: Reading) -> Outcome:
+        s = self.motion(reading)
+        robot = self.robot
+        if reading.gravity is not None:
+            robot = replace(robot, gravity=np.asarray(reading.gravity))
+        regressor = self.average(robot.torque_regressor(s.q, s.dq, s.ddq))
+        read = [self.torque_column(reading, j) for j in range(self.n_joints)]
+        joints = [j for j, (column, _) in enumerate(read) if self.usable(column)]
+        p = regressor.shape[2]
+        designs, targets = [], []
+        for k, j in enumerate(joints):
+            y, use = self._rows(read[j][0])
+            own = np.column_stack([friction(s, j), np.ones(len(s.q))])
+            block = np.zeros((int(use.sum()), p + 4 * len(joints)))
+            block[:, :p] = regressor[use, j]
+            block[:, p + 4 * k : p + 4 * k + 4] = self.average(own)[use]
+            designs.append(block)
+            targets.append(read[j][1] * y[use])
+        columns = [read[j][0] for j in joints]
+        return self._spread(columns, fit_together(designs, targets))
+
+    def _spread(self, columns: Sequence[int], fits: Sequence[RobustFit]) -> Outcome:
+        n = self.n_joints
+        likelihood, scale = np.zeros(n), np.ones(n)
+        residual = [np.zeros(0) for _ in range(n)]
+        for c, fit in zip(columns, fits, strict=True):
+            likelihood[c], scale[c], residual[c] = fit.likelihood, fit.scale, fit.residual
+        return Outcome(likelihood, np.full(n, np.nan), residual, scale)
+
+
+@dataclass(frozen=True)
+class RobustFit:
+    """Coefficients, scale, residual and log-likelihood of a fit with Student's t residuals."""
+
+    coefficients: Array
+    scale: float
+    residual: Array
+    likelihood: float
+
+
+def friction(signals: Signals, joint: int) -> Array:
+    """Columns of viscous and dry friction and of rotor inertia of a joint."""
+    dq = signals.dq[:, joint]
+    sign = np.tanh(dq / (SIGN_BLUR * signals.unit[joint]))
+    return np.column_stack([dq, sign, signals.ddq[:, joint]])
+
+
+def make_fits(signals: Signals, torque: Array, robot: Robot) -> Fits | None:
+    """Rows of a measurement; None where no stretch of it is long enough.
+
+    Parameters
+    ----------
+    signals : Signals
+        Recorded motion.
+    torque : ndarray of shape (n_samples, n_joints), N m or N
+        Recorded torque.
+    robot : Robot
+        As described.
+
+    Returns
+    -------
+    Fits or None
+    """
+    motion = smooth_motion(signals)
+    rate, smooth = motion.rate, motion.signals
+    every = max(1, round(rate * WIDTH / SAMPLES))
+    mean = _running_mean(torque, every | 1)  # an even number would be half a sample late
+    parts = []
+    for rows in signals.segments:
+        edge = max(2, motion.half_width // 2) + every
+        picked = np.arange(rows.start + edge, rows.stop - edge, every)
+        parts.append(picked[: len(picked) // SAMPLES * SAMPLES].reshape(-1, SAMPLES))
+    blocks = np.concatenate(parts) if parts else np.zeros((0, SAMPLES), dtype=int)
+    if len(blocks) < FEWEST:
+        return None
+    if len(blocks) > MOST_ROWS:  # stretches of rows from everywhere in the log
+        blocks = blocks[_stretches(len(blocks))]
+    rows_used = blocks.ravel()
+    taken = smooth.take(rows_used).with_(robot=None)
+    slow = REST * taken.unit
+    moving = np.abs(taken.dq).reshape(-1, SAMPLES, robot.n_joints).mean(axis=1) > slow
+    recorded = Recorded(signals.clock, mean, signals.segments, rows_used)
+    return Fits(robot, taken, mean[rows_used], moving, recorded)
+
+
+def _stretches(n: int) -> NDArray[np.int64]:
+    """Rows of 24 stretches evenly over a log."""
+    length = MOST_ROWS // 24
+    starts = np.linspace(0, n - length, 24).astype(int)
+    return np.unique(starts[:, None] + np.arange(length))
+
+
+def _running_mean(values: Array, width: int) -> Array:
+    """Mean around every sample; ends are not used."""
+    if width < 2:
+        return values
+    total = np.cumsum(np.vstack([np.zeros(values.shape[1]), values]), axis=0)
+    n = len(values)
+    low = np.clip(np.arange(n) - width // 2, 0, n)
+    high = np.clip(low + width, 0, n)
+    return np.asarray((total[high] - total[low]) / np.maximum(high - low, 1)[:, None])
+
+
+def fit_admissible(columns: Array, y: Array, rounds: int = ROUNDS) -> RobustFit:
+    """Robust fit with an offset that may be anything and coefficients that are not negative."""
+    size = np.linalg.norm(columns, axis=0)
+    size[size == 0] = 1.0
+    a = columns / size
+    weight = np.ones(len(y))
+    p = a.shape[1]
+    coefficients, residual, scale = np.zeros(p), y, 1.0
+    for _ in range(rounds):
+        total = weight.sum()
+        b, z = a - weight @ a / total, y - weight @ y / total
+        weighted = weight[:, None] * b
+        # the Cholesky factor of the normal equations has the same least squares as all rows
+        gram = weighted.T @ b
+        gram[np.diag_indices(p)] += 1e-9 * np.trace(gram) / p + 1e-300
+        factor = np.linalg.cholesky(gram).T
+        coefficients = nnls(factor, solve_triangular(factor.T, weighted.T @ z, lower=True))[0]
+        residual = z - b @ coefficients
+        scale = float(np.sqrt(np.mean(weight * residual**2))) + 1e-12
+        weight = (FREEDOM + 1) / (FREEDOM + (residual / scale) ** 2)
+    return RobustFit(coefficients / size, scale, residual, student(residual, scale))
+
+
+def fit_together(designs: Sequence[Array], targets: Sequence[Array]) -> list[RobustFit]:
+    """Robust fit of several joints with common coefficients."""
+    if not designs:
+        return []
+    size = np.sqrt(sum((d**2).sum(axis=0) for d in designs))
+    size[size == 0] = 1.0
+    scaled = [d / size for d in designs]
+    scales = [float(np.std(y)) + 1e-12 for y in targets]
+    weights = [np.ones(len(y)) for y in targets]
+    residuals = list(targets)
+    coefficients = np.zeros(len(size))
+    for _ in range(ROUNDS + 2):
+        gram = 1e-9 * np.eye(len(size)) * sum(float(w.sum()) for w in weights)
+        cross = np.zeros(len(size))
+        for d, y, s, w in zip(scaled, targets, scales, weights, strict=True):
+            weighted = d * (w / s**2)[:, None]
+            gram += weighted.T @ d
+            cross += weighted.T @ y
+        diagonal = np.sqrt(np.diag(gram))
+        gram = gram / diagonal[:, None] / diagonal + 1e-10 * np.eye(len(size))
+        coefficients = cho_solve(cho_factor(gram), cross / diagonal) / diagonal
+        residuals = [y - d @ coefficients for d, y in zip(scaled, targets, strict=True)]
+        scales = [
+            float(np.sqrt(np.mean(w * r**2))) + 1e-12
+            for w, r in zip(weights, residuals, strict=True)
+        ]
+        weights = [
+            (FREEDOM + 1) / (FREEDOM + (r / s) ** 2) for r, s in zip(residuals, scales, strict=True)
+        ]
+    return [
+        RobustFit(coefficients / size, s, r, student(r, s))
+        for r, s in zip(residuals, scales, strict=True)
+    ]
+
+
+def student(residual: Array, scale: float) -> float:
+    """Log-likelihood of residuals under Student's t."""
+    constant = gammaln((FREEDOM + 1) / 2) - gammaln(FREEDOM / 2) - np.log(FREEDOM * np.pi) / 2
+    spread = np.log1p((residual / scale) ** 2 / FREEDOM)
+    return float(len(residual) * (constant - np.log(scale)) - (FREEDOM + 1) / 2 * spread.sum())
+
+
+def _inflation(residual: Array) -> float:
+    """Variance inflation of a mean of rows, from the likeness of neighbouring rows."""
+    if len(residual) < FEWEST:
+        return 1.0
+    r = residual - np.median(residual)
+    r = np.clip(r, *(np.array([-3, 3]) * (1.4826 * np.median(np.abs(r)) + 1e-300)))
+    alike = float(r[1:] @ r[:-1] / (r @ r)) if r @ r > 0 else 0.0
+    alike = float(np.clip(alike, 0.0, MOST_ALIKE))
+    return (1 + alike) / (1 - alike)

@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The measurement that is checked, with what several checks want to know about it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from skidyn._signals import Array, Signals
+from skidyn.measurement._measures import (
+    excited,
+    is_repeated,
+    longest_plateau_share,
+    velocity_consistency,
+)
+
+if TYPE_CHECKING:
+    from skidyn.measurement._delay import Delay
+    from skidyn.measurement._fits import Fits
+    from skidyn.robots import Robot
+
+
+@dataclass
+class Measurement:
+    """Motion and torque as recorded, and the robot they are said to come from.
+
+    Parameters
+    ----------
+    signals : Signals
+        Recorded motion; its positions and velocities are looked at as they are.
+    torque : ndarray of shape (n_samples, n_joints), N m or N
+        Recorded torque.
+    robot : Robot or None
+        Robot as its description says; checks that need it are left out without it.
+    joint_names : sequence of str
+        Names for sentences and remedies.
+    unsigned, delay : optional
+        What checks found that others want to know; filled in by them.
+
+    Examples
+    --------
+    >>> from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+    >>> from skidyn.logs import check_log
+    >>> log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=2, duration=4.0)
+    >>> flipped = log.frame.assign(dq2=-log.frame["dq2"])
+    >>> check_log(flipped, log.robot).checks[0].check
+    'velocity'
+    """
+
+    signals: Signals
+    torque: Array
+    robot: Robot | None
+    joint_names: Sequence[str]
+    unsigned: tuple[list[int], dict[int, float]] | None = field(default=None, repr=False)
+    delay: Delay | None = field(default=None, repr=False)
+
+    @property
+    def n_joints(self) -> int:
+        """Number of joints."""
+        return self.signals.n_joints
+
+    @property
+    def n_samples(self) -> int:
+        """Number of rows."""
+        return self.signals.n_samples
+
+    def joint(self, k: int) -> str:
+        """Name of a joint for a sentence.
+
+        Parameters
+        ----------
+        k : int
+            Joint, counted from 0.
+
+        Returns
+        -------
+        str
+            Its number, counted from 1, and its name where it has one.
+        """
+        name = str(self.joint_names[k])
+        return name if name == f"joint {k + 1}" else f"joint {k + 1} ({name})"
+
+    @cached_property
+    def steps(self) -> Array:
+        """Time steps inside trajectories, s."""
+        time, number = self.signals.clock, self.signals.trajectory
+        return np.asarray(np.diff(time)[number[1:] == number[:-1]])
+
+    @cached_property
+    def rate(self) -> float:
+        """Median sampling rate, Hz."""
+        steps = self.steps[self.steps > 0]
+        return 1 / float(np.median(steps)) if len(steps) else 1.0
+
+    @cached_property
+    def jitter(self) -> float:
+        """Half the width between the 5 % and 95 % quantiles of the steps, over their median."""
+        spreads = []
+        for rows in self.signals.segments:
+            steps = np.diff(self.signals.clock[rows])
+            if len(steps):
+                low, middle, high = np.quantile(steps, [0.05, 0.5, 0.95])
+                spreads.append((high - low) / 2 / middle if middle > 0 else 0.0)
+        return float(np.median(spreads)) if spreads else 0.0
+
+    @cached_property
+    def gaps(self) -> Array:
+        """Steps longer than 5 median steps inside trajectories, s."""
+        return np.asarray(self.steps[self.steps > 5 / self.rate])
+
+    @cached_property
+    def velocities(self) -> list[tuple[float, float]]:
+        """Slope and correlation of integrated velocity on position, by joint."""
+        s = self.signals
+        return [
+            velocity_consistency(s.clock, s.q[:, k], s.dq[:, k], s.segments)
+            for k in range(self.n_joints)
+        ]
+
+    @cached_property
+    def excited(self) -> list[bool]:
+        """Which joints move enough to be identified."""
+        s = self.signals
+        return [excited(s.q[:, k], s.dq[:, k], s.segments) for k in range(self.n_joints)]
+
+    @cached_property
+    def repeated(self) -> int:
+        """Rows that repeat all positions of the row before although joints move."""
+        s = self.signals
+        return int(is_repeated(s.q, s.dq, s.trajectory).sum())
+
+    @cached_property
+    def at_limit(self) -> list[float]:
+        """Share of rows in which the torque of each joint stays at its extreme value."""
+        columns = self.torque.T
+        return [longest_plateau_share(column, self.signals.segments) for column in columns]
+
+    @cached_property
+    def fits(self) -> Fits | None:
+        """Averaged rows to which readings of the measurement are fitted."""
+        from skidyn.measurement._fits import make_fits  # with it all columns of the evidence
+
+        return None if self.robot is None else make_fits(self.signals, self.torque, self.robot)

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Measures of single signals of a log, used by its quality report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+#: Windows over which velocity is compared with differentiated position, s.
+WINDOW = 0.05
+
+
+def position_step(position: np.ndarray) -> float:
+    """Step of a position sensor, or NaN where positions are not visibly quantised.
+
+    Gaps between neighbouring distinct values are whole multiples of the step of the sensor.
+    """
+    gaps = np.diff(np.unique(position))
+    gaps = gaps[gaps > 1e-12]
+    if len(gaps) < 20:
+        return np.nan
+    smallest = np.sort(gaps)[: max(len(gaps) // 50, 5)]
+    step = float(np.median(smallest))
+    if step < 0.8 * smallest[-1] or smallest[0] < 0.8 * step:
+        return np.nan
+    largest = float(np.abs(position).max())
+    if step < 8 * np.finfo(np.float32).eps * largest and np.all(position == np.float32(position)):
+        return np.nan  # the step of the numbers in the file, not of the sensor
+    multiples = gaps[gaps < 20 * step] / step
+    whole = np.abs(multiples - np.round(multiples)) < 0.1
+    return step if whole.mean() > 0.9 else np.nan
+
+
+def is_repeated(position: np.ndarray, velocity: np.ndarray, trajectory: np.ndarray) -> np.ndarray:
+    """Rows in which no position changes although some joint moves, as a mask."""
+    again = np.zeros(len(position), dtype=bool)
+    same = np.all(position[1:] == position[:-1], axis=1) & (trajectory[1:] == trajectory[:-1])
+    moving = np.any(np.abs(velocity[1:]) > 0.02 * np.abs(velocity).max(axis=0), axis=1)
+    again[1:] = same & moving
+    return again
+
+
+def rest_share(velocity: np.ndarray) -> float:
+    """Share of rows in which a joint stands: below 0.5 % of its largest velocity."""
+    largest = np.abs(velocity).max()
+    return float(np.mean(np.abs(velocity) <= 0.005 * largest)) if largest > 0 else 1.0
+
+
+def reversals(velocity: np.ndarray, segments: Sequence[slice]) -> int:
+    """Changes of direction, with a dead band of 2 % of the largest velocity against noise."""
+    band = 0.02 * np.abs(velocity).max()
+    count = 0
+    for rows in segments:
+        moving = velocity[rows][np.abs(velocity[rows]) > band]
+        count += int(np.sum(np.signbit(moving[1:]) != np.signbit(moving[:-1])))
+    return count
+
+
+def longest_plateau_share(torque: np.ndarray, segments: Sequence[slice]) -> float:
+    """Share of rows in runs of five or more at the extreme value of the torque."""
+    span = np.ptp(torque)
+    if span == 0:
+        return 1.0
+    at_limit = (torque >= torque.max() - 1e-6 * span) | (torque <= torque.min() + 1e-6 * span)
+    at_limit &= torque != 0  # the least magnitude is no limit
+    rows = 0
+    for part in segments:
+        edges = np.flatnonzero(np.diff(np.r_[0, at_limit[part].astype(int), 0]))
+        lengths = edges[1::2] - edges[::2]
+        rows += int(lengths[lengths >= 5].sum())
+    return rows / len(torque)
+
+
+def velocity_consistency(
+    time: np.ndarray, position: np.ndarray, velocity: np.ndarray, segments: Sequence[slice]
+) -> tuple[float, float]:
+    """Slope and correlation of integrated velocity against change of position.
+
+    Both are taken over windows of 50 ms (in samples of the median step), which averages noise and
+    quantisation out. NaN where the joint does not move.
+    """
+    steps = np.concatenate([np.diff(time[rows]) for rows in segments])
+    if len(steps) == 0:
+        return np.nan, np.nan
+    window = int(np.clip(np.round(WINDOW / np.median(steps)), 1, 50))
+    change, integral = [], []
+    for rows in segments:
+        t, q, dq = time[rows], position[rows], velocity[rows]
+        if len(t) <= window:
+            continue
+        area = np.r_[0.0, np.cumsum((dq[1:] + dq[:-1]) / 2 * np.diff(t))]
+        change.append(q[window:] - q[:-window])
+        integral.append(area[window:] - area[:-window])
+    if not change:
+        return np.nan, np.nan
+    x, y = np.concatenate(change), np.concatenate(integral)
+    if x @ x < 1e-20 or y @ y < 1e-20:
+        return np.nan, np.nan
+    return float(x @ y / (x @ x)), float(x @ y / np.sqrt((x @ x) * (y @ y)))
+
+
+def excited(position: np.ndarray, velocity: np.ndarray, segments: Sequence[slice]) -> bool:
+    """Whether a joint moves at all: more than 100 steps of noise, in both directions."""
+    span = np.ptp(position)
+    noise = np.median(np.abs(np.diff(position, n=2))) if len(position) > 2 else 0.0
+    return bool(span > 1e-3 and span > 20 * noise and reversals(velocity, segments) > 0)

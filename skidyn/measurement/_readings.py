@@ -1,0 +1,270 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Readings of a log that differ from the owner's in one thing, and the search for the best."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from skidyn._signals import Array
+from skidyn.measurement._fits import Fits, Outcome, Reading, friction
+
+#: Log-likelihood, after the likeness of neighbouring rows is taken off, that a change must gain.
+LEAST = 15.0
+#: What it must gain at least where identified bodies decide, by so much, and the share of a joint's
+#: residual that it then takes off.
+WEAKEST, DECISIVE, HALF = 3.0, 60.0, 0.5
+#: What it gains with stated bodies where identified ones, that could be negative, need not agree.
+OVERWHELMING = 100.0
+#: Changes of one joint that gain alike up to this, or this share, cannot be told apart.
+TIED, ALIKE = 3.0, 0.05
+#: What a change must gain with identified bodies. Negative masses could take the place of torque
+#: with the other sign or of gravity that points up or is absent, so that these gain little.
+NEEDED = {
+    **dict.fromkeys(("motion_sign", "joint_sign", "order", "torque_order", "zero"), 10.0),
+    **dict.fromkeys(("torque_sign", "gravity"), -3.0),
+}
+#: Share of gravity that a compensated torque may still hold: bodies are known to so much.
+LEFT_OVER = 0.4
+#: Least share of a joint's spread that the new reading must take away.
+LEAST_DROP = 0.15
+#: Strength of gravity, and the least angle that is no tilt of a table, degrees.
+GRAVITY, LEAST_ANGLE = 9.81, 20.0
+#: Offsets of a position that are tried, rad.
+OFFSETS = np.deg2rad([-135, -90, -45, 45, 90, 135, 180])
+#: Rounds of the fits that only rank, and how many changes are looked at more closely.
+SCREENED, FINALISTS = 1, 12
+
+
+@dataclass(frozen=True)
+class Change:
+    """One thing in which a reading differs from the log as its owner reads it.
+
+    Attributes
+    ----------
+    kind : str
+        ``"torque_sign"``, ``"motion_sign"``, ``"joint_sign"`` (both), ``"order"``,
+        ``"torque_order"``, ``"gravity"``, ``"no_gravity"`` or ``"zero"``.
+    joints : tuple of int
+        Joints concerned, from 0.
+    reading : Reading
+        With this change and those found before it.
+    gain, confirmed : float
+        Log-likelihood gained with the bodies of the description, and with identified ones.
+    drop : float
+        Share of the residual's spread that it takes off, of the joint that gains most.
+    rivals : tuple of str
+        Other kinds of change of the same joints that explain as much.
+    """
+
+    kind: str
+    joints: tuple[int, ...]
+    reading: Reading
+    gain: float = 0.0
+    confirmed: float = 0.0
+    drop: float = 0.0
+    rivals: tuple[str, ...] = ()
+
+
+def find_changes(fits: Fits) -> list[Change]:
+    """Changes to the reading that the measurement asks for, the strongest first.
+
+    One change is made at a time, the one that gains most; what is left decides on the next. At the
+    end every change must still gain against the reading without it, and identified bodies must not
+    deny it.
+
+    Parameters
+    ----------
+    fits : Fits
+        Rows.
+
+    Returns
+    -------
+    list of Change
+    """
+    found: list[Change] = []
+    reading = Reading()
+    while len(found) < 2 * fits.n_joints:
+        best = _best(fits, reading)
+        if best is None:
+            break
+        # an exchange that goes further takes the place of the one before
+        found = [c for c in found if not (best.kind == c.kind and "order" in c.kind)]
+        found.append(best)
+        reading = best.reading
+    return found
+
+
+def _best(fits: Fits, reading: Reading) -> Change | None:
+    """The alternative that gains most and that identified bodies confirm.
+
+    Few rounds tell which alternatives to look at more closely.
+    """
+    here, rough = fits.nominal(reading), fits.nominal(reading, SCREENED)
+    screened = [
+        (float(fits.nominal(change.reading, SCREENED).margin(rough).sum()), change)
+        for change in _alternatives(fits, reading, here)
+    ]
+    screened = sorted(screened, key=lambda pair: -pair[0])[:FINALISTS]
+    judged = []
+    for rough_gain, change in screened:
+        if rough_gain > 0:
+            there = fits.nominal(change.reading)
+            gain = float(there.margin(here).sum())
+            judged.append(replace(change, gain=gain, drop=_drop(here, there)))
+    judged = [
+        c
+        for c in judged
+        if c.gain >= WEAKEST and c.drop >= LEAST_DROP and _all_gain(fits, c, reading, here)
+    ]
+    judged.sort(key=lambda c: -round(c.gain, 1))
+    if judged and judged[0].kind == "no_gravity" and judged[0].gain >= LEAST:
+        if _without_gravity(fits, reading, here):
+            return judged[0]  # identified bodies make up for what is left of it
+    before = fits.identified(reading)
+    accepted = []
+    for change in judged:
+        if change.kind == "no_gravity":
+            continue
+        confirmed = float(fits.identified(change.reading).margin(before).sum())
+        # stated bodies that are a little wrong make residuals alike over seconds, so that a short
+        # log gains little by them whatever is read wrongly; identified ones then decide
+        strong = change.gain >= LEAST or (confirmed >= DECISIVE and change.drop >= HALF)
+        plain = change.gain >= OVERWHELMING and change.drop >= HALF and NEEDED[change.kind] < 0
+        if strong and (plain or confirmed >= NEEDED[change.kind]):
+            alike = [c for c in judged if c.kind != change.kind and _same_place(c, change)]
+            tied = max(TIED, ALIKE * change.gain)
+            rivals = tuple(dict.fromkeys(c.kind for c in alike if change.gain - c.gain < tied))
+            accepted.append(replace(change, confirmed=confirmed, rivals=rivals))
+    # both are likelihoods of the same torque; turning all of it round changes nothing identified
+    return max(accepted, key=lambda c: c.gain + c.confirmed, default=None)
+
+
+def _same_place(one: Change, other: Change) -> bool:
+    """Whether two changes are rivals: of the same joints, or a zero and gravity."""
+    kinds = {one.kind, other.kind}
+    return one.joints == other.joints or kinds == {"zero", "gravity"}
+
+
+def _all_gain(fits: Fits, change: Change, reading: Reading, here: Outcome) -> bool:
+    """Whether the columns that other joints get now are what is explained better by them."""
+    if "order" not in change.kind:
+        return True
+    there = fits.nominal(change.reading)
+    moved = [
+        column
+        for j in range(fits.n_joints)
+        if (column := fits.torque_column(change.reading, j)[0]) != fits.torque_column(reading, j)[0]
+        and fits.usable(column)
+    ]
+    gains = there.margin(here)[moved]
+    return bool(gains.sum() >= LEAST and np.all(gains > -LEAST))
+
+
+def _drop(before: Outcome, after: Outcome) -> float:
+    shares = 1 - after.scale / before.scale
+    return float(shares[int(np.argmax(after.margin(before)))])
+
+
+def _alternatives(fits: Fits, reading: Reading, here: Outcome) -> Iterator[Change]:
+    """Readings that differ from one in a single thing."""
+    joints = range(fits.n_joints)
+    for j in joints:
+        own = frozenset([j])
+        flip_torque, flip_motion = reading.flip_torque ^ own, reading.flip_motion ^ own
+        yield Change("torque_sign", (j,), replace(reading, flip_torque=flip_torque))
+        yield Change("motion_sign", (j,), replace(reading, flip_motion=flip_motion))
+        both = replace(reading, flip_torque=flip_torque, flip_motion=flip_motion)
+        yield Change("joint_sign", (j,), both)
+    # one at a time they would contradict each other: all of them is another convention
+    every = replace(reading, flip_torque=frozenset(joints) ^ reading.flip_torque)
+    yield Change("torque_sign", tuple(joints), every)
+    yield from _orders(fits, reading)
+    if reading.gravity is None:
+        yield from _gravities(fits, reading, here)
+    if not reading.zero:
+        turning = np.flatnonzero(~fits.signals.prismatic)
+        for j in turning.tolist():
+            for offset in OFFSETS:
+                shifted = replace(reading, zero=(*reading.zero, (int(j), float(offset))))
+                yield Change("zero", (int(j),), shifted)
+
+
+def _orders(fits: Fits, reading: Reading) -> Iterator[Change]:
+    """Orders of the columns: two exchanged, by name, backwards."""
+    n = fits.n_joints
+    for name in ("order", "torque_order"):
+        now = list(getattr(reading, name) or range(n))
+        tried = []
+        for a, b in combinations(range(n), 2):
+            swapped = list(now)
+            swapped[a], swapped[b] = swapped[b], swapped[a]
+            tried.append(swapped)
+        if n > 2 and getattr(reading, name) is None:
+            by_name = sorted(range(n), key=lambda j: fits.robot.joint_names[j])
+            tried += [[by_name.index(j) for j in range(n)], list(range(n))[::-1]]
+        for order in tried:
+            wanted = None if order == list(range(n)) else tuple(order)
+            moved = tuple(j for j in range(n) if order[j] != j)
+            if wanted is not None:
+                changed: Any = {name: wanted}
+                yield Change(name, moved, replace(reading, **changed))
+
+
+def _gravities(fits: Fits, reading: Reading, here: Outcome) -> Iterator[Change]:
+    """Other directions of gravity, the one that fits best among them, and none."""
+    own = np.asarray(fits.robot.gravity, dtype=float)
+    if not np.linalg.norm(own):
+        return
+    # first, so that it goes before a direction in which no joint feels gravity
+    yield Change("no_gravity", (), replace(reading, gravity=(0.0, 0.0, 0.0)))
+    directions = [sign * axis for axis in np.eye(3) for sign in (-1.0, 1.0)]
+    best = fitted_gravity(fits, reading, here)
+    if best is not None and np.linalg.norm(best) > 0:
+        directions.append(best / np.linalg.norm(best))
+    for direction in directions:
+        cosine = float(direction @ own / np.linalg.norm(own))
+        if np.rad2deg(np.arccos(np.clip(cosine, -1, 1))) >= LEAST_ANGLE:
+            x, y, z = (float(v) for v in GRAVITY * direction)
+            yield Change("gravity", (), replace(reading, gravity=(x, y, z)))
+
+
+def _without_gravity(fits: Fits, reading: Reading, here: Outcome) -> bool:
+    """Whether the gravity that fits best is but a small part of the robot's own."""
+    best, own = fitted_gravity(fits, reading, here), np.asarray(fits.robot.gravity, dtype=float)
+    return best is not None and abs(float(best @ own / (own @ own))) < LEFT_OVER
+
+
+def fitted_gravity(fits: Fits, reading: Reading, here: Outcome) -> Array | None:
+    """Gravity that explains the torque best with the bodies of the description, m/s^2."""
+    s = fits.motion(reading)
+    still = fits.robot.inverse_dynamics(s.q, s.dq, s.ddq, gravity=(0.0, 0.0, 0.0))
+    pulls = [fits.robot.gravity_torque(s.q, gravity=tuple(axis)) for axis in np.eye(3)]
+    blocks, targets = [], []
+    for j in range(fits.n_joints):
+        column, sign = fits.torque_column(reading, j)
+        use = fits.moving[:, column]
+        if not fits.usable(column):
+            continue
+        y = sign * fits.average(fits.torque[:, column])[use] - fits.average(still[:, j])[use]
+        own = np.column_stack([fits.average(friction(s, j))[use], np.ones(int(use.sum()))])
+        basis, _ = np.linalg.qr(own)
+        pull = np.column_stack([fits.average(p[:, j])[use] for p in pulls])
+        blocks.append((pull - basis @ (basis.T @ pull)) / here.scale[column])
+        targets.append((y - basis @ (basis.T @ y)) / here.scale[column])
+    if not blocks:
+        return None
+    a, y = np.vstack(blocks), np.concatenate(targets)
+    weight = np.ones(len(y))
+    gravity = np.zeros(3)
+    for _ in range(5):
+        scaled = a * np.sqrt(weight)[:, None]
+        gravity = np.linalg.lstsq(scaled, y * np.sqrt(weight), rcond=1e-6)[0]
+        r = y - a @ gravity
+        spread = 1.4826 * float(np.median(np.abs(r))) + 1e-12
+        weight = 1 / np.maximum(1.0, np.abs(r) / (1.5 * spread))
+    return np.asarray(gravity)

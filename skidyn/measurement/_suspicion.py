@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a check suspects about a measurement, and the option that mends it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+#: ``certain``: the measurement is not what it claims, and no diagnosis of it is true.
+#: ``suspected``: it probably is not. ``noted``: it is, but there is something it cannot tell.
+Certainty = Literal["certain", "suspected", "noted"]
+CERTAINTIES: tuple[Certainty, ...] = ("certain", "suspected", "noted")
+
+
+@dataclass(frozen=True)
+class Remedy:
+    """The option that mends what a check suspects.
+
+    Parameters
+    ----------
+    option : str
+        Option of the command line, ``"--flip elbow"``.
+    code : str
+        The same as an argument of :func:`skidyn.logs.read_log`, ``"flip=['elbow']"``.
+
+    Examples
+    --------
+    >>> from skidyn.measurement import Remedy
+    >>> str(Remedy("--flip elbow", "flip=['elbow']"))
+    "--flip elbow (in Python: flip=['elbow'])"
+    """
+
+    option: str
+    code: str
+
+    def __str__(self) -> str:
+        return f"{self.option} (in Python: {self.code})"
+
+
+@dataclass(frozen=True)
+class Suspicion:
+    """One thing about a measurement that its owner should know.
+
+    Parameters
+    ----------
+    check : str
+        Name of the check.
+    suspicion : str
+        What it suspects, as a clause.
+    evidence : str
+        What it saw.
+    certainty : {"certain", "suspected", "noted"}
+        Certain ones stop a diagnosis; noted ones are no mistake but limit what the log can tell.
+    joints : tuple of int
+        Joints concerned, counted from 1; empty if it concerns the whole log.
+    remedy : Remedy or None
+        The option that mends it; None where none can.
+
+    Examples
+    --------
+    >>> from skidyn.measurement import Suspicion
+    >>> print(Suspicion("clock_unit", "time is in ms", "the median step is 10 s", "certain"))
+    time is in ms: the median step is 10 s.
+    """
+
+    check: str
+    suspicion: str
+    evidence: str
+    certainty: Certainty
+    joints: tuple[int, ...] = ()
+    remedy: Remedy | None = None
+
+    def __str__(self) -> str:
+        mend = "" if self.remedy is None else f" Mend it with {self.remedy}."
+        return f"{self.suspicion}: {self.evidence}.{mend}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """As the reports hold it.
+
+        Returns
+        -------
+        dict
+            ``check, suspicion, evidence, certainty, joints`` and ``remedy`` (``option`` and
+            ``code``, or None).
+        """
+        remedy = self.remedy and {"option": self.remedy.option, "code": self.remedy.code}
+        return {
+            "check": self.check,
+            "suspicion": self.suspicion,
+            "evidence": self.evidence,
+            "certainty": self.certainty,
+            "joints": list(self.joints),
+            "remedy": remedy,
+        }

@@ -1,0 +1,425 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Checks that fit the robot: sign, order, gravity, zero, scale and delay of what was recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from skidyn._signals import Array
+from skidyn.measurement._check import Check
+from skidyn.measurement._delay import Delay, find_delay
+from skidyn.measurement._fits import Fits, Outcome, Reading, fit_admissible, friction
+from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._measures import reversals
+from skidyn.measurement._readings import DECISIVE, HALF, Change, find_changes
+from skidyn.measurement._suspicion import Certainty, Suspicion
+
+#: Share of the largest torque below zero that a magnitude may reach, and reversals it must see.
+BELOW, TURNS = 0.01, 4
+#: Share of zeros from which a torque is not a magnitude but only its one direction.
+CUT = 0.25
+#: Log-likelihood that the magnitude must gain over the torque itself, and to be sure.
+LEAST, SURE = 15.0, 40.0
+#: Share of a torque's spread that the robot must explain for its multiple to be told.
+EXPLAINED = 0.5
+#: Multiples of the robot's own torque that wrong masses may well make.
+USUAL = (0.4, 2.5)
+#: Factors of units of torque.
+UNITS = {1e3: "Nmm", 1e2: "Ncm", 1e-3: "kNm"}
+#: Smallest delay that is told, s, how many standard errors it must have, and how far the lag of a
+#: joint may be from it.
+SMALLEST, ERRORS, ALIKE = 0.004, 5.0, 0.006
+#: Share of the joints whose lags must be alike; friction shifts each joint by another amount.
+AGREEING = 0.75
+
+
+class UnsignedTorque(Check):
+    """Magnitudes in the place of torques, as servos report their current."""
+
+    name = "unsigned_torque"
+    suspects = "torque or current without its sign"
+    stage = 1
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        unsigned, gains = unsigned_columns(measurement)
+        if not unsigned:
+            return
+        moving = [k for k, moves in enumerate(measurement.excited) if moves]
+        every = len(unsigned) >= 3 and set(moving) <= set(unsigned)
+        zeros = float(np.median([_cut(measurement.torque[:, k]) for k in unsigned]))
+        names = ", ".join(measurement.joint(k) for k in unsigned)
+        evidence = (
+            f"of {measurement.n_samples} rows none is negative although the joints reverse "
+            f"{sum(_turns(measurement, k) for k in unsigned)} times"
+        )
+        if gains:
+            evidence += (
+                "; the magnitude of the robot's own torque is more likely by "
+                f"{max(gains.values()):.0f} (log-likelihood)"
+            )
+        cut = zeros > CUT
+        yield self.suspicion(
+            f"the torque of {names} is cut at zero"
+            if cut
+            else f"the torque of {names} has no sign",
+            evidence + (f"; {zeros:.0%} of it are zero" if cut else ""),
+            "certain" if every or max(gains.values(), default=0) > SURE else "suspected",
+            unsigned,
+            None if cut else ("--torque-sign command", "torque_sign='command'"),
+        )
+
+
+def _cut(torque: Array) -> float:
+    """Share of zeros beyond those of a coarse magnitude, which has as many of its first step."""
+    least = float(torque[torque > 0].min(initial=np.inf))
+    first = float(np.mean((torque > 0) & (torque < 1.5 * least)))
+    return max(0.0, float(np.mean(torque == 0)) - 3 * first)
+
+
+def _turns(measurement: Measurement, k: int) -> int:
+    return reversals(measurement.signals.dq[:, k], measurement.signals.segments)
+
+
+def unsigned_columns(measurement: Measurement) -> tuple[list[int], dict[int, float]]:
+    """Columns of the torque that hold magnitudes, and by how much a fit says so.
+
+    A single column is told by a fit of the magnitude of the robot's torque; where no column of
+    three or more is ever negative although all joints reverse, none has a sign.
+    """
+    if measurement.unsigned is None:
+        measurement.unsigned = _unsigned(measurement)
+    return measurement.unsigned
+
+
+def _unsigned(measurement: Measurement) -> tuple[list[int], dict[int, float]]:
+    torque = measurement.torque
+    one_sided = [
+        k
+        for k in range(measurement.n_joints)
+        if np.ptp(torque[:, k]) > 0
+        and torque[:, k].min() >= -BELOW * torque[:, k].max()
+        and _turns(measurement, k) >= TURNS
+    ]
+    moving = [k for k, moves in enumerate(measurement.excited) if moves]
+    gains = {}
+    if measurement.fits is not None:
+        for k in one_sided:
+            gain = _magnitude_gain(measurement.fits, k)
+            if gain > LEAST:
+                gains[k] = gain
+    every = len(one_sided) >= 3 and set(moving) <= set(one_sided)
+    if every or max(gains.values(), default=0.0) > SURE:
+        return one_sided, gains  # a recorder of magnitudes gives no column a sign
+    return sorted(gains), gains
+
+
+def _magnitude_gain(fits: Fits, k: int) -> float:
+    """Log-likelihood that the magnitude of the robot's torque gains over the torque itself."""
+    if not fits.usable(k):
+        return 0.0
+    s = fits.motion(Reading())
+    own = fits.robot.inverse_dynamics(s.q, s.dq, s.ddq)[:, k]
+    use = fits.moving[:, k]
+    columns = fits.average(np.column_stack([own, friction(s, k)]))[use]
+    y = fits.average(fits.torque[:, k])[use]
+    # a torque of the other sign is one-sided too where gravity is
+    plain = max(fit_admissible(columns, sign * y).likelihood for sign in (1.0, -1.0))
+    best = -np.inf
+    size = float(np.abs(columns[:, 0]).mean()) + 1e-12
+    for share in (0.0, 0.3, 3.0):  # how much friction there is before anything is fitted
+        guess = columns[:, 0] + share * size * columns[:, 2]
+        for _ in range(8):
+            sign = np.where(guess < 0, -1.0, 1.0)
+            fit = fit_admissible(columns, sign * y)
+            guess = sign * y - fit.residual
+        best = max(best, fit.likelihood)
+    return best - plain if np.isfinite(best) else 0.0
+
+
+class Columns(Check):
+    """Signs, order and zero of joints, and gravity, that are not those of the robot."""
+
+    name = "reading"
+    suspects = (
+        "the sign of single joints, their order, the zero of a position, the direction of gravity, "
+        "or torque from which gravity was taken off"
+    )
+    stage = 1
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        fits = measurement.fits
+        if fits is None:
+            return
+        unsigned, _ = unsigned_columns(measurement)
+        changes = find_changes(fits.without(unsigned))
+        for kind in dict.fromkeys(change.kind for change in changes):
+            alike = [change for change in changes if change.kind == kind]
+            yield self._told(measurement, kind, alike, changes[-1].reading)
+
+    def _told(
+        self, measurement: Measurement, kind: str, changes: list[Change], final: Reading
+    ) -> Suspicion:
+        joints = sorted({j for change in changes for j in change.joints})
+        names = ", ".join(measurement.joint(j) for j in joints)
+        best = max(changes, key=lambda change: change.gain)
+        evidence = (
+            f"read so, the robot's own torque explains the measured one better by "
+            f"{best.gain:.0f} (log-likelihood), and leaves {100 * best.drop:.0f} % less of it"
+        )
+        certainty: Certainty = "certain" if _sure(changes) else "suspected"
+        rivals = {_RIVALS[rival] for change in changes for rival in change.rivals}
+        if rivals:
+            certainty = "suspected"
+            evidence += f"; {', or '.join(sorted(rivals))} would explain it as well"
+        if kind == "torque_sign":
+            columns = [f"tau{j + 1}" for j in joints]
+            what = f"the torque of {names} has the other sign"
+            remedy = (f"--flip {','.join(columns)}", f"flip={columns}")
+        elif kind == "motion_sign":
+            columns = [f"q{j + 1}" for j in joints]
+            what = f"position and velocity of {names} have the other sign"
+            remedy = (f"--flip {','.join(columns)}", f"flip={columns}")
+        elif kind == "joint_sign":
+            columns = [f"{q}{j + 1}" for j in joints for q in ("q", "tau")]
+            what = f"{names} count the other way round than in the robot's description"
+            remedy = (f"--flip {','.join(columns)}", f"flip={columns}")
+        elif kind in ("order", "torque_order"):
+            order = [k + 1 for k in (getattr(final, kind) or range(measurement.n_joints))]
+            words = ",".join(map(str, order))
+            if kind == "order":
+                what = f"the columns of {names} are in another order than the robot's joints"
+                remedy = (f"--order {words}", f"order={order}")
+            else:
+                what = f"the torques of {names} are exchanged"
+                remedy = (f"--order tau={words}", f"order={{'tau': {order}}}")
+        elif kind == "zero":
+            values = ", ".join(f"{np.rad2deg(v):.0f} deg" for j, v in final.zero if j in joints)
+            what = f"the zero of {names} is off by about {values}"
+            pairs = {f"q{j + 1}": round(v, 4) for j, v in final.zero if j in joints}
+            words = ",".join(f"{name}={value}" for name, value in pairs.items())
+            remedy = (f"--zero {words}", f"zero={pairs}")
+        else:
+            gravity = [round(x, 2) + 0.0 for x in (final.gravity or ())]
+            words = ",".join(f"{x:g}" for x in gravity)
+            if kind == "gravity":
+                what = f"gravity points along ({words}) in the base frame: the robot is mounted so"
+            else:
+                what = "the torque holds no gravity: it was taken off"
+            remedy = (f"--gravity={words}", f"Robot.from_urdf(..., gravity={tuple(gravity)})")
+        return self.suspicion(what, evidence, certainty, joints, remedy)
+
+
+#: What another reading of the same joints would mean.
+_RIVALS = {
+    "torque_sign": "the torque with the other sign",
+    "motion_sign": "the position with the other sign",
+    "joint_sign": "position and torque with the other sign",
+    "order": "another order of all columns",
+    "torque_order": "another order of the torques",
+    "zero": "another zero of a position",
+    "gravity": "another direction of gravity",
+    "no_gravity": "no gravity",
+}
+
+
+def _sure(changes: Iterable[Change]) -> bool:
+    """Whether every change gains much, and takes off most of what the log as it is leaves."""
+    return all(
+        (c.gain > SURE and c.drop > 0.3 and c.confirmed >= 0)
+        or (c.confirmed > DECISIVE and c.drop > HALF)
+        for c in changes
+    )
+
+
+class TorqueScale(Check):
+    """Torque in another unit, at the motor, or currents."""
+
+    name = "torque_scale"
+    suspects = "currents, motor torque or another unit in the place of joint torque"
+    stage = 2
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        fits = measurement.fits
+        if fits is None:
+            return
+        unsigned, _ = unsigned_columns(measurement)
+        fits = fits.without(unsigned)
+        gains = _known_gains(fits)
+        odd = [k for k, gain in gains.items() if not USUAL[0] <= gain <= USUAL[1]]
+        if not odd:
+            return
+        told = ", ".join(f"{measurement.joint_names[k]} {gains[k]:.3g}" for k in gains)
+        every = len(odd) == len(gains)
+        typical = float(np.median([gains[k] for k in gains]))
+        unit = next((u for f, u in UNITS.items() if abs(np.log(typical / f)) < 0.3), None)
+        if every and unit is not None and len(gains) > 1:
+            yield self.suspicion(
+                f"torque looks like {unit}",
+                f"it is the robot's own torque times {told}",
+                "certain",
+                odd,
+                (f"--units tau={unit}", f"units={{'tau': '{unit}'}}"),
+            )
+            return
+        pairs = {f"tau{k + 1}": float(f"{1 / gains[k]:.3g}") for k in odd}
+        words = ",".join(f"{name}={value}" for name, value in pairs.items())
+        remedy = (f"--gain {words}", f"gain={pairs}")
+        if every:
+            yield self.suspicion(
+                "torques look like motor currents, motor torques or another unit",
+                f"they follow the robot's rigid-body torque at another scale ({told}). Better than "
+                "the gains below, which hold the bodies of the description, are the torques per "
+                "ampere of the drives (--drive-gains with i columns)",
+                "suspected",
+                odd,
+                remedy,
+            )
+            return
+        odd = [k for k in odd if _confirmed(fits, k, gains[k])]
+        if not odd:
+            return
+        pairs = {name: value for name, value in pairs.items() if int(name[3:]) - 1 in odd}
+        words = ",".join(f"{name}={value}" for name, value in pairs.items())
+        remedy = (f"--gain {words}", f"gain={pairs}")
+        names = ", ".join(measurement.joint(k) for k in odd)
+        yield self.suspicion(
+            f"the torque of {names} is at another scale than that of the other joints",
+            f"torques are the robot's own times {told}",
+            "suspected",
+            odd,
+            remedy,
+        )
+
+
+def _confirmed(fits: Fits, k: int, gain: float) -> bool:
+    """Whether identified bodies, which all joints share, ask for the gain of one joint too."""
+    plain = fits.identified(Reading())
+    other = fits.scaled({k: gain}).identified(Reading())
+    # the density of a torque is that of the divided one over the gain
+    change = other.margin(plain)
+    change[k] -= float(fits.moving[:, k].sum()) * np.log(gain) / max(other.inflation[k], 1.0)
+    return float(change.sum()) > LEAST
+
+
+def _known_gains(fits: Fits) -> dict[int, float]:
+    """Multiple of the robot's own torque, of the columns of which it explains enough."""
+    here = fits.nominal(Reading())
+    s = fits.motion(Reading())
+    known = {}
+    for k in range(fits.n_joints):
+        if not fits.usable(k) or not here.gain[k] > 0:
+            continue
+        use = fits.moving[:, k]
+        y = fits.average(fits.torque[:, k])[use]
+        bare = fit_admissible(fits.average(friction(s, k))[use], y)
+        if here.scale[k] ** 2 < (1 - EXPLAINED) * bare.scale**2 * (1 - EXPLAINED):
+            known[k] = float(here.gain[k])
+    return known
+
+
+class Bodies(Check):
+    """Bodies of the description that are not those of the robot."""
+
+    name = "bodies"
+    suspects = "masses or inertias of the description that are not those of the robot"
+    stage = 2
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        fits = measurement.fits
+        if fits is None or not np.any(fits.robot.inertial_parameters):
+            return
+        stated, identified = fits.nominal(Reading()), fits.identified(Reading())
+        wrong = []
+        for k in range(fits.n_joints):
+            if not fits.usable(k):
+                continue
+            spread = _spread(fits.average(fits.torque[:, k])[fits.moving[:, k]])
+            if stated.scale[k] > 0.5 * spread and identified.scale[k] < 0.15 * spread:
+                wrong.append(k)
+        if wrong:
+            ratios = ", ".join(
+                f"{measurement.joint_names[k]} {stated.scale[k] / identified.scale[k]:.2g}"
+                for k in wrong
+            )
+            yield self.suspicion(
+                "the bodies of the robot's description do not explain the torque, identified ones "
+                "do",
+                "errors with the stated bodies and any friction are those of identified bodies "
+                f"times {ratios}",
+                "suspected",
+                wrong,
+            )
+
+
+def _spread(values: Array) -> float:
+    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
+
+
+class ComputedTorque(Check):
+    """Torque that equals a model: commanded or computed, not measured."""
+
+    name = "computed_torque"
+    suspects = "commanded or computed torque in the place of a measured one"
+    stage = 2
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        fits = measurement.fits
+        if fits is None:
+            return
+        shares = []
+        outcome: Outcome = fits.identified(Reading())
+        for k in range(fits.n_joints):
+            if fits.usable(k):
+                spread = _spread(fits.average(fits.torque[:, k])[fits.moving[:, k]])
+                shares.append(outcome.scale[k] / spread if spread > 0 else 1.0)
+        if shares and max(shares) < 1e-4 and fits.n_rows > 200:
+            yield self.suspicion(
+                "the torque has no noise: it was commanded or computed, not measured",
+                f"a rigid body with friction explains all of it but {max(shares):.1g}",
+                "noted",
+            )
+
+
+class TorqueDelay(Check):
+    """Torque that is late or early against the motion, alike in all joints."""
+
+    name = "torque_delay"
+    suspects = "torque that is late or early against the motion"
+    stage = 2
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        found = measured_delay(measurement)
+        if found is None or not np.isfinite(found.common):
+            return
+        told = found.joints[np.isfinite(found.joints)]
+        alike = np.abs(told - found.common) < max(ALIKE, 0.3 * abs(found.common))
+        if (
+            abs(found.common) > max(SMALLEST, ERRORS * found.error)
+            and found.gain > LEAST
+            and alike.mean() >= AGREEING
+            and len(told) > measurement.n_joints / 2
+        ):
+            ms = 1e3 * found.common
+            late = float(f"{found.common:.4f}")
+            yield self.suspicion(
+                f"torque is {'late' if ms > 0 else 'early'} against motion by about "
+                f"{abs(ms):.1f} ms",
+                f"bodies, friction and rotor inertia explain it best at that lag (standard error "
+                f"{1e3 * found.error:.1f} ms, alike in {int(alike.sum())} of "
+                f"{measurement.n_joints} joints)",
+                "suspected",
+                remedy=(f"--late tau={late:g}", f"late={{'tau': {late:g}}}"),
+            )
+
+
+def measured_delay(measurement: Measurement) -> Delay | None:
+    """Delay of the torque of a measurement; None without a robot or rows."""
+    fits = measurement.fits
+    if fits is None:
+        return None
+    if measurement.delay is None:
+        unsigned, _ = unsigned_columns(measurement)
+        measurement.delay = find_delay(fits.without(unsigned))
+    return measurement.delay

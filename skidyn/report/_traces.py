@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Torque over time, thinned for a screen, with what is not judged and what is cut off."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidyn._signals import Array, Signals
+from skidyn.diagnosis import regimes
+from skidyn.report._decimate import rows_with_peaks
+
+if TYPE_CHECKING:
+    from skidyn.diagnosis import Diagnosis
+
+#: Buckets over the whole log; up to six rows of each bucket are drawn.
+BUCKETS = 3000
+#: Gap between pieces of a log on the axis of time, as a share of the whole.
+GAP = 0.004
+#: Stretches that are not judged are joined where less than this share of the whole is between.
+JOIN = 1 / 1500
+#: The axis of the residual shows this share of the judged samples, and so much more room; peaks
+#: within ``REACH`` times that are shown too.
+SHOWN, ROOM, REACH = 0.998, 1.15, 1.6
+
+
+def traces(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """Measured and modelled torque over time for each joint, trajectories laid end to end.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        From :func:`skidyn.diagnosis.diagnose`.
+
+    Returns
+    -------
+    list of dict
+        ``time``, ``measured``, ``before``, ``after``, ``breaks`` (rows that begin a new piece),
+        ``starts`` of the trajectories, ``apart`` (stretches of time that are not judged, with the
+        reason) and ``frame`` (range of the residual's axis, and what lies outside it).
+    """
+    comparison, after = diagnosis.comparison, diagnosis.comparison_after
+    signals = comparison.signals
+    clock, starts = elapsed(signals)
+    rest = regimes(comparison)["rest"]
+    table = []
+    for j in range(signals.n_joints):
+        measured, before = comparison.measured[:, j], comparison.predicted[:, j]
+        residuals = measured - before, measured - after.predicted[:, j]
+        pieces = rows_with_peaks([measured, *residuals], signals.segments, BUCKETS)
+        rows = np.concatenate(pieces)
+        judged = comparison.judged_samples[:, j]
+        table.append(
+            {
+                "time": np.round(clock[rows], 5),
+                "measured": measured[rows],
+                "before": before[rows],
+                "after": after.predicted[rows, j],
+                # where a line must not be drawn on from the previous row
+                "breaks": np.cumsum([len(piece) for piece in pieces])[:-1],
+                "starts": starts,
+                "apart": [
+                    *_stretches(clock, signals.segments, rest[:, j] & ~judged, "rest"),
+                    *_stretches(clock, signals.segments, ~rest[:, j] & ~judged, "reversal"),
+                ],
+                "frame": _frame(residuals, judged),
+            }
+        )
+    return table
+
+
+def _stretches(
+    clock: Array, segments: list[slice], mask: NDArray[np.bool_], reason: str
+) -> list[list[Any]]:
+    """Beginning, end and reason of every run of samples, close ones joined."""
+    found: list[list[Any]] = []
+    gap = JOIN * float(clock[-1] - clock[0])
+    for segment in segments:
+        here = mask[segment].astype(np.int8)
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], here, [0]])))
+        first = len(found)
+        for a, b in edges.reshape(-1, 2) + segment.start:
+            begin, end = float(clock[a]), float(clock[b - 1])
+            if len(found) > first and begin - found[-1][1] < gap:
+                found[-1][1] = round(end, 4)
+            else:
+                found.append([round(begin, 4), round(end, 4), reason])
+    return found
+
+
+def _frame(residuals: tuple[Array, ...], judged: NDArray[np.bool_]) -> dict[str, Any]:
+    """Range of the axis that shows nearly all judged samples, and how many peaks lie outside."""
+    peak = max(float(np.abs(r).max()) for r in residuals)
+    use = judged if judged.any() else np.ones_like(judged)
+    reach = ROOM * max(float(np.quantile(np.abs(r[use]), SHOWN)) for r in residuals)
+    if not 0 < reach * REACH < peak:
+        reach = ROOM * peak
+    outside = np.any([np.abs(r) > reach for r in residuals], axis=0)
+    return {"reach": reach or 1.0, "cut": int(outside.sum()), "largest": peak}
+
+
+def elapsed(signals: Signals) -> tuple[Array, list[dict[str, Any]]]:
+    """Time that runs on over the borders of trajectories, with a gap that the eye sees.
+
+    Parameters
+    ----------
+    signals : Signals
+        Motion.
+
+    Returns
+    -------
+    clock : ndarray of shape (n_samples,), s
+        Time on the axis.
+    starts : list of dict
+        ``trajectory`` and ``time``, s, of each beginning.
+    """
+    pieces = [signals.clock[segment] for segment in signals.segments]
+    total = sum(float(piece[-1] - piece[0]) for piece in pieces)
+    gap = min(GAP * total, 0.1 * total / len(pieces))
+    clock = np.empty(signals.n_samples)
+    starts: list[dict[str, Any]] = []
+    end = 0.0
+    for segment, time in zip(signals.segments, pieces, strict=True):
+        clock[segment] = time - time[0] + end
+        name = int(signals.trajectory[segment.start])
+        if not starts or starts[-1]["trajectory"] != name:
+            starts.append({"trajectory": name, "time": end})
+        end = float(clock[segment.stop - 1]) + gap
+    return clock, starts

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Base parameters: the combinations of inertial parameters that torque depends on.
+
+References
+----------
+M. Gautier (1991), Numerical calculation of the base inertial parameters of robots, J. Robotic
+Systems 8(4), 485-506.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidyn._signals import Array
+from skidyn.robots._robot import Robot
+
+#: Random states from which the structure is read, and the tolerance of its rank.
+STATES, TOLERANCE = 400, 1e-9
+#: Factors of a combination smaller than this are rounding.
+NEGLIGIBLE = 1e-7
+
+
+@dataclass(frozen=True)
+class BaseParameters:
+    """Independent columns of the torque regressor and how the others join them.
+
+    Parameters
+    ----------
+    index : ndarray of shape (n_base,)
+        Columns of the torque regressor that are kept.
+    regrouping : ndarray of shape (n_base, 10 * n_bodies)
+        Base parameters as combinations of all inertial parameters.
+    expressions : tuple of str
+        The combinations in words, such as ``"Izz_link1 + 0.04*m_link2"``.
+
+    Examples
+    --------
+    >>> from skidyn.datasets import load_planar_arm
+    >>> find_base_parameters(load_planar_arm()).expressions[0]
+    'mcx_link1'
+    """
+
+    index: NDArray[np.int64]
+    regrouping: Array
+    expressions: tuple[str, ...]
+
+    def values(self, inertial_parameters: Array) -> Array:
+        """Base parameters of given inertial parameters.
+
+        Parameters
+        ----------
+        inertial_parameters : ndarray of shape (n_bodies, 10)
+            Of every body.
+
+        Returns
+        -------
+        ndarray of shape (n_base,)
+            In the order of ``index``.
+        """
+        return self.regrouping @ np.ravel(inertial_parameters)
+
+
+def find_base_parameters(robot: Robot) -> BaseParameters:
+    """Base parameters of a robot, from random motion within its limits.
+
+    Parameters
+    ----------
+    robot : Robot
+        Robot.
+
+    Returns
+    -------
+    BaseParameters
+        Columns, combinations and their names.
+
+    Examples
+    --------
+    >>> from skidyn.datasets import load_planar_arm
+    >>> len(find_base_parameters(load_planar_arm()).index)
+    6
+    """
+    return _find(robot)
+
+
+def base_parameter_index(robot: Robot) -> NDArray[np.int64]:
+    """Columns of the torque regressor that are linearly independent."""
+    return _find(robot).index
+
+
+@lru_cache(maxsize=64)
+def _find(robot: Robot) -> BaseParameters:
+    from scipy.linalg import qr, solve_triangular  # not paid for by who only reads a robot
+
+    rng = np.random.default_rng(0)
+    n, p = robot.n_joints, 10 * robot.n_bodies
+    # More states than unknowns, whatever the size of the robot.
+    count = max(STATES, 2 * p // n + 20)
+    q, dq, ddq = rng.uniform(-np.pi, np.pi, (3, count, n))
+    regressor = np.asarray(robot.torque_regressor(q, dq, ddq)).reshape(-1, p)
+    size = np.linalg.norm(regressor, axis=0)
+    moved = np.flatnonzero(size > TOLERANCE * max(size.max(initial=0.0), 1e-300))
+    triangle, pivots = qr(regressor[:, moved] / size[moved], mode="r", pivoting=True)
+    diagonal = np.abs(np.diag(triangle))
+    rank = int(np.sum(diagonal > TOLERANCE * diagonal[0])) if len(diagonal) else 0
+    independent, dependent = moved[pivots[:rank]], moved[pivots[rank:]]
+    joined = solve_triangular(triangle[:rank, :rank], triangle[:rank, rank:])
+    regrouping = np.zeros((rank, p))
+    regrouping[np.arange(rank), independent] = 1.0
+    # Columns of unit size: what is negligible does not depend on units.
+    joined[np.abs(joined) < NEGLIGIBLE] = 0.0
+    regrouping[:, dependent] = joined * size[dependent] / size[independent][:, None]
+    order = np.argsort(independent)
+    regrouping = regrouping[order]
+    names = robot.parameter_names
+    expressions = tuple(
+        _expression(row, int(own), names)
+        for row, own in zip(regrouping, independent[order], strict=True)
+    )
+    return BaseParameters(independent[order].astype(np.int64), regrouping, expressions)
+
+
+def _expression(row: Array, own: int, names: tuple[str, ...] | list[str]) -> str:
+    text = names[own]
+    for k in np.flatnonzero(row):
+        if k != own:
+            sign = "+" if row[k] > 0 else "-"
+            factor = abs(row[k])
+            text += (
+                f" {sign} {names[k]}"
+                if abs(factor - 1) < NEGLIGIBLE
+                else (f" {sign} {factor:.6g}*{names[k]}")
+            )
+    return text

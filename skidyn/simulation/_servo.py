@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Robots that log commands and positions but no torque: position servos as torque sensors."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidyn._columns import column_names, resolve_columns, trajectory_numbers
+from skidyn._exceptions import SkidynError
+from skidyn._signals import Array, Signals, signals_from
+from skidyn.evidence import smooth_motion
+from skidyn.forward import Controller
+from skidyn.robots import Robot
+
+#: Longest delay of the command that is tried, s.
+LONGEST_DELAY = 0.1
+#: Standard errors that the inverse of a gain has to be above zero.
+SEEN = 3.0
+#: Velocity (rad/s) below which dry friction may be anything up to its size, so that the error of
+#: position says nothing.
+RESTS = 0.03
+#: Blocks of time left out in turn for the standard error of a gain.
+BLOCKS = 10
+
+
+def servo_torque(controller: Controller, log: Any) -> Array:
+    """Torque of position servos from their commands and positions.
+
+    A servo whose gain is known is a torque sensor: what it does is its gain times its error. With
+    this torque all that skidyn does with a log of torques, such as
+    :class:`~skidyn.identification.RBDRegressor` or :func:`~skidyn.diagnosis.diagnose`, is open to
+    a log without. A gain that is 10 % wrong makes every size 10 % wrong, and no name.
+
+    Parameters
+    ----------
+    controller : Controller
+        Gains of the servos, delay of the command, limit of the torque.
+    log : DataFrame
+        ``time`` (s), ``q1..``, ``dq1..`` (rad, m) and the command ``q_ref1..``; with several
+        recordings also ``trajectory``.
+
+    Returns
+    -------
+    ndarray of shape (n_samples, n_joints)
+        N m or N.
+
+    Raises
+    ------
+    SkidynError
+        A column is missing.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> from skidyn.simulation import Controller, servo_torque
+    >>> log = pd.DataFrame({"time": [0.0, 0.01], "q1": [0.0, 0.0], "dq1": 0.0, "q_ref1": [0.1, 0.2]})
+    >>> servo_torque(Controller(20.0), log).round(3).ravel().tolist()
+    [2.0, 4.0]
+    """  # noqa: E501
+    signals, reference = _read(log, None)
+    own = controller.checked(reference.shape[1])
+    wanted, rate = _late(signals, reference, own.delay)
+    return own.torque(signals.q, signals.dq, wanted, rate)
+
+
+def fit_servo(robot: Robot, log: Any, *, shared: bool = False) -> Controller:
+    """Gain and delay of position servos from the weight of the robot.
+
+    A servo that holds a load against gravity keeps an error of position by which its gain shows:
+    the error is fitted by the URDF's rigid-body torque, viscous and dry friction and a constant,
+    joint by joint [1]_. The command's delay is the one of 0 to 0.1 s that fits best. Damping of the
+    servo and viscous friction cannot be told apart in motion alone; the model gets both. In slow
+    motion a late command looks like more of it, too: only motion of some hertz tells them apart.
+
+    Parameters
+    ----------
+    robot : Robot
+        Robot, whose inertial parameters are taken as true: the gains scale with them.
+    log : DataFrame
+        ``time`` (s), ``q1..``, ``dq1..`` and ``q_ref1..``, and ``trajectory`` if there are several.
+    shared : bool, default=False
+        One gain for all joints: they have the same servo and settings. Needed where a joint feels
+        no gravity.
+
+    Returns
+    -------
+    Controller
+        With ``stiffness`` (N m/rad) and ``delay`` (s); damping 0, which the model's viscous
+        friction holds.
+
+    Raises
+    ------
+    SkidynError
+        A column is missing, or the log does not show the gain of a joint.
+
+    References
+    ----------
+    .. [1] M. Duclusaud, G. Passault, V. Padois, O. Ly (2024), Extended friction models for the
+       physics simulation of servo actuators.
+
+    Examples
+    --------
+    >>> from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+    >>> from skidyn.simulation import fit_servo
+    >>> log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=2)
+    >>> frame = log.frame
+    >>> for j in (1, 2):  # a servo of 40 N m/rad: its error is the torque over its gain
+    ...     frame[f"q_ref{j}"] = frame[f"q{j}"] + frame[f"tau{j}"] / 40.0
+    >>> servo = fit_servo(log.robot, frame)
+    >>> bool(abs(servo.stiffness[0] / 40 - 1) < 0.05), round(servo.delay, 3)
+    (True, 0.0)
+    """
+    signals, reference = _read(log, robot)
+    n = robot.n_joints
+    if reference.shape[1] != n:
+        raise SkidynError(f"the log has {reference.shape[1]} commands; the robot has {n} joints")
+    torque = robot.inverse_dynamics(signals.q, signals.dq, signals.ddq)
+    designs = [
+        np.column_stack([torque[:, j], signals.dq[:, j], signals.sign[:, j], 1 + 0 * torque[:, j]])
+        for j in range(n)
+    ]
+    moves = np.abs(signals.dq) > RESTS * signals.unit
+    step = float(np.median(np.diff(signals.clock)))
+    # The same for every delay: a late command makes the error itself larger.
+    size = np.std(reference - signals.q, axis=0) + 1e-12
+    best: tuple[float, float, Array] = (np.inf, 0.0, np.zeros((1, n)))
+    for delay in step * np.arange(int(LONGEST_DELAY / step) + 1):
+        wanted, _ = _late(signals, reference, float(delay))
+        error = wanted - signals.q
+        inverse, left = _inverse_gains(designs, error, moves, size, shared)
+        if left < best[0] * (1 - 1e-6):
+            best = left, float(delay), inverse
+    _, delay, inverse = best
+    value = inverse[0]
+    std = np.sqrt((BLOCKS - 1) / BLOCKS * np.sum((inverse[1:] - inverse[1:].mean(0)) ** 2, axis=0))
+    hidden = np.flatnonzero(~(value > SEEN * std))
+    if len(hidden):
+        names = ", ".join(robot.joint_names[j] for j in hidden)
+        raise SkidynError(
+            f"this log does not show the servo gain of {names}: the error of position does not "
+            "follow the robot's weight there. Give shared=True if all joints have the same servo, "
+            "or a Controller with the gain that you know"
+        )
+    return Controller(stiffness=1.0 / value, damping=0.0, delay=delay, follows_velocity=False)
+
+
+def _inverse_gains(
+    designs: list[Array], error: Array, moves: NDArray[np.bool_], size: Array, shared: bool
+) -> tuple[Array, float]:
+    """One over the gains, of all rows and without one block each, and what is left of the error."""
+    rows = len(error)
+    block = np.arange(rows) * BLOCKS // rows
+    found, left = [], 0.0
+    for k in range(-1, BLOCKS):
+        used = [(block != k) & moves[:, j] for j in range(len(designs))]
+        if not shared:
+            parts = [
+                np.linalg.lstsq(a[keep], error[keep, j], rcond=None)[0]
+                for j, (a, keep) in enumerate(zip(designs, used, strict=True))
+            ]
+            inverse = np.array([x[0] for x in parts])
+        else:
+            # Friction of every joint is taken out of its torque and error; one slope is left.
+            pairs = []
+            for j, (a, keep) in enumerate(zip(designs, used, strict=True)):
+                q, _ = np.linalg.qr(a[keep, 1:])
+                both = np.column_stack([a[keep, 0], error[keep, j]])
+                pairs.append(both - q @ (q.T @ both))
+            slope = sum(p[:, 0] @ p[:, 1] for p in pairs) / sum(p[:, 0] @ p[:, 0] for p in pairs)
+            inverse = np.full(len(designs), slope)
+            parts = []
+            for j, (a, keep) in enumerate(zip(designs, used, strict=True)):
+                rest = error[keep, j] - slope * a[keep, 0]
+                parts.append(np.r_[slope, np.linalg.lstsq(a[keep, 1:], rest, rcond=None)[0]])
+        found.append(inverse)
+        if k < 0:
+            residual = error - np.column_stack([a @ x for a, x in zip(designs, parts, strict=True)])
+            left = float(np.mean((residual / size)[moves] ** 2))
+    return np.array(found), left
+
+
+def _read(log: Any, robot: Robot | None) -> tuple[Signals, Array]:
+    """Signals, smoothed where a robot needs accelerations, and the command."""
+    names = column_names(log)
+    if names is None:
+        raise SkidynError("the log is no table; give a DataFrame with time, q1.., dq1.., q_ref1..")
+    joints: list[str] = [] if robot is None else list(robot.joint_names)
+    if robot is None:
+        while f"q{len(joints) + 1}" in names:
+            joints.append(f"joint{len(joints) + 1}")
+    columns = resolve_columns(names, len(names), joints, require_acceleration=False)
+    if columns.time is None:
+        raise SkidynError("the log has no column 'time' (s)")
+    wanted = [f"q_ref{j + 1}" for j in range(len(joints))]
+    lost = [name for name in wanted if name not in names]
+    if lost:
+        raise SkidynError(f"the log lacks the command column(s) {', '.join(lost)}")
+    used = [*columns.q, *columns.dq, columns.time]
+    used += [] if columns.trajectory is None else [columns.trajectory]
+    table = np.zeros((len(log), len(names)))
+    for k in used:
+        table[:, k] = np.asarray(log[names[k]], dtype=float)
+    plain = replace(columns, ddq=columns.dq, temperature=None)
+    signals = signals_from(table, plain, robot)
+    signals = signals.with_(trajectory=trajectory_numbers(table, plain))
+    if robot is not None:
+        signals = smooth_motion(signals).signals
+    return signals, np.column_stack([np.asarray(log[name], dtype=float) for name in wanted])
+
+
+def _late(signals: Signals, reference: Array, delay: float) -> tuple[Array, Array]:
+    """The command as it reaches the servo, and its velocity."""
+    wanted, rate = reference.copy(), np.zeros_like(reference)
+    for rows in signals.segments:
+        time = signals.clock[rows]
+        if len(time) < 2:
+            continue
+        for j in range(reference.shape[1]):
+            wanted[rows, j] = np.interp(time - delay, time, reference[rows, j])
+        rate[rows] = np.gradient(wanted[rows], time, axis=0)
+    return wanted, rate

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The first screen of a diagnosis."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.diagnosis import diagnose
+from skidyn.diagnosis._episodes import Episode
+from skidyn.identification import RBDRegressor
+
+
+@pytest.fixture(scope="module")
+def missing():
+    log = make_hidden_effect_log(load_planar_arm(), "spring", joints=[2])
+    return diagnose(RBDRegressor(log.robot), log.X, log.y)
+
+
+@pytest.fixture(scope="module")
+def complete():
+    log = make_hidden_effect_log(load_planar_arm(), None)
+    return diagnose(RBDRegressor(log.robot), log.X, log.y)
+
+
+def test_says_what_is_missing_and_where_in_the_headline(missing):
+    story = missing.story()
+    assert story["headline"] == "Missing: spring on joint 2"
+    (line,) = story["findings"]
+    assert line["where"] == "joint 2" and line["size"].startswith("k = ")
+    assert "±" in line["size"] and "N m/rad" in line["size"]
+
+
+def test_numbers_are_those_of_the_diagnosis(missing):
+    rows = missing.story()["joints"]
+    assert [row["before"] for row in rows] == list(missing.rmse_before)
+    assert [row["after"] for row in rows] == list(missing.rmse_after)
+    assert rows[1]["speaks"] and rows[1]["state"] == "better"
+    assert " → " in rows[1]["text"] and "noise" in rows[1]["text"]
+
+
+def test_a_complete_model_has_nothing_to_say(complete):
+    story = complete.story()
+    assert story["headline"] == "Nothing significant is missing"
+    assert story["findings"] == [] and story["quiet"] == "All joints are at their noise."
+    assert complete.failures == []
+
+
+def test_an_error_above_the_noise_is_said(complete):
+    noisy = dataclasses.replace(complete, noise_floor=complete.rmse_after / 3)
+    story = noisy.story()
+    assert "exceeds the noise" in story["text"]
+    assert "3.0 times the noise" in story["left"] and "healthy robots" in story["left"]
+
+
+def test_a_material_remainder_is_never_called_complete(complete):
+    parts = dataclasses.replace(complete.parts, material=np.array([False, True]))
+    story = dataclasses.replace(complete, parts=parts, verdict="unknown").story()
+    assert story["headline"] == "Something without a name is missing on joint 2"
+    assert story["mark"] == "?"
+
+
+def test_rivals_are_said_with_the_name(missing):
+    finding = dataclasses.replace(missing.findings[0], rivals=("gravity_compensator",))
+    story = dataclasses.replace(missing, findings=[finding]).story()
+    assert "cannot separate it from gravity compensator" in story["findings"][0]["sure"]
+    assert story["findings"][0]["doubtful"]
+
+
+def test_a_joint_that_gets_worse_is_flagged(missing):
+    history = [dict(step, rmse=list(step["rmse"])) for step in missing.history]
+    history[-1]["rmse"][0] = 1.5 * history[0]["rmse"][0]
+    rows = dataclasses.replace(missing, history=history).story()["joints"]
+    assert rows[0]["state"] == "worse" and rows[0]["speaks"]
+
+
+def test_a_notebook_shows_it_escaped(missing):
+    hostile = dataclasses.replace(missing, joint_names=("<script>", "elbow"))
+    html = hostile._repr_html_()
+    assert "Missing: spring" in html and "<script>" not in html
+    assert "nan" not in html.lower()
+
+
+def test_unknown_noise_leaves_numbers_out(missing):
+    story = dataclasses.replace(missing, noise_floor=np.full(2, np.nan)).story()
+    assert "noise –" in story["joints"][1]["text"]
+
+
+def test_when_a_torque_comes_and_goes_is_said(missing):
+    episode = Episode(3, 2.0, 2.5, (2,), (1.2,), None, None)
+    finding = dataclasses.replace(missing.findings[0], when=[episode])
+    story = dataclasses.replace(missing, findings=[finding]).story()
+    assert story["findings"][0]["when"] == "from 2.0 to 2.5 s of trajectory 3"
+
+
+def test_confidence_is_said_where_it_is_known(missing):
+    finding = dataclasses.replace(missing.findings[0], confidence=0.62)
+    line = dataclasses.replace(missing, findings=[finding]).story()["findings"][0]
+    assert "62% sure of the name" in line["sure"] and line["doubtful"]

@@ -1,0 +1,252 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What each estimator is for: broken rows, poor logs, noisy motion, data in parts."""
+
+import numpy as np
+import pandas as pd
+import polars
+import pytest
+
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.effects import Term
+from skidyn.exceptions import SkidynError
+from skidyn.identification import ESTIMATORS, RBDRegressor, is_consistent, repetition_instruments
+from skidyn.robots import find_base_parameters
+
+ROBOT = load_planar_arm()
+#: They need more than motion and torque without a clock: instruments, time.
+SPECIAL = ("instrumental", "output_error")
+LOG = make_hidden_effect_log(ROBOT, None, n_trajectories=8, duration=4.0, random_state=2)
+
+
+def motion(n=600, seed=0, speed=2.0):
+    return np.random.default_rng(seed).uniform(-speed, speed, (n, 6))
+
+
+def torque(X, parameters=None):
+    rigid = ROBOT.inverse_dynamics(X[:, :2], X[:, 2:4], X[:, 4:], parameters=parameters)
+    return rigid + 0.3 * X[:, 2:4] + 0.5 * np.tanh(X[:, 2:4] / 0.003)
+
+
+def error(model):
+    """Error on new motion, relative to the torque."""
+    X = motion(300, seed=9)
+    return float(np.linalg.norm(model.predict(X) - torque(X)) / np.linalg.norm(torque(X)))
+
+
+@pytest.mark.parametrize("estimator", [e for e in ESTIMATORS if e not in SPECIAL])
+def test_exact_data_gives_the_exact_model(estimator):
+    X = motion()
+    model = RBDRegressor(ROBOT, estimator=estimator).fit(X, torque(X))
+    assert error(model) < 1e-6
+    assert len(model.coef_std_) == len(model.coef_names_) == len(model.coef_)
+
+
+def test_ordinary_lets_a_noisy_joint_spoil_the_others():
+    X = motion()
+    y = torque(X) + np.random.default_rng(1).normal(0, (3.0, 0.01), (600, 2))
+    weighted, ordinary = (
+        RBDRegressor(ROBOT, estimator=e).fit(X, y) for e in ("weighted", "ordinary")
+    )
+    at = weighted.coef_names_.index("viscous.Fv[2]")
+    X = motion(300, seed=9)
+    errors = [np.abs(m.predict(X) - torque(X))[:, 1].mean() for m in (weighted, ordinary)]
+    assert errors[0] < errors[1] / 5
+    assert weighted.coef_std_[at] < ordinary.coef_std_[at]
+
+
+@pytest.mark.parametrize("share", [0.05, 0.2])
+def test_robust_survives_broken_rows(share):
+    X, rng = motion(), np.random.default_rng(3)
+    y = torque(X) + rng.normal(0, 0.1, (600, 2))
+    broken = rng.random(600) < share
+    y[broken] += 40.0
+    robust = RBDRegressor(ROBOT, estimator="robust").fit(X, y)
+    clean = RBDRegressor(ROBOT).fit(X[~broken], y[~broken])
+    assert error(robust) < 1.2 * error(clean) < 0.05 * error(RBDRegressor(ROBOT).fit(X, y))
+    # Rows are sorted by fold, which without time and trajectories is their order.
+    weights = robust.row_weights_[0]
+    assert np.median(weights[broken]) < 0.01 < 0.5 < np.median(weights[~broken])
+
+
+def test_parts_give_what_the_whole_gives():
+    whole = RBDRegressor(ROBOT).fit(LOG.X, LOG.y)
+    number = LOG.X["trajectory"].to_numpy()
+    for order in (range(8), [5, 2, 7, 0, 3, 1, 6, 4]):
+        model = RBDRegressor(ROBOT)
+        for k in order:
+            model.partial_fit(LOG.X[number == k], LOG.y[number == k])
+        np.testing.assert_allclose(model.coef_, whole.coef_, rtol=1e-7)
+        np.testing.assert_allclose(model.coef_std_, whole.coef_std_, rtol=1e-5)
+        assert model.coef_names_ == whole.coef_names_
+
+
+@pytest.mark.parametrize("estimator", ["ordinary", "ridge", "entropic"])
+def test_parts_of_samples_give_what_the_whole_gives(estimator):
+    X = motion()
+    y = torque(X) + np.random.default_rng(1).normal(0, 0.1, (600, 2))
+    whole = RBDRegressor(ROBOT, estimator=estimator, prior_std=1.0, consistent=True).fit(X, y)
+    model = RBDRegressor(ROBOT, estimator=estimator, prior_std=1.0, consistent=True)
+    for part in np.split(np.arange(600), [100, 350]):
+        model.partial_fit(X[part], y[part])
+    np.testing.assert_allclose(model.predict(X), whole.predict(X), rtol=1e-5, atol=1e-5)
+
+
+def test_memory_of_parts_does_not_grow():
+    X = motion(40)
+    model = RBDRegressor(ROBOT)
+    for _ in range(25):
+        model.partial_fit(X, torque(X))
+    assert len(model.evidence_.trajectories) == 20
+    assert sum(model.evidence_.counts.values()) == 25 * 40 * 2
+
+
+def test_forgetting_follows_a_change():
+    X = motion(200)
+    models = [RBDRegressor(ROBOT, forgetting=f) for f in (1.0, 0.5)]
+    for friction in (0.0, 0.0, 0.0, 0.4, 0.4, 0.4, 0.4):
+        for model in models:
+            model.partial_fit(X, torque(X) + friction * X[:, 2:4])
+    name = models[0].coef_names_.index("viscous.Fv[1]")
+    kept, followed = (model.coef_[name] for model in models)
+    assert kept < 0.55 < 0.65 < followed < 0.7 + 1e-9
+
+
+def test_shape_parameters_of_a_fit_are_kept_by_parts():
+    log = make_hidden_effect_log(ROBOT, "stribeck", n_trajectories=4, duration=4.0)
+    model = RBDRegressor(ROBOT, ("viscous", "coulomb", ("stribeck", [1])))
+    with pytest.raises(SkidynError, match="open shape parameters"):
+        model.partial_fit(log.X, log.y)
+    model.fit(log.X, log.y)
+    terms = list(model.effect_terms_)
+    assert model.partial_fit(log.X, log.y).effect_terms_ == terms
+    assert isinstance(terms[0], Term)
+
+
+def test_parameters_without_meaning_are_refused():
+    X = motion(50)
+    y = torque(X)
+    for wrong, message in (
+        ({"estimator": "best"}, "'weighted'"),
+        ({"prior_std": 0.0}, "prior_std"),
+        ({"forgetting": 1.5}, "forgetting"),
+        ({"estimator": "instrumental"}, "instruments"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            RBDRegressor(ROBOT, **wrong).fit(X, y)
+    with pytest.raises(ValueError, match="takes no instruments"):
+        RBDRegressor(ROBOT).fit(X, y, instruments=X)
+    with pytest.raises(AttributeError):
+        RBDRegressor(ROBOT, estimator="robust").partial_fit(X, y)
+
+
+def poor_log(seed):
+    """Few samples of slow motion, much noise."""
+    X = motion(40, seed, speed=0.3)
+    truth = ROBOT.inertial_parameters * np.random.default_rng(seed).uniform(0.8, 1.2, (2, 1))
+    noise = np.random.default_rng(seed + 1).normal(0, 1.0, (40, 2))
+    return X, torque(X, truth) + noise, truth
+
+
+def least_squares(X, y):
+    """Changes of the base parameters and friction by plain least squares, and the model's."""
+    model = RBDRegressor(ROBOT).fit(X, y)
+    noise = dict(enumerate(model.noise_std_))
+    change = model.evidence_.solve(noise=noise)
+    base = find_base_parameters(ROBOT)
+    change[: len(base.index)] += base.values(ROBOT.inertial_parameters)
+    return change
+
+
+@pytest.mark.parametrize("estimator", ["weighted", "ridge", "entropic"])
+def test_the_urdf_helps_where_the_log_is_poor(estimator):
+    gains = []
+    base = find_base_parameters(ROBOT)
+    for seed in range(5):
+        X, y, truth = poor_log(seed)
+        new = motion(300, seed=9)
+        wanted = torque(new, truth)
+        plain = least_squares(X, y)
+        regressor = np.asarray(ROBOT.torque_regressor(new[:, :2], new[:, 2:4], new[:, 4:]))
+        rigid = regressor[:, :, base.index] @ plain[: len(base.index)]
+        rest = new[:, 2:4] * plain[-4:-2] + np.tanh(new[:, 2:4] / 0.003) * plain[-2:]
+        model = RBDRegressor(ROBOT, estimator=estimator).fit(X, y)
+        errors = (np.linalg.norm(p - wanted) for p in (rigid + rest, model.predict(new)))
+        before, after = errors
+        gains.append(after / before)
+    assert np.median(gains) < 0.8
+
+
+def test_entropic_bodies_always_exist():
+    for seed in range(10):
+        X = motion(60, seed)
+        y = np.random.default_rng(seed).normal(0, 10.0 ** (seed / 2 - 2), (60, 2))
+        model = RBDRegressor(ROBOT, estimator="entropic").fit(X, y)
+        assert is_consistent(model.inertial_parameters_)
+
+
+def test_strong_priors_keep_the_urdf_and_weak_ones_least_squares():
+    X, y, _ = poor_log(0)
+    for estimator in ("ridge", "entropic"):
+        strong = RBDRegressor(ROBOT, estimator=estimator, prior_std=1e-6).fit(X, y)
+        nominal = ROBOT.inertial_parameters
+        np.testing.assert_allclose(strong.inertial_parameters_, nominal, atol=1e-6)
+    weak = RBDRegressor(ROBOT, estimator="ridge", prior_std=1e5).fit(X, y)
+    np.testing.assert_allclose(weak.coef_, least_squares(X, y), rtol=1e-3, atol=1e-3)
+
+
+def noisy_motion(seed, noise):
+    """Torque of a reference motion, and the motion as noisy sensors see it."""
+    rng = np.random.default_rng(seed)
+    reference = rng.uniform(-2, 2, (2000, 6))
+    X = reference + rng.normal(0, noise, reference.shape) * [0, 0, 1, 1, 1, 1]
+    y = ROBOT.inverse_dynamics(reference[:, :2], reference[:, 2:4], reference[:, 4:])
+    return X, y + 0.5 * reference[:, 2:4] + rng.normal(0, 0.1, y.shape), reference
+
+
+def test_instruments_undo_the_bias_of_noisy_motion():
+    X, y, reference = noisy_motion(0, 0.5)
+    plain = RBDRegressor(ROBOT, ("viscous",)).fit(X, y)
+    model = RBDRegressor(ROBOT, ("viscous",), estimator="instrumental")
+    model.fit(X, y, instruments=reference)
+    at = model.coef_names_.index("viscous.Fv[1]")
+    assert plain.coef_[at] < 0.95 * 0.5
+    assert abs(model.coef_[at] - 0.5) < 3 * model.coef_std_[at] < 0.1
+    table = model.durbin_wu_hausman()
+    assert min(row["p_value"] for row in table) * len(table) < 0.01
+
+
+def test_clean_motion_needs_no_instruments():
+    least = []
+    for seed in range(6):
+        X, y, reference = noisy_motion(seed, 0.0)
+        other = reference + np.random.default_rng(seed + 50).normal(0, 0.3, X.shape)
+        model = RBDRegressor(ROBOT, ("viscous",), estimator="instrumental")
+        table = model.fit(X, y, instruments=other).durbin_wu_hausman()
+        least.append(min(row["p_value"] for row in table) * len(table))
+    assert np.median(least) > 0.05
+
+
+def test_runs_of_one_motion_are_instruments_of_each_other():
+    truth = np.random.default_rng(0).uniform(-2, 2, (400, 6))
+    y = ROBOT.inverse_dynamics(truth[:, :2], truth[:, 2:4], truth[:, 4:]) + 0.5 * truth[:, 2:4]
+    names = [f"{s}{j}" for s in ("q", "dq", "ddq") for j in (1, 2)]
+    rng = np.random.default_rng(1)
+    runs = [pd.DataFrame(truth + rng.normal(0, 0.4, truth.shape), columns=names) for _ in range(8)]
+    X = pd.concat([run.assign(trajectory=k) for k, run in enumerate(runs)], ignore_index=True)
+    torque = np.vstack([y] * 8)
+    torque += rng.normal(0, 0.1, torque.shape)
+    model = RBDRegressor(ROBOT, ("viscous",), estimator="instrumental")
+    model.fit(X, torque, instruments=repetition_instruments(X))
+    plain = RBDRegressor(ROBOT, ("viscous",)).fit(X, torque)
+    at = model.coef_names_.index("viscous.Fv[1]")
+    assert abs(model.coef_[at] - 0.5) < 0.02 < 0.04 < abs(plain.coef_[at] - 0.5)
+    same = repetition_instruments(polars.DataFrame(dict(X.items())))
+    np.testing.assert_allclose(same["dq2"].to_numpy(), repetition_instruments(X)["dq2"])
+    with pytest.raises(SkidynError, match="400 and 399 rows|399 and 400 rows"):
+        repetition_instruments(X.iloc[:-1])
+
+
+def test_instruments_of_other_rows_are_refused():
+    X, y, reference = noisy_motion(0, 0.1)
+    with pytest.raises(ValueError, match="rows of X"):
+        RBDRegressor(ROBOT, estimator="instrumental").fit(X, y, instruments=reference[:-1])

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Output error: what noisy motion does to least squares, a simulation does not feel."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.exceptions import SkidynError
+from skidyn.identification import RBDRegressor, is_consistent
+from skidyn.simulation import Controller, simulate, simulation_errors
+
+
+@pytest.fixture(scope="module")
+def clean():
+    return make_hidden_effect_log(
+        load_planar_arm(), None, n_trajectories=4, duration=8.0, random_state=0
+    )
+
+
+def test_simulates_better_than_least_squares_of_a_slow_log(clean):
+    """At 12.5 Hz accelerations are smoothed away, which biases least squares."""
+    train = (clean.frame["trajectory"] < 3).to_numpy()
+    few = np.flatnonzero(train)[::8]
+    X, y = clean.X.iloc[few], clean.y[few]
+    models = [
+        RBDRegressor(clean.robot, estimator=e).fit(X, y) for e in ("weighted", "output_error")
+    ]
+    scores = [simulation_errors(m, clean.X[~train], clean.y[~train]).score for m in models]
+    assert scores[1] < 0.95 * scores[0]
+    assert np.all(np.isfinite(models[1].coef_std_)) and np.all(models[1].coef_std_ > 0)
+    low, high = models[1].predict_interval(clean.X[~train])
+    assert np.all(low < high)
+
+
+def test_exact_data_keep_the_exact_model(clean):
+    """What least squares has right already, a simulation does not spoil."""
+    frame = clean.X[clean.frame["trajectory"] == 0].reset_index(drop=True)
+    model = RBDRegressor(clean.robot).fit(clean.X, clean.y)
+    wanted = frame.assign(q_ref1=frame["q1"], q_ref2=frame["q2"])
+    controller = Controller(stiffness=300.0, damping=20.0)
+    motion = simulate(model, wanted, controller=controller)
+    torque = controller.checked(2).torque(
+        motion[["q1", "q2"]].to_numpy(),
+        motion[["dq1", "dq2"]].to_numpy(),
+        frame[["q1", "q2"]].to_numpy(),
+        np.gradient(frame[["q1", "q2"]].to_numpy(), frame["time"], axis=0),
+    )
+    X = motion[["time", "q1", "q2", "dq1", "dq2"]]
+    plain = simulation_errors(RBDRegressor(clean.robot).fit(X, torque), X, torque)
+    refined = RBDRegressor(clean.robot, estimator="output_error").fit(X, torque)
+    again = simulation_errors(refined, X, torque)
+    assert again.score < 1.05 * plain.score < 0.05
+
+
+def test_consistent_on_request(clean):
+    train = clean.frame["trajectory"] < 2
+    model = RBDRegressor(clean.robot, estimator="output_error", consistent=True)
+    model.fit(clean.X[train], clean.y[train])
+    assert np.all(is_consistent(model.inertial_parameters_))
+
+
+def test_needs_time_and_whole_rows(clean):
+    X = pd.DataFrame(np.random.default_rng(0).normal(size=(200, 6)))
+    X.columns = [f"{s}{j}" for s in ("q", "dq", "ddq") for j in (1, 2)]
+    model = RBDRegressor(clean.robot, estimator="output_error")
+    with pytest.raises(SkidynError, match="time"):
+        model.fit(X, np.zeros((200, 2)))
+    with pytest.raises(AttributeError, match="partial_fit"):
+        model.partial_fit(clean.X, clean.y)

@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import pickle
+from importlib import resources
+
+import numpy as np
+import polars
+import pytest
+from sklearn.base import clone
+from sklearn.model_selection import GridSearchCV, GroupKFold, cross_val_score
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import FunctionTransformer
+from sklearn.utils.estimator_checks import parametrize_with_checks
+
+from skidyn._columns import Columns
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.exceptions import ColumnError
+from skidyn.identification import RBDRegressor, is_consistent
+from skidyn.model_selection import TrajectoryKFold
+from skidyn.robots import Robot
+
+ONE_JOINT = """<robot name="pendulum"><link name="base"/>
+<link name="rod"><inertial><origin xyz="0.2 0 0"/><mass value="1.5"/>
+<inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="j1" type="revolute"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/>
+<limit lower="-3" upper="3" effort="50" velocity="3"/></joint></robot>"""
+
+
+class AnyColumns(RBDRegressor):
+    """Takes whatever columns and targets scikit-learn's checks bring; for tests only."""
+
+    def _resolve(self, n_features):
+        n = self.robot_.n_joints
+        at = [k % n_features for k in range(3 * n)]
+        return Columns(tuple(at[:n]), tuple(at[n : 2 * n]), tuple(at[2 * n :]))
+
+    def __sklearn_tags__(self):
+        # A pendulum does not follow the made-up data of the checks.
+        tags = super().__sklearn_tags__()
+        tags.regressor_tags.poor_score = True
+        return tags
+
+
+EXPECTED = {
+    "check_regressor_multioutput": "the robot and not y says how many outputs there are",
+}
+
+ROBUST = {
+    "check_sample_weight_equivalence_on_dense_data": (
+        "rows are judged by their weighted residual, which copies of a row do not change"
+    ),
+}
+
+
+@parametrize_with_checks(
+    [
+        AnyColumns(Robot.from_urdf(ONE_JOINT), estimator=name, consistent=name == "weighted")
+        for name in ("weighted", "robust", "entropic")
+    ],
+    expected_failed_checks=lambda estimator: (
+        EXPECTED | (ROBUST if estimator.estimator == "robust" else {})
+    ),
+)
+def test_scikit_learn_contract(estimator, check):
+    check(estimator)
+
+
+@pytest.fixture(scope="module")
+def log():
+    return make_hidden_effect_log(
+        load_planar_arm(), None, n_trajectories=4, duration=5.0, random_state=1
+    )
+
+
+@pytest.fixture(scope="module")
+def model(log):
+    return RBDRegressor(log.robot).fit(log.X, log.y)
+
+
+@pytest.fixture(scope="module")
+def exact():
+    """Motion and torque of another planar arm than the URDF's, without noise."""
+    robot = load_planar_arm()
+    rng = np.random.default_rng(0)
+    truth = robot.inertial_parameters * rng.uniform(0.8, 1.2, (robot.n_bodies, 1))
+    X = rng.uniform(-2, 2, (600, 6))
+    y = robot.inverse_dynamics(X[:, :2], X[:, 2:4], X[:, 4:], parameters=truth)
+    return robot, truth, X, y + 0.3 * X[:, 2:4] + 0.5 * np.tanh(X[:, 2:4] / 0.003)
+
+
+def test_order_of_columns_does_not_matter(log, model):
+    shuffled = log.X[list(np.random.default_rng(0).permutation(log.X.columns))]
+    other = RBDRegressor(log.robot).fit(shuffled, log.y)
+    np.testing.assert_allclose(other.predict(shuffled), model.predict(log.X), atol=1e-9)
+    with pytest.raises(ValueError, match="feature names"):
+        model.predict(shuffled)
+
+
+def test_polars(log, model):
+    X = polars.DataFrame({name: log.X[name].to_numpy() for name in log.X.columns})
+    np.testing.assert_allclose(model.predict(X), model.predict(log.X))
+    assert RBDRegressor(log.robot).fit(X, log.y).score(X, log.y) > 0.9
+
+
+def test_clone_and_pickle(log, model):
+    again = clone(model).fit(log.X, log.y)
+    np.testing.assert_allclose(again.predict(log.X), model.predict(log.X))
+    copy = pickle.loads(pickle.dumps(model))
+    np.testing.assert_allclose(copy.predict(log.X), model.predict(log.X))
+
+
+def test_searches_over_effects_in_a_pipeline(log):
+    pipe = make_pipeline(FunctionTransformer(), RBDRegressor(log.robot))
+    grid = {"rbdregressor__effects": [(), ("viscous", "coulomb")]}
+    search = GridSearchCV(pipe, grid, cv=TrajectoryKFold(n_splits=2)).fit(log.X, log.y)
+    assert search.best_params_["rbdregressor__effects"] == ("viscous", "coulomb")
+
+
+def test_folds_of_trajectories(log):
+    groups = log.X["trajectory"]
+    model = RBDRegressor(log.robot)
+    one = cross_val_score(model, log.X, log.y, cv=GroupKFold(2), groups=groups)
+    two = cross_val_score(model, log.X, log.y, cv=TrajectoryKFold(n_splits=2))
+    assert min(one) > 0.8 and min(two) > 0.8
+
+
+def test_one_joint_may_have_flat_torque():
+    robot = Robot.from_urdf(ONE_JOINT)
+    X = np.random.default_rng(0).uniform(-1, 1, (300, 3))
+    y = robot.inverse_dynamics(X[:, :1], X[:, 1:2], X[:, 2:])[:, 0] + 0.4 * X[:, 1]
+    model = RBDRegressor(robot, ("viscous",)).fit(X, y)
+    assert model.predict(X).shape == y.shape
+    np.testing.assert_allclose(model.predict(X), y, atol=1e-6)
+
+
+def test_errors_name_what_is_wrong(log):
+    model = RBDRegressor(log.robot)
+    with pytest.raises(ColumnError, match="1 column"):
+        model.fit(log.X, log.y[:, :1] if isinstance(log.y, np.ndarray) else log.y.iloc[:, :1])
+    state = log.X.drop(columns=[c for c in log.X if c.startswith("ddq") or c == "time"])
+    with pytest.raises(ColumnError, match="neither accelerations nor time"):
+        model.fit(state, log.y)
+    with pytest.raises(ValueError, match="identified"):
+        RBDRegressor(log.robot, parameters="guessed").fit(log.X, log.y)
+
+
+def test_exact_data_gives_the_exact_model(exact):
+    robot, truth, X, y = exact
+    model = RBDRegressor(robot).fit(X, y)
+    q, dq, ddq = np.random.default_rng(5).uniform(-3, 3, (3, 50, 2))
+    expected = robot.inverse_dynamics(q, dq, ddq, parameters=truth)
+    np.testing.assert_allclose(model.rigid_body_torque(q, dq, ddq), expected, atol=1e-6)
+    coefficients = [float(c[0]) for c in model.effect_coefficients_.values()]
+    np.testing.assert_allclose(sorted(coefficients), [0.3, 0.3, 0.5, 0.5], atol=1e-6)
+
+
+def test_same_as_least_squares_with_pinocchio(exact):
+    pin = pytest.importorskip("pinocchio")
+    robot, _, X, y = exact
+    text = resources.files("skidyn.datasets").joinpath("robots", "planar_arm.urdf").read_text()
+    oracle = pin.buildModelFromXML(text)
+    data = oracle.createData()
+
+    def columns(rows):
+        blocks = []
+        for x in rows:
+            rigid = pin.computeJointTorqueRegressor(oracle, data, x[:2], x[2:4], x[4:])
+            blocks.append(np.hstack([rigid, np.diag(x[2:4]), np.diag(np.tanh(x[2:4] / 0.003))]))
+        return np.vstack(blocks)
+
+    solution = np.linalg.lstsq(columns(X), y.ravel(), rcond=1e-10)[0]
+    new = np.random.default_rng(6).uniform(-2, 2, (40, 6))
+    prediction = RBDRegressor(robot).fit(X, y).predict(new)
+    np.testing.assert_allclose(prediction.ravel(), columns(new) @ solution, atol=1e-6)
+
+
+def test_nominal_parameters_stay(exact):
+    robot, _, X, y = exact
+    model = RBDRegressor(robot, parameters="nominal").fit(X, y)
+    np.testing.assert_array_equal(model.inertial_parameters_, robot.inertial_parameters)
+    assert len(model.coef_) == 4
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_consistent_even_on_pure_noise(seed):
+    rng = np.random.default_rng(seed)
+    X, y = rng.uniform(-2, 2, (120, 6)), rng.normal(0, 10.0 ** rng.uniform(-2, 2), (120, 2))
+    model = RBDRegressor(load_planar_arm(), consistent=True).fit(X, y)
+    assert is_consistent(model.inertial_parameters_)
+    assert all(np.all(c >= 0) for c in model.effect_coefficients_.values())
+
+
+def test_intervals_cover_the_truth(exact):
+    robot, _, X, y = exact
+    inside = []
+    for seed in range(15):
+        noise = np.random.default_rng(seed).normal(0, 0.2, y.shape)
+        model = RBDRegressor(robot).fit(X, y + noise)
+        std = dict(zip(model.coef_names_, model.coef_std_, strict=True))
+        for j in (1, 2):
+            for name, truth in ((f"viscous.Fv[{j}]", 0.3), (f"coulomb.Fc[{j}]", 0.5)):
+                value = model.coef_[model.coef_names_.index(name)]
+                inside.append(abs(value - truth) < 2.5 * std[name])
+    assert np.mean(inside) > 0.85
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"consistent": "yes"}, "True, False or BodyConstraints"),
+        ({"smooth": "x"}, "True, False or None"),
+        ({"forgetting": "a"}, "expected a number"),
+        ({"effects": "viscous"}, r"effects=\['viscous'\]"),
+    ],
+)
+def test_parameters_of_another_kind_are_refused(exact, wrong, message):
+    robot, _, X, y = exact
+    with pytest.raises(ValueError, match=message):
+        RBDRegressor(robot, **wrong).fit(X, y)

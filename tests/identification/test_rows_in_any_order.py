@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Rows in any order, few rows, weights; recordings known again by their motion."""
+
+import warnings
+
+import numpy as np
+import pytest
+from sklearn.ensemble import BaggingRegressor
+from sklearn.experimental import enable_halving_search_cv  # noqa: F401
+from sklearn.model_selection import (
+    HalvingGridSearchCV,
+    ShuffleSplit,
+    cross_val_score,
+    train_test_split,
+)
+
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.effects import Term
+from skidyn.exceptions import ColumnError, LogWarning
+from skidyn.identification import RBDRegressor
+from skidyn.model_selection import LeakageWarning, TrajectoryKFold
+
+ROBOT = load_planar_arm()
+LOG = make_hidden_effect_log(ROBOT, None, n_trajectories=8, duration=4.0, random_state=2)
+N = ROBOT.n_joints
+
+
+def with_acceleration(X):
+    motion = RBDRegressor(ROBOT).fit(LOG.X, LOG.y)._motion(X)[0]
+    return X.assign(**{f"ddq{j + 1}": motion.ddq[:, j] for j in range(N)})
+
+
+FULL = with_acceleration(LOG.X)
+
+
+def rmse(model, X, y):
+    return float(np.sqrt(np.mean((model.predict(X) - y) ** 2)))
+
+
+@pytest.mark.parametrize("X", [LOG.X, FULL], ids=["positions", "accelerations"])
+def test_shuffled_rows_fit_and_predict_as_ordered_ones(X):
+    rng = np.random.default_rng(0)
+    mixed = rng.permutation(len(X))
+    ordered = RBDRegressor(ROBOT).fit(X, LOG.y)
+    with pytest.warns(LeakageWarning, match="TrajectoryKFold"):
+        shuffled = RBDRegressor(ROBOT).fit(X.iloc[mixed], LOG.y[mixed])
+    np.testing.assert_allclose(shuffled.coef_, ordered.coef_, rtol=1e-9)
+    expected = ordered.predict(X)
+    np.testing.assert_allclose(shuffled.predict(X.iloc[mixed]), expected[mixed], atol=1e-9)
+    low, high = shuffled.predict_interval(X.iloc[mixed])
+    assert np.mean((low < LOG.y[mixed]) & (LOG.y[mixed] < high)) > 0.9
+
+
+def test_a_random_split_of_rows():
+    X_train, X_test, y_train, y_test = train_test_split(FULL, LOG.y, random_state=0)
+    with pytest.warns(LeakageWarning):
+        model = RBDRegressor(ROBOT).fit(X_train, y_train)
+    whole = RBDRegressor(ROBOT).fit(FULL, LOG.y)
+    assert rmse(model, X_test, y_test) < 1.2 * rmse(whole, X_test, y_test)
+
+
+@pytest.mark.filterwarnings("ignore::skidyn.model_selection.LeakageWarning")
+@pytest.mark.filterwarnings("ignore::skidyn.exceptions.LogWarning")
+def test_tools_of_scikit_learn_that_draw_rows():
+    model = RBDRegressor(ROBOT)
+    scores = cross_val_score(model, FULL, LOG.y, cv=ShuffleSplit(2, random_state=0))
+    assert scores.min() > 0.9
+    X = FULL.to_numpy()
+    time, trajectory = (list(FULL.columns).index(name) for name in ("time", "trajectory"))
+    bare = RBDRegressor(ROBOT, time=time, trajectory=trajectory)
+    names = ("q", "dq", "ddq")
+    order = [
+        time,
+        trajectory,
+        *(FULL.columns.get_loc(f"{s}{j + 1}") for s in names for j in (0, 1)),
+    ]
+    X, bare = X[:, order], bare.set_params(time=0, trajectory=1)
+    bag = BaggingRegressor(bare, n_estimators=3, random_state=0).fit(X, LOG.y)
+    assert bag.score(X, LOG.y) > 0.9
+    search = HalvingGridSearchCV(
+        model, {"estimator": ["weighted", "ordinary"]}, cv=2, random_state=0, error_score="raise"
+    )
+    assert search.fit(FULL, LOG.y).best_score_ > 0.9
+
+
+def test_forty_rows_give_a_model_or_say_why_not():
+    few = np.sort(np.random.default_rng(1).choice(len(FULL), 40, replace=False))
+    with pytest.warns(LogWarning, match="40 samples make"):
+        model = RBDRegressor(ROBOT).fit(FULL.iloc[few], LOG.y[few])
+    assert np.any(model.coef_[-4:] != 0)
+    assert rmse(model, FULL, LOG.y) < 0.5 * LOG.y.std()
+
+
+def test_recordings_on_top_of_each_other():
+    """Without their number nothing tells rows of recordings with the same clock apart."""
+    start = FULL.groupby("trajectory")["time"].transform("min")
+    same = FULL.assign(time=(FULL["time"] - start).round(6)).drop(columns="trajectory")
+    mixed = np.random.default_rng(0).permutation(len(FULL))
+    X, y = same.iloc[mixed], LOG.y[mixed]
+    with pytest.warns(LeakageWarning):
+        model = RBDRegressor(ROBOT, smooth=False).fit(X, y)
+    assert rmse(model, same, LOG.y) < 0.5 * LOG.y.std()
+    bare = X.drop(columns=["ddq1", "ddq2"])
+    with pytest.warns(LeakageWarning), pytest.raises(ColumnError, match="number the recordings"):
+        RBDRegressor(ROBOT).fit(bare, y)
+
+
+def test_weights_are_repetitions_where_there_is_no_clock():
+    X = np.random.default_rng(0).uniform(-2, 2, (200, 6))
+    y = ROBOT.inverse_dynamics(X[:, :2], X[:, 2:4], X[:, 4:]) + 0.3 * X[:, 2:4]
+    y += np.random.default_rng(1).normal(0, 0.1, y.shape)
+    weight = np.random.default_rng(2).integers(0, 4, 200)
+    weighted = RBDRegressor(ROBOT).fit(X, y, sample_weight=weight)
+    rows = np.repeat(np.arange(200), weight)
+    repeated = RBDRegressor(ROBOT).fit(X[rows], y[rows])
+    np.testing.assert_allclose(weighted.coef_, repeated.coef_, rtol=1e-5, atol=1e-6)
+
+
+def test_rows_of_weight_zero_do_not_count_but_are_neighbours():
+    y = LOG.y.copy()
+    weight = np.ones(len(y))
+    weight[1000:1200] = 0.0
+    y[1000:1200] += 100.0
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", LogWarning)
+        model = RBDRegressor(ROBOT).fit(LOG.X, y, sample_weight=weight)
+    clean = RBDRegressor(ROBOT).fit(LOG.X, LOG.y)
+    rest = np.ones(len(y), bool)
+    rest[1000:1200] = False
+    assert rmse(model, LOG.X[rest], LOG.y[rest]) < 1.1 * rmse(clean, LOG.X[rest], LOG.y[rest])
+    with pytest.raises(ValueError, match="zero"):
+        RBDRegressor(ROBOT).fit(LOG.X, LOG.y, sample_weight=np.zeros(len(y)))
+
+
+@pytest.fixture(scope="module")
+def with_an_offset_in_one_run():
+    y = LOG.y + 2.0 * (LOG.X["trajectory"].to_numpy() == 1)[:, None] * np.array([1.0, 0.0])
+    terms = ["viscous", "coulomb", Term("offset", (0,), {"trajectories": (1,)})]
+    return RBDRegressor(ROBOT, terms).fit(LOG.X, y), y
+
+
+def test_what_is_found_in_one_recording_stays_with_it(with_an_offset_in_one_run):
+    model, y = with_an_offset_in_one_run
+    assert rmse(model, LOG.X, y) < 1.05 * rmse(RBDRegressor(ROBOT).fit(LOG.X, LOG.y), LOG.X, LOG.y)
+    other = make_hidden_effect_log(ROBOT, None, n_trajectories=3, duration=4.0, random_state=7)
+    plain = RBDRegressor(ROBOT).fit(LOG.X, LOG.y)
+    assert rmse(model, other.X, other.y) < 1.05 * rmse(plain, other.X, other.y)
+
+
+def test_a_recording_is_known_again_by_its_motion(with_an_offset_in_one_run):
+    model, y = with_an_offset_in_one_run
+    one = LOG.X[LOG.X["trajectory"] == 1]
+    expected = model.predict(LOG.X)[(LOG.X["trajectory"] == 1).to_numpy()]
+    np.testing.assert_allclose(model.predict(one.assign(trajectory=9)), expected, atol=1e-9)
+    part = one.iloc[100:300].astype("float32")
+    assert np.abs(model.predict(part)[30:-30] - expected[130:270]).max() < 0.3
+
+
+def test_folds_of_trajectories_are_no_shuffled_rows():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", LeakageWarning)
+        cross_val_score(RBDRegressor(ROBOT), LOG.X, LOG.y, cv=TrajectoryKFold(4))

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Recordings of several files, and tables whose columns hold lists."""
+
+import gzip
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.exceptions import LogError
+from skidyn.logs import read_log
+
+LOG = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=2, duration=3.0).frame
+RUN = LOG[LOG["trajectory"] == 0].reset_index(drop=True)
+pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
+
+
+def lists(frame, quantity):
+    return frame[[f"{quantity}1", f"{quantity}2"]].to_numpy().tolist()
+
+
+def as_lists(frame):
+    return pd.DataFrame(
+        {
+            "timestamp": frame["time"],
+            "positions": [str(row) for row in lists(frame, "q")],
+            "torques": [str(row) for row in lists(frame, "tau")],
+        }
+    )
+
+
+def same(read, expected, names=("q1", "q2", "tau1", "tau2")):
+    for name in names:
+        np.testing.assert_allclose(read[name], expected[name], atol=1e-9)
+
+
+def test_columns_that_hold_lists(tmp_path):
+    as_lists(RUN).to_csv(tmp_path / "log.csv", index=False)
+    same(read_log(tmp_path / "log.csv", check=False), RUN)
+
+
+def test_a_cell_that_is_no_list_is_named(tmp_path):
+    table = as_lists(RUN)
+    table.loc[7, "torques"] = "stopped"
+    table.to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises(LogError, match=r"torques holds 'stopped' in row 7"):
+        read_log(tmp_path / "log.csv", check=False)
+
+
+def test_commands_beside_states_in_a_folder(tmp_path):
+    (tmp_path / "run").mkdir()
+    with gzip.open(tmp_path / "run" / "state.csv.gz", "wt") as file:
+        as_lists(RUN).to_csv(file, index=False)
+    command = as_lists(RUN.assign(q1=RUN["q1"] + 0.5)).drop(columns="torques")
+    command.to_csv(tmp_path / "run" / "control.csv", index=False)
+    (tmp_path / "run" / "joint_list.txt").write_text("shoulder\nelbow\n")
+    frame = read_log(tmp_path / "run", check=False)
+    same(frame, RUN)
+    np.testing.assert_allclose(frame["cmd1"], RUN["q1"] + 0.5)
+    assert frame.attrs["joint_names"] == ["shoulder", "elbow"]
+
+
+def test_one_file_per_signal(tmp_path):
+    RUN[["time"]].to_csv(tmp_path / "time.csv", index=False)
+    for name, quantity in (("positions", "q"), ("velocities", "dq"), ("torque", "tau")):
+        block = RUN[[f"{quantity}1", f"{quantity}2"]]
+        block.columns = ["left", "right"]
+        block.to_csv(tmp_path / f"{name}.csv", index=False)
+    same(read_log(tmp_path, check=False), RUN, ("time", "q1", "dq2", "tau2"))
+
+
+def test_files_of_differing_length_are_refused(tmp_path):
+    RUN[["time", "q1", "q2"]].to_csv(tmp_path / "positions.csv", index=False)
+    RUN[["tau1", "tau2"]].iloc[:-5].to_csv(tmp_path / "torques.csv", index=False)
+    with pytest.raises(LogError, match=r"torques.csv has no time column and 295 rows"):
+        read_log(tmp_path, check=False)
+
+
+def test_folders_and_patterns_of_whole_logs(tmp_path):
+    for k, run in LOG.groupby("trajectory"):
+        run.drop(columns="trajectory").to_csv(tmp_path / f"run{k}.csv", index=False)
+    for path in (tmp_path, tmp_path / "run*.csv"):
+        frame = read_log(path, check=False)
+        assert frame["trajectory"].nunique() == 2
+        same(frame, LOG)
+    with pytest.raises(LogError, match="no file matches"):
+        read_log(tmp_path / "none*.csv")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(LogError, match="the folder holds no log"):
+        read_log(tmp_path / "empty")
+
+
+def test_lerobot_data_set(tmp_path):
+    folder = tmp_path / "data" / "chunk-000"
+    folder.mkdir(parents=True)
+    (tmp_path / "meta").mkdir()
+    names = {"observation.state": {"names": ["shoulder.pos", "elbow.pos"]}}
+    (tmp_path / "meta" / "info.json").write_text(json.dumps({"fps": 100, "features": names}))
+    for k, run in LOG.groupby("trajectory"):
+        pd.DataFrame(
+            {
+                "observation.state": lists(run, "q"),
+                "observation.effort": lists(run, "tau"),
+                "action": lists(run, "q"),
+                "timestamp": run["time"].to_numpy() - run["time"].iloc[0],
+                "frame_index": np.arange(len(run)),
+                "episode_index": k,
+            }
+        ).to_parquet(folder / f"episode_{k:06d}.parquet")
+    frame = read_log(tmp_path, check=False)
+    same(frame, LOG)
+    np.testing.assert_allclose(frame["cmd2"], LOG["q2"])
+    assert frame["trajectory"].nunique() == 2
+    assert frame.attrs["joint_names"] == ["shoulder", "elbow"]
+
+
+@pytest.mark.parametrize("unit", ["ms", "us", "ns"])
+def test_dates_and_durations_in_any_unit(tmp_path, unit):
+    for kind in ("timedelta64", "datetime64"):
+        stamps = np.round(RUN["time"].to_numpy() * 1e3).astype("timedelta64[ms]")
+        if kind == "datetime64":
+            stamps = np.datetime64("2026-01-01") + stamps
+        table = RUN.drop(columns=["time", "trajectory"]).assign(
+            time=stamps.astype(f"{kind}[{unit}]")
+        )
+        table.to_parquet(tmp_path / "log.parquet")
+        frame = read_log(tmp_path / "log.parquet", check=False)
+        assert np.diff(frame["time"]).mean() == pytest.approx(0.01, rel=1e-3)
+
+
+def test_patterns_name_columns_without_a_robot(tmp_path):
+    names = {"q1": "a_angle_x", "q2": "b_angle_x", "tau1": "m0_load", "tau2": "m1_load"}
+    RUN[["time", *names]].rename(columns=names).to_csv(tmp_path / "log.csv", index=False)
+    columns = {"q": "{joint}_angle_x", "tau": "m{i}_load"}
+    same(read_log(tmp_path / "log.csv", columns=columns, check=False), RUN)
+    with pytest.raises(LogError, match="no column is like"):
+        read_log(tmp_path / "log.csv", columns={"q": "{joint}_none", "tau": "m{i}_load"})
+
+
+def test_names_of_simulators(tmp_path):
+    names = {f"{ours}{k}": f"{theirs}{k}" for k in (1, 2) for ours, theirs in SIMULATOR.items()}
+    RUN[["time", *names]].rename(columns=names).to_csv(tmp_path / "log.csv", index=False)
+    same(read_log(tmp_path / "log.csv", check=False), RUN, ("q1", "dq2", "tau2"))
+
+
+SIMULATOR = {"q": "qpos", "dq": "qvel", "tau": "qtorque"}
+
+
+def test_a_git_lfs_pointer_is_recognised(tmp_path):
+    pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 10\n"
+    (tmp_path / "log.csv").write_text(pointer)
+    with pytest.raises(LogError, match="git lfs pull"):
+        read_log(tmp_path / "log.csv")

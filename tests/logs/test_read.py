@@ -1,0 +1,334 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reading logs from files that the usual libraries write."""
+
+import warnings
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from skidyn.datasets import load_planar_arm
+from skidyn.exceptions import LogError, LogWarning
+from skidyn.logs import read_log
+
+ROBOT = load_planar_arm()
+N = 200
+
+
+def table(n=N, names="q{k} dq{k} tau{k}", rate=100.0):
+    """Two joints that swing, with torques of the order of the planar arm's."""
+    t = np.arange(n) / rate
+    columns = {"time": t}
+    q, dq, tau = names.split()
+    for k in range(2):
+        phase = 2 * np.pi * (0.7 + 0.4 * k)
+        columns[q.format(k=k + 1, j=ROBOT.joint_names[k])] = 0.5 * np.sin(phase * t)
+        columns[dq.format(k=k + 1, j=ROBOT.joint_names[k])] = 0.5 * phase * np.cos(phase * t)
+        columns[tau.format(k=k + 1, j=ROBOT.joint_names[k])] = np.cos(phase * t) + k
+    return pd.DataFrame(columns)
+
+
+def quiet_read(*args, **options):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", LogWarning)
+        return read_log(*args, **options)
+
+
+def assert_same(frame, source):
+    for name in ("time", "q1", "q2", "dq1", "dq2", "tau1", "tau2"):
+        np.testing.assert_allclose(frame[name], source[name], rtol=0, atol=1e-9, err_msg=name)
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t", " "])
+def test_csv_with_any_separator(tmp_path, separator):
+    source = table()
+    source.to_csv(tmp_path / "log.csv", sep=separator, index=False)
+    frame = quiet_read(tmp_path / "log.csv")
+    assert_same(frame, source)
+    assert frame["trajectory"].unique().tolist() == [0]
+
+
+def test_csv_with_decimal_comma_and_comment(tmp_path):
+    source = table().round(6)
+    text = source.to_csv(sep=";", decimal=",", index=False)
+    (tmp_path / "log.csv").write_text("# recorded in spring\n" + text)
+    assert_same(quiet_read(tmp_path / "log.csv"), source)
+
+
+def test_csv_without_header_by_position(tmp_path):
+    source = table()
+    source.to_csv(tmp_path / "log.txt", index=False, header=False)
+    columns = {"time": 0, "q": [1, 4], "dq": [2, 5], "tau": [3, 6]}
+    assert_same(quiet_read(tmp_path / "log.txt", columns=columns), source)
+
+
+def test_parquet_and_npz(tmp_path):
+    source = table()
+    source.to_parquet(tmp_path / "log.parquet")
+    assert_same(quiet_read(tmp_path / "log.parquet"), source)
+    blocks = {name: source[[f"{name}1", f"{name}2"]].to_numpy() for name in ("q", "dq", "tau")}
+    np.savez(tmp_path / "log.npz", t=source["time"], joint_names=["a", "b"], **blocks)
+    frame = quiet_read(tmp_path / "log.npz")
+    assert_same(frame, source)
+    assert frame.attrs["joint_names"] == ["a", "b"]
+
+
+def test_parquet_with_list_columns(tmp_path):
+    source = table()
+    pd.DataFrame(
+        {
+            "timestamp": source["time"],
+            "position": source[["q1", "q2"]].to_numpy().tolist(),
+            "velocity": source[["dq1", "dq2"]].to_numpy().tolist(),
+            "effort": source[["tau1", "tau2"]].to_numpy().tolist(),
+        }
+    ).to_parquet(tmp_path / "states.parquet")
+    assert_same(quiet_read(tmp_path / "states.parquet"), source)
+
+
+@pytest.mark.parametrize("layout", ["rows", "columns", "struct"])
+def test_matlab(tmp_path, layout):
+    from scipy.io import savemat
+
+    source = table()
+    blocks = {name: source[[f"{name}1", f"{name}2"]].to_numpy() for name in ("q", "dq", "tau")}
+    data = {"t": source["time"].to_numpy(), **blocks}
+    if layout == "columns":
+        data = {name: values.T for name, values in data.items()}
+    savemat(tmp_path / "log.mat", {"log": data} if layout == "struct" else data)
+    assert_same(quiet_read(tmp_path / "log.mat"), source)
+
+
+def test_hdf5_groups_with_clocks_of_their_own(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    source = table()
+    slow = np.arange(0, 2, 0.05)
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        state = file.create_group("state")
+        state["time"] = source["time"]
+        state["q"] = source[["q1", "q2"]]
+        state["dq"] = source[["dq1", "dq2"]]
+        drive = file.create_group("drive")
+        drive["time"] = slow
+        drive["torque"] = np.column_stack([slow, 2 * slow])
+    with pytest.warns(LogWarning, match="interpolated to the clock of state"):
+        frame = read_log(tmp_path / "log.h5", check=False)
+    assert frame["time"].max() <= slow.max()
+    np.testing.assert_allclose(frame["tau2"], 2 * frame["time"], atol=1e-9)
+
+
+def joint_states(source):
+    for row in source.itertuples():
+        yield round(row.time * 1e9), [row.q1, row.q2], [row.dq1, row.dq2], [row.tau1, row.tau2]
+
+
+def test_mcap(tmp_path):
+    writer = pytest.importorskip("mcap_ros2.writer")
+    definition = """std_msgs/Header header
+string[] name
+float64[] position
+float64[] velocity
+float64[] effort
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
+    source = table(60)
+    with (tmp_path / "log.mcap").open("wb") as file:
+        target = writer.Writer(file)
+        schema = target.register_msgdef("sensor_msgs/msg/JointState", definition)
+        for ns, q, dq, tau in joint_states(source):
+            message = {
+                "header": {"stamp": {"sec": 7, "nanosec": ns}, "frame_id": ""},
+                "name": ["joint2", "joint1"],
+                "position": q[::-1],
+                "velocity": dq[::-1],
+                "effort": tau[::-1],
+            }
+            target.write_message("/joint_states", schema, message, log_time=ns, publish_time=ns)
+        target.finish()
+    frame = quiet_read(tmp_path / "log.mcap", robot=ROBOT)
+    assert_same(frame, source)
+
+
+@pytest.mark.parametrize("kind", ["ros1", "ros2", "bare"])
+def test_bags(tmp_path, kind):
+    pytest.importorskip("rosbags")
+    from rosbags.rosbag1 import Writer as Writer1
+    from rosbags.rosbag2 import Writer as Writer2
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC if kind == "ros1" else Stores.LATEST)
+    types = store.types
+    state = types["sensor_msgs/msg/JointState"]
+    header, time = types["std_msgs/msg/Header"], types["builtin_interfaces/msg/Time"]
+    source = table(60)
+    path = tmp_path / ("log.bag" if kind == "ros1" else "bag")
+    target = Writer1(path) if kind == "ros1" else Writer2(path, version=9)
+    with target as bag:
+        connection = bag.add_connection("/joint_states", state.__msgtype__, typestore=store)
+        for ns, *blocks in joint_states(source):
+            stamp = time(sec=5, nanosec=ns)
+            first = {"seq": 0} if kind == "ros1" else {}
+            message = state(
+                header(**first, stamp=stamp, frame_id=""),
+                list(ROBOT.joint_names),
+                *(np.array(block) for block in blocks),
+            )
+            pack = store.serialize_ros1 if kind == "ros1" else store.serialize_cdr
+            bag.write(connection, ns + 5 * 10**9, pack(message, state.__msgtype__))
+    if kind == "bare":
+        path = next(path.glob("*.db3")).rename(tmp_path / "lonely.db3")
+    assert_same(quiet_read(path, robot=ROBOT), source)
+
+
+def test_several_files_are_trajectories(tmp_path):
+    for k in range(3):
+        table(50).to_csv(tmp_path / f"{k}.csv", index=False)
+    frame = quiet_read([tmp_path / f"{k}.csv" for k in range(3)])
+    assert frame["trajectory"].value_counts().to_dict() == {0: 50, 1: 50, 2: 50}
+    assert [file[-5:] for file in frame.attrs["files"]] == ["0.csv", "1.csv", "2.csv"]
+
+
+def test_files_with_other_columns_are_refused(tmp_path):
+    table(50).to_csv(tmp_path / "a.csv", index=False)
+    table(50).assign(volts=1.0).to_csv(tmp_path / "b.csv", index=False)
+    with pytest.raises(LogError, match="volts is in this file or in the first one"):
+        quiet_read([tmp_path / "a.csv", tmp_path / "b.csv"])
+
+
+def test_long_gap_begins_a_trajectory(tmp_path):
+    source = table()
+    source.loc[100:, "time"] += 30.0
+    source.to_csv(tmp_path / "log.csv", index=False)
+    with pytest.warns(LogWarning, match="cut at 1 gap"):
+        frame = read_log(tmp_path / "log.csv", check=False)
+    assert frame["trajectory"].tolist() == [0] * 100 + [1] * 100
+    assert quiet_read(tmp_path / "log.csv", split_gaps=None)["trajectory"].nunique() == 1
+
+
+def test_clock_that_starts_anew_begins_a_trajectory(tmp_path):
+    pd.concat([table(80), table(80)]).to_csv(tmp_path / "log.csv", index=False)
+    with pytest.warns(LogWarning, match="clock starts anew 1 time"):
+        frame = read_log(tmp_path / "log.csv", check=False)
+    assert frame["trajectory"].nunique() == 2
+
+
+def test_rests_can_be_cut(tmp_path):
+    move, rest = table(100), table(100)
+    rest[["q1", "q2"]] = move[["q1", "q2"]].iloc[-1].to_numpy()
+    rest[["dq1", "dq2"]] = 0.0
+    log = pd.concat([move, rest, move], ignore_index=True)
+    log["time"] = np.arange(300) / 100
+    log.to_csv(tmp_path / "log.csv", index=False)
+    frame = quiet_read(tmp_path / "log.csv", split_dwells=0.5)
+    assert frame["trajectory"].nunique() == 2
+    assert 140 < int(np.argmax(frame["trajectory"] == 1)) < 160
+
+
+def test_units_are_converted_on_request(tmp_path):
+    source = table()
+    degrees = source.copy()
+    degrees[["q1", "q2"]] = np.rad2deg(source[["q1", "q2"]])
+    degrees["time"] *= 1000
+    degrees["tau2"] *= 1000
+    degrees.to_csv(tmp_path / "log.csv", index=False)
+    units = {"q": "deg", "time": "ms", "tau2": "mNm"}
+    assert_same(quiet_read(tmp_path / "log.csv", units=units), source)
+    with pytest.raises(LogError, match="'grad' is no unit of q"):
+        read_log(tmp_path / "log.csv", units={"q": "grad"})
+
+
+def test_units_that_a_header_states_must_be_asked_for(tmp_path):
+    source = table()
+    stated = source.rename(columns={"time": "Time [ms]", "q1": "q1 (deg)", "q2": "q2 (deg)"})
+    stated["Time [ms]"] *= 1000
+    stated[["q1 (deg)", "q2 (deg)"]] = np.rad2deg(source[["q1", "q2"]])
+    stated.to_csv(tmp_path / "log.csv", index=False)
+    wanted = r"'Time \[ms\]' states ms.* pass units={'time': 'ms', 'q': 'deg'}"
+    with pytest.raises(LogError, match=wanted):
+        read_log(tmp_path / "log.csv")
+    frame = quiet_read(tmp_path / "log.csv", units={"time": "ms", "q": "deg"})
+    assert_same(frame, source)
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        "position_{k} velocity_{k} effort_{k}",
+        "q_{j} dq_{j} tau_{j}",
+        "{j}_pos {j}_vel {j}_torque",
+        "/joint_states/{j}/position /joint_states/{j}/velocity /joint_states/{j}/effort",
+        "Q[{k}] QD[{k}] TAU_J[{k}]",
+    ],
+)
+def test_usual_names_are_recognised(tmp_path, names):
+    table(names=names).to_csv(tmp_path / "log.csv", index=False)
+    assert_same(quiet_read(tmp_path / "log.csv", robot=ROBOT), table())
+
+
+def test_counting_from_zero_is_recognised(tmp_path):
+    source = table()
+    zero = source.rename(columns=lambda n: n.replace("1", "0").replace("2", "1"))
+    zero.to_csv(tmp_path / "log.csv", index=False)
+    assert_same(quiet_read(tmp_path / "log.csv"), source)
+
+
+def test_patterns_with_joint_and_index(tmp_path):
+    table(names="a.{j} b.{k} c.{k}").to_csv(tmp_path / "log.csv", index=False)
+    columns = {"q": "a.{joint}", "dq": "b.{index}", "tau": "c.{index}"}
+    assert_same(quiet_read(tmp_path / "log.csv", robot=ROBOT, columns=columns), table())
+
+
+def test_missing_velocity_is_derived_and_said(tmp_path):
+    source = table()
+    source.drop(columns=["dq1", "dq2"]).to_csv(tmp_path / "log.csv", index=False)
+    with pytest.warns(LogWarning, match="derived by central differences"):
+        frame = read_log(tmp_path / "log.csv", check=False)
+    np.testing.assert_allclose(frame["dq1"][1:-1], source["dq1"][1:-1], atol=5e-3)
+
+
+def test_further_columns_stay(tmp_path):
+    table().assign(volts=24.0, note="calm").to_csv(tmp_path / "log.csv", index=False)
+    with pytest.warns(LogWarning, match="without numbers left out: note"):
+        frame = read_log(tmp_path / "log.csv", check=False)
+    assert (frame["volts"] == 24).all()
+
+
+def test_dates_become_seconds(tmp_path):
+    source = table()
+    dated = source.assign(time=pd.to_datetime(source["time"] + 1.6e9, unit="s"))
+    dated.to_csv(tmp_path / "log.csv", index=False)
+    np.testing.assert_allclose(quiet_read(tmp_path / "log.csv")["time"], source["time"], atol=1e-6)
+
+
+def test_other_messages_by_topic_and_mapping(tmp_path):
+    pytest.importorskip("rosbags")
+    from rosbags.rosbag2 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.LATEST)
+    array, layout = (
+        store.types[f"std_msgs/msg/{n}"] for n in ("Float64MultiArray", "MultiArrayLayout")
+    )
+    source = table(60)
+    with Writer(tmp_path / "bag", version=9) as bag:
+        connection = bag.add_connection("/drive", array.__msgtype__, typestore=store)
+        for row in source.itertuples(index=False):
+            message = array(layout([], 0), np.array(row[1:]))
+            raw = store.serialize_cdr(message, array.__msgtype__)
+            bag.write(connection, round(row.time * 1e9), raw)
+    with pytest.raises(LogError, match=r"no sensor_msgs/JointState. It holds /drive \(std_msgs"):
+        read_log(tmp_path / "bag")
+    columns = {
+        "q": ["data[0]", "data[3]"],
+        "dq": ["data[1]", "data[4]"],
+        "tau": ["data[2]", "data[5]"],
+    }
+    frame = quiet_read(tmp_path / "bag", topics=["/drive"], columns=columns)
+    assert_same(frame, source)

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What mends a log is asked for, counted, and refused by name where it cannot be done."""
+
+import numpy as np
+import pytest
+
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.exceptions import LogError
+from skidyn.logs import check_log, read_log
+
+ROBOT = load_planar_arm()
+LOG = make_hidden_effect_log(ROBOT, None, n_trajectories=3, duration=4.0).frame
+
+
+@pytest.fixture
+def read(tmp_path):
+    def run(frame, **options):
+        frame.to_csv(tmp_path / "log.csv", index=False)
+        return read_log(tmp_path / "log.csv", check=False, **options)
+
+    return run
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+@pytest.mark.parametrize(
+    "spoil, mend",
+    [
+        ({"tau2": -1.0}, {"flip": ["joint2"]}),
+        ({"tau2": -1.0}, {"flip": [2]}),
+        ({"q1": -1.0, "dq1": -1.0}, {"flip": ["q1"]}),
+        ({"dq1": -1.0}, {"flip": ["dq1"]}),
+        ({"tau1": 50.0}, {"gain": {"tau1": 0.02}}),
+        ({"tau1": 1e3, "tau2": 1e3}, {"gain": {"tau": 1e-3}}),
+    ],
+)
+def test_factors_are_taken_back(read, spoil, mend):
+    other = LOG.assign(**{name: factor * LOG[name] for name, factor in spoil.items()})
+    mended = read(other, robot=ROBOT, **mend)
+    for name in spoil:
+        np.testing.assert_allclose(mended[name], LOG[name], atol=1e-9)
+    assert any(note.startswith(("flip", "gain")) for note in mended.attrs["notes"])
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_order_and_zero_are_taken_back(read):
+    swapped = {f"{q}{k}": LOG[f"{q}{3 - k}"] for q in ("q", "dq", "tau") for k in (1, 2)}
+    mended = read(LOG.assign(**swapped), order=[2, 1])
+    np.testing.assert_allclose(mended["q2"], LOG["q2"])
+    np.testing.assert_allclose(mended["tau1"], LOG["tau1"])
+    torques = read(LOG.assign(tau1=LOG["tau2"], tau2=LOG["tau1"]), order={"tau": [2, 1]})
+    np.testing.assert_allclose(torques["tau1"], LOG["tau1"])
+    np.testing.assert_allclose(
+        read(LOG.assign(q1=LOG["q1"] + 1), zero={"q1": 1.0})["q1"], LOG["q1"]
+    )
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_jittering_stamps_become_even_and_missing_rows_stay_missing(read):
+    jitter = np.random.default_rng(0).uniform(-2e-3, 2e-3, len(LOG))
+    holes = LOG.assign(time=LOG["time"] + jitter).drop(index=[50, 51, 700])
+    mended = read(holes, clock="regular")
+    steps = np.concatenate([np.diff(run["time"]) for _, run in mended.groupby("trajectory")])
+    whole = steps / 0.01
+    assert np.abs(whole - np.round(whole)).max() < 0.01 and sorted(np.round(whole))[-2:] == [2, 3]
+    assert any("stamps were moved" in note for note in mended.attrs["notes"])
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_repeated_rows_are_left_out_and_rest_is_kept(read):
+    rest = LOG.copy()
+    still = rest.index[:100]
+    rest.loc[still, ["q1", "q2"]] = LOG.loc[0, ["q1", "q2"]].to_numpy()
+    rest.loc[still, ["dq1", "dq2"]] = 0.0
+    stale = rest.copy()
+    moving = np.flatnonzero(rest.index > 150)[::4]
+    signals = ["q1", "q2", "dq1", "dq2"]
+    stale.loc[moving, signals] = rest.loc[moving - 1, signals].to_numpy()
+    mended = read(stale, drop_repeated=True)
+    gone = len(rest) - len(mended)
+    assert 0.9 * len(moving) < gone <= len(moving)
+    assert check_log(mended).repeated_rows == 0
+    assert any(f"{gone} of {len(rest)} rows left out" in n for n in mended.attrs["notes"])
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_delay_and_wrapped_positions_are_taken_out(read):
+    late = LOG.copy()
+    for _, run in LOG.groupby("trajectory"):
+        late.loc[run.index, "tau1"] = np.interp(run["time"] - 0.02, run["time"], run["tau1"])
+    mended = read(late, late={"tau1": 0.02})
+    same = LOG.merge(mended, on=["time", "trajectory"], suffixes=("", "_mended"))
+    assert np.abs(same["tau1"] - same["tau1_mended"]).median() < 1e-9
+    far = LOG.assign(q1=LOG["q1"] * 4)
+    wrapped = far.assign(q1=(far["q1"] + np.pi) % (2 * np.pi) - np.pi)
+    turns = (read(wrapped, unwrap=True)["q1"] - far["q1"]) / 2 / np.pi
+    assert np.abs(turns - np.round(turns)).max() < 1e-9
+    assert turns.groupby(LOG["trajectory"]).std().max() < 1e-9
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_sign_from_the_command(read):
+    command = {f"cmd{k}": LOG[f"q{k}"] + 0.01 * LOG[f"tau{k}"] for k in (1, 2)}
+    unsigned = LOG.assign(tau1=LOG["tau1"].abs(), tau2=LOG["tau2"].abs(), **command)
+    np.testing.assert_allclose(read(unsigned, torque_sign="command")["tau1"], LOG["tau1"])
+
+
+@pytest.mark.parametrize(
+    "options, words",
+    [
+        ({"flip": ["elbow"]}, "flip: 'elbow' is neither a joint .joint1, joint2. nor a column"),
+        ({"flip": ["tau7"]}, "flip: 'tau7'"),
+        ({"order": [1, 1]}, r"order: \[1, 1\] is no order of 2 joints"),
+        ({"order": {"volts": [2, 1]}}, "order: 'volts' is none of"),
+        ({"order": {"temp": [2, 1]}}, "order: the log has no temp1"),
+        ({"gain": {"tau1": 0.0}}, "gain: tau1 is to be multiplied by 0.0"),
+        ({"gain": {"volts": 2.0}}, "gain: the log has no volts"),
+        ({"zero": {"tau1": 2.0}}, "zero: tau1 is no position"),
+        ({"zero": {"q1": float("nan")}}, "zero: q1 is to read nan"),
+        ({"late": {"volts": 0.1}}, "late: the log has no volts"),
+        ({"clock": "even"}, "clock is 'even'"),
+        ({"torque_sign": "guess"}, "torque_sign is 'guess'"),
+        ({"torque_sign": "command"}, "the log has no cmd1, cmd2"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_what_cannot_be_mended_is_refused_by_name(read, options, words):
+    with pytest.raises(LogError, match=words):
+        read(LOG, robot=ROBOT, **options)

@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""One list of checks: what it suspects, how sure, and the option that mends it."""
+
+import numpy as np
+import pytest
+
+from skidyn._signals import Signals
+from skidyn.datasets import load_planar_arm, load_scara, make_hidden_effect_log
+from skidyn.diagnosis import Settings, diagnose
+from skidyn.exceptions import LogError
+from skidyn.identification import RBDRegressor
+from skidyn.logs import check_log
+from skidyn.measurement import (
+    Measurement,
+    Remedy,
+    Suspicion,
+    check_measurement,
+    list_checks,
+    refuse_certain,
+)
+
+ROBOT = load_planar_arm()
+LOG = make_hidden_effect_log(ROBOT, "stribeck", joints=[2], n_trajectories=4, random_state=3)
+
+
+@pytest.fixture
+def signals():
+    t = np.arange(0, 20, 0.01)
+    rate = np.array([0.7, 1.3])
+    phase = t[:, None] * rate
+    return Signals(
+        1.2 * np.sin(phase),
+        1.2 * rate * np.cos(phase),
+        -1.2 * rate**2 * np.sin(phase),
+        np.zeros(len(t), dtype=int),
+        time=t,
+    )
+
+
+@pytest.fixture
+def torque(signals):
+    noise = np.random.default_rng(0).normal(0, 0.05, signals.q.shape)
+    return ROBOT.inverse_dynamics(signals.q, signals.dq, signals.ddq) + noise
+
+
+def found(signals, torque, robot=ROBOT):
+    return check_measurement(Measurement(signals, torque, robot, ("shoulder", "elbow")))
+
+
+def only(suspicions, check, certainty, remedy):
+    told = [s for s in suspicions if s.certainty != "noted"]
+    assert [s.check for s in told] == [check], told
+    assert told[0].certainty == certainty
+    assert (told[0].remedy and told[0].remedy.option) == remedy
+
+
+def test_nothing_wrong(signals, torque):
+    assert found(signals, torque) == []
+    assert found(signals, torque, None) == []
+
+
+def test_degrees_of_positions_alone(signals, torque):
+    degrees = signals.with_(q=np.rad2deg(signals.q))
+    only(found(degrees, torque), "position_unit", "certain", "--units q=deg")
+
+
+def test_milliseconds(signals, torque):
+    only(
+        found(signals.with_(time=signals.time * 1e3), torque),
+        *("clock_unit", "certain", "--units time=ms"),
+    )
+
+
+def test_velocity_with_the_other_sign(signals, torque):
+    turned = signals.with_(dq=signals.dq * [1, -1])
+    only(found(turned, torque), "velocity", "certain", "--flip dq2")
+
+
+def test_wrapped_position(signals, torque):
+    far = signals.with_(q=signals.q + [np.pi, 0])
+    wrapped = far.with_(q=(far.q + np.pi) % (2 * np.pi) - np.pi)
+    told = found(wrapped, torque)
+    assert "--unwrap" in {s.remedy.option for s in told if s.check == "wrapped_position"}
+
+
+def test_torque_in_newton_millimetres(signals, torque):
+    only(found(signals, 1e3 * torque), "torque_scale", "certain", "--units tau=Nmm")
+
+
+def test_currents(signals, torque):
+    told = [s for s in found(signals, torque * 0.05) if s.check == "torque_scale"]
+    assert told and "motor currents" in told[0].suspicion
+
+
+@pytest.mark.parametrize("joint", [0, 1])
+def test_torque_with_the_other_sign(signals, torque, joint):
+    sign = np.where(np.arange(2) == joint, -1, 1)
+    only(found(signals, torque * sign), "reading", "certain", f"--flip tau{joint + 1}")
+
+
+def told_of(frame, robot=ROBOT):
+    return {s.check: s for s in check_log(frame, robot).checks}
+
+
+def test_exchanged_torques():
+    frame = LOG.frame.assign(tau1=LOG.frame["tau2"], tau2=LOG.frame["tau1"])
+    reading = told_of(frame)["reading"]
+    assert reading.certainty == "certain" and reading.remedy.option == "--order tau=2,1"
+
+
+def test_torque_without_gravity(signals, torque):
+    told = found(signals, torque - ROBOT.gravity_torque(signals.q))
+    only(told, "reading", told[0].certainty, "--gravity=0,0,0")
+
+
+def test_torque_without_sign():
+    robot = load_scara()
+    log = make_hidden_effect_log(robot, None, n_trajectories=4, random_state=5)
+    names = [f"tau{k}" for k in range(1, 5)]
+    quality = check_log(log.frame.assign(**{n: log.frame[n].abs() for n in names}), robot)
+    told = [s for s in quality.checks if s.check == "unsigned_torque"]
+    assert told and told[0].certainty == "certain"
+    assert told[0].remedy.option == "--torque-sign command"
+
+
+def test_repeated_rows(signals, torque):
+    held = np.arange(len(signals.q)) // 2 * 2
+    repeated = signals.with_(q=signals.q[held], dq=signals.dq[held])
+    told = {s.check: s for s in found(repeated, torque)}
+    assert told["repeated_rows"].remedy.option == "--drop-repeated"
+
+
+def test_clock_that_jitters(signals, torque):
+    stamps = signals.time + np.random.default_rng(1).uniform(-1e-3, 1e-3, len(signals.time))
+    told = {s.check: s for s in found(signals.with_(time=stamps), torque)}
+    assert told["clock_jitter"].certainty == "certain"
+    assert told["clock_jitter"].remedy.option == "--clock regular"
+
+
+def test_samples_that_really_were_uneven():
+    rng = np.random.default_rng(2)
+    t = np.cumsum(rng.uniform(0.004, 0.016, 3000))
+    phase = t[:, None] * [0.7, 1.3]
+    motion = Signals(
+        np.sin(phase), np.cos(phase) * [0.7, 1.3], 0 * phase, np.zeros(3000, int), time=t
+    )
+    told = {s.check: s for s in found(motion, phase, None)}
+    assert told["clock_jitter"].certainty == "noted" and told["clock_jitter"].remedy is None
+
+
+def test_late_torque():
+    assert "torque_delay" not in told_of(LOG.frame)
+    frame = LOG.frame.copy()
+    for _, run in LOG.frame.groupby("trajectory"):
+        for name in ("tau1", "tau2"):
+            frame.loc[run.index, name] = np.interp(run["time"] - 0.02, run["time"], run[name])
+    delay = told_of(frame)["torque_delay"]
+    assert "late" in delay.suspicion and delay.certainty == "suspected"
+    assert float(delay.remedy.option.partition("=")[2]) == pytest.approx(0.02, abs=0.003)
+
+
+def test_saturation(signals, torque):
+    limit = 0.8 * np.abs(torque[:, 0]).max()
+    cut = np.column_stack([np.clip(torque[:, 0], -limit, limit), torque[:, 1]])
+    told = {s.check: s for s in found(signals, cut)}
+    assert told["clipped_torque"].joints == (1,)
+
+
+def test_still_joint(signals, torque):
+    still = signals.with_(q=signals.q * [1, 0], dq=signals.dq * [1, 0])
+    told = {s.check: s for s in found(still, torque)}
+    assert told["still_joint"].joints == (2,) and "elbow" in str(told["still_joint"])
+
+
+def test_certain_ones_come_first_and_stop_a_diagnosis():
+    turned = LOG.X.assign(dq2=-LOG.X["dq2"])
+    model = RBDRegressor(ROBOT)
+    with pytest.raises(LogError, match="--flip dq2.*force=True"):
+        diagnose(model, turned, LOG.y)
+    with pytest.warns(UserWarning, match="has the other sign"):
+        forced = diagnose(model, turned, LOG.y, settings=Settings(max_findings=0), force=True)
+    assert forced.checks[0].certainty == "certain"
+    assert forced.to_dict()["checks"][0]["remedy"] == {
+        "option": "--flip dq2",
+        "code": "flip=['dq2']",
+    }
+
+
+def test_refusal_names_every_remedy():
+    two = [
+        Suspicion("a", "this", "seen", "certain", remedy=Remedy("--flip x", "flip=['x']")),
+        Suspicion("b", "that", "seen", "suspected", remedy=Remedy("--unwrap", "unwrap=True")),
+    ]
+    with pytest.raises(LogError, match="--flip x") as caught:
+        refuse_certain(two)
+    assert "--unwrap" not in str(caught.value)
+
+
+def test_checks_have_names_of_their_own():
+    checks = list_checks()
+    assert len({check.name for check in checks}) == len(checks)
+    assert all(check.suspects for check in checks)

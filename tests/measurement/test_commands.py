@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The commands say first what matters, with the option that mends it, and take that option."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from skidyn import datasets
+from skidyn.cli import main
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+
+URDF = str(Path(datasets.__file__).parent / "robots" / "planar_arm.urdf")
+LOG = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=3, duration=4.0).frame
+
+
+@pytest.fixture
+def flipped(tmp_path):
+    path = tmp_path / "log.csv"
+    LOG.assign(dq2=-LOG["dq2"]).to_csv(path, index=False)
+    return str(path)
+
+
+def test_check_says_first_what_matters_with_the_command_that_mends_it(flipped, capsys):
+    assert main(["check", flipped]) == 0
+    told = capsys.readouterr().out
+    assert told.startswith("!! the velocity of") and "--flip dq2" in told
+    assert f"skidyn check {flipped} --flip dq2" in told
+    assert main(["check", flipped, "--flip", "dq2", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["checks"] == []
+
+
+@pytest.mark.parametrize(
+    "option, words",
+    [
+        (["--flip", "elbow"], "flip: 'elbow' is neither"),
+        (["--zero", "q1"], "'q1' is not NAME=VALUE"),
+        (["--gain", "tau1=much"], "'much' is no number"),
+        (["--order", "tau=1"], "is no order of 2 joints"),
+    ],
+)
+def test_an_option_that_cannot_be_met_is_refused(flipped, capsys, option, words):
+    assert main(["check", flipped, *option]) == 2
+    assert words in capsys.readouterr().err
+
+
+def test_diagnose_stops_with_the_remedy_unless_forced(flipped, tmp_path, capsys):
+    assert main(["diagnose", flipped, "--urdf", URDF]) == 2
+    assert "--flip dq2" in capsys.readouterr().err
+    out = str(tmp_path / "report.json")
+    assert main(["diagnose", flipped, "--urdf", URDF, "--force", "--out", out]) == 0
+    with open(out) as file:
+        report = json.load(file)
+    assert report["checks"][0]["certainty"] == "certain"
+    assert report["provenance"]["options"]["force"] is True
+
+
+def test_gravity_of_another_length_than_three_is_refused(flipped, capsys):
+    assert main(["check", flipped, "--urdf", URDF, "--gravity", "0,1"]) == 2
+    assert "gravity" in capsys.readouterr().err

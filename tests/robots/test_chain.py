@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The chain of pytorch-kinematics against the NumPy engine."""
+
+import numpy as np
+import pytest
+
+from skidyn.datasets import load_panda, load_scara, load_ur10e
+from skidyn.robots import Robot
+
+torch = pytest.importorskip("torch")
+
+BRANCHED = """
+<robot name="branched"><link name="base"/><link name="plate"/><link name="a"/><link name="b"/>
+  <link name="c"/><link name="tip"/>
+  <joint name="mount" type="fixed"><parent link="base"/><child link="plate"/>
+    <origin xyz="0 0 1" rpy="0.3 0 0.1"/></joint>
+  <joint name="j1" type="revolute"><parent link="plate"/><child link="a"/><axis xyz="1 2 0"/>
+    <origin xyz="0.1 0 0" rpy="0 0.2 0"/>
+    <limit lower="-1" upper="2" velocity="1" effort="1"/></joint>
+  <joint name="j2" type="prismatic"><parent link="a"/><child link="b"/>
+    <limit lower="-1" upper="2" velocity="1" effort="1"/></joint>
+  <joint name="j3" type="continuous"><parent link="plate"/><child link="c"/>
+    <mimic joint="j1" multiplier="-2" offset="0.4"/></joint>
+  <joint name="end" type="fixed"><parent link="b"/><child link="tip"/>
+    <origin xyz="0 0.2 0" rpy="1 0 0"/></joint>
+</robot>
+"""
+ROBOTS = {
+    "panda": load_panda,
+    "ur10e": load_ur10e,
+    "scara": load_scara,
+    "branched": lambda: Robot.from_urdf(BRANCHED),
+    "locked": lambda: Robot.from_urdf(BRANCHED, joints=["j2"]),
+}
+
+
+def chain_positions(robot, q):
+    tree = robot.tree
+    return torch.tensor(q[:, tree.coordinates] * tree.multipliers + tree.offsets)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_frames_agree_with_the_numpy_engine(name):
+    robot = ROBOTS[name]()
+    q = np.random.default_rng(0).uniform(-3, 3, (20, robot.n_joints))
+    chain = robot.chain
+    assert tuple(chain.get_joint_parameter_names()) == robot.body_joints
+    poses = chain.forward_kinematics(chain_positions(robot, q))
+    assert set(poses) == set(robot.links)
+    for link, pose in poses.items():
+        matrix = pose.get_matrix().numpy()
+        position, rotation = np.zeros((1, 3)), np.eye(3)
+        if robot.links[link].body >= 0:
+            position, rotation = robot.forward_kinematics(q, link)
+        else:
+            position, rotation = robot.links[link].translation, robot.links[link].rotation
+        assert np.abs(matrix[:, :3, 3] - position).max() < 1e-9
+        assert np.abs(matrix[:, :3, :3] - rotation).max() < 1e-9
+
+
+def test_jacobian_of_the_serial_chain_agrees():
+    from pytorch_kinematics.chain import SerialChain
+
+    robot = load_panda()
+    q = np.random.default_rng(0).uniform(-3, 3, (20, 7))
+    serial = SerialChain(robot.chain, robot.body_names[-1], dtype=torch.float64)
+    jacobian = serial.jacobian(torch.tensor(q)).numpy()
+    np.testing.assert_allclose(jacobian, robot.jacobian(q), atol=1e-9)
+
+
+def test_poses_are_differentiable():
+    robot = load_panda()
+    q = torch.zeros(3, 7, dtype=torch.float64, requires_grad=True)
+    pose = robot.chain.forward_kinematics(q)[robot.body_names[-1]].get_matrix()
+    pose[:, 2, 3].sum().backward()
+    np.testing.assert_allclose(q.grad.numpy(), robot.jacobian(np.zeros((3, 7)))[:, 2], atol=1e-9)
+
+
+def test_a_chain_that_was_moved_leaves_the_robot_alone():
+    robot = load_scara()
+    robot.chain.to(dtype=torch.float32)
+    assert robot.chain.dtype == torch.float64

@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Simulation errors, the scorer, and the verdict on a change."""
+
+import json
+
+import numpy as np
+import pytest
+from sklearn.model_selection import cross_val_score
+
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.effects import Term
+from skidyn.exceptions import SkidynError
+from skidyn.identification import RBDRegressor
+from skidyn.model_selection import TrajectoryKFold
+from skidyn.simulation import (
+    Controller,
+    fit_controller,
+    judge_by_simulation,
+    neg_simulation_error,
+    simulation_errors,
+)
+
+
+@pytest.fixture(scope="module")
+def log():
+    return make_hidden_effect_log(load_planar_arm(), "spring", joints=[1], n_trajectories=4)
+
+
+@pytest.fixture(scope="module")
+def models(log):
+    train = log.frame["trajectory"] < 3
+    plain = RBDRegressor(log.robot).fit(log.X[train], log.y[train])
+    with_spring = plain.with_effects([("spring", [1])]).fit(log.X[train], log.y[train])
+    return plain, with_spring
+
+
+def test_errors_are_small_where_the_model_is_right_and_are_json(log, models):
+    test = log.frame["trajectory"] == 3
+    errors = simulation_errors(models[1], log.X[test], log.y[test])
+    assert errors.position.shape == errors.velocity.shape == (2,)
+    assert np.all(errors.position < 0.1 * errors.resting)
+    assert errors.n_lost == 0 and errors.score < 0.1
+    assert json.loads(json.dumps(errors.to_dict()))["joints"] == ["joint1", "joint2"]
+    assert "joint2" in errors.text and "rad/s" in str(errors)
+
+
+def test_verdict_on_an_effect_that_is_there_and_its_contrary(log, models):
+    test = log.frame["trajectory"] == 3
+    better = judge_by_simulation(*models, log.X[test], log.y[test])
+    worse = judge_by_simulation(*models[::-1], log.X[test], log.y[test])
+    assert better.improves and not better.worsens and better.change < np.log(0.7)
+    assert worse.worsens and "grows" in worse.text
+    np.testing.assert_allclose(better.change, -worse.change, rtol=0.3)
+
+
+def test_verdict_is_left_open_where_nothing_changes(log, models):
+    test = log.frame["trajectory"] == 3
+    same = judge_by_simulation(models[1], models[1], log.X[test], log.y[test])
+    assert not same.improves and not same.worsens and "chance" in same.text
+
+
+def test_one_piece_is_no_evidence(log, models):
+    test = log.frame["trajectory"] == 3
+    with pytest.raises(SkidynError, match="one piece"):
+        judge_by_simulation(*models, log.X[test], log.y[test], horizon=None)
+
+
+def test_motion_that_explodes_is_infinite_not_silent(log, models):
+    test = log.frame["trajectory"] == 3
+    broken = RBDRegressor(log.robot, [Term("spring", (0,))]).fit(log.X, log.y)
+    term = broken.effect_terms_[0]
+    broken.effect_coefficients_[term] = np.array([-1e5, 0.0])
+    errors = simulation_errors(broken, log.X[test], log.y[test])
+    assert errors.n_lost > 0 and not np.isfinite(errors.score)
+    assert "without bound" in errors.text
+    verdict = judge_by_simulation(models[0], broken, log.X[test], log.y[test])
+    assert "without bound" in verdict.text
+
+
+def test_scorer_prefers_the_model_that_moves_like_the_robot(log):
+    cv = TrajectoryKFold(2)
+    scores = [
+        cross_val_score(
+            RBDRegressor(log.robot, effects), log.X, log.y, scoring=neg_simulation_error, cv=cv
+        ).mean()
+        for effects in (["viscous", "coulomb"], ["viscous", "coulomb", ("spring", [1])])
+    ]
+    assert scores[1] > scores[0]
+
+
+def test_controller_is_found_from_a_log_and_closes_the_loop(log, models):
+    frame = log.X[log.frame["trajectory"] == 3].reset_index(drop=True)
+    late = frame[["q1", "q2"]].shift(3).bfill()
+    torque = 80 * (late.to_numpy() - frame[["q1", "q2"]]) - 5 * frame[["dq1", "dq2"]].to_numpy()
+    frame = frame.assign(q_ref1=frame["q1"], q_ref2=frame["q2"])
+    found = fit_controller(frame, torque)
+    np.testing.assert_allclose(found.stiffness, 80, rtol=1e-3)
+    np.testing.assert_allclose(found.damping, 5, rtol=1e-2)
+    np.testing.assert_allclose(found.delay, 0.03, atol=1e-9)
+    assert not found.follows_velocity
+    gains = Controller(stiffness=2000.0, damping=100.0)
+    errors = simulation_errors(models[1], frame, controller=gains)
+    assert errors.position.max() < 0.05
