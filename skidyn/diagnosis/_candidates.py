@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 
 from skidyn._progress import track
 from skidyn._signals import Array
@@ -36,17 +37,17 @@ class Candidate:
     variables: tuple[str, ...] = ()
     n_shapes: int = 0
 
-    @property
+    @cached_property
     def width(self) -> int:
         """Number of coefficients."""
         return self.term.width
 
-    @property
+    @cached_property
     def signs(self) -> Array:
         """1 for every coefficient that physics forbids to be negative, else 0."""
         return self.term.signs
 
-    @property
+    @cached_property
     def limits(self) -> Array:
         """Largest magnitude of every coefficient at which the formula holds."""
         return self.term.limits
@@ -56,7 +57,7 @@ class Candidate:
         """Joints of the term, from 0."""
         return self.term.joints
 
-    @property
+    @cached_property
     def site(self) -> tuple[str, tuple[int, ...]]:
         """Kind and joints: what can be added once."""
         return self.kind, self.term.joints

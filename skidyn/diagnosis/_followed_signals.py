@@ -14,8 +14,8 @@ References
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ from scipy.stats import ttest_1samp
 from sklearn.ensemble import HistGradientBoostingRegressor
 
 from skidyn._signals import Array
-from skidyn.diagnosis._proposal import pursue
+from skidyn.diagnosis._pursuit import Products, pursue
 from skidyn.diagnosis._variables import average_at_rows, averaged_signals
 from skidyn.evidence import Problem
 
@@ -35,6 +35,8 @@ LEAST_SHARE, CHANCE = 0.03, 0.005
 COUNTS = 0.1
 #: A further product must bring this share of the squared residual.
 WORTH = 0.05
+#: A product that varies by a smaller share of its squares counts as constant.
+CONSTANT = 1e-10
 
 
 def followed_signals(problem: Problem, joint: int, residual: Array) -> list[tuple[str, ...]]:
@@ -86,13 +88,16 @@ def _by_trees(
     left, cost = np.zeros(len(y)), np.zeros(len(names))
     rng = np.random.default_rng(0)
     parts = [fold % 4 == k for k in range(4)]
-    trees = []
+    trees, seen = [], np.zeros(len(y), dtype=bool)
     for out in parts:
         learner = HistGradientBoostingRegressor(
             max_iter=50, learning_rate=0.15, max_leaf_nodes=12, early_stopping=False, random_state=0
         )
         trees.append(learner.fit(X[~out], y[~out]))
         left[out] = (y[out] - learner.predict(X[out])) ** 2
+        seen |= out
+        if left[seen].sum() >= np.sum(y[seen] ** 2):
+            return []  # noise: trees that follow it do worse than none, and more would too
     if not _predictable(y, left, fold):
         return []
     for out, learner in zip(parts, trees, strict=True):
@@ -109,35 +114,103 @@ def _by_products(
     signals: dict[str, Array], y: Array, fold: NDArray[np.int64]
 ) -> list[tuple[str, ...]]:
     """The signals of the best products of two simple functions."""
-    names, simple = [], []
-    for name, x in signals.items():
-        functions = _simple_functions(name, x)
-        names += [name] * len(functions)
-        simple += functions
-    pairs = list(itertools.combinations(range(len(simple)), 2))
-    columns = np.column_stack([*simple, *(simple[i] * simple[k] for i, k in pairs)])
-    of = [{name} for name in names] + [{names[i], names[k]} for i, k in pairs]
-    columns = (columns - columns.mean(0)) / np.maximum(columns.std(0), 1e-300)
-
-    def together(chosen: Sequence[int]) -> set[str]:
-        return set().union(*(of[i] for i in chosen))
+    pairs = _Pairs.of(signals)
+    of = pairs.signal[np.array([pairs.first, pairs.second])]
 
     def admissible(chosen: Sequence[int]) -> NDArray[np.bool_]:
-        used = together(chosen)
-        return np.array([len(used | o) <= MOST_SIGNALS for o in of])
+        used = np.unique(of[:, chosen][of[:, chosen] >= 0])
+        new = (of >= 0) & ~np.isin(of, used)
+        more = new.sum(0) - (new[0] & (of[0] == of[1]))
+        return np.asarray(len(used) + more <= MOST_SIGNALS)
 
     worth = WORTH * float(y @ y)
-    chosen, _ = pursue(columns, y, fold, worth=worth, longest=len(of), admissible=admissible)
+    products = pairs.products(y, fold)
+    chosen, _ = pursue(products, worth=worth, longest=of.shape[1], admissible=admissible)
     if not chosen:
         return []
+    columns = np.column_stack([pairs.column(k) for k in chosen])
     left = np.zeros(len(y))
     for f in np.unique(fold):
         out = fold == f
-        weights = np.linalg.lstsq(columns[~out][:, chosen], y[~out], rcond=None)[0]
-        left[out] = (y[out] - columns[out][:, chosen] @ weights) ** 2
+        weights = np.linalg.lstsq(columns[~out], y[~out], rcond=None)[0]
+        left[out] = (y[out] - columns[out] @ weights) ** 2
     if not _predictable(y, left, fold):
         return []
-    return [tuple(sorted(of[chosen[0]])), tuple(sorted(together(chosen)))]
+    names = list(signals)
+    sets = [{names[i] for i in of[:, k] if i >= 0} for k in chosen]
+    return [tuple(sorted(sets[0])), tuple(sorted(set().union(*sets)))]
+
+
+@dataclass(frozen=True)
+class _Pairs:
+    """Products of two simple functions of the signals, less their means.
+
+    There may be many thousands. What pursuit needs of them are sums of products of three or four
+    functions, which one matrix product gives for all pairs.
+
+    Attributes
+    ----------
+    values : ndarray of shape (n_rows, n_functions)
+        Of the functions; the last one is constant.
+    signal : ndarray of shape (n_functions,)
+        Number of the signal behind each, -1 for the constant.
+    first, second : ndarray of shape (n_pairs,)
+        Functions of each pair: every function alone, then all pairs.
+    mean : ndarray of shape (n_pairs,)
+        Of each product over all rows.
+    """
+
+    values: Array
+    signal: NDArray[np.int64]
+    first: NDArray[np.int64]
+    second: NDArray[np.int64]
+    mean: Array
+
+    @classmethod
+    def of(cls, signals: dict[str, Array]) -> _Pairs:
+        functions = [_simple_functions(name, x) for name, x in signals.items()]
+        values = np.column_stack([x for some in functions for x in some])
+        values = values / np.maximum(np.abs(values).max(axis=0), 1e-300)
+        count, constant = values.shape[1], np.ones(len(values))
+        first, second = np.triu_indices(count, 1)
+        first = np.concatenate([np.arange(count), first])
+        second = np.concatenate([np.full(count, count), second])
+        values = np.column_stack([values, constant])
+        signal = np.repeat(np.arange(len(functions)), [len(some) for some in functions])
+        mean = (values.T @ values / len(values))[first, second]
+        return cls(values, np.append(signal, -1), first, second, mean)
+
+    def column(self, k: int) -> Array:
+        """Values of one product, shape (n_rows,)."""
+        return np.asarray(
+            self.values[:, self.first[k]] * self.values[:, self.second[k]] - self.mean[k]
+        )
+
+    def products(self, y: Array, fold: NDArray[np.int64]) -> Products:
+        """Products of all columns with themselves, with a residual and with each other."""
+        parts = [np.flatnonzero(fold == f) for f in np.unique(fold)]
+        square = np.array([self._squares(self.values[rows]) for rows in parts])
+        size = (square + [len(rows) * self.mean**2 for rows in parts]).sum(0)
+        tells = square.sum(0) > CONSTANT * size  # else what is left is rounding
+
+        def along(values: Array) -> Array:
+            return np.where(tells, [self._with(values[r], self.values[r]) for r in parts], 0.0)
+
+        return Products(
+            np.where(tells, square, 0.0),
+            along(y),
+            np.array([y[rows] @ y[rows] for rows in parts]),
+            lambda k: along(self.column(k)),
+        )
+
+    def _squares(self, values: Array) -> Array:
+        fourth, mixed = (values**2).T @ values**2, values.T @ values
+        at = self.first, self.second
+        return np.asarray(fourth[at] - 2 * self.mean * mixed[at] + len(values) * self.mean**2)
+
+    def _with(self, y: Array, values: Array) -> Array:
+        third = values.T @ (values * y[:, None])
+        return np.asarray(third[self.first, self.second] - self.mean * y.sum())
 
 
 def _simple_functions(name: str, x: Array) -> list[Array]:

@@ -58,11 +58,11 @@ def profile_error(
     places = _places(blocks, soft, grams.shape[2] - 1)
     for _ in range(passes):
         weight = 1 / sigma**2
-        joined = np.einsum("fjab,j->fab", grams, weight)
+        joined = np.tensordot(grams, weight, axes=(1, 0))
         pull = soft_prior(joined[:, :-1, :-1].sum(0), places) if places else None
         _, left = solve_left_out(joined[:, :-1, :-1], joined[:, :-1, -1], pull, ridge=10 * RIDGE)
         b = np.column_stack([-left, np.ones(len(left))])
-        errors = np.einsum("fa,fjab,fb->fj", b, grams, b, optimize=True)
+        errors = np.sum(np.matmul(grams, b[:, None, :, None])[..., 0] * b[:, None], axis=2)
         # A joint that rests has no rows; its weight is of no account but must be finite.
         sigma = np.where(counts > 0, np.sqrt(errors.sum(0) / np.maximum(counts, 1)) + 1e-100, 1.0)
     return errors

@@ -2,8 +2,8 @@
 """A short formula for a nameless torque: sparse regression over a small, safe grammar.
 
 Products of a few functions of the positions and of the velocities that the torque depends on are
-tried one by one, and the best is kept; then a second and a third (orthogonal matching pursuit,
-Pati, Rezaiifar, Krishnaprasad 1993), judged by the error of the held-out folds.
+tried one by one, and the best is kept; then a second and a third (orthogonal matching pursuit),
+judged by the error of the held-out folds.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from skidyn._signals import Array
+from skidyn.diagnosis._pursuit import Products, pursue
 from skidyn.effects import Term, formula
 from skidyn.evidence import Problem
 
@@ -154,7 +154,8 @@ def propose(
     fold = problem.fold[joint]
     nothing = float(residual @ residual)
     goal = max(nothing - float(np.sum((residual - explained) ** 2)), 1e-300)
-    chosen, reached = pursue(columns, residual, fold, worth=WORTH * goal, longest=LONGEST)
+    products = Products.of_columns(columns, residual, fold)
+    chosen, reached = pursue(products, worth=WORTH * goal, longest=LONGEST)
     share = (nothing - reached) / goal
     if not chosen or share < LEAST_SHARE:
         return None
@@ -164,104 +165,3 @@ def propose(
     text = " ".join(parts).removeprefix("+")
     found = tuple(terms[i] for i in chosen)
     return Proposal(joint + 1, text, words, tuple(map(float, coefficients)), float(share), found)
-
-
-def pursue(
-    columns: Array,
-    residual: Array,
-    fold: NDArray[np.int64],
-    *,
-    worth: float,
-    longest: int,
-    admissible: Callable[[Sequence[int]], NDArray[np.bool_]] | None = None,
-) -> tuple[list[int], float]:
-    """Orthogonal matching pursuit, judged by the error of the held-out folds.
-
-    Parameters
-    ----------
-    columns : ndarray of shape (n_rows, n_columns)
-        Candidates.
-    residual : ndarray of shape (n_rows,)
-        What they are to explain.
-    fold : ndarray of shape (n_rows,)
-        Number of the fold of every row.
-    worth : float
-        Squared error that a further column must take away.
-    longest : int
-        Columns at most.
-    admissible : callable, optional
-        Which columns may join those that are chosen; all by default.
-
-    Returns
-    -------
-    chosen : list of int
-    reached : float
-        Held-out squared error with them.
-    """
-    chosen: list[int] = []
-    reached = float(residual @ residual)
-    products = _Products(columns, residual, fold)
-    while len(chosen) < longest:
-        errors = products.errors_with_each()
-        if admissible is not None:
-            errors[~admissible(chosen)] = np.inf
-        best = int(np.argmin(errors))
-        if reached - errors[best] < worth:
-            break
-        chosen.append(best)
-        products.choose(best)
-        reached = float(errors[best])
-    return chosen, reached
-
-
-class _Products:
-    """Products of columns and of a residual within each fold: all that leaving folds out takes.
-
-    The rows are read once at the start, and once for every column that is chosen.
-    """
-
-    def __init__(self, columns: Array, residual: Array, fold: NDArray[np.int64]) -> None:
-        size = np.sqrt(np.einsum("ij,ij->j", columns, columns))
-        self._columns = columns / np.where(size > 0, size, 1.0)
-        self._folds = [np.flatnonzero(fold == f) for f in np.unique(fold)]
-        parts = [(self._columns[rows], residual[rows]) for rows in self._folds]
-        self._square = np.array([np.einsum("ij,ij->j", a, a) for a, _ in parts])
-        self._right = np.array([a.T @ y for a, y in parts])
-        self._energy = np.array([y @ y for _, y in parts])
-        self._chosen: list[int] = []
-        self._with_chosen: list[Array] = []  # one of shape (n_folds, n_columns) per chosen column
-
-    def choose(self, column: int) -> None:
-        """Take a column into the model."""
-        self._chosen.append(column)
-        self._with_chosen.append(
-            np.array([self._columns[rows, column] @ self._columns[rows] for rows in self._folds])
-        )
-
-    def errors_with_each(self) -> Array:
-        """Held-out squared error with each column added to the chosen ones, (n_columns,)."""
-        chosen = self._chosen
-        n_folds, n_columns = self._square.shape
-        cross = np.zeros((n_folds, len(chosen), n_columns))
-        for k, block in enumerate(self._with_chosen):
-            cross[:, k] = block
-        errors = np.zeros(n_columns)
-        for f in range(n_folds):
-            # Sweep the chosen columns out of the others and of the residual of all other folds.
-            mixed = cross.sum(0) - cross[f]
-            square, right = self._square.sum(0) - self._square[f], self._right.sum(0)
-            right = right - self._right[f]
-            inverse = np.linalg.pinv(mixed[:, chosen], rcond=1e-12, hermitian=True)
-            mimic, base = inverse @ mixed, inverse @ right[chosen]
-            size = square - np.einsum("kc,kc->c", mimic, mixed)
-            new = size > 1e-9 * np.maximum(square, 1e-300)
-            gain = np.where(new, (right - right[chosen] @ mimic) / np.where(new, size, 1.0), 0.0)
-            # The error of the fold itself, multiplied out.
-            own, here = cross[f], cross[f][:, chosen]
-            level = self._energy[f] - 2 * base @ self._right[f, chosen] + base @ here @ base
-            slope = self._right[f] - self._right[f, chosen] @ mimic - base @ own
-            slope += (here @ base) @ mimic
-            bend = self._square[f] - 2 * np.einsum("kc,kc->c", mimic, own)
-            bend += np.einsum("kc,kc->c", mimic, here @ mimic)
-            errors += level - 2 * gain * slope + gain**2 * bend
-        return errors

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,9 +87,8 @@ class Screen:
             target = np.zeros((self.problem.n_folds, len(index) * k))
             for j, block in rows.items():
                 for f, here in enumerate(self.folds[j]):
-                    part = block[here].reshape(-1, len(index), k)
-                    own[f] += np.einsum("rck,rcl->ckl", part, part, optimize=True)
-                    target[f] += block[here].T @ self.target[j][here]
+                    own[f] += _products(block[None, here], block[None, here], k)[0]
+                    target[f] += self.target[j][here] @ block[here]
             signs = np.array([self.candidates[i].signs for i in index])
             limits = np.array([self.candidates[i].limits for i in index])
             soft = np.array([self.candidates[i].term.effect.softness for i in index])
@@ -113,11 +113,7 @@ class Screen:
 
     def held_out(self, model: _Model) -> Array:
         """Squared error of every fold when it is left out, in units of the noise, (n_folds,)."""
-        errors = np.empty(len(model.square))
-        for f, train in enumerate(model.training()):
-            b = train.solution
-            errors[f] = model.square[f] - 2 * b @ model.cross[f] + b @ model.gram[f] @ b
-        return errors
+        return model.errors
 
     def step(self, model: _Model, wanted: NDArray[np.bool_] | None = None) -> Array:
         """Held-out error of every fold after each candidate is added, (n_candidates, n_folds).
@@ -125,9 +121,7 @@ class Screen:
         Candidates that are not ``wanted``, and those whose coefficients come out with a sign or a
         magnitude that physics forbids, get infinity.
         """
-        n_folds = self.problem.n_folds
-        errors = np.full((len(self.candidates), n_folds), np.inf)
-        *trained, whole = [*model.training(), model.fitted()]
+        errors = np.full((len(self.candidates), self.problem.n_folds), np.inf)
         for group in self._groups:
             pick = np.arange(len(group.index))
             if wanted is not None:
@@ -135,19 +129,19 @@ class Screen:
                 if not len(pick):
                     continue
             columns = (pick[:, None] * group.width + np.arange(group.width)).ravel()
-            cross = sum(
-                self._folded(model.design[j], block[:, columns], j)
-                for j, block in group.rows.items()
+            cross = np.asarray(
+                sum(
+                    self._folded(model.design[j], block[:, columns], j)
+                    for j, block in group.rows.items()
+                )
             )
             own, target = group.own[:, pick], group.target[:, columns]
             ridge = group.ridge[pick]
-            for f, train in enumerate(trained):
-                errors[group.index[pick], f] = _swept_error(
-                    model, train, f, np.asarray(cross), own, target, ridge
-                )
+            errors[group.index[pick]] = _swept_errors(model, cross, own, target, ridge).T
             signs, limits = group.signs[pick], group.limits[pick]
             if signs.any() or np.isfinite(limits).any():
-                gain = _gain(whole, np.asarray(cross).sum(0), own.sum(0), target.sum(0), ridge)[0]
+                total = (x.sum(0, keepdims=True) for x in (cross, own, target))
+                gain = _gain([model.fitted], *total, ridge)[0][0]
                 forbidden = (gain * signs < 0) | (np.abs(gain) > limits)
                 errors[group.index[pick[forbidden.any(axis=1)]]] = np.inf
         return errors
@@ -160,84 +154,88 @@ class _Model:
     cross: Array  # (n_folds, p)
     square: Array  # (n_folds,)
 
-    def training(self) -> list[Normal]:
+    @cached_property
+    def trained(self) -> list[Normal]:
         """The model fitted without each fold in turn."""
         return [self._fit(g, c) for g, c in zip(self.gram, self.cross, strict=True)]
 
+    @cached_property
     def fitted(self) -> Normal:
         """The model fitted to all folds."""
         return self._fit(0.0, 0.0)
+
+    @cached_property
+    def solutions(self) -> Array:
+        """Its coefficients without each fold in turn, shape (n_folds, p)."""
+        return np.array([train.solution for train in self.trained])
+
+    @cached_property
+    def errors(self) -> Array:
+        """Squared error of every fold when it is left out, shape (n_folds,)."""
+        b = self.solutions
+        bent = np.matmul(self.gram, b[:, :, None])[:, :, 0]
+        return np.asarray(self.square + np.sum(b * (bent - 2 * self.cross), axis=1))
 
     def _fit(self, gram: Array | float, cross: Array | float) -> Normal:
         total = self.gram.sum(0)
         return Normal(total - gram, self.cross.sum(0) - cross, column_sizes(total))
 
 
+def _products(a: Array, b: Array, k: int) -> Array:
+    """Products a.T @ b of the k columns of each candidate, (n_folds, n_candidates, k, k)."""
+    if k == 1:
+        return np.asarray(np.einsum("fpc,fpc->fc", a, b)[:, :, None, None])
+    parted = (x.reshape(*x.shape[:2], x.shape[2] // k, k) for x in (a, b))
+    left, right = (x.transpose(0, 2, 1, 3) for x in parted)
+    return np.asarray(np.matmul(left.transpose(0, 1, 3, 2), right))
+
+
 def _gain(
-    train: Normal, cross: Array, own: Array, target: Array, ridge: Array
+    trained: Sequence[Normal], cross: Array, own: Array, target: Array, ridge: Array
 ) -> tuple[Array, Array]:
-    """Coefficients of every candidate beside the fitted model, and how the model mimics it.
+    """Coefficients of every candidate beside fitted models, and how these mimic it.
 
     Parameters
     ----------
-    train : Normal
-        Model fitted to some rows.
-    cross : ndarray of shape (p, n_candidates * width)
-        Products of the model's columns and the candidates' on these rows.
-    own : ndarray of shape (n_candidates, width, width)
+    trained : sequence of Normal
+        The model fitted to some rows, and to others.
+    cross : ndarray of shape (n_fits, p, n_candidates * width)
+        Products of the model's columns and the candidates' on the rows of each fit.
+    own : ndarray of shape (n_fits, n_candidates, width, width)
         Gram matrix of each candidate.
-    target : ndarray of shape (n_candidates * width,)
+    target : ndarray of shape (n_fits, n_candidates * width)
         Products of the candidates' columns and the torque.
     ridge : ndarray of shape (n_candidates, width)
         Added to the diagonal of the Gram matrices.
 
     Returns
     -------
-    gain : ndarray of shape (n_candidates, width)
-    swept : ndarray of shape (p, n_candidates * width)
+    gain : ndarray of shape (n_fits, n_candidates, width)
+    swept : ndarray of shape (n_fits, p, n_candidates * width)
     """
-    n, k = own.shape[:2]
-    swept = train.solve(cross)
-    block = own - np.einsum(
-        "pck,pcl->ckl", cross.reshape(-1, n, k), swept.reshape(-1, n, k), optimize=True
-    )
-    gradient = (target - cross.T @ train.solution).reshape(n, k)
-    diagonal = np.einsum("ckk->ck", own)
-    size = diagonal.max(axis=1, keepdims=True)
+    k = own.shape[2]
+    swept = np.array([train.solve(x) for train, x in zip(trained, cross, strict=True)])
+    solutions = np.array([train.solution for train in trained])
+    gradient = target - np.matmul(solutions[:, None], cross)[:, 0]
+    diagonal = np.einsum("fckk->fck", own)
+    size = diagonal.max(axis=2, keepdims=True)
     size = np.where(size > 0, size, 1 / (CANDIDATE_RIDGE * TINY))  # no row at all here
-    block = block + np.eye(k) * (CANDIDATE_RIDGE * (diagonal + TINY * size) + ridge)[:, None, :]
-    return np.linalg.solve(block, gradient[:, :, None])[:, :, 0], swept
+    added = CANDIDATE_RIDGE * (diagonal + TINY * size) + ridge
+    block = own - _products(cross, swept, k) + np.eye(k) * added[:, :, None, :]
+    return np.linalg.solve(block, gradient.reshape(*diagonal.shape, 1))[:, :, :, 0], swept
 
 
-def _swept_error(
-    model: _Model, train: Normal, fold: int, cross: Array, own: Array, target: Array, ridge: Array
-) -> Array:
-    """Held-out error of one fold for every candidate of a group, shape (n_candidates,)."""
-    n, k = own.shape[1], own.shape[2]
-    gain, swept = _gain(
-        train,
-        cross.sum(0) - cross[fold],
-        own.sum(0) - own[fold],
-        target.sum(0) - target[fold],
-        ridge,
-    )
-    b = train.solution
-    mimic = swept.reshape(-1, n, k)
+def _swept_errors(model: _Model, cross: Array, own: Array, target: Array, ridge: Array) -> Array:
+    """Held-out error of every fold for the candidates of a group, (n_folds, n_candidates)."""
+    others = (x.sum(0) - x for x in (cross, own, target))
+    gain, swept = _gain(model.trained, *others, ridge)
     # The same change judged on the fold left out.
-    gram, here = model.gram[fold], cross[fold]
-    base = model.square[fold] - 2 * b @ model.cross[fold] + b @ gram @ b
-    remainder = model.cross[fold] - gram @ b
-    slope = (target[fold] - here.T @ b - swept.T @ remainder).reshape(n, k)
-    here3 = here.reshape(-1, n, k)
-    mixed = np.einsum("pck,pcl->ckl", mimic, here3, optimize=True)
-    bent = (gram @ swept).reshape(-1, n, k)
-    curve = (
-        own[fold]
-        - mixed
-        - mixed.transpose(0, 2, 1)
-        + np.einsum("pck,pcl->ckl", mimic, bent, optimize=True)
-    )
-    linear = np.einsum("ck,ck->c", gain, slope)
-    quadratic = np.einsum("ck,ckl,cl->c", gain, curve, gain, optimize=True)
-    error: Array = base - 2 * linear + quadratic
-    return error
+    b, k = model.solutions[:, :, None], own.shape[2]
+    remainder = model.cross[:, :, None] - np.matmul(model.gram, b)
+    slope = target - np.sum(cross * b, axis=1) - np.sum(swept * remainder, axis=1)
+    mixed = _products(swept, cross, k)
+    bent = _products(swept, np.matmul(model.gram, swept), k)
+    curve = own - mixed - mixed.transpose(0, 1, 3, 2) + bent
+    linear = np.sum(gain * slope.reshape(gain.shape), axis=2)
+    quadratic = np.sum(gain * np.matmul(curve, gain[:, :, :, None])[:, :, :, 0], axis=2)
+    return np.asarray(model.errors[:, None] - 2 * linear + quadratic)

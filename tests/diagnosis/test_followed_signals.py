@@ -56,3 +56,15 @@ def test_a_joint_that_rests_in_some_trajectories_is_diagnosed_all_the_same():
 
     assert diagnosis.verdict != "complete"
     assert any(2 in finding.joints for finding in diagnosis.findings)
+
+
+def test_a_product_of_signals_that_do_nothing_alone_is_followed():
+    log = make_hidden_effect_log(load_ur5(), None, noise="low", random_state=3)
+    y = np.array(log.y, dtype=float)
+    y[:, 5] += 0.05 * np.sign(log.X["dq4"]) * log.X["dq5"] + 0.05 * log.X["dq4"]
+
+    diagnosis = diagnose(RBDRegressor(log.robot, ("viscous", "coulomb")), log.X, y)
+
+    (finding,) = diagnosis.findings
+    assert finding.joints == (6,)
+    assert set(finding.variables) == {"dq4", "dq5"}

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from skidyn.diagnosis._proposal import pursue
+from skidyn.diagnosis._pursuit import Products, pursue
 
 
 def held_out_error(columns, residual, fold):
@@ -40,7 +40,7 @@ def test_it_chooses_what_fits_one_by_one_would(seed):
     columns[:, 5] = 0.0  # a column that says nothing
     residual = columns @ (rng.normal(size=12) / columns.std(0).clip(1e-9)) + rng.normal(size=200)
     fold = rng.integers(0, 6, 200)
-    found, reached = pursue(columns, residual, fold, worth=5.0, longest=5)
+    found, reached = pursue(Products.of_columns(columns, residual, fold), worth=5.0, longest=5)
     expected, error = greedy(columns, residual, fold, 5.0, 5)
     assert found == expected
     assert reached == pytest.approx(error, rel=1e-9)
@@ -50,5 +50,6 @@ def test_a_copy_of_a_chosen_column_adds_nothing():
     rng = np.random.default_rng(0)
     column = rng.normal(size=100)
     columns = np.column_stack([column, 3 * column, rng.normal(size=100)])
-    found, _ = pursue(columns, column, np.arange(100) % 5, worth=1e-6, longest=3)
+    products = Products.of_columns(columns, column, np.arange(100) % 5)
+    found, _ = pursue(products, worth=1e-6, longest=3)
     assert len(found) == 1
