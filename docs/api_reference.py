@@ -195,10 +195,13 @@ PAGES: tuple[Page, ...] = (
                 "Functions",
                 (
                     "render_comparison",
+                    "render_fleet",
                     "render_html",
                     "summarize",
                     "summarize_comparison",
+                    "summarize_fleet",
                     "write_comparison",
+                    "write_fleet",
                     "write_html",
                     "write_json",
                 ),

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterable, Sequence
 
 #: Titles that begin with the name of a person or a model.
-NAMES = ("Dahl", "LuGre", "Maxwell", "Stribeck")
+NAMES = ("Coulomb", "Dahl", "LuGre", "Maxwell", "Stribeck")
 
 
 def fall(before: float, after: float, noise: float, unit: str, added: bool = True) -> str:

@@ -79,7 +79,7 @@ def test_six_recipes_run_as_they_stand(tmp_path, monkeypatch):
             exec(re.sub(r"^   ", "", block, flags=re.MULTILINE), names)
         log, frame = names["log"], names["frame"]
         assert len(frame) == len(log.y) and names["robot"].joint_names == log.robot.joint_names
-        assert names["figure"]["type"] == "bars" and len(names["figure"]["values"]) == 2
+        assert names["picture"] == {"number": 0}
         assert len(names["diagnosis"].findings) == 1
         (tmp_path / "log.stars").write_text("time*q1*dq1*tau1\n0.0*1.0*0.1*2.0\n0.1*1.1*0.1*2.0\n")
         assert len(read_log("log.stars", check=False)) == 2

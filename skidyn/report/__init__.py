@@ -1,19 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reports: a diagnosis, or two compared, as plain dictionaries and as self-contained pages."""
+"""Reports: a diagnosis, two compared, or a fleet, as dictionaries and as self-contained pages."""
 
 from skidyn._writing import write_json
 from skidyn.report._compare import summarize_comparison
 from skidyn.report._compare_html import render_comparison
+from skidyn.report._fleet import render_fleet, summarize_fleet, write_fleet
 from skidyn.report._html import render_html
 from skidyn.report._summary import summarize
 from skidyn.report._write import write_comparison, write_html
 
 __all__ = [
     "render_comparison",
+    "render_fleet",
     "render_html",
     "summarize",
     "summarize_comparison",
+    "summarize_fleet",
     "write_comparison",
+    "write_fleet",
     "write_html",
     "write_json",
 ]

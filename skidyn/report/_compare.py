@@ -3,17 +3,19 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from skidyn._exceptions import SkidynError
 from skidyn._plain import plain
+from skidyn._text import digits, inside, joints_told, listed
 from skidyn._version import versions
 from skidyn.metrics import paired_comparison, trajectory_errors
-from skidyn.report._html import parameter_rows
-from skidyn.report._overlay import overlays, time_tables
-from skidyn.report._summary import judged_regimes, verdict_sentence
+from skidyn.report._heat import judged_regimes
+from skidyn.report._parameters import parameter_rows
+from skidyn.report._picture import read_all
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -21,8 +23,26 @@ if TYPE_CHECKING:
     from skidyn._signals import Array
     from skidyn.diagnosis import Diagnosis, Finding
 
+#: Errors whose ratio is within this share of one are alike.
+ALIKE = 0.1
 #: Half the width of a 95 % interval in standard errors.
 NORMAL = 1.96
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two diagnoses side by side, and what their comparison has found.
+
+    Attributes
+    ----------
+    diagnoses : tuple of two Diagnosis
+        Of robots with the same joints.
+    report : dict
+        Schema ``skidyn.comparison/1``.
+    """
+
+    diagnoses: tuple[Diagnosis, Diagnosis]
+    report: dict[str, Any]
 
 
 def summarize_comparison(
@@ -95,9 +115,10 @@ def summarize_comparison(
         {
             "report": report,
             "title": title or getattr(signals.robot, "name", "") or "Robot inverse dynamics",
+            "headline": _headline(report),
             "sentence": _sentence(report),
-            "overlays": overlays(both),
-            "times": time_tables(both, same),
+            "joints": _rows(both, report),
+            **read_all("comparison", Pair(both, report)),
         }
     )
     return document
@@ -111,12 +132,12 @@ def _same_log(first: Diagnosis, second: Diagnosis) -> bool:
 
 
 def _side(diagnosis: Diagnosis, name: str, provenance: Mapping[str, Any]) -> dict[str, Any]:
-    comparison = diagnosis.comparison
+    comparison, told = diagnosis.comparison, diagnosis.story()
     torque = np.sqrt(np.mean(comparison.measured**2, axis=0))
     return {
         "name": name,
         "verdict": diagnosis.verdict,
-        "sentence": verdict_sentence(diagnosis),
+        "sentence": f"{told['headline']}. {told['left']}",
         "n_samples": comparison.signals.n_samples,
         "n_trajectories": len(np.unique(comparison.signals.trajectory)),
         "rms_torque": torque,
@@ -226,22 +247,81 @@ def _table(diagnosis: Diagnosis) -> dict[str, dict[str, float]]:
     }
 
 
+def _rows(both: Sequence[Diagnosis], report: dict[str, Any]) -> list[dict[str, Any]]:
+    """One row per joint with the errors of both as given; those that differ or fail speak."""
+    rows = []
+    for row, other, change in zip(
+        *(d.story()["joints"] for d in both), report["ratios"], strict=True
+    ):
+        errors = [row["before"], other["before"]]
+        ratio = change["ratio"]
+        differs = bool(np.isfinite(ratio)) and not 1 / (1 + ALIKE) < ratio < 1 + ALIKE
+        noises = [digits(side["noise"]) for side in (row, other)]
+        noise = noises[0] if noises[0] == noises[1] else " and ".join(noises)
+        rows.append(
+            {
+                "joint": row["joint"],
+                "name": row["name"],
+                "before": errors[0],
+                "after": errors[1],
+                "ratios": [row["ratios"][0], other["ratios"][0]],
+                "state": "differs" if differs else "alike",
+                "speaks": differs or row["speaks"] or other["speaks"],
+                "text": f"{digits(errors[0])} against {digits(errors[1])} {row['unit']} "
+                f"(noise {noise})",
+            }
+        )
+    return rows
+
+
+def _headline(report: dict[str, Any]) -> str:
+    """The outcome in a few words: what only one of the two lacks, or how their errors compare."""
+    names = report["names"]
+    parts = []
+    for name in names:
+        own = [row for row in report["findings"] if row["in"] == [name]]
+        if own:
+            parts.append(f"only in “{name}”: {_brief(own)}")
+    if parts:
+        return "; ".join(parts).replace("only", "Only", 1)
+    mean = _mean_ratio(report)
+    if report["same_log"] and mean is not None and abs(mean - 1) >= ALIKE:
+        best = names[0] if mean > 1 else names[1]
+        return f"“{best}” has the smaller error"
+    if report["findings"]:
+        return "The same effects are missing in both"
+    return "Nothing is missing in either"
+
+
+def _brief(rows: Sequence[dict[str, Any]]) -> str:
+    joints: dict[str, list[int]] = {}
+    for row in rows:
+        title = next(filter(None, row["titles"])).partition(", best described by ")[0]
+        joints.setdefault(inside(title), []).append(row["joint"])
+    return listed([f"{title} on {joints_told(sorted(on))}" for title, on in joints.items()])
+
+
+def _mean_ratio(report: dict[str, Any]) -> float | None:
+    """Geometric mean over joints of the error of the second over that of the first."""
+    ratios = np.array([row["ratio"] for row in report["ratios"]], dtype=float)
+    good = ratios[np.isfinite(ratios) & (ratios > 0)]
+    return float(np.exp(np.log(good).mean())) if len(good) else None
+
+
 def _sentence(report: dict[str, Any]) -> str:
     """The outcome in two or three sentences."""
     first, second = (f"“{name}”" for name in report["names"])
-    ratios = np.array([row["ratio"] for row in report["ratios"]], dtype=float)
-    good = ratios[np.isfinite(ratios) & (ratios > 0)]
+    mean = _mean_ratio(report)
     text = (
         "These are two models of the same recording. "
         if report["same_log"]
         else "These are two different recordings. "
     )
-    if len(good):
-        mean = float(np.exp(np.log(good).mean()))
-        less = int((good < 1).sum())
+    if mean is not None:
+        less = sum(row["ratio"] < 1 for row in report["ratios"])
         text += (
             f"As given, {second} has {_change(mean, first)} in the mean over joints, and the "
-            f"smaller one on {less} of {len(good)} joints. "
+            f"smaller one on {less} of {len(report['ratios'])} joints. "
         )
     findings = report["findings"]
     if not findings:

@@ -8,6 +8,9 @@ from typing import Any
 
 Number = float | None
 
+#: Colours of the two sides of a comparison, by their names in page.css.
+COLOURS = ("before", "after")
+
 
 def curve_figure(curve: dict[str, Any], unit: str) -> dict[str, Any]:
     """Residual against a signal, with the effect's curve.
@@ -40,6 +43,63 @@ def curve_figure(curve: dict[str, Any], unit: str) -> dict[str, Any]:
             {"label": "effect", "colour": "after", "style": "line", "values": column["effect"]},
         ],
     }  # fmt: skip
+
+
+def overlay_figure(picture: dict[str, Any], report: dict[str, Any]) -> dict[str, Any]:
+    """Residuals of two diagnoses against one signal.
+
+    Parameters
+    ----------
+    picture : dict
+        ``joint``, ``variable``, ``unit``, ``x`` and two ``sides``.
+    report : dict
+        ``names`` of the two and ``units`` of the joints.
+
+    Returns
+    -------
+    dict
+        Figure of the type ``"lines"``.
+    """
+    unit = report["units"][picture["joint"] - 1]
+    return {
+        "type": "lines",
+        "x": picture["x"],
+        "x_label": f"{picture['variable']} in {picture['unit']}",
+        "y_label": f"residual in {unit}",
+        "series": [
+            {"label": name, "colour": colour, "style": "line", "dash": k == 0,
+             "values": side["median"], "low": side["low"], "high": side["high"]}
+            for k, (name, colour, side) in enumerate(
+                zip(report["names"], COLOURS, picture["sides"], strict=True))
+        ],
+    }  # fmt: skip
+
+
+def finding_charts(finding: dict[str, Any], units: Sequence[str]) -> list[dict[str, Any]]:
+    """Pictures of a finding: the residual over two variables, or against one with its curve.
+
+    Parameters
+    ----------
+    finding : dict
+        ``maps`` and ``curves``.
+    units : sequence of str
+        Unit of the torque of every joint.
+
+    Returns
+    -------
+    list of dict
+        The curve or map with ``drawn``, its figure, and ``over``, its variables in words.
+    """
+    maps = [
+        {**table, "drawn": map_figure(table), "over": " and ".join(table["variables"])}
+        for table in finding["maps"]
+    ]
+    curves = [
+        {**curve, "drawn": curve_figure(curve, units[curve["joint"] - 1]),
+         "over": curve["variable"]}
+        for curve in finding["curves"]
+    ]  # fmt: skip
+    return maps + curves
 
 
 def fall_figure(errors: Sequence[Number], floor: Number, unit: str) -> dict[str, Any]:

@@ -31,9 +31,9 @@ def overlays(both: Sequence[Diagnosis]) -> list[dict[str, Any]]:
     Returns
     -------
     list of dict
-        ``joint`` (from 1), ``variable``, ``unit``, ``x`` and for each of the two ``median``,
-        ``low`` and ``high`` (quartiles) of the residual while the joint slides, N m or N; NaN
-        where a log has not been.
+        ``joint`` (from 1), ``variable``, ``unit``, ``x``, ``apart`` (how far the two part, over the
+        noise) and for each of the two ``sides`` ``median``, ``low`` and ``high`` (quartiles) of
+        the residual while the joint slides, N m or N; NaN where a log has not been.
     """
     signals = both[0].comparison.signals
     pictures = []
@@ -55,10 +55,18 @@ def overlays(both: Sequence[Diagnosis]) -> list[dict[str, Any]]:
                     "variable": f"{name}{j + 1}",
                     "unit": unit,
                     "x": (edges[:-1] + edges[1:]) / 2,
-                    "sides": [_quartiles(x, r, edges) for x, r in pairs],
+                    "sides": (sides := [_quartiles(x, r, edges) for x, r in pairs]),
+                    "apart": _apart(sides, both[0].noise[j]),
                 }
             )
     return pictures
+
+
+def _apart(sides: Sequence[dict[str, Array]], noise: float) -> float:
+    """How far two curves part, over the noise: medians and quartiles, in the mean over bins."""
+    gaps = np.abs([sides[0][key] - sides[1][key] for key in ("low", "median", "high")])
+    known = np.isfinite(gaps)
+    return float(gaps[known].mean() / max(noise, 1e-300)) if known.any() else 0.0
 
 
 def _sliding(diagnosis: Diagnosis, name: str, joint: int) -> tuple[Array, Array]:

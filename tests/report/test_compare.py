@@ -27,7 +27,7 @@ def test_two_models_of_one_log_share_their_rows(fakes):
     second.comparison.measured[:] = first.comparison.measured
     summary = summarize_comparison(first, second, names=("usual", "whole"))
     assert summary["report"]["same_log"]
-    (table,) = summary["times"]["joints"][0]
+    (table,) = summary["time"]["joints"][0]
     assert set(table["columns"]) == {"measured", "first", "second"}
     ratio = summary["report"]["ratios"][0]
     assert ratio["low"] < ratio["ratio"] < ratio["high"]
@@ -37,8 +37,8 @@ def test_two_models_of_one_log_share_their_rows(fakes):
 def test_two_logs_keep_their_own_times(fakes):
     summary = summarize_comparison(*two_logs(fakes), names=("new", "worn"))
     assert not summary["report"]["same_log"]
-    assert [len(tables) for tables in summary["times"]["joints"]] == [2, 2, 2]
-    assert summary["times"]["starts"] == []  # the borders of one are not those of the other
+    assert [len(tables) for tables in summary["time"]["joints"]] == [2, 2, 2]
+    assert summary["time"]["starts"] == []  # the borders of one are not those of the other
     found = {(tuple(f["kinds"]), f["joint"]): f["in"] for f in summary["report"]["findings"]}
     assert found == {
         (("spring",), 3): ["new"], (("dahl",), 1): ["new", "worn"], (("dahl",), 2): ["new", "worn"],
@@ -56,7 +56,7 @@ def test_rivals_are_one_finding(fakes):
 
 def test_curves_are_those_of_the_residual(fakes):
     summary = summarize_comparison(*two_logs(fakes))
-    curve = next(o for o in summary["overlays"] if o["variable"] == "dq1")
+    curve = next(o for o in summary["residuals"] if o["variable"] == "dq1")
     median = np.array(curve["sides"][0]["median"], dtype=float)
     x = np.array(curve["x"])
     known = np.isfinite(median) & (np.abs(x) > 0.1)

@@ -20,7 +20,7 @@ def compared(open_file, fakes, tmp_path):
 def test_numbers_are_those_of_the_file(compared):
     page, report, _ = compared
     for side, name in enumerate(("first", "second")):
-        cells = page.locator(f"#errors [data-{name}]").all()
+        cells = page.locator(f"#where [data-{name}]").all()
         shown = [float(cell.get_attribute(f"data-{name}")) for cell in cells]
         assert shown == report["sides"][side]["rmse_before"]
     rows = page.locator("table.findings tbody tr").all()
@@ -40,8 +40,8 @@ def test_both_logs_are_read_under_one_cursor(compared):
     values = page.locator(".panel:first-child .u-value").all_inner_texts()
     assert all(text.endswith((" s", " N m", " N")) for text in values)
     time = float(values[0].split()[0])
-    joint = int(page.locator(".panel h4").first.inner_text().split()[0]) - 1
-    for shown, table in zip(values[1:3], summary["times"]["joints"][joint], strict=True):
+    joint = int(page.locator(".panel h4").first.inner_text().rpartition("(")[2][:-1]) - 1
+    for shown, table in zip(values[4:6], summary["time"]["joints"][joint], strict=True):
         k = min(range(len(table["time"])), key=lambda i: abs(table["time"][i] - time))
         measured = table["columns"]["measured"][k]
         assert float(shown.split()[0].replace("−", "-")) == pytest.approx(measured, rel=0.02)

@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from skidyn.report import render_html, summarize
-from skidyn.report._glossary import MEANINGS, meaning
+from skidyn.report._glossary import FLEET_MEANINGS, MEANINGS, meaning
 
 DOCS = Path(__file__).parents[2] / "docs" / "user_guide" / "glossary.rst"
 
@@ -19,6 +19,6 @@ def test_the_page_explains_every_word(fakes):
         assert f"<dfn>{word}</dfn>" in page
 
 
-@pytest.mark.parametrize("word", MEANINGS)
+@pytest.mark.parametrize("word", [*MEANINGS, *FLEET_MEANINGS])
 def test_the_documentation_says_the_same(word):
-    assert f"   {word}\n      {MEANINGS[word]}\n" in DOCS.read_text("utf-8")
+    assert f"   {word}\n      {meaning(word)}\n" in DOCS.read_text("utf-8")

@@ -4,7 +4,7 @@ import re
 import pytest
 
 from skidyn.report import render_html, summarize
-from skidyn.report._html import parameter_rows
+from skidyn.report._parameters import parameter_rows
 
 
 def test_markup_in_names_is_escaped(fakes):

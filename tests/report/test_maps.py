@@ -10,7 +10,7 @@ def test_an_effect_of_two_variables_is_mapped(fakes):
     signals, comparison = diagnosis.comparison.signals, diagnosis.comparison
     comparison.predicted[:] = comparison.measured
     comparison.predicted[:, 1] -= signals.q[:, 0] + 10 * signals.q[:, 2]
-    (table,) = summarize(diagnosis)["findings"][1]["maps"]
+    (table,) = summarize(diagnosis)["what"][1]["maps"]
     assert table["joint"] == 2 and table["units"] == ["rad", "m"]
     middles = [np.convolve(table[k], [0.5, 0.5], "valid") for k in ("x", "y")]
     expected = middles[0][None, :] + 10 * middles[1][:, None]
@@ -21,4 +21,4 @@ def test_an_effect_of_two_variables_is_mapped(fakes):
 
 
 def test_named_effects_and_single_variables_have_no_map(fakes):
-    assert all(not f["maps"] for f in summarize(fakes.make_diagnosis())["findings"])
+    assert all(not f["maps"] for f in summarize(fakes.make_diagnosis())["what"])

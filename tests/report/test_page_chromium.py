@@ -105,7 +105,7 @@ def test_a_name_in_the_legend_hides_its_curve(open_page, fakes):
 
 def test_hover_shows_the_numbers_of_the_summary(open_page, fakes):
     diagnosis = fakes.make_diagnosis()
-    trace = summarize(diagnosis)["traces"][0]
+    trace = summarize(diagnosis)["time"]["traces"][0]
     page = open_page(diagnosis)
     x, y, width, _ = over(page)
     page.mouse.move(x + 0.4 * width, y + 60)
@@ -133,7 +133,7 @@ def test_the_cursor_of_one_joint_reads_all(open_page, fakes):
 
 def test_pictures_of_findings_show_values(open_page, fakes):
     diagnosis = fakes.make_diagnosis()
-    curve = summarize(diagnosis)["findings"][0]["curves"][0]
+    curve = summarize(diagnosis)["what"][0]["curves"][0]
     page = open_page(diagnosis)
     picture = page.locator(".finding [data-figure='0'] .u-over")
     picture.scroll_into_view_if_needed()

@@ -32,8 +32,8 @@ const common = (() => {
   const yAxis = (label, more) => axis(label, { size: 48, space: 28, ...more });
 
   // Markers take the colours of the theme by name: they are elements, not strokes of a canvas.
-  const legend = (colours) => ({
-    live: true, markers: { width: 2, stroke: (u, i) => `var(--${colours[i - 1]})`, fill: () => "transparent" },
+  const legend = (colours, dashes = []) => ({
+    live: true, markers: { width: 2, stroke: (u, i) => `var(--${colours[i - 1]})`, dash: (u, i) => dashes[i - 1] || "solid", fill: () => "transparent" },
   });
 
   // A name in the legend is a button: with the keyboard too.

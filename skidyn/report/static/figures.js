@@ -14,26 +14,26 @@
   // Series with an optional band between `low` and `high`; the band has no line in the legend.
   function lines(place, figure) {
     const data = [figure.x], series = [{ label: figure.x_label.split(" in ")[0], value: (u, v) => digits(v) }];
-    const bands = [], colours = [];
+    const bands = [], colours = [], dashes = [];
     for (const s of figure.series) {
       const points = s.style === "points", stroke = () => colour(s.colour);
       let told = (u, v) => digits(v);
       if (s.low) {
         for (const edge of [s.high, s.low]) {
-          data.push(edge); colours.push(s.colour);
+          data.push(edge); colours.push(s.colour); dashes.push("");
           series.push({ label: "", class: "quiet", stroke: "transparent", points: { show: false } });
         }
         bands.push({ series: [data.length - 2, data.length - 1], fill: () => faint(s.band || s.colour, 0.16) });
         told = (u, v, _, i) => (v == null ? "–" : `${digits(v)} (${digits(s.low[i])} to ${digits(s.high[i])})`);
       }
-      data.push(s.values); colours.push(s.colour);
+      data.push(s.values); colours.push(s.colour); dashes.push(points ? "dotted" : s.dash ? "dashed" : "solid");
       series.push({
         label: s.label, class: s.low ? "banded" : null, stroke, width: points ? 0 : 2.2, dash: s.dash ? [6, 4] : undefined, value: told,
         paths: points ? () => null : undefined, points: { show: points, size: 5, fill: stroke, stroke, width: 0 },
       });
     }
     plot(place, {
-      height: HEIGHT, padding: PADDING, series, bands, legend: legend(colours),
+      height: HEIGHT, padding: PADDING, series, bands, legend: legend(colours, dashes),
       scales: { x: { time: false }, y: { range: padded } },
       axes: [xAxis(figure.x_label), yAxis(figure.y_label)], cursor: { drag: still },
     }, data);

@@ -92,7 +92,7 @@
       joint.box.append(part);
       const u = plot(part, {
         height: wanted.height + (bottom ? 34 : 0), padding: [k ? 8 : 18, 12, bottom ? 0 : 8, 0],
-        series: [{ label: "time", value: clock }, ...series], legend: legend(order.map((s) => s.colour)),
+        series: [{ label: "time", value: clock }, ...series], legend: legend(order.map((s) => s.colour), order.map((s) => (s.dash ? "dashed" : "solid"))),
         scales: { x: { time: false, range: (_, low, high) => [low, high] }, y: wanted.range ? { range: () => wanted.range } : {} },
         axes: [xAxis("time in s, trajectories one after another", bottom ? {} : { label: undefined, size: 4, values: (_, s) => s.map(() => "") }),
           yAxis(wanted.label)],

@@ -1,0 +1,19 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Terms of the page and what they mean."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from skidyn.report._glossary import MEANINGS
+from skidyn.report._picture import Canvas, Picture, Summary
+
+
+class Glossary(Picture):
+    """The words that are explained on hover too."""
+
+    place, title = 60, "Terms"
+
+    def show(self, summary: Summary, canvas: Canvas) -> dict[str, Any]:
+        """All meanings."""
+        return {"glossary": MEANINGS}

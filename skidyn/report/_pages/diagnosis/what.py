@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What is missing: a card for every finding."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from skidyn.effects import get_effect
+from skidyn.report._figures import finding_charts
+from skidyn.report._maps import residual_maps
+from skidyn.report._parameters import parameter_rows
+from skidyn.report._picture import Canvas, Picture, Summary
+
+if TYPE_CHECKING:
+    from skidyn.diagnosis import Diagnosis, Finding
+
+
+class What(Picture):
+    """Formula, curve, parameters with intervals, rivals, and the line that adds it."""
+
+    place, title = 30, "What is missing"
+
+    def read(self, subject: Diagnosis) -> list[dict[str, Any]]:
+        """Every finding with its curves and maps."""
+        return [
+            {
+                **finding.to_dict(),
+                "title": finding.title,
+                "code": finding.code,
+                "formula": "" if finding.kind == "unknown" else get_effect(finding.kind).formula,
+                "notes": _notes(finding),
+                "curves": finding.curves,
+                "maps": residual_maps(subject, finding),
+            }
+            for finding in subject.findings
+        ]
+
+    def show(self, summary: Summary, canvas: Canvas) -> dict[str, Any] | None:
+        """Cards with numbered charts; nothing without findings."""
+        cards = []
+        for finding, line in zip(summary["what"], summary["story"]["cards"], strict=True):
+            charts = [
+                {**chart, "figure": canvas.figure(chart["drawn"])}
+                for chart in finding_charts(finding, summary["units"])
+            ]
+            rows = parameter_rows(finding)
+            cards.append({**finding, "line": line, "charts": charts, "rows": rows})
+        return {"cards": cards} if cards else None
+
+
+def _notes(finding: Finding) -> list[str]:
+    """What there is to say of a finding beside its name, size and rivals."""
+    sentences = []
+    caveat = "" if finding.kind == "unknown" else get_effect(finding.kind).caveat
+    if caveat:
+        sentences.append(f"Note that {caveat}.")
+    mass = finding.parameters.get("mass", {}).get("value", 0.0)
+    if isinstance(mass, float) and mass < 0:
+        sentences.append("The mass is negative: the description has a load that the robot lacks.")
+    return sentences

@@ -1,0 +1,12 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Every deviation in numbers."""
+
+from __future__ import annotations
+
+from skidyn.report._picture import Picture
+
+
+class What(Picture):
+    """Coefficient, common value, deviation and how sure it is."""
+
+    place, title = 20, "In which effect"

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A picture of a page: one small class, one template, and a script where it draws in its own way.
+
+The module stands in the folder of its page, ``skidyn/report/_pages/<page>/<name>.py``, its template
+``<name>.html.jinja`` and its script ``<name>.js`` beside it. Nothing else names it: a page is made
+of the pictures in its folder, in the order of their ``place``.
+"""
+
+from __future__ import annotations
+
+import pkgutil
+from functools import cache
+from importlib import import_module
+from typing import Any, ClassVar
+
+Summary = dict[str, Any]
+
+
+class Canvas:
+    """What the scripts of a page draw, collected from its pictures.
+
+    Attributes
+    ----------
+    numbers : dict
+        ``figures``, and whatever else a picture's own script reads.
+
+    Examples
+    --------
+    >>> canvas = Canvas()
+    >>> canvas.figure({"type": "bars", "values": [2.0, 1.0]})
+    0
+    """
+
+    def __init__(self) -> None:
+        self.numbers: dict[str, Any] = {"figures": []}
+
+    def figure(self, figure: dict[str, Any]) -> int:
+        """Number by which a template shows a figure; a figure shown twice is stored once.
+
+        Parameters
+        ----------
+        figure : dict
+            ``type`` is a drawing of ``static/figures.js``; the rest is what that draws.
+
+        Returns
+        -------
+        int
+        """
+        figures: list[dict[str, Any]] = self.numbers["figures"]
+        if figure not in figures:
+            figures.append(figure)
+        return figures.index(figure)
+
+
+class Picture:
+    """A part of a page: what it reads, and what its template shows.
+
+    Attributes
+    ----------
+    place : int
+        The pictures of a page stand in this order.
+    title : str, default=""
+        Entry in the list of contents; none if empty.
+
+    Examples
+    --------
+    >>> class Errors(Picture):
+    ...     place, title = 25, "Errors"
+    ...
+    ...     def read(self, subject):
+    ...         return subject.comparison.rmse()
+    ...
+    ...     def show(self, summary, canvas):
+    ...         return {"figure": canvas.figure({"type": "bars", "values": summary["errors"]})}
+    """
+
+    place: ClassVar[int]
+    title: ClassVar[str] = ""
+
+    def read(self, subject: Any) -> Any:
+        """What the page needs of a diagnosis, a comparison or a fleet.
+
+        Parameters
+        ----------
+        subject : object
+            What the page is about.
+
+        Returns
+        -------
+        object
+            Stored in the summary under the name of the picture's module, as values of JSON.
+        """
+        return None
+
+    def show(self, summary: Summary, canvas: Canvas) -> dict[str, Any] | None:
+        """Variables of the template.
+
+        Parameters
+        ----------
+        summary : dict
+            What the pictures have read, by their names, and what all of them share.
+        canvas : Canvas
+            Takes what is to be drawn.
+
+        Returns
+        -------
+        dict or None
+            None leaves the picture out.
+        """
+        return {}
+
+
+@cache
+def pictures(page: str) -> dict[str, Picture]:
+    """Pictures of a page by their names, in the order of the page.
+
+    Parameters
+    ----------
+    page : {"comparison", "diagnosis", "fleet"}
+        Folder of ``skidyn/report/_pages``.
+
+    Returns
+    -------
+    dict of str to Picture
+    """
+    package = import_module(f"skidyn.report._pages.{page}")
+    found = {}
+    for entry in pkgutil.iter_modules(package.__path__):
+        module = import_module(f"{package.__name__}.{entry.name}")
+        own = (value for value in vars(module).values() if isinstance(value, type))
+        found[entry.name] = next(
+            kind()
+            for kind in own
+            if issubclass(kind, Picture) and kind.__module__ == module.__name__
+        )
+    return dict(sorted(found.items(), key=lambda item: item[1].place))
+
+
+def read_all(page: str, subject: Any) -> Summary:
+    """What every picture of a page reads of its subject, by the pictures' names."""
+    return {name: picture.read(subject) for name, picture in pictures(page).items()}

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Coefficients and dates in words."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from skidyn._text import inside, listed
+from skidyn.effects import get_effect, list_effects
+
+
+def coefficient_told(column: str) -> str:
+    """A coefficient in words, such as ``"Fv of viscous friction on joint 1"``.
+
+    Parameters
+    ----------
+    column : str
+        Name of a coefficient, such as ``"viscous.Fv[1]"``.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> coefficient_told("viscous.Fv[1]")
+    'Fv of viscous friction on joint 1'
+    """
+    match = re.fullmatch(r"(\w+)\.(\w+)\[([\d, ]+)\]", column)
+    if match is None or match[1] not in list_effects():
+        return column
+    joints = match[3].replace(" ", "").split(",")
+    where = f"joint{'s' if len(joints) > 1 else ''} {listed(joints)}"
+    return f"{match[2]} of {inside(get_effect(match[1]).title)} on {where}"
+
+
+def since_told(date: Any) -> str:
+    """Since when a coefficient is outside its band; a plain number is that of a trajectory."""
+    return f"at trajectory {date}" if isinstance(date, int) else f"on {date}"
