@@ -10,8 +10,6 @@ Importing the package loads no submodule; each one is loaded when it is first us
 import importlib
 from typing import Any
 
-from skidyn._version import package_version, show_versions
-
 __all__ = [
     "__version__",
     "committee",
@@ -43,16 +41,20 @@ __all__ = [
     "simulation",
 ]
 
-_PERSISTENCE = frozenset({"load_model", "save_model"})
-_SUBMODULES = frozenset(__all__) - {"__version__", "show_versions"} - _PERSISTENCE
+#: Where the names that are no submodules come from.
+_HOMES = {
+    "load_model": "skidyn._persistence",
+    "save_model": "skidyn._persistence",
+    "show_versions": "skidyn._version",
+}
 
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
-        return package_version()
-    if name in _PERSISTENCE:
-        return getattr(importlib.import_module("skidyn._persistence"), name)
-    if name in _SUBMODULES:
+        return importlib.import_module("skidyn._version").package_version()
+    if name in _HOMES:
+        return getattr(importlib.import_module(_HOMES[name]), name)
+    if name in __all__:
         return importlib.import_module(f"skidyn.{name}")
     raise AttributeError(f"module 'skidyn' has no attribute {name!r}")
 

@@ -1,9 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``python -m skidyn`` runs the command line."""
+"""The command line, as ``python -m skidyn`` and the script ``skidyn`` run it."""
 
 import sys
 
-from skidyn.cli import main
+
+def main() -> int:
+    """Import and run the command line; Ctrl-C ends either with one line."""
+    try:
+        from skidyn.cli import main as run
+
+        return run()
+    except KeyboardInterrupt:
+        print("stopped; no file was left half written", file=sys.stderr)
+        return 130
+
 
 if __name__ == "__main__":
     sys.exit(main())

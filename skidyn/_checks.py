@@ -142,11 +142,14 @@ def as_numbers(frame: pd.DataFrame, names: Sequence[str], source: str = "the log
     LogError
         A cell is no number; the message names column, row and content.
     """
-    frame = frame.copy()
+    import pandas as pd
+
+    # All at once: one column after the other takes the square of their number.
+    columns = dict(frame.items())
     for name in names:
         column = frame[name]
         if column.dtype.kind in "fiub":
-            frame[name] = column.astype(np.float64)
+            columns[name] = column.astype(np.float64)
             continue
         if column.dtype.kind == "M":
             raise LogError(
@@ -162,8 +165,8 @@ def as_numbers(frame: pd.DataFrame, names: Sequence[str], source: str = "the log
                     f"{source}: column {name!r} holds {cell!r} in row {row} where a number is "
                     "expected. Mend or remove that row, or leave the column out."
                 ) from None
-        frame[name] = cells.astype(np.float64)
-    return frame
+        columns[name] = pd.Series(cells.astype(np.float64), index=frame.index)
+    return pd.DataFrame(columns)
 
 
 def handle_missing(

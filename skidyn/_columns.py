@@ -10,7 +10,6 @@ velocities, all accelerations, in the joint order of the robot.
 
 from __future__ import annotations
 
-import difflib
 import numbers
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from skidyn._exceptions import ColumnError
+from skidyn._text import suggest
 
 #: How a key column may be given to an estimator: by position, by name, found by itself, or absent.
 ColumnSpec = int | str | None
@@ -153,7 +153,7 @@ def _key_column(
             f"{what}={spec!r} names a column, but X has no column names; give its position."
         )
     if spec not in names:
-        raise ColumnError(f"{what} column {spec!r} is not in X{_suggest(str(spec), names)}.")
+        raise ColumnError(f"{what} column {spec!r} is not in X{suggest(str(spec), names)}.")
     return names.index(str(spec))
 
 
@@ -173,16 +173,11 @@ def _by_name(
         return None
     style = max(styles, key=lambda wanted: sum(name in names for name in wanted))
     missing = [name for name in style if name not in names]
-    hint = _suggest(missing[0], names)
+    hint = suggest(missing[0], names)
     raise ColumnError(
         f"X lacks the column(s) {', '.join(missing)}{hint}. The robot has {len(joint_names)} "
         f"joints: {', '.join(joint_names)}."
     )
-
-
-def _suggest(name: str, names: Sequence[str]) -> str:
-    close = difflib.get_close_matches(name, list(names), n=1)
-    return f" (did you mean {close[0]!r}?)" if close else ""
 
 
 def column_names(X: Any) -> list[str] | None:

@@ -3,14 +3,15 @@
 
 from __future__ import annotations
 
-import difflib
 import re
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from skidyn._exceptions import LogError
 from skidyn._limits import LONGEST_NAME, MOST_COLUMNS
+from skidyn._text import suggest
 from skidyn._units import split_unit
 
 #: A joint beyond, and beyond the number of columns, is a damaged name: a list of as many joints
@@ -194,19 +195,21 @@ def _expand(
     if "{joint}" in value:
         if robot_joints is not None:
             return [value.replace("{joint}", joint) for joint in robot_joints]
-        around = "(.+)".join(map(re.escape, value.split("{joint}")))
-        found = [name for name in names if re.fullmatch(around, name)]
+        first, *others = map(re.escape, value.split("{joint}"))
+        pattern = first + "(.+)" + r"\1".join(others)  # wherever it stands, one name
+        found = [name for name in names if re.fullmatch(pattern, name)]
         if not found:
             raise LogError(f"columns: no column is like {value!r}. There are: {_listed(names)}.")
         return list(found)
     value = value.replace("{i}", "{index}")
     if "{index}" in value:
-        first = 0 if value.replace("{index}", "0") in names else 1
+        known = set(names)
+        first = 0 if value.replace("{index}", "0") in known else 1
         if robot_joints is not None:
             count = len(robot_joints)
         else:
             count = 0
-            while value.replace("{index}", str(count + first)) in names:
+            while value.replace("{index}", str(count + first)) in known:
                 count += 1
         return [value.replace("{index}", str(k + first)) for k in range(max(count, 1))]
     return [value]
@@ -221,11 +224,9 @@ def _existing(value: str | int, names: Sequence[str], target: str, source: str) 
         return names[value]
     if value in names:
         return str(value)
-    close = difflib.get_close_matches(str(value), list(names), n=1)
-    hint = f" Did you mean {close[0]!r}?" if close else ""
     raise LogError(
-        f"columns: {target!r} is to be {value!r}, which is not in {source}.{hint} "
-        f"It has: {_listed(names)}."
+        f"columns: {target!r} is to be {value!r}, which is not in {source}"
+        f"{suggest(value, names)}. It has: {_listed(names)}."
     )
 
 
@@ -337,18 +338,17 @@ def _place_by_joint(
     if robot_joints is None:
         if not match.joint_names:
             match.joint_names = list(found)
-        for joint in match.joint_names:
+        for k, joint in enumerate(match.joint_names):
             if joint in found:
-                match.columns[f"{quantity}{match.joint_names.index(joint) + 1}"] = found[joint]
+                match.columns[f"{quantity}{k + 1}"] = found[joint]
         return
-    located = {joint: _locate(joint, found) for joint in robot_joints}
+    located = _located(robot_joints, found)
     missing = [joint for joint, hit in located.items() if hit is None]
     # a name such as "tau_cmd" speaks of no joint
     if len(missing) == len(robot_joints) and quantity != "q":
         return
     if missing:
-        close = difflib.get_close_matches(missing[0], list(found), n=1, cutoff=0.5)
-        hint = f" (did you mean {close[0]!r}?)" if close else ""
+        hint = suggest(missing[0], found, cutoff=0.5)
         raise LogError(
             f"{source} has no {quantity} of the joint(s) {_listed(missing)}{hint}; it has "
             f"{_listed(found)}. If the log covers part of the robot, load it with "
@@ -356,26 +356,42 @@ def _place_by_joint(
             f"columns={{'{quantity}': [...]}} in the order of the robot."
         )
     match.joint_names = list(robot_joints)
+    used = set(located.values())
     for k, joint in enumerate(robot_joints):
         hit = located[joint]
         assert hit is not None
         match.columns[f"{quantity}{k + 1}"] = found[hit]
-        if hit != joint:
-            match.notes.append(f"{quantity}: column {found[hit]!r} taken for joint {joint!r}")
-    for joint in found:
-        if joint not in located.values():
-            match.notes.append(
-                f"{quantity}: column {found[joint]!r} belongs to no joint of the robot and is kept "
-                "under its own name"
-            )
+    guessed = {joint: found[hit] for joint, hit in located.items() if hit and hit != joint}
+    if guessed:
+        match.notes.append(
+            f"{quantity}: column(s) {_listed(guessed.values())} taken for joint(s) "
+            f"{_listed(guessed)}"
+        )
+    if left := [found[joint] for joint in found if joint not in used]:
+        match.notes.append(
+            f"{quantity}: column(s) {_listed(left)} belong to no joint of the robot and are kept "
+            "under their own names"
+        )
 
 
-def _locate(joint: str, found: Mapping[str, str]) -> str | None:
-    """The name in ``found`` that is this joint, if only one is; "joint" and case do not matter."""
-    if joint in found:
-        return joint
-    alike = [name for name in found if _core(name) == _core(joint)]
-    return alike[0] if len(alike) == 1 else None
+def _located(joints: Sequence[str], found: Mapping[str, str]) -> dict[str, str | None]:
+    """For every joint its name in ``found``: the same, or the only one that is alike.
+
+    Alike are names that differ in case, separators or the word joint.
+    """
+    known, alike = set(joints), dict[str, list[str]]()
+    for name in found:
+        if name not in known:
+            alike.setdefault(_core(name), []).append(name)
+    rivals = Counter(_core(joint) for joint in known if joint not in found)
+
+    def locate(joint: str) -> str | None:
+        if joint in found:
+            return joint
+        names = alike.get(core := _core(joint), [])
+        return names[0] if len(names) == rivals[core] == 1 else None
+
+    return {joint: locate(joint) for joint in joints}
 
 
 def _core(joint: str) -> str:
@@ -396,7 +412,7 @@ def _number_of_joints(match: NameMatch) -> int:
     return max(numbers, default=0)
 
 
-def _listed(names: Sequence[str] | Mapping[str, str], limit: int = 12) -> str:
+def _listed(names: Iterable[str], limit: int = 12) -> str:
     names = [str(name) for name in names]
     more = f", ... ({len(names)} in all)" if len(names) > limit else ""
     return ", ".join(names[:limit]) + more

@@ -111,7 +111,9 @@ def save_model(path: Any, model: Any) -> Path:
     Raises
     ------
     SkidynError
-        The model holds a function, or something else that :func:`load_model` never creates.
+        The model holds a function, or something else that :func:`load_model` never creates. A
+        fitted :class:`skidyn.diagnosis.EffectSearchCV` holds its diagnosis: store its
+        ``best_estimator_``.
 
     Examples
     --------
@@ -129,16 +131,25 @@ def save_model(path: Any, model: Any) -> Path:
     try:
         data = skops.dumps(model)
     except Exception as error:  # whatever an object answers that cannot tell its state
-        raise SkidynError(f"{type(model).__name__} cannot be stored: {error}") from error
+        raise SkidynError(
+            f"{type(model).__name__} cannot be stored: {error}.{_instead(model)}"
+        ) from error
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         nodes = list(_nodes(_description(archive, target)))
     lost = {name for loader, name in nodes if loader not in _LOADERS}
     if lost:
         raise SkidynError(
             f"{type(model).__name__} cannot be stored: it holds {', '.join(sorted(lost))}, and "
-            "only data and classes are loaded again. Put a class with this method in its place"
+            "only data and classes are loaded again. Put a class with this method in its place."
+            f"{_instead(model)}"
         )
     return write_bytes(target, data)
+
+
+def _instead(model: Any) -> str:
+    """What of a search can be stored."""
+    found = hasattr(model, "best_estimator_")
+    return " Store its best_estimator_, which is the model that was found." if found else ""
 
 
 def load_model(path: str | os.PathLike[str], *, trusted: Iterable[str] = ()) -> Any:
@@ -176,18 +187,19 @@ def load_model(path: str | os.PathLike[str], *, trusted: Iterable[str] = ()) -> 
     source, own = Path(path), frozenset(trusted)
     for name in own:
         _check_class(name)
-    try:
-        with zipfile.ZipFile(source) as archive:
-            nodes = set(_nodes(_description(archive, source)))
-    except zipfile.BadZipFile as error:
-        raise SkidynError(
-            f"{source}: not a skops file. Pickles and joblib files are refused, since loading one "
-            "can run any code; store models with skidyn.save_model"
-        ) from error
-    except (KeyError, TypeError, AttributeError, RecursionError, ValueError) as error:
-        if isinstance(error, SkidynError):
+    with source.open("rb") as file:
+        try:
+            with zipfile.ZipFile(file) as archive:
+                nodes = set(_nodes(_description(archive, source)))
+        except SkidynError:
             raise
-        raise SkidynError(f"{source}: cannot be loaded: {error}") from error
+        except zipfile.BadZipFile as error:
+            raise SkidynError(
+                f"{source}: not a skops file. Pickles and joblib files are refused, since loading "
+                "one can run any code; store models with skidyn.save_model"
+            ) from error
+        except Exception as error:  # damaged archives raise whatever their content leads to
+            raise SkidynError(f"{source}: cannot be loaded: {error}") from error
     foreign = sorted({name for loader, name in nodes if not _is_known(loader, name, own)})
     if not foreign:
         named = sorted({name for _, name in nodes if name in CLASSES} | own)

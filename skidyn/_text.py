@@ -3,9 +3,13 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 from collections.abc import Iterable, Sequence
+from itertools import islice
 
+#: How many names are compared with a misspelt one, and how much of them: long names take long.
+TRIED, LONGEST_TRIED = 500, 60
 #: Titles that begin with the name of a person or a model.
 NAMES = ("Coulomb", "Dahl", "LuGre", "Maxwell", "Stribeck")
 
@@ -93,3 +97,14 @@ def measure(name: str, value: object, unit: str = "") -> str:
     else:
         text = digits(value) if isinstance(value, float) else str(value)
     return f"{name} = {text.replace('-', '−')}{'' if unit in ('', '1') else f' {raised(unit)}'}"
+
+
+def suggest(word: object, names: Iterable[str], cutoff: float = 0.6) -> str:
+    """The name that was probably meant, for the end of a message; empty without one.
+
+    >>> suggest("dq_elbw", ["q_elbow", "dq_elbow"])
+    " (did you mean 'dq_elbow'?)"
+    """
+    tried = [name for name in islice(names, TRIED) if len(name) <= LONGEST_TRIED]
+    close = difflib.get_close_matches(str(word)[:LONGEST_TRIED], tried, n=1, cutoff=cutoff)
+    return f" (did you mean {close[0]!r}?)" if close else ""

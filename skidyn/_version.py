@@ -13,10 +13,11 @@ _CORE = (
     "pytorch-kinematics",
     "numpy",
     "scipy",
+    "pandas",
     "joblib",
 )
 _OPTIONAL = (
-    "matplotlib", "jinja2", "pandas", "polars", "pyarrow", "h5py", "mcap", "rosbags", "rich",
+    "matplotlib", "jinja2", "polars", "pyarrow", "h5py", "mcap", "rosbags", "rich",
     "onnx", "skops", "pooch", "dask",
 )  # fmt: skip
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import glob
 import json
 import os
 import stat
@@ -33,16 +34,30 @@ def keeping_inputs() -> Iterator[None]:
 
 
 def keep(paths: Iterable[PathLike]) -> None:
-    """Protect files that are read, under whatever name they may be written."""
+    """Protect files that are read, under whatever name they may be written.
+
+    A folder stands for all files in it, and a pattern for all that it matches.
+    """
     known = _INPUTS.get()
     if known is None:
         return
     for path in paths:
-        try:
-            found = os.stat(path)
-        except (OSError, ValueError):  # the reader says what is wrong with it
-            continue
-        known.add((found.st_dev, found.st_ino))
+        for name in [path, *_inside(os.fspath(path))]:
+            try:
+                found = os.stat(name)
+            except (OSError, ValueError):  # the reader says what is wrong with it
+                continue
+            known.add((found.st_dev, found.st_ino))
+
+
+def _inside(path: str) -> Iterator[str]:
+    if os.path.isdir(path):
+        for folder, _, names in os.walk(path):
+            yield from (os.path.join(folder, name) for name in names)
+    elif not os.path.exists(path) and glob.has_magic(path):
+        for match in glob.glob(path, recursive=True):
+            yield match
+            yield from _inside(match)
 
 
 def writable(path: PathLike) -> Path:

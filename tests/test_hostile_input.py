@@ -144,6 +144,24 @@ def test_a_bag_reads_no_database_outside_its_folder(world):
     assert not {f for f in heard if f.startswith(str(secret.parent))}
 
 
+@pytest.mark.parametrize("suffix", ["mat", "feather"])
+def test_modules_that_come_with_a_log_are_not_imported(world, suffix):
+    """These formats are decoded in another process first."""
+    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=1, duration=1.0).frame
+    if suffix == "mat":
+        from scipy.io import savemat
+
+        savemat("log.mat", {name: log[name].to_numpy() for name in log})
+    else:
+        pytest.importorskip("pyarrow")
+        log.to_feather("log.feather")
+    for name in ("numpy", "scipy", "pyarrow", "resource"):
+        with open(f"{name}.py", "w") as file:
+            file.write("open('harm', 'w').close()\n")
+    assert len(read_log(f"log.{suffix}", check=False)) == len(log)
+    assert not os.path.exists("harm")
+
+
 def test_a_report_makes_no_command_write_where_it_says(world):
     from skidyn.cli import main
 

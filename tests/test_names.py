@@ -34,8 +34,10 @@ def test_columns_follow_the_order_of_the_robot():
 def test_names_without_the_word_joint_are_taken_and_told():
     match = match_names(["q_Elbow", "q_shoulder-pan", "q_gripper"], robot_joints=JOINTS)
     assert match.columns == {"q1": "q_shoulder-pan", "q2": "q_Elbow"}
-    assert any("'q_Elbow' taken for joint 'elbow_joint'" in note for note in match.notes)
-    assert any("'q_gripper' belongs to no joint" in note for note in match.notes)
+    assert any(
+        "q_Elbow taken for joint(s) shoulder_pan_joint, elbow_joint" in note for note in match.notes
+    )
+    assert any("q_gripper belong to no joint" in note for note in match.notes)
 
 
 def test_actual_and_indexed_names():

@@ -23,6 +23,7 @@ import skidyn
 from skidyn._persistence import CLASSES
 from skidyn.committee import ELMCommittee
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.diagnosis import EffectSearchCV
 from skidyn.exceptions import SkidynError
 from skidyn.hybrid import HybridRegressor
 from skidyn.identification import RBDRegressor
@@ -93,6 +94,27 @@ def test_damaged_files_are_told(tmp_path):
         archive.writestr("schema.json", "{}")
     with pytest.raises(SkidynError, match="cannot be loaded"):
         skidyn.load_model(tmp_path / "m.skops")
+
+
+@pytest.mark.parametrize(
+    ("at", "value"),
+    [(6, b"\xff"), (10, b"\x63"), (8, b"\x01"), (42, b"\xff\xff\xff\x7f")],
+    ids=["version", "compression", "encryption", "offset"],
+)
+def test_damaged_archives_are_told(tmp_path, at, value):
+    """What fuzzing found: each of these is an error of another type to the archive's reader."""
+    file, _ = stored(tmp_path)
+    data = bytearray(file.read_bytes())
+    entry = data.rindex(b"PK\x01\x02")  # of schema.json, the last in the list of contents
+    data[entry + at : entry + at + len(value)] = value
+    file.write_bytes(data)
+    with pytest.raises(SkidynError, match=r"m\.skops: (cannot be loaded|not a skops file)"):
+        skidyn.load_model(file)
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(FileNotFoundError, match="none.skops"):
+        skidyn.load_model(tmp_path / "none.skops")
 
 
 def test_a_bomb_is_not_unpacked(tmp_path, monkeypatch):
@@ -198,6 +220,18 @@ def test_a_model_with_a_function_inside_is_refused_when_it_is_stored(tmp_path):
     with pytest.raises(SkidynError, match="log1p"):
         skidyn.save_model(tmp_path / "m.skops", model)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_search_says_what_of_it_can_be_stored(tmp_path):
+    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=4, duration=3.0)
+    search = EffectSearchCV(RBDRegressor(log.robot), effects=("spring",), cv=2)
+    skidyn.load_model(skidyn.save_model(tmp_path / "before.skops", search))
+    search.fit(log.X, log.y)
+    with pytest.raises(SkidynError, match="EffectSearchCV cannot be .* best_estimator_, which"):
+        skidyn.save_model(tmp_path / "m.skops", search)
+    assert not (tmp_path / "m.skops").exists()
+    again = skidyn.load_model(skidyn.save_model(tmp_path / "m.skops", search.best_estimator_))
+    np.testing.assert_array_equal(again.predict(log.X), search.predict(log.X))
 
 
 def test_one_large_array_named_again_and_again_is_not_unpacked(tmp_path, monkeypatch):

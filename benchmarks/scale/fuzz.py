@@ -8,15 +8,18 @@ Usage: python benchmarks/scale/fuzz.py [--inputs 2000] [--seed 0] [--only urdf c
 The last form lets coverage of skidyn's own code guide the damage; it ends at the first crash,
 after the seconds, or never, and libFuzzer prints how many inputs it tried.
 
-An input counts as a crash if anything but a skidyn error is raised, or if it takes over 10 s.
+An input counts as a crash if anything but a skidyn error is raised, or if it takes over 10 s of
+this process's own time or 10 min by the clock.
 """
 
 from __future__ import annotations
 
 import argparse
+import gzip
 import io
 import itertools
 import json
+import os
 import random
 import signal
 import sys
@@ -24,13 +27,14 @@ import tempfile
 import time
 import traceback
 import warnings
+import zipfile
 from pathlib import Path
 
 import numpy as np
 
 from skidyn.exceptions import SkidynError
 
-SECONDS = 10
+SECONDS, PATIENCE = 10, 600
 #: Pieces that break parsers more often than random bytes do.
 PIECES = [
     b"nan", b"1e999", b"-1", b"0", b"<", b">", b"&lt;", b"\x00", b"\xff\xfe", b"\n", b",", b'"',
@@ -40,10 +44,13 @@ PIECES = [
 ]  # fmt: skip
 
 
-def _urdf(data: bytes, folder: Path) -> None:
-    from skidyn.robots import Robot
+def _robot(constructor: str):
+    def read(data: bytes, folder: Path) -> None:
+        from skidyn.robots import Robot
 
-    Robot.from_urdf(data)
+        getattr(Robot, constructor)(data)
+
+    return read
 
 
 def _log(suffix: str):
@@ -93,8 +100,11 @@ def _stream(data: bytes, folder: Path) -> None:
 
 
 TARGETS = {
-    "urdf": _urdf,
+    "urdf": _robot("from_urdf"),
+    "sdf": _robot("from_sdf"),
+    "mjcf": _robot("from_mjcf"),
     "csv": _log(".csv"),
+    "gz": _log(".csv.gz"),
     "parquet": _log(".parquet"),
     "feather": _log(".feather"),
     "npz": _log(".npz"),
@@ -102,6 +112,7 @@ TARGETS = {
     "hdf5": _log(".h5"),
     "mcap": _log(".mcap"),
     "bag": _log(".bag"),
+    "db3": _log(".db3"),
     "report": _report,
     "formula": _formula,
     "model": _model,
@@ -127,24 +138,41 @@ def _mcap_of(frame) -> bytes:
     return out.getvalue()
 
 
-def _bag_of(frame) -> bytes:
-    from rosbags.rosbag1 import Writer
+def _bag_of(frame, version: int) -> bytes:
+    """A ROS 1 bag, or the database of a ROS 2 bag."""
+    from rosbags import rosbag1, rosbag2
     from rosbags.typesys import Stores, get_typestore
 
-    store = get_typestore(Stores.ROS1_NOETIC)
+    store = get_typestore(Stores.ROS1_NOETIC if version == 1 else Stores.LATEST)
     kinds, kind = store.types, "sensor_msgs/msg/JointState"
+    serialize = store.serialize_ros1 if version == 1 else store.serialize_cdr
+    number = {"seq": 0} if version == 1 else {}
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "a.bag")
-        with Writer(path) as writer:
+        with rosbag1.Writer(path) if version == 1 else rosbag2.Writer(path, version=9) as writer:
             connection = writer.add_connection("/joint_states", kind, typestore=store)
             for row in frame.to_dict("records"):
                 now = round(1e9 * (1 + row["time"] + 100 * row["trajectory"]))
                 stamp = kinds["builtin_interfaces/msg/Time"](now // 10**9, now % 10**9)
-                header = kinds["std_msgs/msg/Header"](seq=0, stamp=stamp, frame_id="")
+                header = kinds["std_msgs/msg/Header"](stamp=stamp, frame_id="", **number)
                 values = [np.array([row[f"{s}{j}"] for j in (1, 2)]) for s in ("q", "dq", "tau")]
                 state = kinds[kind](header, ["joint1", "joint2"], *values)
-                writer.write(connection, now, store.serialize_ros1(state, kind))
-        return path.read_bytes()
+                writer.write(connection, now, serialize(state, kind))
+        return (path if version == 1 else next(path.glob("*.db3"))).read_bytes()
+
+
+_INERTIA = "<ixx>1</ixx><ixy>0</ixy><ixz>0</ixz><iyy>1</iyy><iyz>0</iyz><izz>1</izz>"
+_SDF = f"""<?xml version="1.0"?>
+<sdf version="1.9"><model name="arm"><link name="base"/>
+<link name="a"><pose>0 0 1 0 0 0</pose><inertial><pose>0.1 0 0 0 0 0</pose><mass>2</mass>
+<inertia>{_INERTIA}</inertia></inertial></link>
+<joint name="foot" type="fixed"><parent>world</parent><child>base</child></joint>
+<joint name="j" type="revolute"><parent>base</parent><child>a</child><axis><xyz>0 1 0</xyz>
+<limit><lower>-1</lower><upper>1</upper></limit></axis></joint></model></sdf>"""
+_MJCF = """<mujoco><worldbody><body name="a"><joint name="j1" axis="0 1 0" armature="0.1"/>
+<geom size="0.1" mass="1"/><body name="b" pos="0 0 1"><joint name="j2" type="slide" axis="1 0 0"/>
+<inertial pos="0 0 0.1" mass="2" diaginertia="1 1 1"/></body></body></worldbody>
+<equality><joint joint1="j2" joint2="j1" polycoef="0 1 0 0 0"/></equality></mujoco>"""
 
 
 def seeds(name: str) -> list[bytes]:
@@ -156,6 +184,8 @@ def seeds(name: str) -> list[bytes]:
 
         folder = Path(datasets.__file__).parent / "robots"
         return [file.read_bytes() for file in sorted(folder.glob("*.urdf"))[:4]]
+    if name in ("sdf", "mjcf"):
+        return [(_SDF if name == "sdf" else _MJCF).encode()]
     if name == "formula":
         return [b"sin(q1 - q3)", b"abs(dq2)**1.5*sign(dq2)", b"-(q1*q2)/(1+exp(-t))", b"9**9"]
     if name == "report":
@@ -165,13 +195,20 @@ def seeds(name: str) -> list[bytes]:
     if name == "model":
         import skops.io
         from sklearn.linear_model import Ridge
+        from sklearn.pipeline import make_pipeline
 
-        return [skops.io.dumps(Ridge().fit(np.eye(3), np.ones(3)))]
+        from skidyn.identification import RBDRegressor
+        from skidyn.preprocessing import SmoothDerivatives
+
+        own = make_pipeline(SmoothDerivatives(), RBDRegressor(load_planar_arm()))
+        return [skops.io.dumps(model) for model in (Ridge().fit(np.eye(3), np.ones(3)), own)]
     log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=2, duration=1.0)
     frame, buffer = log.frame, io.BytesIO()
     arrays = {column: frame[column].to_numpy() for column in frame}
     if name == "csv":
         return [frame.head(30).to_csv(index=False).encode(), b"time;q1\n0,1;2\n0,2;3\n"]
+    if name == "gz":
+        return [gzip.compress(frame.head(30).to_csv(index=False).encode())]
     if name in ("parquet", "stream"):
         frame.to_parquet(buffer)
     elif name == "feather":
@@ -190,12 +227,28 @@ def seeds(name: str) -> list[bytes]:
                 file[column] = values
     elif name == "mcap":
         return [_mcap_of(frame), b"\x89MCAP0\r\n" + bytes(200) + b"\x89MCAP0\r\n"]
-    elif name == "bag":
-        return [_bag_of(frame)]
+    elif name in ("bag", "db3"):
+        return [_bag_of(frame, 1 if name == "bag" else 2)]
     return [buffer.getvalue()]
 
 
 def damage(data: bytes, rng: random.Random) -> bytes:
+    """Damage an input, or what it holds where checksums would tell of damage to the whole."""
+    if data.startswith(b"PK") and rng.random() < 0.7:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            members = {name: archive.read(name) for name in archive.namelist()}
+        hit = rng.choice(list(members))
+        members[hit] = _damaged(members[hit], rng)
+        with zipfile.ZipFile(out := io.BytesIO(), "w") as archive:
+            for name, content in members.items():
+                archive.writestr(name, content)
+        return out.getvalue()
+    if data.startswith(b"\x1f\x8b") and rng.random() < 0.7:
+        return gzip.compress(_damaged(gzip.decompress(data), rng))
+    return _damaged(data, rng)
+
+
+def _damaged(data: bytes, rng: random.Random) -> bytes:
     """One to six changes: bytes flipped, pieces put in, cut out, repeated, or the end lost."""
     out = bytearray(data)
     for _ in range(rng.randint(1, 6)):
@@ -218,12 +271,12 @@ def damage(data: bytes, rng: random.Random) -> bytes:
     return bytes(out)
 
 
-class _TooSlow(Exception):
-    pass
+class _TooSlow(BaseException):
+    """Not an Exception: readers tell those of their decoders as damage."""
 
 
 def _alarm(*_):
-    raise _TooSlow(f"more than {SECONDS} s")
+    raise _TooSlow(f"more than {SECONDS} s of processor time, or {PATIENCE} s")
 
 
 def try_inputs(
@@ -233,22 +286,25 @@ def try_inputs(
     rng, crashes, accepted = random.Random(f"{name} {seed}"), [], 0
     good = seeds(name)
     end = time.monotonic() + seconds if seconds else None
-    signal.signal(signal.SIGALRM, _alarm)
+    for each in (signal.SIGALRM, signal.SIGPROF):
+        signal.signal(each, _alarm)
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         for k in itertools.count():
             if k >= count if end is None else time.monotonic() > end:
                 break
             data = good[k] if k < len(good) else damage(rng.choice(good), rng)
-            signal.alarm(SECONDS)
+            signal.setitimer(signal.ITIMER_PROF, SECONDS)
+            signal.alarm(PATIENCE)
             try:
                 TARGETS[name](data, Path(folder))
                 accepted += 1
             except SkidynError:
                 pass
-            except Exception:
+            except (Exception, _TooSlow):
                 crashes.append((data, traceback.format_exc()))
             finally:
+                signal.setitimer(signal.ITIMER_PROF, 0)
                 signal.alarm(0)
     return k, accepted, crashes
 
@@ -286,6 +342,12 @@ def guided(name: str, seconds: int) -> None:
     atheris.Fuzz()
 
 
+def _processor_time() -> float:
+    """Of this process and of those that it started, s."""
+    times = os.times()
+    return sum(times[:4])
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--inputs", type=int, default=2000)
@@ -297,12 +359,14 @@ def main() -> int:
     if options.atheris:
         guided(options.only[0], options.seconds)
     total = 0
-    print("reader inputs read refused crashes")
+    print("reader inputs read refused crashes processor_seconds")
     for name in options.only:
+        start = _processor_time()
         tried, accepted, crashes = try_inputs(name, options.inputs, options.seed, options.seconds)
+        took = _processor_time() - start
         total += len(crashes)
         refused = tried - accepted - len(crashes)
-        print(name, tried, accepted, refused, len(crashes), flush=True)
+        print(name, tried, accepted, refused, len(crashes), round(took), flush=True)
         seen = set()
         for data, text in crashes:
             last = text.strip().splitlines()[-1][:70]

@@ -19,6 +19,7 @@ from skidyn._commands._output import (
     run_diagnosis,
 )
 from skidyn._exceptions import SkidynError
+from skidyn._writing import writable
 
 if TYPE_CHECKING:
     from skidyn.diagnosis import Diagnosis
@@ -90,6 +91,8 @@ def _compare(options: argparse.Namespace) -> None:
         return
     from skidyn.report import summarize_comparison, write_comparison
 
+    if options.html:
+        writable(Path(options.html).with_suffix(".json"))
     names = options.names.split(",") if options.names else _names(options, pair)
     diagnoses = [_diagnosed(side) for side in pair]
     sources = [provenance(side) for side in pair]

@@ -10,6 +10,9 @@ import textwrap
 from itertools import groupby
 from typing import Any, TextIO
 
+#: Signs that move the cursor or change the terminal; names in files may hold them.
+_OBEYED = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
+
 
 class FittingStream:
     """A terminal whose long lines are broken between words, not within them.
@@ -44,7 +47,7 @@ class FittingStream:
 
 
 def fit(line: str, width: int, end: str = "") -> str:
-    """A line broken between words to fit a width.
+    """A line broken between words to fit a width, without signs that a terminal obeys.
 
     Parameters
     ----------
@@ -70,6 +73,7 @@ def fit(line: str, width: int, end: str = "") -> str:
     0.5   one two three
           four five
     """
+    line = _OBEYED.sub(lambda hit: f"\\x{ord(hit[0]):02x}", line)
     if len(line) <= width:
         return line
     lead = line[: len(line) - len(line.lstrip())]

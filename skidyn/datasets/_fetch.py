@@ -13,6 +13,7 @@ import numpy as np
 
 from skidyn._exceptions import LogError
 from skidyn._optional import import_optional
+from skidyn._writing import write_text
 from skidyn.logs import read_log
 
 if TYPE_CHECKING:
@@ -260,7 +261,8 @@ def fetch_xl330(
     >>> from skidyn.datasets import fetch_xl330
     >>> servo = fetch_xl330()  # doctest: +SKIP
     """
-    pandas = import_optional("pandas", extra="io")
+    import pandas
+
     address = url or XL330_URL
     paths, tables = [], []
     for number, run in enumerate(runs or XL330_RUNS):
@@ -308,7 +310,8 @@ def fetch_panda_gaz(*, data_home: str | os.PathLike[str] | None = None, url: str
     >>> from skidyn.datasets import fetch_panda_gaz
     >>> panda = fetch_panda_gaz()  # doctest: +SKIP
     """
-    pandas = import_optional("pandas", extra="io")
+    import pandas
+
     address = (url or GAZ_URL).rstrip("/")
     paths, parts = [], {}
     for signal, name in {"q": "positions", "dq": "velocity", "tau": "torques", "": "time"}.items():
@@ -371,7 +374,8 @@ def fetch_screw_drive(
     >>> from skidyn.datasets import fetch_screw_drive
     >>> drive = fetch_screw_drive()  # doctest: +SKIP
     """
-    pandas = import_optional("pandas", extra="io")
+    import pandas
+
     address = url or SCREW_URL
     paths, tables = [], []
     for number, run in enumerate(runs or SCREW_RUNS):
@@ -384,7 +388,8 @@ def fetch_screw_drive(
 
 
 def _drive_run(path: Path) -> pd.DataFrame:
-    pandas = import_optional("pandas", extra="io")
+    import pandas
+
     lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
     try:
         first = lines.index("ms;rpm;%") + 1
@@ -403,7 +408,8 @@ def _drive_run(path: Path) -> pd.DataFrame:
 
 
 def _servo_run(path: Path) -> pd.DataFrame:
-    pandas = import_optional("pandas", extra="io")
+    import pandas
+
     try:
         entries = pandas.DataFrame(json.loads(path.read_text(encoding="utf-8"))["entries"])
         current = entries["load"].to_numpy()
@@ -443,5 +449,5 @@ def _retrieve(
             f"{file} has the SHA-256 checksum {found}, not {known}. Remove the file to download it "
             "again; if the checksum stays, the source has changed."
         )
-    note.write_text(found, encoding="ascii")
+    write_text(note, found)
     return file

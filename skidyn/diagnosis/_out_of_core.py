@@ -12,7 +12,6 @@ import numpy as np
 from scipy import stats
 
 from skidyn._exceptions import LogError, SkidynError
-from skidyn._optional import import_optional
 from skidyn._signals import Array
 from skidyn.diagnosis._diagnosis import diagnose, own_terms
 from skidyn.diagnosis._findings import Finding
@@ -246,7 +245,8 @@ def _sample(
     sources: Sequence[Source], n_rows: int, robot: Robot, columns: ColumnMap | None, max_rows: int
 ) -> tuple[Any, Array]:
     """The trajectories that were drawn, as a table, and their torque."""
-    pd = import_optional("pandas", extra="io")
+    import pandas as pd
+
     names: list[str] = []
     sample = np.empty((0, 0))
     done = number = 0

@@ -110,9 +110,8 @@ class SeparatingMotion:
         DataFrame
             Columns ``time, q1.., dq1.., ddq1..``.
         """
-        from skidyn._optional import import_optional
+        import pandas
 
-        pandas = import_optional("pandas", extra="io")
         n = self.q.shape[1]
         names = [f"{s}{j + 1}" for s in ("q", "dq", "ddq") for j in range(n)]
         table = pandas.DataFrame(np.hstack([self.q, self.dq, self.ddq]), columns=names)

@@ -93,9 +93,8 @@ class Excitation:
         DataFrame
             Columns ``time, q1.., dq1.., ddq1..``.
         """
-        from skidyn._optional import import_optional
+        import pandas
 
-        pandas = import_optional("pandas", extra="io")
         time, *states = self.sample(rate)
         n = self.robot.n_joints
         names = [f"{s}{j + 1}" for s in ("q", "dq", "ddq") for j in range(n)]

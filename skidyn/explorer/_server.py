@@ -143,6 +143,7 @@ class Explorer:
         return self._changed(joint, trajectory)
 
     def _remove(self, step: int, joint: int, trajectory: int) -> dict[str, Any]:
+        self.session.check_place(int(joint), int(trajectory))
         self.session.remove(int(step))
         return self._changed(joint, trajectory)
 
@@ -294,7 +295,8 @@ def make_app(explorer: Explorer, port: int) -> Any:
             content = await asyncio.wrap_future(thread.submit(explorer.answer, question, words))
             return JSONResponse(content, headers=headers)
         except (LookupError, OSError, TypeError, ValueError, OverflowError) as error:
-            return JSONResponse({"error": str(error)}, 400, headers=headers)
+            told = str(error).encode("utf-8", "backslashreplace").decode()  # halves of letters
+            return JSONResponse({"error": told}, 400, headers=headers)
         except RecursionError:
             return JSONResponse({"error": "the question is nested too deep"}, 400, headers=headers)
 

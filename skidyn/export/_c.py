@@ -103,7 +103,7 @@ def _text(static: StaticModel, name: str) -> str:
     left = "; ".join(name_term(robot, term) for term in static.left)
     return _TEMPLATE.format(
         robot=printable(robot.name),
-        terms=static.title,
+        terms=printable(static.title),
         left=f"\n * Not in it: {printable(left)}.\n *" if left else "",
         joints=printable(", ".join(robot.joint_names)),
         name=name,

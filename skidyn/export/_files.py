@@ -7,7 +7,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from skidyn._writing import write_bytes, write_json
+from skidyn._writing import writable, write_bytes, write_json
 from skidyn.effects import Term
 from skidyn.export._model import describe_term, name_term
 from skidyn.identification import RBDRegressor
@@ -30,8 +30,9 @@ def write_files(
         Names of what the file does not hold. If it holds everything there is no side-car, and one
         of an earlier export is removed.
     """
-    write_bytes(path, content.encode() if isinstance(content, str) else content)
     beside = Path(f"{os.fspath(path)}.skidyn.json")
+    writable(beside)  # neither without the other
+    write_bytes(path, content.encode() if isinstance(content, str) else content)
     if isinstance(model, Robot) or not left:
         beside.unlink(missing_ok=True)
         return ()

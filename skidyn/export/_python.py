@@ -111,10 +111,10 @@ def _text(static: StaticModel, name: str) -> str:
     left = "; ".join(name_term(robot, term) for term in static.left)
     return _TEMPLATE.format(
         robot=printable(robot.name),
-        terms=static.title,
+        terms=printable(static.title),
         left=f" Not in it: {printable(left)}." if left else "",
         functions=f"from numpy import {', '.join(used)}\n" if used else "",
-        joints=robot.joint_names,
+        joints=tuple(map(str, robot.joint_names)),
         name=name,
         n=robot.n_joints,
         columns=columns,

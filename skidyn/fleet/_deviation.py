@@ -112,7 +112,7 @@ def compare_fleet(
     Raises
     ------
     SkidynError
-        Fewer than 8 robots, evidence of different columns, or an unknown column.
+        Fewer than 8 robots, evidence of different columns or with NaN, or an unknown column.
 
     References
     ----------
@@ -143,6 +143,12 @@ def compare_fleet(
     if any(part.columns != parts[0].columns for part in parts):
         odd = next(n for n, part in evidence.items() if part.columns != parts[0].columns)
         raise SkidynError(f"the evidence of robot {odd!r} has other columns than the first one")
+    for name, part in evidence.items():
+        if not all(np.isfinite(factor).all() for factor in part.factors.values()):
+            raise SkidynError(
+                f"the evidence of robot {name!r} holds NaN or infinite values; leave the robot "
+                "out, or read its log again"
+            )
     coefficients, noise = weighted_solution(merge(parts))
     chosen = effect_columns(parts[0], columns)
     index = [parts[0].columns.index(name) for name in chosen]

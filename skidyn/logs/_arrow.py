@@ -28,7 +28,6 @@ _INDEX = "__index_level_"
 
 def read_parquet_channels(path: Path, max_bytes: int) -> list[Channel]:
     """Read a Parquet or Feather table; list columns become one column per joint."""
-    import_optional("pandas", extra="io")
     arrow = import_optional("pyarrow", extra="io")
     try:
         if path.suffix.lower() == ".parquet":

@@ -199,7 +199,8 @@ def try_in_another_process(path: Path, max_bytes: int, imports: str, statement: 
     code = _TRIAL.format(imports=imports, statement=statement)
     few = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     done = subprocess.run(
-        [sys.executable, "-c", code, str(path), str(_COPIES * max_bytes + _OVERHEAD)],
+        # -P: no module of the working directory, where the file may have come with some
+        [sys.executable, "-P", "-c", code, str(path), str(_COPIES * max_bytes + _OVERHEAD)],
         capture_output=True,
         text=True,
         errors="replace",

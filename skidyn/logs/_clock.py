@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from skidyn._exceptions import LogError
-from skidyn._optional import import_optional
 from skidyn._signals import GAP_STEPS, find_segments
 
 if TYPE_CHECKING:
@@ -42,7 +41,8 @@ def seconds(table: pd.DataFrame, rate: float | None, source: str) -> np.ndarray:
     LogError
         No clock at all, or one that cannot be read.
     """
-    pandas = import_optional("pandas", extra="io")
+    import pandas
+
     if "time" not in table.columns:
         if rate is None:
             raise LogError(
@@ -113,7 +113,8 @@ def align_channels(
         A signal occurs in two channels, a clock starts anew in one of several channels, or the
         channels do not overlap in time.
     """
-    pandas = import_optional("pandas", extra="io")
+    import pandas
+
     if len(tables) == 1 and rate is None:
         return tables[0]
     for table, name in zip(tables, names, strict=True):
@@ -175,7 +176,8 @@ def align_channels(
 
 def _resampled(table: pd.DataFrame, rate: float, notes: list[str]) -> pd.DataFrame:
     """One table on a regular clock within each of its runs."""
-    pandas = import_optional("pandas", extra="io")
+    import pandas
+
     time = table["time"].to_numpy()
     run = np.zeros(len(time), dtype=np.int64)
     run[1:] = np.cumsum(np.diff(time) < 0)
@@ -219,7 +221,8 @@ def _interpolate(table: pd.DataFrame, clock: np.ndarray) -> pd.DataFrame:
     On a slower clock a value is the mean over one of its steps: single samples would carry noise
     and vibration that are faster than the clock, and look slow there.
     """
-    pandas = import_optional("pandas", extra="io")
+    import pandas
+
     time = table["time"].to_numpy()
     before = np.clip(np.searchsorted(time, clock, side="right") - 1, 0, len(time) - 1)
     half = _half_step(time, clock)

@@ -217,7 +217,8 @@ def _runs(channels: list[Channel], path: Path) -> list[Channel]:
     columns = {frozenset(c.table.columns) for c in channels}
     if len(channels) == 1 or len(columns) > 1 or "trajectory" in next(iter(columns)):
         return channels
-    pd = import_optional("pandas", extra="io")
+    import pandas as pd
+
     ordered = sorted(channels, key=lambda c: [int(n) for n in re.findall(r"\d+", c.name)])
     tables = [c.table.assign(trajectory=k) for k, c in enumerate(ordered)]
     warn_about_log(

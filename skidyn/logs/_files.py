@@ -17,7 +17,6 @@ import numpy as np
 from skidyn._checks import refuse_duplicates, warn_about_log
 from skidyn._exceptions import LogError
 from skidyn._names import PER_JOINT, quantity_of
-from skidyn._optional import import_optional
 from skidyn.logs._bounds import MAX_BYTES, check_size
 
 if TYPE_CHECKING:
@@ -56,7 +55,8 @@ class Channel:
 
 def read_csv_channels(path: Path, max_bytes: int) -> list[Channel]:
     """Read a text table; the separator, a decimal comma and a missing header are recognised."""
-    pandas = import_optional("pandas", extra="io")
+    import pandas
+
     check_size(path, _unpacked(path, max_bytes), max_bytes)
     with _open_text(path) as file:
         lines = [line for _, line in zip(range(200), file, strict=False)]
@@ -310,7 +310,8 @@ def table_from_arrays(columns: Mapping[str, np.ndarray]) -> pd.DataFrame:
 
     A single column ``q`` is the position of the only joint and becomes ``q1``.
     """
-    pandas = import_optional("pandas", extra="io")
+    import pandas
+
     flat: dict[str, Any] = {}
     for name, values in columns.items():
         single = values.ndim == 1 or values.shape[1] == 1

@@ -14,7 +14,6 @@ from typing import Any
 
 from skidyn._exceptions import LogError
 from skidyn._names import quantity_of
-from skidyn._optional import import_optional
 from skidyn.logs._files import Channel
 from skidyn.logs._formats import known_suffixes, suffix_of
 
@@ -178,7 +177,7 @@ def _as_signal(channel: Channel, file: Path) -> Channel:
 
 def _side_by_side(channels: Sequence[Channel]) -> list[Channel]:
     """Channels without a clock put beside the one of as many rows that has one."""
-    pandas = import_optional("pandas", extra="io")
+    import pandas
 
     def has_clock(channel: Channel) -> bool:
         return any(quantity_of(str(name)) == "time" for name in channel.table.columns)

@@ -14,7 +14,6 @@ import numpy as np
 
 from skidyn._checks import warn_about_log
 from skidyn._exceptions import LogError
-from skidyn._optional import import_optional
 from skidyn._progress import track
 from skidyn.logs._bounds import MAX_BYTES
 from skidyn.logs._folders import find_runs, read_runs
@@ -142,7 +141,8 @@ def read_log(
     ['time', 'trajectory', 'q1', 'dq1', 'tau1']
     >>> folder.cleanup()
     """
-    pandas = import_optional("pandas", extra="io")
+    import pandas
+
     paths = [path] if isinstance(path, (str, os.PathLike)) else list(path)
     if not paths:
         raise LogError("no file to read: the list of paths is empty.")

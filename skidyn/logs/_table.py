@@ -155,6 +155,8 @@ def _torque_from_current(
     table: pd.DataFrame, n: int, gains: Sequence[float] | None, source: str
 ) -> pd.DataFrame:
     """Torque columns from currents and gains; currents alone are never taken for torques."""
+    import pandas as pd
+
     currents = [f"i{k + 1}" for k in range(n)]
     has_current = all(name in table.columns for name in currents)
     if gains is None:
@@ -177,16 +179,17 @@ def _torque_from_current(
         raise LogError(f"drive_gains is {gains!r}; expected {n} numbers, one per joint.") from None
     if factors.shape != (n,) or not np.isfinite(factors).all():
         raise LogError(f"drive_gains needs {n} finite numbers, one per joint; got {factors}.")
-    table = table.copy()
-    for k, name in enumerate(currents):
-        table[f"tau{k + 1}"] = factors[k] * table[name]
-    return table
+    torques = {f"tau{k + 1}": factors[k] * table[name] for k, name in enumerate(currents)}
+    others = table.drop(columns=[name for name in torques if name in table.columns])
+    return pd.concat([others, pd.DataFrame(torques, index=table.index)], axis=1)
 
 
 def _clean(
     table: pd.DataFrame, n: int, match: NameMatch, source: str, options: TableOptions
 ) -> pd.DataFrame:
     """Rows in order of time, finite, cut into trajectories, with velocities."""
+    import pandas as pd
+
     own_trajectories = "trajectory" in table.columns
     signals = [name for name in table.columns if SIGNAL_COLUMN.fullmatch(name)]
     keys = ["time", "trajectory"] if own_trajectories else ["time"]
@@ -224,8 +227,8 @@ def _clean(
     if not any(f"dq{k + 1}" in table.columns for k in range(n)):
         q = table[[f"q{k + 1}" for k in range(n)]].to_numpy()
         dq = derive_velocity(q, table["time"].to_numpy(), table["trajectory"].to_numpy())
-        for k in range(n):
-            table[f"dq{k + 1}"] = dq[:, k]
+        velocities = {f"dq{k + 1}": dq[:, k] for k in range(n)}
+        table = pd.concat([table, pd.DataFrame(velocities, index=table.index)], axis=1)
         match.notes.append(f"{source}: no velocities recorded; derived by central differences of q")
     require_columns(table, n, ("q", "dq", "tau"), source)
     return table

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from skidyn._exceptions import SkidynError
-from skidyn._writing import write_json, write_text
+from skidyn._writing import writable, write_json, write_text
 from skidyn.report._compare_html import render_comparison
 from skidyn.report._html import render_html
 
@@ -68,5 +68,6 @@ def write_comparison(path: PathLike, summary: dict[str, Any]) -> tuple[Path, Pat
     beside = Path(path).with_suffix(".json")
     if beside == Path(path):
         raise SkidynError(f"{path}: the page needs another ending, such as .html")
+    writable(beside)  # neither without the other
     page = write_text(path, render_comparison(summary))
     return page, write_json(beside, summary["report"])

@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from skidyn._exceptions import RobotDescriptionError
+from skidyn._text import suggest
 from skidyn.dynamics import KinematicTree, transform_inertial
 from skidyn.robots._description import Description, Joint, Mimic
 
@@ -142,7 +142,7 @@ def _root_of(description: Description) -> str:
             if link not in links:
                 raise RobotDescriptionError(
                     f"The {role} link {link!r} of joint {joint.name!r} is not described"
-                    f"{_suggest(link, links)}."
+                    f"{suggest(link, links)}."
                 )
         if joint.child in parent_joint:
             raise RobotDescriptionError(
@@ -175,7 +175,7 @@ def _resolve_mimics(description: Description) -> dict[str, Mimic]:
             if follow.leader not in description.joints:
                 raise RobotDescriptionError(
                     f"Joint {leader.name!r} mimics {follow.leader!r}, which is not described"
-                    f"{_suggest(follow.leader, description.joints)}."
+                    f"{suggest(follow.leader, description.joints)}."
                 )
             if follow.leader in seen:
                 raise RobotDescriptionError(
@@ -206,7 +206,7 @@ def _moving_joints(
         if name not in description.joints:
             raise RobotDescriptionError(
                 f"joints names {name!r}, which the URDF does not describe"
-                f"{_suggest(name, description.joints)}. It has: {_listed(independent)}."
+                f"{suggest(name, description.joints)}. It has: {_listed(independent)}."
             )
         if name not in independent:
             reason = "is fixed" if name not in following else f"mimics {following[name].leader!r}"
@@ -221,8 +221,3 @@ def _moving_joints(
 def _listed(names: Sequence[str]) -> str:
     shown = ", ".join(repr(name) for name in names[:8])
     return shown if len(names) <= 8 else f"{shown} and {len(names) - 8} more"
-
-
-def _suggest(name: object, names: Iterable[str]) -> str:
-    close = difflib.get_close_matches(str(name), list(names), n=1)
-    return f" (did you mean {close[0]!r}?)" if close else ""

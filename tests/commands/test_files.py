@@ -8,9 +8,12 @@ import os
 import shutil
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
 
 import pytest
 
+import skidyn
 from skidyn import cli
 
 
@@ -43,12 +46,16 @@ def report(work, tmp_path_factory):
         ["payload", "{log}", "--unloaded", "{other}", "--urdf", "{urdf}", "--out", "{other}"],
         ["add", "--from", "{report}", "--effect", "dahl", "--out", "{report}"],
         ["separate", "--from", "{report}", "--out", "{log}"],
+        ["excite", "--urdf", "{urdf}", "--recorded", "{folder}", "--out", "{log}"],
+        ["excite", "--urdf", "{urdf}", "--recorded", "{pattern}", "--out", "{log}"],
+        ["compare", "{report}", "{again}", "--html", "{page}"],  # numbers go beside the page
     ],
 )
 def test_no_command_writes_onto_what_it_reads(report, tmp_path, words, capsys):
     for name in ("log.csv", "arm.urdf", "report.json"):
         shutil.copy(report.parent / name, tmp_path / name)
     shutil.copy(tmp_path / "log.csv", tmp_path / "other.csv")
+    shutil.copy(tmp_path / "report.json", tmp_path / "again.json")
     (tmp_path / "link.urdf").symlink_to(tmp_path / "arm.urdf")
     places = {
         "log": tmp_path / "log.csv",
@@ -56,6 +63,10 @@ def test_no_command_writes_onto_what_it_reads(report, tmp_path, words, capsys):
         "urdf": tmp_path / "arm.urdf",
         "link": tmp_path / "link.urdf",
         "report": tmp_path / "report.json",
+        "again": tmp_path / "again.json",
+        "page": tmp_path / "report.html",
+        "folder": tmp_path,
+        "pattern": tmp_path / "*.csv",
     }
     before = {f.name: f.read_bytes() for f in tmp_path.iterdir()}
     try:
@@ -176,16 +187,19 @@ def test_closed_and_narrow_outputs_are_no_traceback(work):
         assert "No space left" in done.stderr and "Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize("module", ["numpy", "skidyn.identification"])
-def test_ctrl_c_while_modules_are_imported_is_one_line(work, module):
+@pytest.mark.parametrize("how", ["python -m skidyn", "skidyn"])
+@pytest.mark.parametrize("module", ["skidyn.cli", "argparse", "numpy", "skidyn.identification"])
+def test_ctrl_c_while_modules_are_imported_is_one_line(work, module, how):
+    with open(Path(skidyn.__file__).parents[1] / "pyproject.toml", "rb") as file:
+        home, _, name = tomllib.load(file)["project"]["scripts"]["skidyn"].partition(":")
+    script = f"from {home} import {name}\nsys.exit({name}())\n"
+    module_run = "import runpy\nrunpy.run_module('skidyn', run_name='__main__')\n"
     code = (
         "import sys\n"
         "class Stop:\n"
         "    def find_spec(self, name, path=None, target=None):\n"
         f"        if name == {module!r}: raise KeyboardInterrupt\n"
-        "sys.meta_path.insert(0, Stop())\n"
-        "from skidyn.cli import main\n"
-        "sys.exit(main(sys.argv[1:]))\n"
+        "sys.meta_path.insert(0, Stop())\n" + (script if how == "skidyn" else module_run)
     )
     words = ["compare", str(work / "log.csv"), "--urdf", str(work / "arm.urdf")]
     done = subprocess.run(

@@ -23,6 +23,7 @@ from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
 from skidyn.identification import RBDRegressor
 
+pandas = pytest.importorskip("pandas")
 pty = pytest.importorskip("pty", reason="no terminals here")
 ESCAPE = re.compile(r"\x1b\[[0-9;?]*[a-zA-Z]")
 
@@ -99,6 +100,18 @@ def test_ctrl_c_in_the_search_leaves_no_file_and_no_traceback(short, tmp_path):
     assert ESCAPE.sub("", shown).splitlines()[-1] == "stopped; no file was left half written"
     assert shown.rfind("\x1b[?25h") > shown.rfind("\x1b[?25l")  # the cursor is shown again
     assert list(tmp_path.iterdir()) == []
+
+
+def test_names_in_files_do_not_reach_the_terminal_as_commands(short, tmp_path):
+    frame = pandas.read_csv(short[0])
+    frame["\x1b]0;title\x07\x1b[2Jvoice\x9b"] = "loud"
+    frame.drop(columns="tau1").to_csv(tmp_path / "log.csv", index=False)
+
+    code, shown = in_terminal("compare", tmp_path / "log.csv", *short[1:])
+
+    assert code == cli.BAD_INPUT
+    assert r"\x1b]0;title\x07\x1b[2Jvoice\x9b" in "".join(shown.split("\n    "))
+    assert not set("\x1b\x07\x9b") & set(shown)
 
 
 def test_ctrl_c_ends_the_explorer(short, tmp_path):

@@ -103,6 +103,8 @@ def test_only_who_has_the_token_gets_an_answer(port, explorer):
 
 
 def test_bad_questions_get_an_error_and_change_nothing(port, explorer):
+    ask(port, "/api/add", {"kind": "spring", "joint": 2, "trajectory": 0}, explorer.token)
+    before = explorer.session.history
     for question, words in (
         ("unknown", {}),
         ("add", {"kind": "<script>", "joint": 1}),
@@ -112,13 +114,17 @@ def test_bad_questions_get_an_error_and_change_nothing(port, explorer):
         ("ranked", {"joint": 1, "trajectory": 99, "time": 1.0}),
         ("state", [1]),
         ("add", {"kind": "spring", "joint": 2, "trajectory": 99}),
+        ("remove", {"step": 1, "joint": 2, "trajectory": 99}),
+        ("remove", {"step": 1, "joint": 77, "trajectory": 0}),
+        ("ranked", {"joint": 1, "trajectory": [], "time": 1.0}),
+        ("ranked", {"joint": 1, "trajectory": {"a": 1}, "time": 1.0}),
         ("ranked", {"joint": 1, "trajectory": 0, "time": float("inf")}),
         ("ranked", {"joint": 1, "trajectory": 0, "time": float("nan")}),
     ):
         status, content = ask(port, f"/api/{question}", words, explorer.token)
         assert status == 400, question
         assert content["error"]
-    assert len(explorer.session.history) == 1
+    assert explorer.session.history == before and len(before) == 2
 
 
 @pytest.mark.parametrize(
@@ -128,6 +134,9 @@ def test_bad_questions_get_an_error_and_change_nothing(port, explorer):
         (b'{"joint": 1e999, "trajectory": 0}', 400),
         (b'{"joint": 1, "trajectory": 0, "time": 1e308}', 400),
         (b'{"joint": "\xff"}', 400),
+        (b'{"\\ud800": 1}', 400),
+        (b'{"joint": "\\ud800", "trajectory": 0}', 400),
+        (b'{"joint": 1, "trajectory": 1e400}', 400),
         (b" " * 300_000, 413),
     ],
 )

@@ -4,10 +4,12 @@
 import numpy as np
 import pytest
 
-from skidyn.evidence import Evidence
-from skidyn.exceptions import SkidynError
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.evidence import Evidence, evidence_from_parquet
+from skidyn.exceptions import LogError, SkidynError
 from skidyn.fleet import compare_fleet
 
+TORQUES = ("tau1", "tau2")
 COLUMNS = ("m_link1", "viscous.Fv[1]", "coulomb.Fc[1]", "coulomb.Fc[2]")
 
 
@@ -67,3 +69,30 @@ def test_wrong_fleets_are_refused():
     fleet["r4"] = Evidence.from_rows(("a",), {(0, 0): np.ones((3, 2))})
     with pytest.raises(SkidynError, match="'r4' has other columns"):
         compare_fleet(fleet)
+
+
+def test_evidence_that_is_no_number_names_its_robot():
+    fleet = make_fleet(50, 0)
+    broken = {key: factor.copy() for key, factor in fleet["r37"].factors.items()}
+    broken[0, 0][0, 1] = np.nan
+    with pytest.raises(SkidynError, match="r37"):
+        fleet["r37"] = Evidence(COLUMNS, broken, fleet["r37"].counts)
+        compare_fleet(fleet)
+
+
+def test_one_broken_log_of_fifty_is_named_and_the_others_are_compared(tmp_path):
+    pytest.importorskip("pyarrow", reason="needs skidyn[io]")
+    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=2, duration=2.0)
+    rng, evidence, refused = np.random.default_rng(0), {}, []
+    for k in range(50):
+        file = tmp_path / f"robot_{k}.parquet"
+        noisy = {name: log.frame[name] + 0.3 * rng.normal(size=len(log.frame)) for name in TORQUES}
+        log.frame.assign(**noisy).to_parquet(file)
+        if k == 37:
+            file.write_bytes(file.read_bytes()[:-500])
+        try:
+            evidence[file.stem] = evidence_from_parquet(file, log.robot)
+        except LogError as error:
+            refused.append(str(error))
+    assert len(refused) == 1 and "robot_37.parquet" in refused[0]
+    assert len(compare_fleet(evidence).robots) == 49

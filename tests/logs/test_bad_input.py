@@ -186,7 +186,7 @@ def test_joint_names_that_differ_are_suggested(saved):
     renamed = LOG.rename(columns=lambda name: name.replace("q1", "q_jiont1").replace("q2", "q_x"))
     with pytest.raises(LogError, match=r"joint1, joint2 \(did you mean 'jiont1'\?\)"):
         read_log(saved(renamed), robot=ROBOT)
-    with pytest.raises(LogError, match="'speed', .*Did you mean 'speed1'"):
+    with pytest.raises(LogError, match="'speed', .*did you mean 'speed1'"):
         read_log(saved(LOG.rename(columns={"q1": "speed1"})), columns={"q": ["speed", "q2"]})
 
 

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._exceptions import SkidynError
-from skidyn._optional import import_optional
 from skidyn.datasets.hidden_effects._friction import FRICTION
 from skidyn.datasets.hidden_effects._hysteresis import HYSTERESIS
 from skidyn.datasets.hidden_effects._motion import Motion, plan_motion
@@ -358,9 +357,9 @@ def _bunch(
     sample_time: float,
     base: tuple[str, ...],
 ) -> Bunch:
+    import pandas as pd
     from sklearn.utils import Bunch  # a second of imports: only where a log is made
 
-    pd = import_optional("pandas", extra="io")
     n = world.n_joints
     keys = {
         "time": world.time.ravel(),

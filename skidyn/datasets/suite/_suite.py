@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from skidyn._exceptions import SkidynError
-from skidyn._optional import import_optional
+from skidyn._writing import replacing, write_json, write_text
 from skidyn.datasets.suite._case import NAMED, TIERS, simulate
 from skidyn.datasets.suite._hidden import Maker
 from skidyn.datasets.suite._nameless import NAMELESS
@@ -89,7 +88,7 @@ class SuiteCase:
         Raises
         ------
         ImportError
-            MuJoCo or pandas is not installed (extras ``mujoco`` and ``io``).
+            MuJoCo or pyarrow is not installed (extras ``mujoco`` and ``io``).
 
         Examples
         --------
@@ -98,9 +97,9 @@ class SuiteCase:
         >>> log.meta["base_model"]  # doctest: +SKIP
         ['rigid_body', 'viscous', 'coulomb', 'rotor_inertia']
         """
+        import pandas as pd
         from sklearn.utils import Bunch  # a second of imports: only where a log is made
 
-        pd = import_optional("pandas", extra="io")
         columns, meta, truth = simulate(self)
         return Bunch(frame=pd.DataFrame(columns), urdf=urdf_of(self.robot), meta=meta, truth=truth)
 
@@ -121,13 +120,11 @@ class SuiteCase:
         """
         log = self.make()
         case, truth = Path(folder, "cases", self.name), Path(folder, "truth", f"{self.name}.json")
-        case.mkdir(parents=True, exist_ok=True)
-        truth.parent.mkdir(parents=True, exist_ok=True)
-        log.frame.to_parquet(case / "log.parquet", index=False)
-        (case / "robot.urdf").write_text(log.urdf, encoding="utf-8")
-        (case / "meta.json").write_text(json.dumps(log.meta, indent=1), encoding="utf-8")
-        truth.write_text(json.dumps(log.truth, indent=1), encoding="utf-8")
-        return truth
+        with replacing(case / "log.parquet") as part:
+            log.frame.to_parquet(part, index=False)
+        write_text(case / "robot.urdf", log.urdf)
+        write_json(case / "meta.json", log.meta)
+        return write_json(truth, log.truth)
 
 
 def hidden_effect_suite(
