@@ -1,21 +1,31 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How many mistakes in logs are named, and how many are named that are none.
+"""How many mistakes in logs are named, how many are named that are none, and what mending gives.
 
-Usage: python benchmarks/measurement/mistakes.py [--seed 1] [--logs 5] [--only jitter,order]
+Usage: python benchmarks/measurement/mistakes.py [--cases FOLDER] [--seed 1] [--logs 5]
+       [--only jitter,order] [--mend] [--verbose]
 
-Logs of four robots, half of them with a hidden effect, are spoiled in one way each. Printed are, by
-mistake, how many were named on the right joints, how many of these are certain, and in how many
-logs something else was suspected.
+Logs, half of them with a hidden effect, are spoiled in one way each (see ``spoils.py``). Printed
+are, by mistake, in how many logs it was named on the right joints with the right remedy, in how
+many of these it was certain, and in how many logs something else was suspected. ``--mend`` reads
+the spoiled log again with the remedy and prints in how many logs that gave back the recorded
+columns; ``--diagnose`` compares the diagnosis of the mended log with that of the clean one where it
+did not. ``--cases`` takes a folder of logs of another simulator (``*/log.parquet`` and
+``robot.urdf``).
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+import ast
+import tempfile
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from spoils import SPOILS, Spoiled
 
 from skidyn.datasets import (
     load_panda,
@@ -24,187 +34,160 @@ from skidyn.datasets import (
     load_ur5,
     make_hidden_effect_log,
 )
-from skidyn.logs import check_log
+from skidyn.logs import check_log, read_log
+from skidyn.measurement import Suspicion
 from skidyn.robots import Robot
 
 ROBOTS = (load_panda, load_ur5, load_scara, load_planar_arm)
 EFFECTS = (None, "stribeck", None, "payload", "torque_ripple", None, "spring", None)
-Spoiled = tuple[pd.DataFrame, str, str]
-Spoil = Callable[[pd.DataFrame, Robot, np.random.Generator], Spoiled]
 
 
-def columns(quantity: str, n: int) -> list[str]:
-    return [f"{quantity}{k + 1}" for k in range(n)]
+@dataclass
+class Case:
+    """A log that is what it claims to be."""
+
+    name: str
+    frame: pd.DataFrame
+    robot: Robot
 
 
-def signs(*quantities: str) -> Spoil:
-    def spoil(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled:
-        k = int(rng.integers(robot.n_joints)) + 1
-        names = [f"{quantity}{k}" for quantity in quantities]
-        told = [f"{name}" for name in names if not (name.startswith("dq") and len(names) > 1)]
-        check = "velocity" if quantities == ("dq",) else "reading"
-        return log.assign(**{name: -log[name] for name in names}), check, f"--flip {','.join(told)}"
-
-    return spoil
-
-
-def exchanged(*quantities: str) -> Spoil:
-    def spoil(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled:
-        order = np.arange(robot.n_joints)
-        a, b = rng.choice(robot.n_joints, 2, replace=False)
-        order[[a, b]] = order[[b, a]]
-        changes = {
-            f"{q}{j + 1}": log[f"{q}{k + 1}"] for q in quantities for j, k in enumerate(order)
-        }
-        words = ",".join(str(k + 1) for k in order)
-        option = words if len(quantities) > 1 else f"tau={words}"
-        return log.assign(**changes), "reading", f"--order {option}"
-
-    return spoil
+def made(seed: int, each: int) -> list[Case]:
+    """Logs of the package's own simulator."""
+    cases = []
+    for k, load in enumerate(ROBOTS):
+        for i in range(each):
+            effect = EFFECTS[(k + i) % len(EFFECTS)]
+            state = seed + 100 * k + i
+            log = make_hidden_effect_log(
+                load(), effect, n_trajectories=5, duration=6.0, random_state=state
+            )
+            cases.append(Case(f"{log.robot.name} {effect}", log.frame, log.robot))
+    return cases
 
 
-def gravity(*direction: float) -> Spoil:
-    """Torque of the stated bodies under another gravity in place of the robot's own."""
-
-    def spoil(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled:
-        q = log[columns("q", robot.n_joints)].to_numpy()
-        change = robot.gravity_torque(q, gravity=direction) - robot.gravity_torque(q)
-        names = columns("tau", robot.n_joints)
-        return (
-            log.assign(**dict(zip(names, (log[names] + change).to_numpy().T, strict=True))),
-            ("reading"),
-            "--gravity",
-        )
-
-    return spoil
+def stored(folder: Path) -> list[Case]:
+    """Logs of another simulator."""
+    cases = []
+    for path in sorted(folder.glob("*/log.parquet")):
+        robot = Robot.from_urdf(path.parent / "robot.urdf")
+        frame = read_log(path, robot=robot, check=False)
+        cases.append(Case(f"{path.parent.name} {robot.name}", frame, robot))
+    return cases
 
 
-def factor(quantity: str, size: float, check: str, option: str) -> Spoil:
-    def spoil(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled:
-        names = [n for n in log.columns if n.rstrip("0123456789") == quantity]
-        return log.assign(**{name: size * log[name] for name in names}), check, option
+def mended(spoiled: Spoiled, told: list[Suspicion]) -> tuple[pd.DataFrame, Robot]:
+    """The spoiled log, read again as its remedies say."""
+    options: dict[str, Any] = {}
+    robot = spoiled.robot
+    for suspicion in told:
+        if suspicion.remedy is None:
+            continue
+        name, _, value = suspicion.remedy.code.partition("=")
+        if name == "Robot.from_urdf(..., gravity":
+            gravity = ast.literal_eval(value.rstrip(")") + ")")
+            robot = robot_with(robot, gravity)
+        else:
+            now = ast.literal_eval(value)
+            before = options.get(name)
+            if isinstance(now, dict) and before:
+                now = {**before, **now}
+            elif isinstance(now, list) and before and name == "flip":
+                now = before + now
+            options[name] = now
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "log.parquet")
+        spoiled.frame.to_parquet(path)
+        return read_log(path, robot=robot, check=False, **options), robot
 
-    return spoil
+
+def robot_with(robot: Robot, gravity: tuple[float, float, float]) -> Robot:
+    from dataclasses import replace
+
+    return replace(robot, gravity=np.asarray(gravity, dtype=float))
 
 
-def currents(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled:
-    gains = rng.uniform(5, 60, robot.n_joints)
-    names = columns("tau", robot.n_joints)
-    return (
-        log.assign(**{n: log[n] / g for n, g in zip(names, gains, strict=True)}),
-        ("torque_scale"),
-        "--gain",
+def gives_back(case: Case, frame: pd.DataFrame, robot: Robot) -> bool:
+    """Whether every column is the recorded one, and gravity that of the robot."""
+    if len(frame) != len(case.frame) or not np.allclose(robot.gravity, case.robot.gravity):
+        return False
+    names = [c for c in case.frame.columns if c.rstrip("0123456789") in ("time", "q", "tau")]
+    return all(
+        float(np.abs(frame[n] - case.frame[n]).max()) <= 1e-5 * float(np.abs(case.frame[n]).max())
+        for n in names
     )
 
 
-def unsigned(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled:
-    names = columns("tau", robot.n_joints)
-    return log.assign(**{n: log[n].abs() for n in names}), "unsigned_torque", "--torque-sign"
+def findings(frame: pd.DataFrame, robot: Robot) -> frozenset[tuple[str, tuple[int, ...]]]:
+    """What a diagnosis names, and on which joints."""
+    from skidyn.diagnosis import diagnose
+    from skidyn.identification import RBDRegressor
 
-
-def zero(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled:
-    k = int(rng.integers(robot.n_joints)) + 1
-    return log.assign(**{f"q{k}": log[f"q{k}"] + np.pi / 2}), "reading", f"--zero q{k}="
-
-
-def late(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled:
-    spoiled, lag = log.copy(), float(rng.uniform(0.008, 0.03))
-    for _, run in log.groupby("trajectory"):
-        for name in columns("tau", robot.n_joints):
-            spoiled.loc[run.index, name] = np.interp(run["time"] - lag, run["time"], run[name])
-    return spoiled, "torque_delay", "--late tau="
-
-
-def jitter(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled:
-    size = rng.choice([1e-4, 3e-4, 1e-3])
-    return (
-        log.assign(time=log["time"] + rng.uniform(-size, size, len(log))),
-        ("clock_jitter"),
-        "--clock regular",
-    )
-
-
-def short_floats(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled:
-    stamps = np.float32(log["time"] + 2000.0).astype(float)
-    return log.assign(time=stamps), "clock_jitter", "--clock regular"
-
-
-def repeated(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled:
-    rows = np.arange(len(log))
-    again = (rng.random(len(log)) < 0.25) & (log["trajectory"].diff() == 0).to_numpy()
-    stale = log.iloc[rows - again].reset_index(drop=True)
-    return stale.assign(time=log["time"]), "repeated_rows", "--drop-repeated"
-
-
-def nothing(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled:
-    return log, "", ""
-
-
-MISTAKES: dict[str, Spoil] = {
-    "nothing": nothing,
-    "torque_sign": signs("tau"),
-    "motion_sign": signs("q", "dq"),
-    "velocity_sign": signs("dq"),
-    "order": exchanged("q", "dq", "tau"),
-    "torque_order": exchanged("tau"),
-    "wall": gravity(0.0, -9.81, 0.0),
-    "ceiling": gravity(0.0, 0.0, 9.81),
-    "compensated": gravity(0.0, 0.0, 0.0),
-    "zero": zero,
-    "unsigned": unsigned,
-    "currents": currents,
-    "newton_millimetres": factor("tau", 1e3, "torque_scale", "--units tau=Nmm"),
-    "milliseconds": factor("time", 1e3, "clock_unit", "--units time=ms"),
-    "degrees": factor("q", 180 / np.pi, "position_unit", "--units q=deg"),
-    "degrees_per_second": factor("dq", 180 / np.pi, "velocity", "--units dq=deg/s"),
-    "late": late,
-    "jitter": jitter,
-    "float32_clock": short_floats,
-    "repeated_rows": repeated,
-}
+    n = robot.n_joints
+    tau = frame[[f"tau{k + 1}" for k in range(n)]].to_numpy()
+    model = RBDRegressor(robot, ("viscous", "coulomb"))
+    result = diagnose(model, frame, tau, force=True)
+    return frozenset((f.effect, tuple(f.joints)) for f in result.findings)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--cases", type=Path, help="folder of stored logs")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--logs", type=int, default=5, help="logs of each robot")
+    parser.add_argument("--first", type=int, help="only so many logs")
     parser.add_argument("--only", help="mistakes, separated by commas")
+    parser.add_argument("--mend", action="store_true", help="read again with the remedies")
+    parser.add_argument("--diagnose", action="store_true", help="compare diagnoses, slow")
     parser.add_argument("--verbose", action="store_true", help="print every log that goes wrong")
     options = parser.parse_args()
-    logs = [
-        make_hidden_effect_log(
-            load(),
-            EFFECTS[(k + i) % len(EFFECTS)],
-            n_trajectories=5,
-            duration=6.0,
-            random_state=options.seed + 100 * k + i,
-        )
-        for k, load in enumerate(ROBOTS)
-        for i in range(options.logs)
-    ]
-    totals = np.zeros(3, dtype=int)
-    print(f"{'mistake':20s} {'named':>9s} {'certain':>9s} {'another':>9s}")
-    for name in options.only.split(",") if options.only else MISTAKES:
-        counts = np.zeros(3, dtype=int)
-        for i, log in enumerate(logs):
-            rng = np.random.default_rng(options.seed + i)
-            spoiled, check, option = MISTAKES[name](log.frame, log.robot, rng)
-            told = [c for c in check_log(spoiled, log.robot).checks if c.certainty != "noted"]
-            right = [c for c in told if is_right(c, check, option)]
-            other = [c for c in told if c not in right]
+    warnings.simplefilter("ignore")
+    cases = stored(options.cases) if options.cases else made(options.seed, options.logs)
+    cases = cases[: options.first]
+    known: dict[str, Any] = {}
+    totals = np.zeros(5, dtype=int)
+    print(f"{'mistake':24s} {'named':>9s} {'certain':>9s} {'another':>9s} {'mended':>9s}")
+    for name in options.only.split(",") if options.only else SPOILS:
+        counts, n = np.zeros(4, dtype=int), 0
+        for i, case in enumerate(cases):
+            rng = np.random.default_rng([options.seed, i])
+            spoiled = SPOILS[name](case.frame, case.robot, rng)
+            if spoiled is None:  # a robot that cannot make this mistake
+                continue
+            n += 1
+            checks = check_log(spoiled.frame, spoiled.robot).checks
+            right = [c for c in checks if spoiled.is_right(c)]
+            told = [c for c in checks if c.certainty != "noted"]
+            other = [c for c in told if not spoiled.is_right(c) and not spoiled.follows(c)]
             certain = any(c.certainty == "certain" for c in right)
-            counts += [bool(right), certain, bool(other)]
-            if options.verbose and (other or (check and not right)):
-                print("   ", log.robot.name, option, [str(c)[:90] for c in told])
-        print(f"{name:20s}" + "".join(f" {c:4d}/{len(logs):<4d}" for c in counts), flush=True)
-        totals += counts
-    print(f"{'all':20s}" + "".join(f" {c:9d}" for c in totals))
+            counts[:3] += [bool(right), certain, bool(other)]
+            good = None
+            if right and (options.mend or options.diagnose):
+                good = mend(case, spoiled, right, known, options.diagnose)
+                counts[3] += good
+            if options.verbose and (other or (spoiled.checks and not right) or good is False):
+                print("   ", case.name, spoiled.says, good, *map(short, checks), sep=" ; ")
+        print(f"{name:24s}" + "".join(f" {c:4d}/{n:<4d}" for c in counts), flush=True)
+        if name != "nothing":
+            totals += [*counts, n]
+    print(f"{'all':24s}" + "".join(f" {c:4d}/{totals[4]:<4d}" for c in totals[:4]))
 
 
-def is_right(told: Any, check: str, option: str) -> bool:
-    """Whether the right check has the right remedy."""
-    remedy = told.remedy.option if told.remedy else ""
-    return bool(check) and told.check == check and remedy.startswith(option)
+def short(told: Suspicion) -> str:
+    """A suspicion in one line."""
+    option = told.remedy.option if told.remedy else "-"
+    return f"{told.check}/{told.certainty}: {told.suspicion[:70]} | {told.evidence[:90]} | {option}"
+
+
+def mend(
+    case: Case, spoiled: Spoiled, told: list[Suspicion], known: dict[str, Any], diagnosed: bool
+) -> bool:
+    """Whether the remedies give back the recorded columns, or at least the diagnosis of them."""
+    frame, robot = mended(spoiled, told)
+    if gives_back(case, frame, robot) or not diagnosed:
+        return gives_back(case, frame, robot)
+    if case.name not in known:
+        known[case.name] = findings(case.frame, case.robot)
+    return bool(findings(frame, robot) == known[case.name])
 
 
 if __name__ == "__main__":

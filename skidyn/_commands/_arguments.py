@@ -97,7 +97,7 @@ def with_log_only(parser: Any, urdf_required: bool = True) -> None:
         type=Input,
         required=urdf_required,
         metavar="URDF",
-        help="description of the robot",
+        help="description of the robot: URDF, SDF or MJCF",
     )
     with_reading(parser)
 
@@ -153,6 +153,12 @@ def with_remedies(parser: Any) -> None:
     )
     mend.add_argument(
         "--drop-repeated", action="store_true", help="leave out rows that repeat the one before"
+    )
+    mend.add_argument(
+        "--split-leaps", action="store_true", help="a new trajectory where positions leap"
+    )
+    mend.add_argument(
+        "--restore-gravity", action="store_true", help="add gravity that was taken off the torque"
     )
     mend.add_argument("--resample", type=float, metavar="HZ", help="rate of an even clock")
 

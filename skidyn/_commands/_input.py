@@ -70,6 +70,8 @@ def reading(options: argparse.Namespace) -> dict[str, Any]:
         "torque_sign": said.get("torque_sign"),
         "clock": said.get("clock"),
         "drop_repeated": said.get("drop_repeated"),
+        "split_leaps": said.get("split_leaps"),
+        "restore_gravity": said.get("restore_gravity"),
     }
     # what was not said is left to read_log, so that a script made of this holds nothing else
     always = ("columns", "units", "drive_gains", "rate")
@@ -141,10 +143,10 @@ def read_robot(options: argparse.Namespace) -> Robot:
     if not path.is_file():
         raise SkidynError(f"no file {options.urdf}; --urdf names the description of the robot")
     gravity = getattr(options, "gravity", None)
-    if gravity is None:
-        return Robot.from_urdf(path, joints=covered_joints(options))
-    along = [number("gravity", word) for word in listed(gravity)]
-    return Robot.from_urdf(path, joints=covered_joints(options), gravity=along)
+    given: dict[str, Any] = {"joints": covered_joints(options)}
+    if gravity is not None:
+        given["gravity"] = [number("gravity", word) for word in listed(gravity)]
+    return Robot.from_file(path, **given)
 
 
 def embedded_robot(name: str) -> Robot:

@@ -110,7 +110,9 @@ RECORDED: dict[str, tuple[type, ...]] = {
     **dict.fromkeys(("columns", "units", "drive_gains", "joints", "effects"), (str, type(None))),
     **dict.fromkeys(("gravity", "flip", "order", "gain", "zero", "late"), (str, type(None))),
     **dict.fromkeys(("torque_sign", "clock"), (str, type(None))),
-    **dict.fromkeys(("unwrap", "drop_repeated", "force"), (bool, type(None))),
+    **dict.fromkeys(
+        ("unwrap", "drop_repeated", "split_leaps", "restore_gravity", "force"), (bool, type(None))
+    ),
     "resample": (float, int, type(None)),
 }
 

@@ -55,7 +55,7 @@ def script(
         "from skidyn.identification import RBDRegressor",
         "from skidyn.robots import Robot",
         "",
-        f"robot = Robot.from_urdf({str(urdf)!r}{only})",
+        f"robot = Robot.from_file({str(urdf)!r}{only})",
         f"log = read_log({[str(name) for name in logs]!r}, robot=robot{how})",
         'tau = log[[f"tau{j + 1}" for j in range(robot.n_joints)]].to_numpy()',
         f"session = Session(RBDRegressor(robot, [{effects}]{_changed(model)}), log, tau)",

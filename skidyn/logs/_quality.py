@@ -256,6 +256,7 @@ def check_log(frame: pd.DataFrame, robot: Robot | None = None) -> LogQuality:
     if len(measurement.steps) == 0:
         raise LogError("every trajectory of the log has a single row; nothing moves in it.")
     n_trajectories = len(np.unique(trajectory))
+    checks = tuple(check_measurement(measurement))
     return LogQuality(
         n_samples=len(time),
         n_trajectories=n_trajectories,
@@ -266,7 +267,7 @@ def check_log(frame: pd.DataFrame, robot: Robot | None = None) -> LogQuality:
         largest_gap=float(measurement.steps.max()),
         repeated_rows=measurement.repeated,
         joints=tuple(_joints(measurement)),
-        checks=tuple(check_measurement(measurement)),
+        checks=checks,
         faults=tuple(messages),
         notes=(_SINGLE,) if n_trajectories == 1 else (),
     )

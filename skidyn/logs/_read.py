@@ -52,6 +52,8 @@ def read_log(
     torque_sign: Literal["recorded", "command"] = "recorded",
     clock: Literal["recorded", "regular"] = "recorded",
     drop_repeated: bool = False,
+    split_leaps: bool = False,
+    restore_gravity: bool = False,
     check: bool = True,
     max_bytes: int = MAX_BYTES,
 ) -> pd.DataFrame:
@@ -105,11 +107,18 @@ def read_log(
     unwrap : bool, default=False
         Take leaps by a turn out of positions.
     torque_sign : {"recorded", "command"}, default="recorded"
-        ``"command"``: magnitudes get the sign of commanded minus measured position.
+        ``"command"``: torques that are never negative get the sign of commanded minus measured
+        position.
     clock : {"recorded", "regular"}, default="recorded"
         ``"regular"``: samples were taken at even steps, and only the stamps jitter.
     drop_repeated : bool, default=False
-        Leave out rows that repeat all positions of the row before while joints move.
+        Leave out rows that repeat all positions of the row before while joints move, or all
+        torques where they are reported less often.
+    split_leaps : bool, default=False
+        Begin a new trajectory where positions leap farther than any velocity takes them, as where
+        recordings were joined.
+    restore_gravity : bool, default=False
+        Add the gravity torque of ``robot`` to torque from which a driver has taken it off.
     check : bool, default=True
         Judge the quality of the log (:func:`check_log`) and warn of what looks wrong.
     max_bytes : int
@@ -158,7 +167,19 @@ def read_log(
         missing,
         split_gaps,
         split_dwells,
-        Remedies(order, flip, gain, zero, unwrap, torque_sign, clock, drop_repeated, late),
+        Remedies(
+            order=order,
+            flip=flip,
+            gain=gain,
+            zero=zero,
+            unwrap=unwrap,
+            torque_sign=torque_sign,
+            clock=clock,
+            drop_repeated=drop_repeated,
+            late=late,
+            split_leaps=split_leaps,
+            restore_gravity=restore_gravity,
+        ),
     )
     tables: list[pd.DataFrame] = []
     files: list[str] = []

@@ -16,11 +16,25 @@ from skidyn._signals import find_segments
 if TYPE_CHECKING:
     import pandas as pd
 
+    from skidyn.robots import Robot
+
 #: Quantities that turn with the position of a joint.
 MOTION = ("q", "dq", "ddq", "cmd")
 QUANTITIES = (*MOTION, "tau", "temp")
+#: Share of the largest torque below zero that a magnitude may reach.
+BELOW = 0.01
 #: How the notes of remedies begin.
-REMEDIES = ("flip:", "gain:", "zero:", "clock:", "late:", "drop_repeated:", "torque_sign:")
+REMEDIES = (
+    "flip:",
+    "gain:",
+    "zero:",
+    "clock:",
+    "late:",
+    "drop_repeated:",
+    "torque_sign:",
+    "split_leaps:",
+    "restore_gravity:",
+)
 
 
 @dataclass(frozen=True)
@@ -36,6 +50,8 @@ class Remedies:
     clock: Literal["recorded", "regular"] = "recorded"
     drop_repeated: bool = False
     late: Mapping[str, float] | None = None
+    split_leaps: bool = False
+    restore_gravity: bool = False
 
 
 def mend_columns(
@@ -97,6 +113,42 @@ def mend_columns(
     return table
 
 
+def restore_gravity(table: pd.DataFrame, robot: Robot | None, notes: list[str]) -> pd.DataFrame:
+    """Add the gravity torque of the described bodies, which a driver had taken off.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Columns of a log.
+    robot : Robot or None
+        As described.
+    notes : list of str
+        What was done is appended here.
+
+    Returns
+    -------
+    DataFrame
+
+    Raises
+    ------
+    LogError
+        There is no robot, or nothing pulls at it.
+    """
+    if robot is None:
+        raise LogError("restore_gravity adds the gravity torque of a robot; give robot=.")
+    n = robot.n_joints
+    pull = robot.gravity_torque(table[[f"q{k + 1}" for k in range(n)]].to_numpy(dtype=float))
+    if not np.any(pull):
+        raise LogError(
+            "restore_gravity has nothing to add: no joint of the robot carries weight, or its "
+            "gravity is zero."
+        )
+    names = [f"tau{k + 1}" for k in range(n)]
+    notes.append(f"restore_gravity: torque of gravity was added in {_all(table)} rows")
+    restored = table[names].to_numpy() + pull
+    return table.assign(**dict(zip(names, restored.T, strict=True)))
+
+
 def mend_rows(table: pd.DataFrame, n: int, remedies: Remedies, notes: list[str]) -> pd.DataFrame:
     """Clock, repeated rows, delay and wrapped positions of a log in order of time.
 
@@ -123,6 +175,8 @@ def mend_rows(table: pd.DataFrame, n: int, remedies: Remedies, notes: list[str])
     names = [f"q{k + 1}" for k in range(n)]
     if remedies.unwrap:
         table = _unwrapped(table, names, notes)
+    if remedies.split_leaps:
+        table = _split_at_leaps(table, names, notes)
     if remedies.drop_repeated:
         table = _without_repeated(table, n, notes)
     if remedies.clock not in ("recorded", "regular"):
@@ -223,15 +277,19 @@ def _sign_from_command(table: pd.DataFrame, n: int, notes: list[str]) -> None:
             f"torque_sign='command' needs the commanded positions; the log has no "
             f"{', '.join(absent)}. Name them with columns={{'cmd': [...]}}."
         )
-    turned = 0
+    turned, signless = 0, 0
     for k in range(1, n + 1):
+        if table[f"tau{k}"].min() < -BELOW * table[f"tau{k}"].max():
+            continue  # it has its sign
         sign = np.sign(table[f"cmd{k}"] - table[f"q{k}"])
         torque = np.abs(table[f"tau{k}"]) * sign
         turned += int(np.sum(torque < 0))
+        signless += 1
         table[f"tau{k}"] = torque
     notes.append(
-        "torque_sign: torques have the sign of commanded minus measured position; "
-        f"{turned} of {n * len(table)} values became negative"
+        f"torque_sign: torques of {signless} joint(s) that were never negative have the sign of "
+        f"commanded minus measured position; {turned} of {signless * len(table)} values became "
+        "negative"
     )
 
 
@@ -249,8 +307,23 @@ def _unwrapped(table: pd.DataFrame, names: Sequence[str], notes: list[str]) -> p
     return table.assign(**changed)
 
 
+def _split_at_leaps(table: pd.DataFrame, names: Sequence[str], notes: list[str]) -> pd.DataFrame:
+    from skidyn.measurement import find_leaps
+
+    number = table["trajectory"].to_numpy()
+    rows = find_leaps(table[names].to_numpy(dtype=float), table["time"].to_numpy(), number)
+    cut = np.zeros(len(table), dtype=np.int64)
+    cut[1:] = number[1:] != number[:-1]
+    cut[rows] = 1
+    notes.append(
+        f"split_leaps: {len(rows)} of {len(table)} rows, to which positions leap, begin a "
+        "trajectory"
+    )
+    return table.assign(trajectory=np.cumsum(cut))
+
+
 def _without_repeated(table: pd.DataFrame, n: int, notes: list[str]) -> pd.DataFrame:
-    from skidyn.measurement import is_repeated
+    from skidyn.measurement import is_held, is_repeated
 
     q = table[[f"q{k + 1}" for k in range(n)]].to_numpy(dtype=float)
     number = table["trajectory"].to_numpy()
@@ -260,5 +333,9 @@ def _without_repeated(table: pd.DataFrame, n: int, notes: list[str]) -> pd.DataF
     else:
         dq = np.gradient(q, axis=0)
     again = is_repeated(q, dq, number)
+    torques = [f"tau{k + 1}" for k in range(n)]
+    if set(torques) <= set(table.columns):
+        moved = np.any(q[1:] != q[:-1], axis=1) & (number[1:] == number[:-1])
+        again |= is_held(table[torques].to_numpy(dtype=float), moved)
     notes.append(f"drop_repeated: {int(again.sum())} of {len(q)} rows left out")
     return table[~again].reset_index(drop=True)

@@ -30,7 +30,7 @@ from skidyn.logs._clock import (
     split_trajectories,
 )
 from skidyn.logs._files import Channel
-from skidyn.logs._remedies import Remedies, mend_columns, mend_rows
+from skidyn.logs._remedies import Remedies, mend_columns, mend_rows, restore_gravity
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -224,6 +224,8 @@ def _clean(
         table = table[keep].reset_index(drop=True)
     _split(table, n, own_trajectories, match, source, options)
     table = mend_rows(table, n, options.remedies, match.notes)
+    if options.remedies.restore_gravity:
+        table = restore_gravity(table, options.robot, match.notes)
     if not any(f"dq{k + 1}" in table.columns for k in range(n)):
         q = table[[f"q{k + 1}" for k in range(n)]].to_numpy()
         dq = derive_velocity(q, table["time"].to_numpy(), table["trajectory"].to_numpy())

@@ -20,6 +20,8 @@ __all__ = [
 
 # For other packages of skidyn; no part of the public interface.
 from skidyn.measurement._measures import (
+    find_leaps as find_leaps,
+    is_held as is_held,
     is_repeated as is_repeated,
     position_step as position_step,
     rest_share as rest_share,

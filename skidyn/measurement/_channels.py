@@ -10,8 +10,9 @@ import numpy as np
 from skidyn.evidence import broken_notes
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._measures import position_step
+from skidyn.measurement._measures import is_held, position_step
 from skidyn.measurement._suspicion import Suspicion
+from skidyn.measurement._torque import cut_columns
 
 #: Share of rows at the extreme torque from which it is told.
 CLIPPED = 0.002
@@ -47,8 +48,11 @@ class ConstantTorque(Check):
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         number = measurement.signals.trajectory
         runs = np.unique(number)
+        lost = cut_columns(measurement)
         for k in range(measurement.n_joints):
             torque = measurement.torque[:, k]
+            if k in lost:
+                continue  # told as such
             if np.ptp(torque) == 0:
                 yield self.suspicion(
                     f"the torque of {measurement.joint(k)} is constant",
@@ -99,6 +103,18 @@ class HeldTorque(Check):
         together = s.trajectory[1:] == s.trajectory[:-1]
         moved = np.any(s.q[1:] != s.q[:-1], axis=1) & together
         if moved.sum() < 50:
+            return
+        held_all = is_held(measurement.torque, moved)
+        if held_all.any():
+            measurement.stale = True
+            share = float(held_all.sum() / moved.sum())
+            yield self.suspicion(
+                "torques hold their last value",
+                f"in {share:.0%} of the rows in which positions change, all of them at once: they "
+                "are reported less often",
+                "certain",
+                remedy=("--drop-repeated", "drop_repeated=True"),
+            )
             return
         shares = np.zeros(measurement.n_joints)
         for k in range(measurement.n_joints):

@@ -29,7 +29,8 @@ from skidyn.measurement._torque import (
     TorqueScale,
     UnsignedTorque,
 )
-from skidyn.measurement._units import ClockUnit, PositionUnit, Velocity, WrappedPosition
+from skidyn.measurement._units import ClockUnit, PositionUnit, WrappedPosition
+from skidyn.measurement._velocity import JoinedRecordings, Velocity, VelocityDelay
 
 #: Nothing else in skidyn keeps a list of checks.
 CHECKS: tuple[Check, ...] = (
@@ -37,6 +38,7 @@ CHECKS: tuple[Check, ...] = (
     PositionUnit(),
     Velocity(),
     WrappedPosition(),
+    JoinedRecordings(),
     UnsignedTorque(),
     Columns(),
     TorqueScale(),
@@ -44,8 +46,9 @@ CHECKS: tuple[Check, ...] = (
     RepeatedRows(),
     ClockJitter(),
     InterpolatedRows(),
-    TorqueDelay(),
+    VelocityDelay(),
     HeldTorque(),
+    TorqueDelay(),
     ConstantTorque(),
     ClippedTorque(),
     ComputedTorque(),
@@ -111,13 +114,17 @@ def check_measurement(measurement: Measurement) -> list[Suspicion]:
         found += told
         if check in _UNITS and any(s.certainty == "certain" for s in told):
             misread = 1
+        elif check in _SCALES and any(s.certainty == "suspected" for s in told):
+            misread = 1
         elif check.stage == 1 and told:
             misread = min(misread, 2)
+    measurement.readable = misread > 1
     return sorted(found, key=lambda s: CERTAINTIES.index(s.certainty))
 
 
-#: Checks whose certain suspicions make every fit of the robot meaningless.
-_UNITS = CHECKS[:4]
+#: Checks whose certain suspicions make every fit of the robot meaningless, and those of which
+#: mere suspicions do.
+_UNITS, _SCALES = CHECKS[:4], CHECKS[:2]
 
 
 def refuse_certain(found: list[Suspicion]) -> None:

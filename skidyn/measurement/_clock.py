@@ -250,11 +250,14 @@ class InterpolatedRows(Check):
             moving += int(both.sum())
             on_line += int((np.all(bend | ~moves, axis=1) & both).sum())
         if moving > 50 and on_line > ON_A_LINE * moving:
+            measurement.stale = True
+            rate = float(f"{measurement.rate * (1 - on_line / moving):.3g}")
             yield self.suspicion(
                 "rows were interpolated from a slower clock",
                 f"in {100 * on_line / moving:.0f} % of the moving rows all joints lie on straight "
                 "lines between their neighbours, so accelerations are those of the interpolation",
-                "suspected",
+                "certain",
+                remedy=(f"--resample {rate:g}", f"resample_rate={rate:g}"),
             )
 
 

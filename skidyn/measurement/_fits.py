@@ -56,6 +56,8 @@ class Reading:
         Joints and what their position reads at the robot's zero.
     gravity : tuple of float or None
         Gravity in the base frame, m/s^2; the robot's own if None.
+    size, stretch : float
+        Factors of positions, and of time, that are to be taken off.
     """
 
     flip_motion: frozenset[int] = frozenset()
@@ -64,6 +66,8 @@ class Reading:
     torque_order: tuple[int, ...] | None = None
     zero: tuple[tuple[int, float], ...] = ()
     gravity: tuple[float, float, float] | None = None
+    size: float = 1.0
+    stretch: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -157,6 +161,15 @@ class Fits:
             torque[:, column] /= gain
         return Fits(self.robot, self.signals, torque, self.moving, self.recorded, self.left_out)
 
+    def with_gravity(self, reading: Reading) -> Fits:
+        """The same rows with the gravity torque of the stated bodies added, read as they are."""
+        pull = self.robot.gravity_torque(self.motion(reading).q)
+        torque = self.torque.copy()
+        for joint in range(self.n_joints):
+            column, sign = self.torque_column(reading, joint)
+            torque[:, column] += sign * pull[:, joint]
+        return Fits(self.robot, self.signals, torque, self.moving, self.recorded, self.left_out)
+
     @property
     def n_rows(self) -> int:
         """Number of rows."""
@@ -175,7 +188,11 @@ class Fits:
         for joint, value in reading.zero:
             zero[joint] = value
         s = self.signals
-        q, dq, ddq = (values[:, order] * sign for values in (s.q, s.dq, s.ddq))
+        faster = reading.stretch
+        q, dq, ddq = (
+            values[:, order] * (sign * faster**k / reading.size)
+            for k, values in enumerate((s.q, s.dq, s.ddq))
+        )
         return s.with_(q=q - zero, dq=dq, ddq=ddq)
 
     def torque_column(self, reading: Reading, joint: int) -> tuple[int, float]:

@@ -13,6 +13,7 @@ import numpy as np
 from skidyn._signals import Array, Signals
 from skidyn.measurement._measures import (
     excited,
+    find_leaps,
     is_repeated,
     longest_plateau_share,
     velocity_consistency,
@@ -22,6 +23,11 @@ if TYPE_CHECKING:
     from skidyn.measurement._delay import Delay
     from skidyn.measurement._fits import Fits
     from skidyn.robots import Robot
+
+
+#: Correlation of integrated velocity with position from which its slope is a scale, and how far
+#: the slopes of joints that share one may differ.
+ALIKE, SHARED = 0.9, 0.05
 
 
 @dataclass
@@ -38,7 +44,9 @@ class Measurement:
         Robot as its description says; checks that need it are left out without it.
     joint_names : sequence of str
         Names for sentences and remedies.
-    unsigned, delay : optional
+    leaps : ndarray of int
+        Rows to which positions leap; trajectories are taken to end there.
+    unsigned, delay, readable, stale : optional
         What checks found that others want to know; filled in by them.
 
     Examples
@@ -57,6 +65,18 @@ class Measurement:
     joint_names: Sequence[str]
     unsigned: tuple[list[int], dict[int, float]] | None = field(default=None, repr=False)
     delay: Delay | None = field(default=None, repr=False)
+    readable: bool = field(default=True, repr=False)
+    stale: bool = field(default=False, repr=False)
+    leaps: Array = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        s = self.signals
+        self.leaps = find_leaps(s.q, s.clock, s.trajectory)
+        if len(self.leaps):  # no other check should take a leap for motion
+            cut = np.zeros(s.n_samples, dtype=np.int64)
+            cut[1:] = s.trajectory[1:] != s.trajectory[:-1]
+            cut[self.leaps] = 1
+            self.signals = s.with_(trajectory=np.cumsum(cut))
 
     @property
     def n_joints(self) -> int:
@@ -120,6 +140,20 @@ class Measurement:
             velocity_consistency(s.clock, s.q[:, k], s.dq[:, k], s.segments)
             for k in range(self.n_joints)
         ]
+
+    @cached_property
+    def velocity_scale(self) -> float:
+        """Slope of integrated velocity on position that all joints share; NaN if they differ."""
+        moving = [
+            slope
+            for (slope, likeness), moves in zip(self.velocities, self.excited, strict=True)
+            if moves and likeness > ALIKE
+        ]
+        if len(moving) < min(2, sum(self.excited)) or not moving:
+            return float("nan")
+        middle = float(np.median(moving))
+        alike = np.abs(np.array(moving) / middle - 1) < SHARED
+        return middle if np.all(alike) else float("nan")
 
     @cached_property
     def excited(self) -> list[bool]:

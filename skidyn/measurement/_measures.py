@@ -9,6 +9,12 @@ import numpy as np
 
 #: Windows over which velocity is compared with differentiated position, s.
 WINDOW = 0.05
+#: Share of rows that hold all torques to be told, and of those that hold any.
+HELD, AT_ONCE = 0.2, 0.7
+#: A leap of a position is so many times farther than its steps before and after, so many times
+#: beyond what positions leave of even motion, and farther than this share of its range; recordings
+#: are joined in this many places at most, as a share of the rows.
+FARTHER, BEYOND, RANGE, PLACES = 4.0, 8.0, 1e-3, 2e-3
 
 
 def position_step(position: np.ndarray) -> float:
@@ -38,6 +44,34 @@ def is_repeated(position: np.ndarray, velocity: np.ndarray, trajectory: np.ndarr
     same = np.all(position[1:] == position[:-1], axis=1) & (trajectory[1:] == trajectory[:-1])
     moving = np.any(np.abs(velocity[1:]) > 0.02 * np.abs(velocity).max(axis=0), axis=1)
     again[1:] = same & moving
+    return again
+
+
+def is_held(torque: np.ndarray, moved: np.ndarray) -> np.ndarray:
+    """Rows in which all torques at once are those of the row before, as a mask.
+
+    Parameters
+    ----------
+    torque : ndarray of shape (n_samples, n_joints)
+        Recorded torque.
+    moved : ndarray of shape (n_samples - 1,) of bool
+        Rows after the first to which positions moved.
+
+    Returns
+    -------
+    ndarray of shape (n_samples,) of bool
+        Empty where it is the coarse steps of a sensor: these change one by one.
+    """
+    same = torque[1:] == torque[:-1]
+    changing = np.ptp(torque, axis=0) > 0
+    again = np.zeros(len(torque), dtype=bool)
+    if changing.sum() < 2 or not moved.any():
+        return again
+    same = same[:, changing]
+    together = np.all(same, axis=1) & moved
+    share, single = together.sum() / moved.sum(), same[moved].mean(axis=0)
+    if share > HELD and share > AT_ONCE * single.max():
+        again[1:] = together
     return again
 
 
@@ -105,3 +139,49 @@ def excited(position: np.ndarray, velocity: np.ndarray, segments: Sequence[slice
     span = np.ptp(position)
     noise = np.median(np.abs(np.diff(position, n=2))) if len(position) > 2 else 0.0
     return bool(span > 1e-3 and span > 20 * noise and reversals(velocity, segments) > 0)
+
+
+def find_leaps(q: np.ndarray, time: np.ndarray, trajectory: np.ndarray) -> np.ndarray:
+    """Rows to which positions leap from the row before, to stay there.
+
+    Parameters
+    ----------
+    q : ndarray of shape (n_samples, n_joints), rad or m
+        Recorded positions.
+    time : ndarray of shape (n_samples,), s
+        Recorded clock.
+    trajectory : ndarray of shape (n_samples,)
+        Trajectory of every row.
+
+    Returns
+    -------
+    ndarray of int
+        Empty where no position leaps, or so many that it is no matter of joining.
+    """
+    n = len(q)
+    if n < 20:
+        return np.zeros(0, dtype=np.intp)
+    step = np.diff(time)
+    usual = float(np.median(step[step > 0])) if np.any(step > 0) else 1.0
+    together = (trajectory[1:] == trajectory[:-1]) & (step < 3 * usual) & (step > 0)
+    moved = np.where(together[:, None], np.diff(q, axis=0), 0.0)
+    # how fast it is before and after, and not the recorded velocity, whose unit may be another
+    around = np.stack([np.roll(moved, k, axis=0) for k in (-3, -2, -1, 1, 2, 3)])
+    beyond = np.abs(moved - np.median(around, axis=0))
+    far = np.abs(moved) > FARTHER * np.abs(around).max(axis=0)
+    far &= beyond > BEYOND * np.quantile(beyond, 0.995, axis=0)
+    far &= beyond > RANGE * np.ptp(q, axis=0)
+    turns = np.abs(moved - 2 * np.pi * np.round(moved / (2 * np.pi))) < 0.05 * 2 * np.pi
+    far &= ~(turns & (np.abs(moved) > np.pi))
+    kept = []
+    for row in np.flatnonzero(far.any(axis=1) & together):
+        stay, held = [], []
+        for k in np.flatnonzero(far[row]):
+            before, after = q[max(0, row - 4) : row + 1, k], q[row + 1 : row + 6, k]
+            leap = abs(q[row + 1, k] - q[row, k])
+            stay.append(abs(np.median(after) - np.median(before)) > 0.5 * leap)
+            # a position that was held catches up in one step
+            held.append(before[-1] == before[0] or after[0] == after[-1])
+        if any(stay) and not all(held):
+            kept.append(row + 1)
+    return np.array(kept if len(kept) <= max(PLACES * n, 2) else [], dtype=np.intp)

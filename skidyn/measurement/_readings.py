@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
@@ -28,12 +28,16 @@ NEEDED = {
     **dict.fromkeys(("motion_sign", "joint_sign", "order", "torque_order", "zero"), 10.0),
     **dict.fromkeys(("torque_sign", "gravity"), -3.0),
 }
+#: What a change must gain beside the one that gains most, as a share.
+BESIDE = 0.3
 #: Share of gravity that a compensated torque may still hold: bodies are known to so much.
 LEFT_OVER = 0.4
 #: Least share of a joint's spread that the new reading must take away.
 LEAST_DROP = 0.15
 #: Strength of gravity, and the least angle that is no tilt of a table, degrees.
 GRAVITY, LEAST_ANGLE = 9.81, 20.0
+#: Cosine of the angle to an axis from which gravity is along that axis.
+UPRIGHT = 0.995
 #: Offsets of a position that are tried, rad.
 OFFSETS = np.deg2rad([-135, -90, -45, 45, 90, 135, 180])
 #: Rounds of the fits that only rank, and how many changes are looked at more closely.
@@ -59,6 +63,8 @@ class Change:
         Share of the residual's spread that it takes off, of the joint that gains most.
     rivals : tuple of str
         Other kinds of change of the same joints that explain as much.
+    restorable : bool
+        Of torque without gravity: it was taken off with the bodies of the description.
     """
 
     kind: str
@@ -68,6 +74,7 @@ class Change:
     confirmed: float = 0.0
     drop: float = 0.0
     rivals: tuple[str, ...] = ()
+    restorable: bool = False
 
 
 def find_changes(fits: Fits) -> list[Change]:
@@ -111,7 +118,13 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
     ]
     screened = sorted(screened, key=lambda pair: -pair[0])[:FINALISTS]
     judged = []
+    refined: set[tuple[int, ...]] = set()
     for rough_gain, change in screened:
+        if change.kind == "zero":
+            if rough_gain <= 0 or change.joints in refined:
+                continue  # another angle of the same joint
+            refined.add(change.joints)
+            change = _refined(fits, change)
         if rough_gain > 0:
             there = fits.nominal(change.reading)
             gain = float(there.margin(here).sum())
@@ -122,9 +135,14 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
         if c.gain >= WEAKEST and c.drop >= LEAST_DROP and _all_gain(fits, c, reading, here)
     ]
     judged.sort(key=lambda c: -round(c.gain, 1))
-    if judged and judged[0].kind == "no_gravity" and judged[0].gain >= LEAST:
+    most = max((c.gain for c in judged), default=0.0)
+    absent = judged[0] if judged and judged[0].kind == "no_gravity" else None
+    if absent is not None and absent.gain >= LEAST:
         if _without_gravity(fits, reading, here):
-            return judged[0]  # identified bodies make up for what is left of it
+            # identified bodies make up for what is left of it
+            if any(c.kind == "gravity" and c.gain > absent.gain - TIED for c in judged):
+                return replace(absent, rivals=("gravity",))  # along it no joint feels a change
+            return replace(absent, restorable=_restorable(fits, absent.reading))
     before = fits.identified(reading)
     accepted = []
     for change in judged:
@@ -134,14 +152,66 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
         # stated bodies that are a little wrong make residuals alike over seconds, so that a short
         # log gains little by them whatever is read wrongly; identified ones then decide
         strong = change.gain >= LEAST or (confirmed >= DECISIVE and change.drop >= HALF)
-        plain = change.gain >= OVERWHELMING and change.drop >= HALF and NEEDED[change.kind] < 0
+        if change.gain < BESIDE * most and confirmed < DECISIVE:
+            continue  # something else explains far more
+        plain = change.gain >= OVERWHELMING and change.drop >= HALF
+        # any zero of a last joint is that of another body, which identified bodies are free to be
+        plain &= NEEDED[change.kind] < 0 or (change.kind == "zero" and confirmed > -WEAKEST)
         if strong and (plain or confirmed >= NEEDED[change.kind]):
             alike = [c for c in judged if c.kind != change.kind and _same_place(c, change)]
             tied = max(TIED, ALIKE * change.gain)
             rivals = tuple(dict.fromkeys(c.kind for c in alike if change.gain - c.gain < tied))
             accepted.append(replace(change, confirmed=confirmed, rivals=rivals))
     # both are likelihoods of the same torque; turning all of it round changes nothing identified
-    return max(accepted, key=lambda c: c.gain + c.confirmed, default=None)
+    if not accepted:
+        return None
+    first = max(accepted, key=lambda c: c.gain + c.confirmed)
+    close = max(TIED, ALIKE * first.gain)
+    tied = [c for c in accepted if c.gain + c.confirmed >= first.gain + first.confirmed - close]
+    # an angle that is free fits at least as well as one that is not
+    best = next((c for c in tied if c.kind != "zero"), first) if first.kind == "zero" else first
+    return _sharpened(fits, best) if best.kind == "zero" else best
+
+
+def _refined(fits: Fits, change: Change) -> Change:
+    """The zero of a position at which the robot explains the torque best, near one that was tried.
+
+    Halving steps: the likelihood has one summit within half a step of what was tried.
+    """
+
+    def likelihood(reading: Reading) -> float:
+        return float(fits.nominal(reading, SCREENED).likelihood.sum())
+
+    return _climbed(change, likelihood, 22.5)
+
+
+def _sharpened(fits: Fits, change: Change) -> Change:
+    """The zero that identified bodies ask for: those of the description are not the robot's."""
+    if change.confirmed < NEEDED["zero"]:
+        return change  # they follow any zero
+
+    def likelihood(reading: Reading) -> float:
+        return float(fits.identified(reading).likelihood.sum())
+
+    return _climbed(change, likelihood, 4.0)
+
+
+def _climbed(change: Change, likelihood: Callable[[Reading], float], degrees: float) -> Change:
+    """Angle of the last zero at the summit of a likelihood, by halving steps."""
+    *others, (joint, angle) = change.reading.zero
+
+    def reading(angle: float) -> Reading:
+        return replace(change.reading, zero=(*others, (joint, float(angle))))
+
+    best, step = likelihood(reading(angle)), np.deg2rad(degrees)
+    while step > np.deg2rad(0.25):
+        for other in (angle - step, angle + step):
+            if (value := likelihood(reading(other))) > best:
+                angle, best = other, value
+                break
+        else:
+            step /= 2
+    return replace(change, reading=reading(angle))
 
 
 def _same_place(one: Change, other: Change) -> bool:
@@ -186,10 +256,10 @@ def _alternatives(fits: Fits, reading: Reading, here: Outcome) -> Iterator[Chang
     yield from _orders(fits, reading)
     if reading.gravity is None:
         yield from _gravities(fits, reading, here)
-    if not reading.zero:
-        turning = np.flatnonzero(~fits.signals.prismatic)
-        for j in turning.tolist():
-            for offset in OFFSETS:
+    found = {joint for joint, _ in reading.zero}
+    for j in np.flatnonzero(~fits.signals.prismatic).tolist():
+        for offset in OFFSETS:
+            if j not in found:
                 shifted = replace(reading, zero=(*reading.zero, (int(j), float(offset))))
                 yield Change("zero", (int(j),), shifted)
 
@@ -225,7 +295,9 @@ def _gravities(fits: Fits, reading: Reading, here: Outcome) -> Iterator[Change]:
     directions = [sign * axis for axis in np.eye(3) for sign in (-1.0, 1.0)]
     best = fitted_gravity(fits, reading, here)
     if best is not None and np.linalg.norm(best) > 0:
-        directions.append(best / np.linalg.norm(best))
+        best = best / np.linalg.norm(best)
+        if float(np.max(np.abs(best))) < UPRIGHT:
+            directions.append(best)
     for direction in directions:
         cosine = float(direction @ own / np.linalg.norm(own))
         if np.rad2deg(np.arccos(np.clip(cosine, -1, 1))) >= LEAST_ANGLE:
@@ -237,6 +309,12 @@ def _without_gravity(fits: Fits, reading: Reading, here: Outcome) -> bool:
     """Whether the gravity that fits best is but a small part of the robot's own."""
     best, own = fitted_gravity(fits, reading, here), np.asarray(fits.robot.gravity, dtype=float)
     return best is not None and abs(float(best @ own / (own @ own))) < LEFT_OVER
+
+
+def _restorable(fits: Fits, without: Reading) -> bool:
+    """Whether gravity was taken off with the stated bodies rather than with those of the robot."""
+    whole = fits.with_gravity(without).identified(replace(without, gravity=None))
+    return float(whole.margin(fits.identified(without)).sum()) > 0
 
 
 def fitted_gravity(fits: Fits, reading: Reading, here: Outcome) -> Array | None:

@@ -19,7 +19,7 @@ from skidyn.measurement._suspicion import Certainty, Suspicion
 #: Share of the largest torque below zero that a magnitude may reach, and reversals it must see.
 BELOW, TURNS = 0.01, 4
 #: Share of zeros from which a torque is not a magnitude but only its one direction.
-CUT = 0.25
+CUT = 0.05
 #: Log-likelihood that the magnitude must gain over the torque itself, and to be sure.
 LEAST, SURE = 15.0, 40.0
 #: Share of a torque's spread that the robot must explain for its multiple to be told.
@@ -43,12 +43,22 @@ class UnsignedTorque(Check):
     stage = 1
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        cut = cut_columns(measurement)
+        if cut:
+            names = ", ".join(measurement.joint(k) for k in cut)
+            shares = ", ".join(f"{np.mean(measurement.torque[:, k] == 0):.0%}" for k in cut)
+            yield self.suspicion(
+                f"the torque of {names} is cut at zero",
+                f"it has one sign alone, and {shares} of it are zero although the joint moves: "
+                "what has the other sign was lost",
+                "certain",
+                cut,
+            )
         unsigned, gains = unsigned_columns(measurement)
         if not unsigned:
             return
         moving = [k for k, moves in enumerate(measurement.excited) if moves]
         every = len(unsigned) >= 3 and set(moving) <= set(unsigned)
-        zeros = float(np.median([_cut(measurement.torque[:, k]) for k in unsigned]))
         names = ", ".join(measurement.joint(k) for k in unsigned)
         evidence = (
             f"of {measurement.n_samples} rows none is negative although the joints reverse "
@@ -59,15 +69,12 @@ class UnsignedTorque(Check):
                 "; the magnitude of the robot's own torque is more likely by "
                 f"{max(gains.values()):.0f} (log-likelihood)"
             )
-        cut = zeros > CUT
         yield self.suspicion(
-            f"the torque of {names} is cut at zero"
-            if cut
-            else f"the torque of {names} has no sign",
-            evidence + (f"; {zeros:.0%} of it are zero" if cut else ""),
+            f"the torque of {names} has no sign",
+            evidence,
             "certain" if every or max(gains.values(), default=0) > SURE else "suspected",
             unsigned,
-            None if cut else ("--torque-sign command", "torque_sign='command'"),
+            ("--torque-sign command", "torque_sign='command'"),
         )
 
 
@@ -76,6 +83,23 @@ def _cut(torque: Array) -> float:
     least = float(torque[torque > 0].min(initial=np.inf))
     first = float(np.mean((torque > 0) & (torque < 1.5 * least)))
     return max(0.0, float(np.mean(torque == 0)) - 3 * first)
+
+
+def cut_columns(measurement: Measurement) -> list[int]:
+    """Columns of the torque of which one sign was lost: zero in its place."""
+    found = []
+    for k in range(measurement.n_joints):
+        torque = measurement.torque[:, k]
+        rows = (
+            np.abs(measurement.signals.dq[:, k]) > 0.02 * np.abs(measurement.signals.dq[:, k]).max()
+        )
+        one_sided = torque.min() == 0 < torque.max() or torque.max() == 0 > torque.min()
+        if one_sided and rows.any() and _turns(measurement, k) >= TURNS:
+            values = np.abs(torque[rows])
+            # a joint that is not driven has zeros alone
+            if CUT < _cut(values) < 0.98 and len(np.unique(values)) > 50:
+                found.append(k)
+    return found
 
 
 def _turns(measurement: Measurement, k: int) -> int:
@@ -95,10 +119,12 @@ def unsigned_columns(measurement: Measurement) -> tuple[list[int], dict[int, flo
 
 def _unsigned(measurement: Measurement) -> tuple[list[int], dict[int, float]]:
     torque = measurement.torque
+    cut = cut_columns(measurement)
     one_sided = [
         k
         for k in range(measurement.n_joints)
-        if np.ptp(torque[:, k]) > 0
+        if k not in cut
+        and np.ptp(torque[:, k]) > 0
         and torque[:, k].min() >= -BELOW * torque[:, k].max()
         and _turns(measurement, k) >= TURNS
     ]
@@ -153,7 +179,7 @@ class Columns(Check):
         if fits is None:
             return
         unsigned, _ = unsigned_columns(measurement)
-        changes = find_changes(fits.without(unsigned))
+        changes = find_changes(fits.without([*unsigned, *cut_columns(measurement)]))
         for kind in dict.fromkeys(change.kind for change in changes):
             alike = [change for change in changes if change.kind == kind]
             yield self._told(measurement, kind, alike, changes[-1].reading)
@@ -207,6 +233,10 @@ class Columns(Check):
                 what = f"gravity points along ({words}) in the base frame: the robot is mounted so"
             else:
                 what = "the torque holds no gravity: it was taken off"
+                if changes[0].restorable:
+                    what += " with the bodies of the description"
+                    remedy = ("--restore-gravity", "restore_gravity=True")
+                    return self.suspicion(what, evidence, certainty, joints, remedy)
             remedy = (f"--gravity={words}", f"Robot.from_urdf(..., gravity={tuple(gravity)})")
         return self.suspicion(what, evidence, certainty, joints, remedy)
 
@@ -245,7 +275,7 @@ class TorqueScale(Check):
         if fits is None:
             return
         unsigned, _ = unsigned_columns(measurement)
-        fits = fits.without(unsigned)
+        fits = fits.without([*unsigned, *cut_columns(measurement)])
         gains = _known_gains(fits)
         odd = [k for k, gain in gains.items() if not USUAL[0] <= gain <= USUAL[1]]
         if not odd:
@@ -393,6 +423,8 @@ class TorqueDelay(Check):
         found = measured_delay(measurement)
         if found is None or not np.isfinite(found.common):
             return
+        if measurement.stale:
+            return  # held and interpolated values are late, or early, by themselves
         told = found.joints[np.isfinite(found.joints)]
         alike = np.abs(told - found.common) < max(ALIKE, 0.3 * abs(found.common))
         if (
@@ -416,10 +448,10 @@ class TorqueDelay(Check):
 
 def measured_delay(measurement: Measurement) -> Delay | None:
     """Delay of the torque of a measurement; None without a robot or rows."""
-    fits = measurement.fits
+    fits = measurement.fits if measurement.readable else None
     if fits is None:
         return None
     if measurement.delay is None:
         unsigned, _ = unsigned_columns(measurement)
-        measurement.delay = find_delay(fits.without(unsigned))
+        measurement.delay = find_delay(fits.without([*unsigned, *cut_columns(measurement)]))
     return measurement.delay

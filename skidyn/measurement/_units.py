@@ -1,30 +1,42 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks of units that need no fit: time, position and velocity against each other and limits."""
+"""Checks of units: time, position and velocity against each other, limits and torque."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
+from skidyn._signals import Array
 from skidyn.measurement._check import Check
-from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._fits import Fits, Reading
+from skidyn.measurement._measurement import ALIKE, Measurement
 from skidyn.measurement._suspicion import Suspicion
 
 DEGREE = np.pi / 180
-#: Units of time that a clock may be in, by the slope of integrated velocity on position.
+#: Units of time, of velocities and of positions, by the slope of integrated velocity on position.
 CLOCKS = {1e3: "ms", 1e6: "us", 1e9: "ns"}
+VELOCITIES = {1 / DEGREE: "deg/s", 30 / np.pi: "rpm", 0.5 / np.pi: "rev/s"}
+POSITIONS = {DEGREE: "deg", 2 * np.pi: "rev"}
+NAMES = {"deg": "degrees", "rev": "turns"}
 #: How far the slope may be off a unit's factor, and off 1.
 NEAR = 0.1
-#: Correlation of integrated velocity with position from which its slope is a unit.
-ALIKE = 0.9
+#: How many times its limit a position reaches that is suspicious, and that is no position.
+FAR, DISTANT = 1.5, 4.0
+#: Largest positions, rad, that would hardly be a motion if they were degrees.
+LEAST_DEGREES = 6.0
+#: How nearly a factor is a round number that it is taken for.
+WHOLE = 2e-3
+#: Log-likelihood by which one scale must explain the torque better than another.
+LEAST = 15.0
 
 
 class ClockUnit(Check):
-    """Time in another unit than seconds."""
+    """Time in another unit than seconds, or at another rate."""
 
     name = "clock_unit"
-    suspects = "time in ms, us or ns"
+    suspects = "time in ms, us or ns, or a clock of another rate"
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         slopes = [s for s, r in measurement.velocities if np.isfinite(s) and r > ALIKE and s > 0]
@@ -36,7 +48,7 @@ class ClockUnit(Check):
                     f"the integrated velocities are {typical:.4g} times the positions they lead to "
                     f"(median over {len(slopes)} joints)",
                     "certain",
-                    remedy=_units({"time": unit}),
+                    remedy=unit_remedy({"time": unit}),
                 )
                 return
         if measurement.rate < 2:
@@ -48,115 +60,206 @@ class ClockUnit(Check):
                 f"time may be in {unit}",
                 f"the median time step is {1 / measurement.rate:.4g} s",
                 "noted" if agrees else "suspected",
-                remedy=_units({"time": unit}),
+                remedy=unit_remedy({"time": unit}),
             )
+            return
+        shared = measurement.velocity_scale
+        if unnamed_scale(measurement, shared) and not _too_far(measurement, DISTANT).any():
+            yield self._rate(measurement, shared)
+
+    def _rate(self, measurement: Measurement, shared: float) -> Suspicion:
+        """Clock, velocities or positions at another scale, whichever the robot's torque says."""
+        gains = {"time": 0.0, "dq": 0.0, "q": 0.0}
+        fits = measurement.fits
+        if fits is not None:
+            gains["time"] = _gained(fits, Reading(stretch=shared))
+            gains["q"] = _gained(fits, Reading(size=1 / shared))
+        best = max(gains, key=lambda name: gains[name])
+        others = [gain for name, gain in gains.items() if name != best]
+        told = fits is not None and gains[best] - max(others) > LEAST
+        best = best if told else "time"
+        what = {"time": "the clock", "dq": "velocities", "q": "positions"}
+        shared = _round(shared)
+        value = float(f"{shared if best == 'q' else 1 / shared:.6g}")
+        doubt = "" if told else "; it may as well be that of velocities or positions"
+        return self.suspicion(
+            f"the scale of {what[best]} is off by a factor of {1 / value:.4g}",
+            f"integrated velocities are {shared:.4g} times the positions they lead to, alike in "
+            f"all joints{doubt}",
+            "certain" if told else "suspected",
+            remedy=(f"--gain {best}={value:g}", f"gain={{'{best}': {value:g}}}"),
+        )
 
 
 class PositionUnit(Check):
-    """Positions of turning joints in degrees."""
+    """Positions of turning joints in degrees, turns, counts, or of the motors."""
 
     name = "position_unit"
-    suspects = "positions in degrees"
+    suspects = "positions in degrees, turns or counts of an encoder, or of motors before the gears"
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
-        largest = np.abs(measurement.signals.q).max(axis=0)
-        robot = measurement.robot
         slopes = [s for s, r in measurement.velocities if np.isfinite(s) and r > ALIKE]
         typical = float(np.median(slopes)) if slopes else 1.0
-        if abs(typical / DEGREE - 1) < NEAR:
+        for factor, unit in POSITIONS.items():
+            if abs(typical / factor - 1) < NEAR:
+                yield self.suspicion(
+                    f"positions look like {NAMES[unit]}",
+                    f"velocities are {typical:.4g} times the differentiated positions (median over "
+                    f"{len(slopes)} joints)",
+                    "certain",
+                    remedy=unit_remedy({"q": unit}),
+                )
+                return
+        far = _too_far(measurement, DISTANT)
+        shared = measurement.velocity_scale
+        if far.any() and unnamed_scale(measurement, shared) and shared < 1:
+            counts = _round_counts(2 * np.pi / shared)
+            shared = 2 * np.pi / counts
             yield self.suspicion(
-                "positions look like degrees",
-                f"velocities are {typical:.4g} times the differentiated positions (median over "
-                f"{len(slopes)} joints)",
+                "positions are counts of an encoder, or those of motors",
+                f"the largest is {np.abs(measurement.signals.q).max():.4g} rad, and they change "
+                f"{1 / shared:.5g} times as fast as the velocities say ({counts:.6g} a turn)",
                 "certain",
-                remedy=_units({"q": "deg"}),
+                np.flatnonzero(far),
+                (f"--gain q={shared:.9g}", f"gain={{'q': {shared:.9g}}}"),
             )
             return
         both = {"q": "deg", "dq": "deg/s"} if abs(typical - 1) < NEAR else {"q": "deg"}
-        if robot is None:
-            k = int(np.argmax(largest))
-            span = float(np.ptp(measurement.signals.q[:, k]))
-            if largest[k] > 4 * np.pi and span > 4 * np.pi:
-                yield self.suspicion(
-                    "positions may be in degrees",
-                    f"q{k + 1} reaches {largest[k]:.4g} rad, {largest[k] / 2 / np.pi:.1f} turns",
-                    "suspected" if int(np.sum(largest > 4 * np.pi)) > 1 else "noted",
-                    [k],
-                    _units(both),
-                )
-            return
-        turning = np.array([kind == "revolute" for kind in robot.joint_types])
-        limits = np.abs(np.asarray(robot.position_limits)).max(axis=1)
-        known = np.isfinite(limits)
-        limits = np.where(known, limits, 2 * np.pi)
-        outside = turning & (largest > 1.5 * limits)
-        if outside.any() and np.all(largest[turning] * DEGREE <= 1.1 * limits[turning]):
-            k = int(np.argmax(np.where(outside, largest / limits, 0)))
-            where = f"the limit is {limits[k]:.3g} rad" if known[k] else "a turn has 6.28 rad"
+        if measurement.robot is None:
+            yield from self._by_turns(measurement, both)
+        elif _too_far(measurement, FAR).any():
+            yield from self._beyond_limits(measurement, both)
+
+    def _by_turns(self, measurement: Measurement, both: dict[str, str]) -> Iterator[Suspicion]:
+        """Without a robot: positions that run over several turns."""
+        largest = np.abs(measurement.signals.q).max(axis=0)
+        k = int(np.argmax(largest))
+        span = float(np.ptp(measurement.signals.q[:, k]))
+        if largest[k] > 4 * np.pi and span > 4 * np.pi:
+            yield self.suspicion(
+                "positions may be in degrees",
+                f"q{k + 1} reaches {largest[k]:.4g} rad, {largest[k] / 2 / np.pi:.1f} turns",
+                "suspected" if int(np.sum(largest > 4 * np.pi)) > 1 else "noted",
+                [k],
+                unit_remedy(both),
+            )
+
+    def _beyond_limits(self, measurement: Measurement, both: dict[str, str]) -> Iterator[Suspicion]:
+        """Positions far outside of the limits: in degrees, or of the motors before the gears."""
+        turning, limits, known = _limits(measurement)
+        largest = np.abs(measurement.signals.q).max(axis=0)
+        named = [
+            any(abs(slope / factor - 1) < NEAR for factor in POSITIONS)
+            for slope, _ in measurement.velocities
+        ]
+        outside = _too_far(measurement, FAR) & ~np.array(named)
+        if not outside.any():
+            return  # told by their velocities, joint by joint
+        k = int(np.argmax(np.where(outside, largest / limits, 0)))
+        where = f"the limit is {limits[k]:.3g} rad" if known[k] else "a turn has 6.28 rad"
+        seen = f"q{k + 1} ({measurement.joint_names[k]}) reaches {largest[k]:.4g} rad where {where}"
+        degrees = bool(np.all(largest[turning] * DEGREE <= 1.1 * limits[turning]))
+        if float(np.median(largest[turning])) < LEAST_DEGREES and degrees:
+            outside &= _too_far(measurement, DISTANT)  # else its zero may be elsewhere
+            if not outside.any():
+                return
+            both = {f"{q}{j + 1}": u for q, u in both.items() for j in np.flatnonzero(outside)}
+        ratio = (
+            None
+            if len(both) > 2
+            else _fitted_size(measurement, float((largest / limits)[turning].max()))
+        )
+        if ratio is not None and not (degrees and abs(ratio * DEGREE - 1) < 0.06):
+            value = float(f"{1 / ratio:.3g}")
+            moving = dict.fromkeys(both, value)
+            words = ",".join(f"{name}={size:g}" for name, size in moving.items())
+            yield self.suspicion(
+                "positions and velocities are those of motors, before the gears, or in an unknown "
+                "unit",
+                f"{seen}; divided by {ratio:.3g} they explain the torque best",
+                "certain",
+                np.flatnonzero(outside),
+                (f"--gain {words}", f"gain={moving}"),
+            )
+        elif degrees:
             certain = bool((outside & known).any()) or float(np.median(largest[turning])) > 25
             yield self.suspicion(
                 "positions look like degrees",
-                f"q{k + 1} ({measurement.joint_names[k]}) reaches {largest[k]:.4g} rad where "
-                f"{where}; read as degrees it would be {largest[k] * DEGREE:.3g} rad",
+                f"{seen}; read as degrees it would be {largest[k] * DEGREE:.3g} rad",
                 "certain" if certain else "suspected",
                 np.flatnonzero(outside),
-                _units(both),
+                unit_remedy(both),
             )
-
-
-class Velocity(Check):
-    """Velocities that are not the derivative of the positions."""
-
-    name = "velocity"
-    suspects = "velocities with the other sign, in degrees, or of something else than the positions"
-
-    def look(self, measurement: Measurement) -> Iterable[Suspicion]:
-        groups: dict[str, list[int]] = {}
-        typical = float(np.median([s for s, _ in measurement.velocities if np.isfinite(s)] or [1]))
-        if any(abs(typical / factor - 1) < NEAR for factor in (*CLOCKS, DEGREE)):
-            return []  # all of them are: the unit of the clock or of the positions
-        for k, (slope, correlation) in enumerate(measurement.velocities):
-            if not np.isfinite(slope) or not measurement.excited[k] or abs(slope - 1) < NEAR:
-                continue
-            cause = "other"
-            if abs(slope + 1) < NEAR and correlation < -ALIKE:
-                cause = "sign"
-            elif abs(slope * DEGREE - 1) < NEAR and correlation > ALIKE:
-                cause = "degrees"
-            elif abs(slope / DEGREE - 1) < NEAR and correlation > ALIKE:
-                cause = "position"
-            groups.setdefault(cause, []).append(k)
-        return [self._told(measurement, cause, joints) for cause, joints in groups.items()]
-
-    def _told(self, measurement: Measurement, cause: str, joints: list[int]) -> Suspicion:
-        names = ", ".join(measurement.joint(k) for k in joints)
-        slopes = ", ".join(
-            f"{measurement.velocities[k][0]:.4g} (correlation {measurement.velocities[k][1]:.3f})"
-            for k in joints
-        )
-        evidence = f"the velocity is {slopes} times the differentiated position"
-        if cause == "sign":
-            columns = [f"dq{k + 1}" for k in joints]
-            return self.suspicion(
-                f"the velocity of {names} has the other sign",
-                evidence,
+        elif _too_far(measurement, DISTANT).any():
+            yield self.suspicion(
+                "positions are in an unknown unit, or those of motors before the gears",
+                seen,
                 "certain",
-                joints,
-                (f"--flip {','.join(columns)}", f"flip={columns}"),
+                np.flatnonzero(outside),
             )
-        every = len(joints) == measurement.n_joints
-        if cause in ("degrees", "position"):
-            quantity, unit = ("dq", "deg/s") if cause == "degrees" else ("q", "deg")
-            units = {quantity: unit} if every else {f"{quantity}{k + 1}": unit for k in joints}
-            what = "velocities look like deg/s" if cause == "degrees" else "positions look like"
-            what += " degrees" if cause == "position" else ""
-            return self.suspicion(f"{what} on {names}", evidence, "certain", joints, _units(units))
-        return self.suspicion(
-            f"the velocity of {names} is not the derivative of the position",
-            evidence,
-            "suspected",
-            joints,
-        )
+
+
+def _limits(measurement: Measurement) -> tuple[NDArray[np.bool_], Array, NDArray[np.bool_]]:
+    """Which joints turn, the largest position of each, and whether the description states it."""
+    robot = measurement.robot
+    if robot is None:
+        n = measurement.n_joints
+        return ~measurement.signals.prismatic, np.full(n, 2 * np.pi), np.zeros(n, dtype=bool)
+    turning = np.array([kind == "revolute" for kind in robot.joint_types])
+    limits = np.abs(np.asarray(robot.position_limits)).max(axis=1)
+    known = np.isfinite(limits)
+    return turning, np.where(known, limits, 2 * np.pi), known
+
+
+def _too_far(measurement: Measurement, times: float) -> NDArray[np.bool_]:
+    """Turning joints whose positions go so many times their limits, or turns, away."""
+    turning, limits, _ = _limits(measurement)
+    return np.asarray(turning & (np.abs(measurement.signals.q).max(axis=0) > times * limits))
+
+
+def unnamed_scale(measurement: Measurement, shared: float) -> bool:
+    """Whether velocities share a scale that is neither 1 nor that of a unit."""
+    known = (1.0, *CLOCKS, *VELOCITIES, *POSITIONS)
+    several = sum(measurement.excited) > 1
+    return several and shared > 0 and not any(abs(shared / f - 1) < NEAR for f in known)
+
+
+def _gained(fits: Fits, reading: Reading) -> float:
+    """Log-likelihood that a reading gains over the log as it is."""
+    return float(fits.nominal(reading).margin(fits.nominal(Reading())).sum())
+
+
+def _fitted_size(measurement: Measurement, least: float) -> float | None:
+    """Factor of all positions at which the robot explains the torque best; None if it is unsure."""
+    fits = measurement.fits
+    if fits is None or least < DISTANT:
+        return None
+    sizes = 0.8 * least * 1.03 ** np.arange(60)
+    likely = np.array([fits.nominal(Reading(size=x), 2).likelihood.sum() for x in sizes])
+    best = int(np.argmax(likely))
+    inflation = max(1.0, float(np.median(fits.nominal(Reading(size=sizes[best])).inflation)))
+    far = np.abs(np.arange(len(sizes)) - best) > 4
+    sure = (likely[best] - likely[far].max()) / inflation > LEAST
+    if not sure or not 0 < best < len(sizes) - 1:
+        return None
+    finer = sizes[best] * 1.002 ** np.arange(-14, 15)
+    likely = np.array([fits.nominal(Reading(size=x), 2).likelihood.sum() for x in finer])
+    return float(finer[int(np.argmax(likely))])
+
+
+def _round(factor: float) -> float:
+    """The whole number, or its reciprocal, or the short decimal fraction that a factor is near."""
+    large = max(factor, 1 / factor)
+    near = [x for x in (round(large), round(large, 1)) if abs(x / large - 1) < WHOLE]
+    whole = near[0] if near else large
+    return whole if factor > 1 else 1 / whole
+
+
+def _round_counts(counts: float) -> float:
+    """Power of two or round number of counts in a turn that counts are near."""
+    digits = 10.0 ** max(0, np.floor(np.log10(counts)) - 1)
+    near = (2.0 ** round(np.log2(counts)), round(counts / digits) * digits)
+    return next((x for x in near if abs(x / counts - 1) < WHOLE), counts)
 
 
 class WrappedPosition(Check):
@@ -186,7 +289,7 @@ class WrappedPosition(Check):
                     break
 
 
-def _units(units: dict[str, str]) -> tuple[str, str]:
+def unit_remedy(units: dict[str, str]) -> tuple[str, str]:
     """The remedy that says units."""
     words = ",".join(f"{name}={unit}" for name, unit in units.items())
     return f"--units {words}", f"units={units}"

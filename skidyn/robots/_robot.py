@@ -20,7 +20,7 @@ from skidyn.robots._description import Description
 from skidyn.robots._mjcf import parse_mjcf
 from skidyn.robots._sdf import parse_sdf
 from skidyn.robots._urdf import parse_urdf
-from skidyn.robots._xml import parse_robot_element, read_description
+from skidyn.robots._xml import first_element, parse_robot_element, read_description
 
 if TYPE_CHECKING:
     import torch
@@ -100,6 +100,57 @@ class Robot:
     inertial_parameters: np.ndarray
     tree: KinematicTree
     links: dict[str, LinkPlacement]
+
+    @classmethod
+    def from_file(
+        cls,
+        source: str | bytes | os.PathLike[str],
+        *,
+        joints: Sequence[str] | None = None,
+        gravity: Sequence[float] | None = None,
+    ) -> Robot:
+        """Read a robot from a URDF, an SDF or an MJCF, whichever its first element says.
+
+        Parameters
+        ----------
+        source : str, bytes or path
+            Path of the file, or the text itself (anything that starts with ``<``).
+        joints : sequence of str, default=None
+            Joints that the logs cover, as in :meth:`from_urdf`.
+        gravity : sequence of 3 floats, default=None
+            Gravitational acceleration in the base frame, m/s^2. None: (0, 0, -9.81), or what an
+            MJCF says.
+
+        Returns
+        -------
+        Robot
+
+        Raises
+        ------
+        RobotDescriptionError
+            As :meth:`from_urdf`, :meth:`from_sdf` and :meth:`from_mjcf`.
+
+        Examples
+        --------
+        >>> from skidyn.robots import Robot
+        >>> robot = Robot.from_file('''
+        ...   <robot name="slider"><link name="base"/>
+        ...     <link name="tool"><inertial>
+        ...       <mass value="2"/><inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/>
+        ...     </inertial></link>
+        ...     <joint name="up" type="prismatic">
+        ...       <parent link="base"/><child link="tool"/><axis xyz="0 0 1"/>
+        ...       <limit lower="0" upper="1" effort="9" velocity="1"/>
+        ...     </joint>
+        ...   </robot>''')
+        >>> robot.gravity_torque([[0.5]])
+        array([[19.62]])
+        """
+        given: dict[str, Any] = {} if gravity is None else {"gravity": gravity}
+        kind = first_element(read_description(source))
+        read: Any = {"sdf": cls.from_sdf, "mujoco": cls.from_mjcf}.get(kind, cls.from_urdf)
+        robot: Robot = read(source, joints=joints, **given)
+        return robot
 
     @classmethod
     def from_urdf(

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import re
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 from xml.parsers import expat
@@ -46,6 +47,13 @@ def read_description(source: str | bytes | os.PathLike[str]) -> bytes:
     return data
 
 
+def first_element(data: bytes) -> str:
+    """Name of the root element, which says the format of a description; empty if there is none."""
+    text = re.sub(rb"<!--.*?-->|<\?.*?\?>", b"", data[:100_000], flags=re.DOTALL)
+    hit = re.search(rb"<\s*([A-Za-z_][\w.-]*)", text)
+    return hit[1].decode() if hit else ""
+
+
 def parse_robot_element(data: bytes) -> ElementTree.Element:
     """Root element with only links and joints in it, free of anything a parser could expand.
 
@@ -62,7 +70,10 @@ def parse_robot_element(data: bytes) -> ElementTree.Element:
             + (f" Robot.{reader} reads it." if reader else "")
         )
     if any("xacro" in element.tag for element in root.iter() if isinstance(element.tag, str)):
-        raise RobotDescriptionError("The description holds xacro macros; expand them first: xacro.")
+        raise RobotDescriptionError(
+            "The description holds xacro macros; expand them first: "
+            "xacro robot.urdf.xacro > robot.urdf (pip install xacro brings it without ROS)."
+        )
     for element in list(root):
         if element.tag == "link":
             _keep(element, _KEPT_IN_LINK)

@@ -1,0 +1,226 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Checks of velocities against positions: sign, scale, order, delay, and leaps of positions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from skidyn._signals import Signals
+from skidyn.measurement._check import Check
+from skidyn.measurement._measurement import ALIKE, Measurement
+from skidyn.measurement._measures import velocity_consistency
+from skidyn.measurement._suspicion import Suspicion
+from skidyn.measurement._units import (
+    CLOCKS,
+    NEAR,
+    POSITIONS,
+    VELOCITIES,
+    unit_remedy,
+    unnamed_scale,
+)
+
+#: Windows over which velocities are compared with positions, at most.
+WINDOWS = 3000
+#: Lags of the velocity that are tried, s; the least that is told, s and in time steps; the share
+#: of the difference that it takes away; joints that agree and how nearly, s.
+LAGS = np.linspace(-0.1, 0.1, 21)
+SMALLEST, STEPS, TAKEN, AGREEING, NEARLY = 0.006, 1.2, 0.3, 0.75, 0.01
+
+
+class Velocity(Check):
+    """Velocities that are not the derivative of the positions."""
+
+    name = "velocity"
+    suspects = (
+        "velocities with the other sign, in degrees or turns, of another joint, or of something "
+        "else than the positions"
+    )
+
+    def look(self, measurement: Measurement) -> Iterable[Suspicion]:
+        shared = measurement.velocity_scale
+        if _of_units(shared) or (np.isfinite(shared) and unnamed_scale(measurement, shared)):
+            return []  # the unit of the clock or of the positions
+        order = _other_order(measurement)
+        if order is not None:
+            moved = [k for k, column in enumerate(order) if column != k]
+            numbers = [column + 1 for column in order]
+            names = ", ".join(measurement.joint(k) for k in moved)
+            words = ",".join(map(str, numbers))
+            told = self.suspicion(
+                f"the velocities of {names} are exchanged",
+                "each is the rate of another joint's position",
+                "certain",
+                moved,
+                (f"--order dq={words}", f"order={{'dq': {numbers}}}"),
+            )
+            return [told]
+        groups: dict[str, list[int]] = {}
+        for k, (slope, correlation) in enumerate(measurement.velocities):
+            if not np.isfinite(slope) or not measurement.excited[k] or abs(slope - 1) < NEAR:
+                continue
+            groups.setdefault(_cause(slope, correlation), []).append(k)
+        return [self._told(measurement, cause, joints) for cause, joints in groups.items()]
+
+    def _told(self, measurement: Measurement, cause: str, joints: list[int]) -> Suspicion:
+        names = ", ".join(measurement.joint(k) for k in joints)
+        slopes = ", ".join(
+            f"{measurement.velocities[k][0]:.4g} (correlation {measurement.velocities[k][1]:.3f})"
+            for k in joints
+        )
+        evidence = f"the velocity is {slopes} times the differentiated position"
+        if cause == "sign":
+            columns = [f"dq{k + 1}" for k in joints]
+            return self.suspicion(
+                f"the velocity of {names} has the other sign",
+                evidence,
+                "certain",
+                joints,
+                (f"--flip {','.join(columns)}", f"flip={columns}"),
+            )
+        every = len(joints) == measurement.n_joints
+        if cause in ("scale", "other"):
+            pairs = {f"dq{k + 1}": float(f"{1 / measurement.velocities[k][0]:.4g}") for k in joints}
+            words = ",".join(f"{name}={value:g}" for name, value in pairs.items())
+            return self.suspicion(
+                f"the velocity of {names} is not the derivative of the position",
+                evidence + ("; it is at another scale" if cause == "scale" else ""),
+                "suspected",
+                joints,
+                (f"--gain {words}", f"gain={pairs}") if cause == "scale" else None,
+            )
+        quantity, unit = cause.split("=")
+        units = {quantity: unit} if every else {f"{quantity}{k + 1}": unit for k in joints}
+        what = "velocities" if quantity == "dq" else "positions"
+        unit = {"deg": "degrees", "rev": "turns"}.get(unit, unit)
+        return self.suspicion(
+            f"{what} look like {unit} on {names}", evidence, "certain", joints, unit_remedy(units)
+        )
+
+
+def _of_units(slope: float) -> bool:
+    """Whether a slope that all joints share is told as a unit of the clock or of positions."""
+    return any(abs(slope / factor - 1) < NEAR for factor in (*CLOCKS, *POSITIONS))
+
+
+def _cause(slope: float, correlation: float) -> str:
+    if abs(slope + 1) < NEAR and correlation < -ALIKE:
+        return "sign"
+    if correlation > ALIKE:
+        for factor, unit in VELOCITIES.items():
+            if abs(slope / factor - 1) < NEAR:
+                return f"dq={unit}"
+        for factor, unit in POSITIONS.items():
+            if abs(slope / factor - 1) < NEAR:
+                return f"q={unit}"
+    return "scale" if abs(correlation) > 0.99 else "other"
+
+
+def _other_order(measurement: Measurement) -> list[int] | None:
+    """Column that holds the velocity of each joint, if they are exchanged; None otherwise."""
+    n = measurement.n_joints
+    own = np.array([likeness for _, likeness in measurement.velocities])
+    odd = [k for k in range(n) if measurement.excited[k] and abs(own[k]) < ALIKE]
+    if len(odd) < 2:
+        return None
+    s = measurement.signals
+    likeness = np.array(
+        [
+            [velocity_consistency(s.clock, s.q[:, k], s.dq[:, m], s.segments)[1] for m in odd]
+            for k in odd
+        ]
+    )
+    rows, found = linear_sum_assignment(-likeness)
+    order = list(range(n))
+    for k, m in zip(rows, found, strict=True):
+        if likeness[k, m] > ALIKE:
+            order[odd[k]] = odd[m]
+    moved = sorted(column for k, column in enumerate(order) if column != k)
+    if not moved or sorted(order) != list(range(n)):
+        return None
+    return order
+
+
+class VelocityDelay(Check):
+    """Velocities that are late or early against the positions, alike in all joints."""
+
+    name = "velocity_delay"
+    suspects = "velocities that are late against the positions: filtered, or another clock"
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        lags = [
+            _lag(measurement.signals, k)
+            for k, (slope, likeness) in enumerate(measurement.velocities)
+            if measurement.excited[k] and likeness > 0.5 and slope > 0.5
+        ]
+        told = np.array([lag for lag in lags if np.isfinite(lag)])
+        if not len(told) or len(told) < AGREEING * sum(measurement.excited):
+            return
+        common = float(np.median(told))
+        alike = np.abs(told - common) < max(NEARLY, 0.3 * abs(common))
+        if (
+            abs(common) < max(SMALLEST, STEPS / measurement.rate)
+            or alike.mean() < AGREEING
+            or alike.sum() < min(2, measurement.n_joints)
+        ):
+            return
+        late, early = ("velocity", "position") if common > 0 else ("position", "velocity")
+        column = "dq" if common > 0 else "q"
+        value = float(f"{abs(common):.2g}")
+        yield self.suspicion(
+            f"the {late} is late against the {early} by about {1e3 * value:g} ms",
+            f"at that lag it is the rate of the position, alike in {int(alike.sum())} of "
+            f"{len(told)} joints that move: it was filtered, or has another clock",
+            "suspected",
+            remedy=(f"--late {column}={value:g}", f"late={{'{column}': {value:g}}}"),
+        )
+
+
+def _lag(signals: Signals, k: int) -> float:
+    """Lag of a joint's velocity behind the rate of its position, s; NaN where it cannot be told."""
+    errors, plain = np.zeros(len(LAGS)), 0.0
+    for rows in signals.segments:
+        time, q, dq = signals.clock[rows], signals.q[rows, k], signals.dq[rows, k]
+        if len(time) < 20 or time[-1] - time[0] < 10 * LAGS[-1] or np.any(np.diff(time) <= 0):
+            continue
+        area = np.r_[0.0, np.cumsum((dq[1:] + dq[:-1]) / 2 * np.diff(time))]
+        # change over windows, so that steps of an encoder do not count
+        begin = time[(time > time[0] + 0.15) & (time < time[-1] - 0.2)]
+        begin = begin[:: 1 + len(begin) * len(signals.segments) // WINDOWS]
+        change = np.interp(begin + 0.05, time, q) - np.interp(begin, time, q)
+        for i, lag in enumerate(LAGS):
+            later = np.interp(begin + 0.05 + lag, time, area) - np.interp(begin + lag, time, area)
+            errors[i] += float(np.sum((later - change) ** 2))
+        plain += float(np.sum(change**2))
+    best = int(np.argmin(errors))
+    if plain <= 0 or best in (0, len(LAGS) - 1) or errors[best] > 0.1 * plain:
+        return float("nan")
+    left, middle, right = errors[best - 1 : best + 2]
+    bend = left - 2 * middle + right
+    step = LAGS[1] - LAGS[0]
+    lag = LAGS[best] + step * (0.5 * (left - right) / bend if bend > 0 else 0.0)
+    return float(lag) if errors[best] < (1 - TAKEN) * errors[len(LAGS) // 2] else 0.0
+
+
+class JoinedRecordings(Check):
+    """Positions that leap to another place and go on from there: recordings joined, or cut out."""
+
+    name = "joined"
+    suspects = "recordings that were joined, or from which a part was cut, as if they were one"
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        s = measurement.signals
+        rows = measurement.leaps
+        if len(rows):
+            shown = ", ".join(str(int(row)) for row in rows[:6]) + (" .." if len(rows) > 6 else "")
+            joint = int(np.argmax(np.abs(s.q[rows[0]] - s.q[rows[0] - 1])))
+            yield self.suspicion(
+                "recordings were joined, or a part was cut out of one",
+                f"positions leap in {len(rows)} place(s) farther than any velocity takes them, and "
+                f"go on from there (rows {shown}; {measurement.joint(joint)} by "
+                f"{abs(s.q[rows[0], joint] - s.q[rows[0] - 1, joint]):.3g})",
+                "certain",
+                remedy=("--split-leaps", "split_leaps=True"),
+            )
