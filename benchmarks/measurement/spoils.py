@@ -373,7 +373,7 @@ def bodies(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled
     size = np.exp(rng.choice([-1, 1], robot.n_bodies) * rng.uniform(1.0, 1.8, robot.n_bodies))
     parameters = np.asarray(robot.inertial_parameters).reshape(robot.n_bodies, 10)
     claimed = replace(robot, inertial_parameters=parameters * size[:, None])
-    return Spoiled(log, claimed, ("bodies",), "", None)
+    return Spoiled(log, claimed, ("bodies", "torque_scale"), "", None)
 
 
 def friction_taken_off(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled:

@@ -16,6 +16,8 @@ from skidyn.measurement._torque import cut_columns
 
 #: Share of rows at the extreme torque from which it is told.
 CLIPPED = 0.002
+#: Step of a position from which it is coarse, rad: a turn in 13 bits.
+COARSE = 0.9 * 2 * np.pi / 2**13
 #: Share of rows that hold the torque of the row before, while it is not coarse, to be told.
 HELD = 0.3
 
@@ -37,6 +39,31 @@ class StillJoint(Check):
                     "noted",
                     [k],
                 )
+
+
+class CoarsePosition(Check):
+    """Positions in steps that are felt as accelerations."""
+
+    name = "coarse_position"
+    suspects = "positions in coarse steps"
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        q = measurement.signals.q
+        steps = {
+            k: position_step(q[:, k])
+            for k in range(measurement.n_joints)
+            if not measurement.signals.prismatic[k]
+        }
+        coarse = {k: step for k, step in steps.items() if step > COARSE}
+        if coarse:
+            largest = max(coarse.values())
+            yield self.suspicion(
+                "positions come in coarse steps",
+                f"of up to {largest:.3g} rad, {2 * np.pi / largest:.0f} a turn; accelerations, "
+                "and small effects on them, are told less surely",
+                "noted",
+                sorted(coarse),
+            )
 
 
 class ConstantTorque(Check):

@@ -4,9 +4,17 @@
 from __future__ import annotations
 
 from skidyn._exceptions import LogError
+from skidyn.measurement._bodies import (
+    Bodies,
+    ComputedTorque,
+    NoFriction,
+    TorqueScale,
+    UnexplainedTorque,
+)
 from skidyn.measurement._channels import (
     BrokenSamples,
     ClippedTorque,
+    CoarsePosition,
     ConstantTorque,
     HeldTorque,
     StillJoint,
@@ -21,14 +29,7 @@ from skidyn.measurement._clock import (
 )
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._suspicion import CERTAINTIES, Suspicion
-from skidyn.measurement._torque import (
-    Bodies,
-    Columns,
-    ComputedTorque,
-    TorqueDelay,
-    TorqueScale,
-    UnsignedTorque,
-)
+from skidyn.measurement._torque import Columns, TorqueDelay, UnsignedTorque
 from skidyn.measurement._units import ClockUnit, PositionUnit, WrappedPosition
 from skidyn.measurement._velocity import JoinedRecordings, Velocity, VelocityDelay
 
@@ -42,6 +43,7 @@ CHECKS: tuple[Check, ...] = (
     UnsignedTorque(),
     Columns(),
     TorqueScale(),
+    UnexplainedTorque(),
     Bodies(),
     RepeatedRows(),
     ClockJitter(),
@@ -52,6 +54,8 @@ CHECKS: tuple[Check, ...] = (
     ConstantTorque(),
     ClippedTorque(),
     ComputedTorque(),
+    NoFriction(),
+    CoarsePosition(),
     SlowSampling(),
     Gaps(),
     StillJoint(),
@@ -112,6 +116,7 @@ def check_measurement(measurement: Measurement) -> list[Suspicion]:
             continue
         told = list(check.look(measurement))
         found += told
+        measurement.scaled |= check.name == "torque_scale" and bool(told)
         if check in _UNITS and any(s.certainty == "certain" for s in told):
             misread = 1
         elif check in _SCALES and any(s.certainty == "suspected" for s in told):

@@ -244,11 +244,15 @@ class Fits:
         key = (motion, joint, column, sign, rounds)
         if key not in self._fitted:
             y, use = self._rows(column)
-            columns = self._columns(motion)[use, :, joint]
+            columns = self.columns(motion)[use, :, joint]
             self._fitted[key] = fit_admissible(columns, sign * y[use], rounds)
         return self._fitted[key]
 
-    def _columns(self, motion: Reading) -> Array:
+    def coefficients(self, joint: int) -> Array:
+        """Of a joint read as it is: multiple of its own torque, viscous, dry, rotor inertia."""
+        return self._joint_fit(Reading(), joint, joint, 1.0, ROUNDS).coefficients
+
+    def columns(self, motion: Reading) -> Array:
         """Mean columns of every joint, shape (n_rows, 4, n_joints)."""
         if motion not in self._moved:
             s = self.motion(motion)

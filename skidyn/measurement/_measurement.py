@@ -46,7 +46,7 @@ class Measurement:
         Names for sentences and remedies.
     leaps : ndarray of int
         Rows to which positions leap; trajectories are taken to end there.
-    unsigned, delay, readable, stale : optional
+    unsigned, delay, readable, stale, scaled : optional
         What checks found that others want to know; filled in by them.
 
     Examples
@@ -67,6 +67,7 @@ class Measurement:
     delay: Delay | None = field(default=None, repr=False)
     readable: bool = field(default=True, repr=False)
     stale: bool = field(default=False, repr=False)
+    scaled: bool = field(default=False, repr=False)
     leaps: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:

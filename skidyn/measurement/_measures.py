@@ -44,7 +44,11 @@ def is_repeated(position: np.ndarray, velocity: np.ndarray, trajectory: np.ndarr
     same = np.all(position[1:] == position[:-1], axis=1) & (trajectory[1:] == trajectory[:-1])
     moving = np.any(np.abs(velocity[1:]) > 0.02 * np.abs(velocity).max(axis=0), axis=1)
     again[1:] = same & moving
-    return again
+    # a coarse sensor holds its value too, but each joint by itself
+    single = np.mean(position[1:] == position[:-1], axis=0)
+    single = single[np.ptp(position, axis=0) > 0]
+    at_once = len(single) < 2 or same.mean() > AT_ONCE * np.median(single)
+    return again if at_once else np.zeros_like(again)
 
 
 def is_held(torque: np.ndarray, moved: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ import numpy as np
 from skidyn._signals import Array
 from skidyn.measurement._check import Check
 from skidyn.measurement._delay import Delay, find_delay
-from skidyn.measurement._fits import Fits, Outcome, Reading, fit_admissible, friction
+from skidyn.measurement._fits import Fits, Reading, fit_admissible, friction
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import reversals
 from skidyn.measurement._readings import DECISIVE, HALF, Change, find_changes
@@ -263,153 +263,14 @@ def _sure(changes: Iterable[Change]) -> bool:
     )
 
 
-class TorqueScale(Check):
-    """Torque in another unit, at the motor, or currents."""
-
-    name = "torque_scale"
-    suspects = "currents, motor torque or another unit in the place of joint torque"
-    stage = 2
-
-    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
-        fits = measurement.fits
-        if fits is None:
-            return
-        unsigned, _ = unsigned_columns(measurement)
-        fits = fits.without([*unsigned, *cut_columns(measurement)])
-        gains = _known_gains(fits)
-        odd = [k for k, gain in gains.items() if not USUAL[0] <= gain <= USUAL[1]]
-        if not odd:
-            return
-        told = ", ".join(f"{measurement.joint_names[k]} {gains[k]:.3g}" for k in gains)
-        every = len(odd) == len(gains)
-        typical = float(np.median([gains[k] for k in gains]))
-        unit = next((u for f, u in UNITS.items() if abs(np.log(typical / f)) < 0.3), None)
-        if every and unit is not None and len(gains) > 1:
-            yield self.suspicion(
-                f"torque looks like {unit}",
-                f"it is the robot's own torque times {told}",
-                "certain",
-                odd,
-                (f"--units tau={unit}", f"units={{'tau': '{unit}'}}"),
-            )
-            return
-        pairs = {f"tau{k + 1}": float(f"{1 / gains[k]:.3g}") for k in odd}
-        words = ",".join(f"{name}={value}" for name, value in pairs.items())
-        remedy = (f"--gain {words}", f"gain={pairs}")
-        if every:
-            yield self.suspicion(
-                "torques look like motor currents, motor torques or another unit",
-                f"they follow the robot's rigid-body torque at another scale ({told}). Better than "
-                "the gains below, which hold the bodies of the description, are the torques per "
-                "ampere of the drives (--drive-gains with i columns)",
-                "suspected",
-                odd,
-                remedy,
-            )
-            return
-        odd = [k for k in odd if _confirmed(fits, k, gains[k])]
-        if not odd:
-            return
-        pairs = {name: value for name, value in pairs.items() if int(name[3:]) - 1 in odd}
-        words = ",".join(f"{name}={value}" for name, value in pairs.items())
-        remedy = (f"--gain {words}", f"gain={pairs}")
-        names = ", ".join(measurement.joint(k) for k in odd)
-        yield self.suspicion(
-            f"the torque of {names} is at another scale than that of the other joints",
-            f"torques are the robot's own times {told}",
-            "suspected",
-            odd,
-            remedy,
-        )
-
-
-def _confirmed(fits: Fits, k: int, gain: float) -> bool:
-    """Whether identified bodies, which all joints share, ask for the gain of one joint too."""
-    plain = fits.identified(Reading())
-    other = fits.scaled({k: gain}).identified(Reading())
-    # the density of a torque is that of the divided one over the gain
-    change = other.margin(plain)
-    change[k] -= float(fits.moving[:, k].sum()) * np.log(gain) / max(other.inflation[k], 1.0)
-    return float(change.sum()) > LEAST
-
-
-def _known_gains(fits: Fits) -> dict[int, float]:
-    """Multiple of the robot's own torque, of the columns of which it explains enough."""
-    here = fits.nominal(Reading())
-    s = fits.motion(Reading())
-    known = {}
-    for k in range(fits.n_joints):
-        if not fits.usable(k) or not here.gain[k] > 0:
-            continue
-        use = fits.moving[:, k]
-        y = fits.average(fits.torque[:, k])[use]
-        bare = fit_admissible(fits.average(friction(s, k))[use], y)
-        if here.scale[k] ** 2 < (1 - EXPLAINED) * bare.scale**2 * (1 - EXPLAINED):
-            known[k] = float(here.gain[k])
-    return known
-
-
-class Bodies(Check):
-    """Bodies of the description that are not those of the robot."""
-
-    name = "bodies"
-    suspects = "masses or inertias of the description that are not those of the robot"
-    stage = 2
-
-    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
-        fits = measurement.fits
-        if fits is None or not np.any(fits.robot.inertial_parameters):
-            return
-        stated, identified = fits.nominal(Reading()), fits.identified(Reading())
-        wrong = []
-        for k in range(fits.n_joints):
-            if not fits.usable(k):
-                continue
-            spread = _spread(fits.average(fits.torque[:, k])[fits.moving[:, k]])
-            if stated.scale[k] > 0.5 * spread and identified.scale[k] < 0.15 * spread:
-                wrong.append(k)
-        if wrong:
-            ratios = ", ".join(
-                f"{measurement.joint_names[k]} {stated.scale[k] / identified.scale[k]:.2g}"
-                for k in wrong
-            )
-            yield self.suspicion(
-                "the bodies of the robot's description do not explain the torque, identified ones "
-                "do",
-                "errors with the stated bodies and any friction are those of identified bodies "
-                f"times {ratios}",
-                "suspected",
-                wrong,
-            )
-
-
-def _spread(values: Array) -> float:
-    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
-
-
-class ComputedTorque(Check):
-    """Torque that equals a model: commanded or computed, not measured."""
-
-    name = "computed_torque"
-    suspects = "commanded or computed torque in the place of a measured one"
-    stage = 2
-
-    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
-        fits = measurement.fits
-        if fits is None:
-            return
-        shares = []
-        outcome: Outcome = fits.identified(Reading())
-        for k in range(fits.n_joints):
-            if fits.usable(k):
-                spread = _spread(fits.average(fits.torque[:, k])[fits.moving[:, k]])
-                shares.append(outcome.scale[k] / spread if spread > 0 else 1.0)
-        if shares and max(shares) < 1e-4 and fits.n_rows > 200:
-            yield self.suspicion(
-                "the torque has no noise: it was commanded or computed, not measured",
-                f"a rigid body with friction explains all of it but {max(shares):.1g}",
-                "noted",
-            )
+def readable_fits(measurement: Measurement) -> Fits | None:
+    """Rows of a measurement without torques that lost their sign; None where none can be fitted."""
+    fits = measurement.fits if measurement.readable else None
+    if fits is None:
+        return None
+    unsigned, _ = unsigned_columns(measurement)
+    lost = [*unsigned, *cut_columns(measurement)]
+    return fits.without(lost) if lost else fits
 
 
 class TorqueDelay(Check):
@@ -448,10 +309,9 @@ class TorqueDelay(Check):
 
 def measured_delay(measurement: Measurement) -> Delay | None:
     """Delay of the torque of a measurement; None without a robot or rows."""
-    fits = measurement.fits if measurement.readable else None
+    fits = readable_fits(measurement)
     if fits is None:
         return None
     if measurement.delay is None:
-        unsigned, _ = unsigned_columns(measurement)
-        measurement.delay = find_delay(fits.without([*unsigned, *cut_columns(measurement)]))
+        measurement.delay = find_delay(fits)
     return measurement.delay

@@ -40,7 +40,8 @@ def signals():
 @pytest.fixture
 def torque(signals):
     noise = np.random.default_rng(0).normal(0, 0.05, signals.q.shape)
-    return ROBOT.inverse_dynamics(signals.q, signals.dq, signals.ddq) + noise
+    friction = 0.8 * signals.dq + 1.2 * np.sign(signals.dq)
+    return ROBOT.inverse_dynamics(signals.q, signals.dq, signals.ddq) + friction + noise
 
 
 def found(signals, torque, robot=ROBOT):
@@ -200,3 +201,68 @@ def test_checks_have_names_of_their_own():
     checks = list_checks()
     assert len({check.name for check in checks}) == len(checks)
     assert all(check.suspects for check in checks)
+
+
+def test_clock_at_another_rate(signals, torque):
+    slow = found(signals.with_(time=2 * signals.time), torque)
+    only(slow, "clock_unit", slow[0].certainty, "--gain time=0.5")
+
+
+def test_positions_in_turns(signals, torque):
+    only(
+        found(signals.with_(q=signals.q / 2 / np.pi), torque),
+        *("position_unit", "certain", "--units q=rev"),
+    )
+
+
+def test_counts_of_an_encoder(signals, torque):
+    counts = np.round(signals.q * 4096 / 2 / np.pi)
+    told = found(signals.with_(q=counts), torque)[0]
+    assert (told.check, told.certainty) == ("position_unit", "certain")
+    name, size = told.remedy.option.split("=")
+    assert name == "--gain q" and float(size) == pytest.approx(2 * np.pi / 4096)
+
+
+def test_exchanged_velocities(signals, torque):
+    only(
+        found(signals.with_(dq=signals.dq[:, ::-1]), torque),
+        *("velocity", "certain", "--order dq=2,1"),
+    )
+
+
+def test_late_velocities(signals, torque):
+    late = np.stack([np.interp(signals.time - 0.03, signals.time, dq) for dq in signals.dq.T], 1)
+    only(found(signals.with_(dq=late), torque), "velocity_delay", "suspected", "--late dq=0.03")
+
+
+def test_joined_recordings_are_told_once_and_cut_for_other_checks(signals, torque):
+    kept = np.r_[0:700, 1250:2000]
+    joined = signals.take(kept).with_(time=signals.time[: len(kept)])
+    only(found(joined, torque[kept]), "joined", "certain", "--split-leaps")
+
+
+def test_zero_of_a_joint(signals, torque):
+    told = found(signals.with_(q=signals.q + [0.0, 1.0]), torque)
+    assert [s.check for s in told] == ["reading"]
+    name, value = told[0].remedy.option.split("=")
+    assert name == "--zero q2" and float(value) == pytest.approx(1.0, abs=0.02)
+
+
+def test_torques_that_are_held(signals, torque):
+    held = torque[np.arange(len(torque)) // 4 * 4]
+    only(found(signals, held), "held_torque", "certain", "--drop-repeated")
+
+
+def test_torque_cut_at_zero(signals, torque):
+    cut = torque.copy()
+    cut[:, 1] = np.maximum(cut[:, 1], 0)
+    told = [s for s in found(signals, cut) if s.certainty == "certain"]
+    assert [(s.check, s.joints) for s in told] == [("unsigned_torque", (2,))]
+    assert told[0].remedy is None
+
+
+def test_torque_of_something_else():
+    wave = np.random.default_rng(4).normal(size=len(LOG.frame))
+    wave = np.convolve(wave, np.hanning(80), "same")
+    other = LOG.frame.assign(tau2=LOG.frame["tau2"].std() * wave / wave.std())
+    assert told_of(other)["unexplained"].joints == (2,)

@@ -1,0 +1,319 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Checks of the torque against bodies: its scale, other bodies, no friction, no measurement."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidyn._signals import Array
+from skidyn.measurement._check import Check
+from skidyn.measurement._fits import Fits, Outcome, Reading, fit_admissible, friction
+from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._suspicion import Suspicion
+from skidyn.measurement._torque import readable_fits
+
+#: Log-likelihood that another scale must gain.
+LEAST = 15.0
+#: Share of a torque's spread that the robot must explain for its multiple to be told.
+EXPLAINED = 0.5
+#: Multiples of the robot's own torque that wrong masses may well make.
+USUAL = (0.4, 2.5)
+#: Factors of units of torque.
+UNITS = {1e3: "Nmm", 1e2: "Ncm", 1e-3: "kNm"}
+#: Error with stated bodies, as a share of the spread, and in errors with identified ones, from
+#: which the stated ones are not those of the robot; share of a torque that bodies are to hold.
+WRONG, TIMES, HEAVY = 0.2, 3.0, 0.3
+#: Error of any bodies, as a share of the spread, and in errors of the mean of a row, from which a
+#: torque has little to do with the motion.
+UNRELATED, BEYOND = 0.67, 4.0
+#: Largest share of friction, and that of the joint in the middle, where there is none.
+FRICTIONLESS, HARDLY = 0.06, 0.02
+#: How near a computed torque is to that of the stated bodies, and how little it scatters.
+EQUAL, CLOSE, SILENT = 0.01, 0.05, 4e-3
+
+
+@dataclass
+class Explained:
+    """How well stated and identified bodies explain the torque of every joint that is used.
+
+    Attributes
+    ----------
+    fits : Fits
+        Rows.
+    stated, identified : Outcome
+        Fits with the bodies of the description and with others.
+    joints : list of int
+        Joints whose torque is used, from 0.
+    """
+
+    fits: Fits
+    stated: Outcome
+    identified: Outcome
+    joints: list[int]
+
+    def _torque(self, k: int) -> Array:
+        fits = self.fits
+        return np.asarray(fits.average(fits.torque[:, k])[fits.moving[:, k]])
+
+    @cached_property
+    def spread(self) -> Array:
+        """Spread of the torque."""
+        return np.array([_spread(self._torque(k)) + 1e-12 for k in self.joints])
+
+    @cached_property
+    def errors(self) -> tuple[Array, Array]:
+        """Errors with stated and with identified bodies, as shares of the spread."""
+        stated, identified = self.stated.scale, self.identified.scale
+        return stated[self.joints] / self.spread, identified[self.joints] / self.spread
+
+    @cached_property
+    def shares(self) -> tuple[Array, Array]:
+        """What the stated bodies and friction hold, as shares of the spread."""
+        columns = self.fits.columns(Reading())
+        held = []
+        for k in self.joints:
+            use = self.fits.moving[:, k]
+            own, viscous, dry, _ = np.moveaxis(columns[use, :, k], 1, 0)
+            c = self.fits.coefficients(k)
+            held.append([_spread(c[0] * own), np.mean(np.abs(c[1] * viscous + c[2] * dry))])
+        bodies, rubs = np.array(held).T / self.spread
+        return bodies, rubs
+
+    @cached_property
+    def scatter(self) -> Array:
+        """Scatter of the samples within rows, as share of the spread of the torque."""
+        fits = self.fits
+        rows = fits.torque.reshape(fits.n_rows, -1, fits.n_joints)
+        bend = rows[:, 2:] - 2 * rows[:, 1:-1] + rows[:, :-2]
+        size = [_spread(bend[:, :, k].ravel()) / np.sqrt(6) for k in self.joints]
+        return np.array(size) / self.spread
+
+
+def explained(measurement: Measurement) -> Explained | None:
+    """Fits of a measurement with stated and with identified bodies; None where there are none."""
+    fits = readable_fits(measurement)
+    if fits is None or not np.any(fits.robot.inertial_parameters):
+        return None
+    joints = [k for k in range(fits.n_joints) if fits.usable(k)]
+    if not joints:
+        return None
+    return Explained(fits, fits.nominal(Reading()), fits.identified(Reading()), joints)
+
+
+class TorqueScale(Check):
+    """Torque in another unit, at the motor, or currents."""
+
+    name = "torque_scale"
+    suspects = "currents, motor torque or another unit in the place of joint torque"
+    stage = 2
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        fits = readable_fits(measurement)
+        if fits is None:
+            return
+        known = _known_gains(fits)
+        odd = [k for k, gain in known.items() if not USUAL[0] <= gain <= USUAL[1]]
+        if not odd:
+            return
+        here = fits.nominal(Reading()).gain
+        gains = {k: float(g) for k, g in enumerate(here) if np.isfinite(g) and g > 0}
+        told = ", ".join(f"{measurement.joint_names[k]} {gain:.3g}" for k, gain in gains.items())
+        values = np.array(list(gains.values()))
+        every = bool(np.all(values < USUAL[0]) or np.all(values > USUAL[1]))
+        typical = float(np.median(values))
+        unit = next((u for f, u in UNITS.items() if abs(np.log(typical / f)) < 0.3), None)
+        if every and unit is not None:
+            yield self.suspicion(
+                f"torque looks like {unit}",
+                f"it is the robot's own torque times {told}",
+                "certain",
+                sorted(gains),
+                (f"--units tau={unit}", f"units={{'tau': '{unit}'}}"),
+            )
+        elif every:
+            yield self.suspicion(
+                "torques look like motor currents, motor torques or another unit",
+                f"they follow the robot's rigid-body torque at another scale ({told}). Better than "
+                "the gains below, which hold the bodies of the description, are the torques per "
+                "ampere of the drives (--drive-gains with i columns)",
+                "suspected",
+                sorted(gains),
+                _gain_remedy(gains),
+            )
+        else:
+            odd = [k for k in odd if _confirmed(fits, k, known[k])]
+            if odd:
+                names = ", ".join(measurement.joint(k) for k in odd)
+                yield self.suspicion(
+                    f"the torque of {names} is at another scale than that of the other joints",
+                    f"torques are the robot's own times {told}",
+                    "suspected",
+                    odd,
+                    _gain_remedy({k: known[k] for k in odd}),
+                )
+
+
+def _gain_remedy(gains: dict[int, float]) -> tuple[str, str]:
+    """Factors that take multiples of the robot's own torque off."""
+    pairs = {f"tau{k + 1}": float(f"{1 / _unit_like(gain):.3g}") for k, gain in gains.items()}
+    words = ",".join(f"{name}={value:g}" for name, value in pairs.items())
+    return f"--gain {words}", f"gain={pairs}"
+
+
+def _unit_like(gain: float) -> float:
+    """The factor of a unit that a multiple of the robot's torque is near."""
+    return next((f for f in UNITS if abs(np.log(gain / f)) < 0.3), gain)
+
+
+def _confirmed(fits: Fits, k: int, gain: float) -> bool:
+    """Whether identified bodies, which all joints share, ask for the gain of one joint too."""
+    plain = fits.identified(Reading())
+    other = fits.scaled({k: gain}).identified(Reading())
+    # the density of a torque is that of the divided one over the gain
+    change = other.margin(plain)
+    change[k] -= float(fits.moving[:, k].sum()) * np.log(gain) / max(other.inflation[k], 1.0)
+    return float(change.sum()) > LEAST
+
+
+def _known_gains(fits: Fits) -> dict[int, float]:
+    """Multiple of the robot's own torque, of the columns of which it explains enough."""
+    here = fits.nominal(Reading())
+    s = fits.motion(Reading())
+    known = {}
+    for k in range(fits.n_joints):
+        if not fits.usable(k) or not here.gain[k] > 0:
+            continue
+        use = fits.moving[:, k]
+        y = fits.average(fits.torque[:, k])[use]
+        bare = fit_admissible(fits.average(friction(s, k))[use], y)
+        if here.scale[k] ** 2 < (1 - EXPLAINED) * bare.scale**2 * (1 - EXPLAINED):
+            known[k] = float(here.gain[k])
+    return known
+
+
+class Bodies(Check):
+    """Bodies of the description that are not those of the robot."""
+
+    name = "bodies"
+    suspects = "masses or inertias of the description that are not those of the robot"
+    stage = 2
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        seen = explained(measurement)
+        if seen is None or measurement.scaled:
+            return
+        stated, identified = seen.errors
+        wrong = (stated > WRONG) & (stated > TIMES * identified)
+        gain = seen.stated.gain[seen.joints]
+        heavy = (seen.shares[0] > HEAVY) & (stated < WRONG)
+        odd = heavy & ((gain < USUAL[0]) | (gain > USUAL[1]))
+        if not wrong.any() and odd.sum() < 2:
+            return
+        joints = [k for k, bad in zip(seen.joints, wrong | odd, strict=True) if bad]
+        ratios = ", ".join(
+            f"{measurement.joint_names[k]} {seen.stated.scale[k] / seen.identified.scale[k]:.2g}"
+            for k in joints
+        )
+        gains = ", ".join(f"{seen.stated.gain[k]:.2g}" for k in joints)
+        yield self.suspicion(
+            "masses or inertias of the robot's description are not those of the robot",
+            "errors with the stated bodies, each torque at the scale that fits it best "
+            f"({gains}), and with any friction, are those of identified bodies times {ratios}; "
+            "identify them (skidyn identify) before effects are read from the stated ones "
+            "(--nominal)",
+            "suspected",
+            joints,
+        )
+
+
+class UnexplainedTorque(Check):
+    """A torque that neither the stated bodies nor any others, with friction, explain."""
+
+    name = "unexplained"
+    suspects = "torque that has little to do with the motion: another signal, joint or time"
+    stage = 2
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        seen = explained(measurement)
+        if seen is None:
+            return
+        least = np.minimum(*seen.errors)
+        steady = seen.scatter / np.sqrt(6)  # white noise is no mistake
+        bad: NDArray[np.bool_] = (least > UNRELATED) & (least > BEYOND * steady)
+        joints = [k for k, found in zip(seen.joints, bad, strict=True) if found]
+        if joints:
+            names = ", ".join(measurement.joint(k) for k in joints)
+            shares = ", ".join(f"{100 * share:.0f} %" for share in least[bad])
+            yield self.suspicion(
+                f"the torque of {names} has little to do with the motion",
+                f"stated or identified bodies with any friction leave {shares} of its spread; it "
+                "may be another signal, of another joint or another time",
+                "suspected",
+                joints,
+            )
+
+
+class NoFriction(Check):
+    """Torque without friction."""
+
+    name = "no_friction"
+    suspects = "torque from which friction was taken off, or that was measured behind the gears"
+    stage = 2
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        seen = explained(measurement)
+        if seen is None:
+            return
+        rubs = seen.shares[1]
+        if len(rubs) > 1 and rubs.max() < FRICTIONLESS and np.median(rubs) < HARDLY:
+            yield self.suspicion(
+                "the torque holds no friction",
+                f"viscous and dry friction hold at most {100 * rubs.max():.1f} % of its spread: "
+                "it was taken off, measured behind the gears, or the log was computed",
+                "noted",
+            )
+
+
+class ComputedTorque(Check):
+    """Torque that equals a model: commanded or computed, not measured."""
+
+    name = "computed_torque"
+    suspects = "commanded or computed torque in the place of a measured one"
+    stage = 2
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        seen = explained(measurement)
+        if seen is None:
+            return
+        stated, identified = seen.errors
+        gain = seen.stated.gain[seen.joints]
+        equal = float(np.median(np.abs(gain - 1)))
+        rubs = seen.shares[1]
+        if (
+            equal < EQUAL
+            and np.median(stated) < CLOSE
+            and rubs.max() < FRICTIONLESS
+            and seen.scatter.max() < SILENT
+        ):
+            yield self.suspicion(
+                "the torque is that of the robot's description: it was commanded or computed, not "
+                "measured",
+                f"it is {np.median(gain):.4g} times the torque of the stated bodies, without "
+                f"friction, and scatters by {seen.scatter.max():.1g} of its spread",
+                "suspected",
+            )
+        elif identified.max() < 1e-4 and seen.fits.n_rows > 200:
+            yield self.suspicion(
+                "the torque has no noise: it was commanded or computed, not measured",
+                f"a rigid body with friction explains all of it but {identified.max():.1g}",
+                "noted",
+            )
+
+
+def _spread(values: Array) -> float:
+    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
