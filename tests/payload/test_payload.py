@@ -55,6 +55,7 @@ def test_body_that_can_exist(found):
 def test_says_what_cannot_be_told_apart(found):
     assert "Mass and drive gains scale alike" in found.text
     assert found.text.startswith("payload at wrist_3_link")
+    assert " → " in found.text and found.text.count(" N m\n") >= 6  # errors of the six joints
     again = json.loads(json.dumps(found.to_dict()))
     assert again["mass"] == found.mass and again["text"] == str(found)
 
