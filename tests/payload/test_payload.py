@@ -176,5 +176,5 @@ def test_joint_with_another_drive_gain_is_named(runs, found):
     assert not any("drive gain before" in note for note in found.notes)
     loaded, unloaded = (frame.assign(tau2=frame["tau2"] * 1.3) for frame in (loaded, unloaded))
     wrong = identify_payload(log.robot, loaded, unloaded, effects=FRICTION)
-    assert "as every joint weighs it" in wrong.text
+    assert "weighed by single joints" in wrong.text
     assert any("drive gain" in note and "Joint" in note for note in wrong.notes)
