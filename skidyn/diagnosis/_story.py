@@ -127,7 +127,9 @@ def _verdict(
             "Judged on data that the fit has not seen, adding "
             f"{'it' if len(lines) == 1 else 'them'} changes the error as shown below."
         )
-        open_ends = f"; the error on {joints_told(material)} is not explained" if material else ""
+        open_ends = (
+            f"; part of the error on {joints_told(material)} is not explained" if material else ""
+        )
         if len(lines) <= SHORT:
             told = [f"{_brief(line['what'])} on {line['where']}" for line in lines]
             return mark, f"Missing: {listed(told)}{open_ends}", text
