@@ -49,14 +49,14 @@ def clock_line(
             continue
         y = np.interp(grid, time, clean[rows])[:POINTS]
         one = np.abs(np.fft.rfft((y - y.mean()) * np.hanning(len(y)), POINTS)) ** 2
-        power += one / (one.mean() + 1e-30)
+        power += one / max(one.mean(), np.finfo(float).tiny)
         spans.append(float(np.ptp(time)))
     frequency = np.fft.rfftfreq(POINTS, 1 / rate)
     band = (frequency > LOWEST) & (frequency < min(HIGHEST, rate / 2.2))
     if not spans or band.sum() < 10:
         return None
     inside = power[band]
-    ratio = inside / (median_filter(inside, min(201, len(inside))) + 1e-12)
+    ratio = inside / np.maximum(median_filter(inside, min(201, len(inside))), 1e-9)
     best = int(np.argmax(ratio))
     if ratio[best] < HEIGHT:
         return None

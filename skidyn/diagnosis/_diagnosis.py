@@ -25,7 +25,12 @@ from skidyn.diagnosis._rule import Settings
 from skidyn.diagnosis._search import search
 from skidyn.effects import Term, list_effects, make_terms
 from skidyn.evidence import Problem, make_problem
-from skidyn.measurement import Measurement, check_measurement, refuse_certain
+from skidyn.measurement import (
+    Measurement,
+    check_measurement,
+    copied_rows,
+    refuse_certain,
+)
 from skidyn.robots import Robot
 
 
@@ -151,7 +156,12 @@ def _diagnose(
     for note in notes:
         warnings.warn(note, LogWarning, stacklevel=4)
     own = _is_rigid_body_regressor(model)
-    if own:
+    residual = None if own else torque - _prediction(model, X, torque)
+    once = ~copied_rows(signals, torque)
+    if not once.all():
+        signals, torque = signals.take(once), torque[once]
+        residual = None if residual is None else residual[once]
+    if residual is None:
         problem = make_problem(
             signals,
             torque,
@@ -161,7 +171,6 @@ def _diagnose(
             smooth=smooth,
         )
     else:
-        residual = torque - _prediction(model, X, torque)
         problem = _residual_problem(signals, residual, robot, smooth, settings)
     _check_rows(problem)
     result = search(problem, kinds, settings)

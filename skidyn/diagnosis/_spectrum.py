@@ -89,8 +89,8 @@ def _spectrum(q: Array, r: Array) -> tuple[Array, Array]:
     power = np.abs(np.fft.rfft(np.bincount(bins, r, BINS))) ** 2
     power = power[: int(HIGHEST * SPAN / (2 * np.pi))]
     # The median of exponentially distributed power is log 2 times its mean.
-    level = median_filter(power, MEDIAN_WIDTH, mode="nearest") / np.log(2) + 1e-30
-    return power, level
+    level = median_filter(power, MEDIAN_WIDTH, mode="nearest") / np.log(2)
+    return power, np.maximum(level, np.finfo(float).tiny)
 
 
 def _peaks(q: Array, r: Array, count: int = 2) -> list[tuple[float, float]]:

@@ -172,7 +172,7 @@ class JointElasticity(_LinkSideEffect):
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
     ) -> dict[str, Any]:
         compliance = float(coefficients[0])
-        return {"K": 1.0 / compliance if abs(compliance) > 1e-12 else 1e12, **shape}
+        return {"K": 1.0 / compliance if compliance else np.inf, **shape}
 
     def units(self, prismatic: bool = False) -> dict[str, str]:
         return {"K": "N/m" if prismatic else "N m/rad", "resonance": "Hz", "damping": "1"}
@@ -197,7 +197,8 @@ class Backlash(_LinkSideEffect):
         # Inertia that the free link presents to its own joint.
         inertia = _torque_slopes(signals, joint)[2][:, joint]
         # Identified parameters need not be consistent; an inertia that vanishes would fly at once.
-        inertia = np.maximum(inertia, 0.05 * np.abs(np.median(inertia)) + 1e-12)
+        inertia = np.maximum(inertia, 0.05 * np.abs(np.median(inertia)))
+        inertia = np.maximum(inertia, np.finfo(float).tiny)
         free = signals.load[:, joint] / inertia
         position: Array = np.zeros_like(free)
         for rows in signals.segments:

@@ -503,6 +503,10 @@ def _folds(rows: Rows, guard: float) -> tuple[Rows, list[NDArray[np.int64]], int
 WINDOW_GUARD = 1 / 16
 
 
+#: Directions weaker than this, relative to the strongest one, are rounding.
+RANK = 1e-7
+
+
 def own_noise(design: Array, target: Array, count: float) -> float:
     """Residual of a joint fitted by itself, which never hides what other joints spoil.
 
@@ -513,8 +517,9 @@ def own_noise(design: Array, target: Array, count: float) -> float:
     size = np.linalg.norm(design, axis=0)
     used = size > 0
     scaled = design[:, used] / size[used]
-    solution = np.linalg.lstsq(scaled, target, rcond=1e-7)[0]
-    return float(np.sqrt(np.sum((target - scaled @ solution) ** 2) / count)) + 1e-9
+    solution = np.linalg.lstsq(scaled, target, rcond=RANK)[0]
+    left, whole = np.sum((target - scaled @ solution) ** 2), np.sum(target**2)
+    return float(np.sqrt(max(left, RANK**2 * whole) / count)) or 1.0
 
 
 def weighted_least_squares(design: list[Array], target: list[Array], sigma: Array) -> Array:

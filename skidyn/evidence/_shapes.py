@@ -55,7 +55,7 @@ class Gain:
         own = np.asarray(sum(block.T @ block for block in z.values()))
         swept = own - cross.T @ self.model.solve(cross)
         slope = sum(block.T @ self.residual[j] for j, block in z.items())
-        swept = swept + (RIDGE * np.trace(own) + 1e-12) * np.eye(len(own))
+        swept = swept + (RIDGE * np.trace(own) + np.finfo(float).tiny) * np.eye(len(own))
         coefficients = np.linalg.solve(swept, slope)
         if np.any(coefficients * signs < 0):
             return -np.inf

@@ -27,6 +27,7 @@ from skidyn.measurement._clock import (
     RepeatedRows,
     SlowSampling,
 )
+from skidyn.measurement._copies import RepeatedRecordings
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._suspicion import CERTAINTIES, Suspicion
 from skidyn.measurement._torque import Columns, TorqueDelay, UnsignedTorque
@@ -46,6 +47,7 @@ CHECKS: tuple[Check, ...] = (
     UnexplainedTorque(),
     Bodies(),
     RepeatedRows(),
+    RepeatedRecordings(),
     ClockJitter(),
     InterpolatedRows(),
     VelocityDelay(),

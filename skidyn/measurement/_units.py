@@ -214,7 +214,10 @@ def _limits(measurement: Measurement) -> tuple[NDArray[np.bool_], Array, NDArray
 def _too_far(measurement: Measurement, times: float) -> NDArray[np.bool_]:
     """Turning joints whose positions go so many times their limits, or turns, away."""
     turning, limits, _ = _limits(measurement)
-    return np.asarray(turning & (np.abs(measurement.signals.q).max(axis=0) > times * limits))
+    q = measurement.signals.q
+    # Whole turns too many are no other unit.
+    q = q - 2 * np.pi * np.round(np.median(q, axis=0) / (2 * np.pi))
+    return np.asarray(turning & (np.abs(q).max(axis=0) > times * limits))
 
 
 def unnamed_scale(measurement: Measurement, shared: float) -> bool:
