@@ -384,24 +384,46 @@ class _Search:
         return self._simplest_of_family(best, ranking)
 
     def _named(self, ranking: list[Hypothesis]) -> Hypothesis:
-        """The first explanation, or a named one whose formula is good enough beside it."""
+        """The first explanation, or one that says more whose formula is good enough beside it.
+
+        A name says more than a function of signals, and an effect that holds in every recording
+        more than one that has its own size in each.
+        """
         best = ranking[0]
-        if best.kind != UNKNOWN or best.errors is None:
+        single = _within(best)
+        if best.errors is None or not (best.kind == UNKNOWN or single):
             return best
-        joints = list(best.joints)
-        weight = 1 / np.maximum(best.errors.sum(0), 1e-300)[joints]
-        after = best.errors.sum(0)[joints]
-        before = after * np.exp(best.gain[joints] / self.problem.rows.counts[joints])
-        removed = float(weight @ (before - after))
+        left = best.errors.sum(0)
+        removed = left * np.expm1(np.maximum(best.gain, 0) / self._counts)
         for rival in ranking[1:]:
-            if rival.kind == UNKNOWN or rival.errors is None:
+            if rival.kind == UNKNOWN or rival.errors is None or _within(rival):
                 continue
-            if rival.errors.shape != best.errors.shape or not set(joints) <= set(rival.joints):
+            joints = sorted(set(best.joints) & set(rival.joints))
+            own = sum(c.width for c in best.candidates if set(c.joints) & set(joints))
+            # What differs between recordings is one finding a joint; a function of signals is not.
+            enough = rival.n_parameters <= own if single else len(joints) == len(best.joints)
+            if not joints or not enough:
                 continue
-            behind = float(weight @ (rival.errors.sum(0)[joints] - after))
-            if behind <= self.settings.form_tolerance * removed:
+            errors = rival.errors
+            if errors.shape != best.errors.shape:
+                errors = self._errors(rival, within=single)
+            weight = 1 / np.maximum(left[joints], 1e-300)
+            behind = float(weight @ (errors.sum(0) - left)[joints])
+            if behind <= self.settings.form_tolerance * float(weight @ removed[joints]):
                 return rival
         return best
+
+    @property
+    def _counts(self) -> NDArray[np.int64]:
+        return np.maximum(self.problem.rows.counts, 1)
+
+    def _errors(self, hypothesis: Hypothesis, within: bool) -> Array:
+        """Held-out errors of an explanation on the folds of single recordings, or of all."""
+        blocks = [*self.blocks, *(c.rows for c in hypothesis.candidates)]
+        soft = [c.term.effect.softness for c in hypothesis.candidates]
+        return profile_error(
+            self.problem, blocks, self.sigma, self.target, within=within, soft=soft
+        )
 
     def _simplest_of_family(self, best: Hypothesis, ranking: list[Hypothesis]) -> Hypothesis:
         """Members of a family differ only in motion made for it: the simplest near one is named."""
@@ -523,11 +545,8 @@ class _Search:
             within = any(_some_recordings(c) for c in candidates)
             if i < self.settings.refined:
                 candidates = refine(self.problem, self.blocks, candidates, self.sigma, self.target)
-            blocks = [*self.blocks, *(c.rows for c in candidates)]
-            soft = [c.term.effect.softness for c in candidates]
-            after = profile_error(
-                self.problem, blocks, self.sigma, self.target, within=within, soft=soft
-            )
+            hypothesis = Hypothesis(kind, tuple(candidates), np.zeros(0), 0.0, 0)
+            after = self._errors(hypothesis, within)
             gain = log_likelihood_gain(before[within], after, self.problem.rows.counts)
             count = self._n_parameters(candidates)
             price = 2 * self._price(candidates)
@@ -650,7 +669,10 @@ def _margin(best: Hypothesis, ranking: Sequence[Hypothesis]) -> float:
     rivals = [
         h.score
         for h in ranking
-        if h.kind != best.kind and own & set(h.joints) and (not family or _family(h) != family)
+        if h.kind != best.kind
+        and own & set(h.joints)
+        and (not family or _family(h) != family)
+        and (_within(best) or not _within(h))  # errors of single recordings are smaller
     ]
     if not rivals or best.score <= 0:
         return 1.0

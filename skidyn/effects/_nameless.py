@@ -7,7 +7,7 @@ They are terms like any other, so a model that adopts one fits, predicts and is 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -20,8 +20,11 @@ from skidyn.effects._base import Coefficient, Effect
 #: Share of the samples of a trajectory left out at either end of its range.
 _OUTSIDE = 0.002
 
-#: Trajectories that must reach a value for a function to follow it there; beyond it stays constant.
+#: Trajectories that must reach a value for a function to follow it there.
 _REACHING = 3
+
+#: Share of the range over which the secant is taken that continues a function beyond its range.
+_SECANT = 0.15
 
 #: Highest order of a function of one signal.
 _ORDER = 12
@@ -81,10 +84,13 @@ class _Spline(NamelessEffect):
         degree = 3
         inner = np.linspace(low, high, self.n_splines - degree + 1)
         knots = np.r_[[low] * degree, inner, [high] * degree]
-        inside = np.clip(x, low, high - 1e-9 * (high - low))
-        # Together they add up to a constant, which the model may lack.
-        splines: Array = BSpline.design_matrix(inside, knots, degree).toarray()
-        return splines
+
+        def splines(inside: Array) -> Array:
+            # Together they add up to a constant, which the model may lack.
+            inside = np.clip(inside, low, high - 1e-9 * (high - low))
+            return np.asarray(BSpline.design_matrix(inside, knots, degree).toarray())
+
+        return _continued(splines, x, low, high)
 
 
 class FunctionOfPosition(_Spline):
@@ -262,11 +268,25 @@ def _supported_range(signals: Signals, x: Array) -> tuple[float, float]:
     return (low, high) if high > low else (float(ends[0, 0]), float(ends[-1, 1]))
 
 
+def _continued(functions: Callable[[Array], Array], x: Array, low: float, high: float) -> Array:
+    """Functions on a range, continued beyond it along their secants over its outer parts."""
+    values = functions(np.clip(x, low, high))
+    reach = _SECANT * (high - low)
+    for beyond, edge, inner in (
+        (np.minimum(x - low, 0.0), low, low + reach),
+        (np.maximum(x - high, 0.0), high, high - reach),
+    ):
+        if beyond.any():
+            at_edge, inside = functions(np.array([edge, inner]))
+            values += np.outer(beyond / (edge - inner), at_edge - inside)
+    return values
+
+
 def _ordered_functions(x: Array, sign: Array | None, low: float, high: float) -> Array:
     """Functions of one signal by rising order, the constant first."""
     if sign is None:
-        inside = np.clip((2 * x - low - high) / max(high - low, 1e-300), -1.0, 1.0)
-        return np.asarray(legvander(inside, _ORDER))
+        inside = (2 * x - low - high) / max(high - low, 1e-300)
+        return _continued(lambda t: np.asarray(legvander(t, _ORDER)), inside, -1.0, 1.0)
     v = np.clip(x / max(-low, high, 1e-300), -1.0, 1.0)
     size = np.abs(v)
     powers = [np.ones_like(v), v, sign, size, v * v, v * size, v**3, size**3]
