@@ -3,24 +3,51 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
+from scipy.stats import gamma
 
 from skidyn._signals import Array, Signals
 
-#: Lowest and highest frequency in Hz, points of the spectrum, height over the local median.
-LOWEST, HIGHEST, POINTS, HEIGHT = 0.3, 25.0, 4096, 4.0
-#: Samples used for the coherent refinement.
-COHERENT = 2500
+#: Lowest frequency in Hz; share of the sampling rate that is the highest.
+LOWEST, HIGHEST = 0.3, 0.45
+#: Frequencies around a line whose median is the noise there, and rows of a segment at least.
+NEIGHBOURS, SHORTEST = 201, 32
+#: Chance of a line, over all frequencies, at which it is worth a test.
+WORTH = 0.01
+#: Samples used for the coherent refinement, which thins the log no further than the line allows.
+COHERENT = 4000
+
+
+@dataclass(frozen=True)
+class ClockLine:
+    """The strongest line of a residual over the clock.
+
+    Attributes
+    ----------
+    frequency : float, Hz
+    chance : float
+        Of so high a line at any frequency of the band if there were none.
+    """
+
+    frequency: float
+    chance: float
 
 
 def clock_line(
-    signals: Signals, residual: Array, use: NDArray[np.bool_], rate: float
-) -> float | None:
-    """Frequency of the strongest line that stands out, None where none does.
+    signals: Signals,
+    residual: Array,
+    use: NDArray[np.bool_],
+    rate: float,
+    band: tuple[float, float] = (LOWEST, np.inf),
+) -> ClockLine | None:
+    """The strongest line that stands out, None where none does.
 
-    Spectra of the segments are added up, so that their phases do not matter; the frequency is
+    Spectra of the segments are added up, so that their phases do not matter; over their local
+    median the sum of m spectra of noise follows a gamma distribution of shape m. The frequency is
     then refined over the whole log, where the phase must hold.
 
     Parameters
@@ -31,39 +58,62 @@ def clock_line(
         Residual of one joint.
     use : ndarray of shape (n_samples,) of bool
         Samples that enter.
-    rate : float
-        Sampling rate in Hz.
+    rate : float, Hz
+        Sampling rate.
+    band : (float, float), Hz
+        Lowest and highest frequency.
 
     Returns
     -------
-    float or None
-        Hz.
+    ClockLine or None
     """
     clean = np.where(use, residual, 0.0)
-    power: Array = np.zeros(POINTS // 2 + 1)
-    spans = []
-    for rows in signals.segments:
+    segments = [rows for rows in signals.segments if _length(signals, rows, rate) >= SHORTEST]
+    if not segments:
+        return None
+    points = 2 ** int(np.ceil(np.log2(2 * max(_length(signals, r, rate) for r in segments))))
+    power: Array = np.zeros(points // 2 + 1)
+    for rows in segments:
         time = signals.clock[rows]
-        grid = np.arange(time[0], time[-1], 1 / rate)
-        if len(grid) < 32:
-            continue
-        y = np.interp(grid, time, clean[rows])[:POINTS]
-        one = np.abs(np.fft.rfft((y - y.mean()) * np.hanning(len(y)), POINTS)) ** 2
+        y = np.interp(np.arange(time[0], time[-1], 1 / rate), time, clean[rows])
+        one = np.abs(np.fft.rfft((y - y.mean()) * np.hanning(len(y)), points)) ** 2
         power += one / max(one.mean(), np.finfo(float).tiny)
-        spans.append(float(np.ptp(time)))
-    frequency = np.fft.rfftfreq(POINTS, 1 / rate)
-    band = (frequency > LOWEST) & (frequency < min(HIGHEST, rate / 2.2))
-    if not spans or band.sum() < 10:
+    frequency = np.fft.rfftfreq(points, 1 / rate)
+    inside = (frequency > band[0]) & (frequency < min(band[1], HIGHEST * rate))
+    if inside.sum() < 10:
         return None
-    inside = power[band]
-    ratio = inside / np.maximum(median_filter(inside, min(201, len(inside))), 1e-9)
+    here, m = power[inside], len(segments)
+    level = median_filter(here, min(NEIGHBOURS * points // 4096 | 1, len(here)))
+    ratio = here / np.maximum(level, 1e-9) * gamma.median(m)
     best = int(np.argmax(ratio))
-    if ratio[best] < HEIGHT:
+    chance = min(1.0, float(gamma.sf(ratio[best], m)) * int(inside.sum()))
+    if chance > WORTH:
         return None
-    centre = float(frequency[band][best])
-    reach = 0.4 / float(np.mean(spans))
-    fine = np.arange(centre - reach, centre + reach, 0.2 / float(np.ptp(signals.clock)))
-    thin = max(1, len(clean) // COHERENT)
-    time, values = signals.clock[::thin], clean[::thin]
-    strength = [np.abs(np.exp(-2j * np.pi * f * time) @ values) for f in fine]
-    return float(fine[int(np.argmax(strength))])
+    spans = [float(np.ptp(signals.clock[rows])) for rows in segments]
+    return ClockLine(_refined(signals, clean, float(frequency[inside][best]), max(spans)), chance)
+
+
+def _length(signals: Signals, rows: slice, rate: float) -> int:
+    return int(np.ptp(signals.clock[rows]) * rate) if rows.stop > rows.start else 0
+
+
+def _refined(signals: Signals, clean: Array, centre: float, span: float) -> float:
+    """Frequency near a line at which the phase holds best over the whole log."""
+    time = signals.clock
+    whole = max(float(np.ptp(time)), span)
+    reach, step = 0.6 / span, 0.2 / whole
+    thin = max(1, len(time) // COHERENT)
+    # Samples are averaged after the line has been moved to rest, so none of it is lost.
+    still = clean * np.exp(-2j * np.pi * centre * time)
+    starts = np.arange(0, len(time), thin)
+    slow = np.add.reduceat(still, starts)
+    middle = np.add.reduceat(time, starts) / np.diff(np.append(starts, len(time)))
+    # Each frequency is the one before it turned by the same angle at every sample.
+    slow = slow * np.exp(2j * np.pi * reach * middle)
+    turn = np.exp(-2j * np.pi * step * middle)
+    count = int(2 * reach / step) + 1
+    strength = np.empty(count)
+    for k in range(count):
+        strength[k] = np.abs(slow.sum())
+        slow *= turn
+    return centre - reach + step * int(np.argmax(strength))

@@ -238,7 +238,7 @@ def _without(
         ripple = ripple - wrong.torque + torque
         rest = replace(rest, torque=torque)
     findings = [rest if h is wrong else h for h in result.findings if h is not wrong or kept]
-    known = [t for t in _found_terms(problem, findings) if t.kind != "torque_ripple"]
+    known = [t for t in _found_terms(problem, findings) if not _on_samples(t)]
     bare = replace_torque(problem, problem.torque - ripple)
     fit = bare.fit((*problem.terms, *known), sigma=result.fit.noise)
     return replace(result, findings=findings, fit=fit, ripple=ripple)
@@ -246,10 +246,15 @@ def _without(
 
 def _unknowns(problem: Problem, result: SearchResult, terms: Sequence[Term]) -> list[UnknownTorque]:
     """What is known about the nameless terms, the ripple taken off."""
-    nameless = [c.term for h in result.findings if h.kind == UNKNOWN for c in h.candidates]
+    nameless = [
+        c.term
+        for h in result.findings
+        if h.kind == UNKNOWN and h.torque is None
+        for c in h.candidates
+    ]
     if not nameless:
         return []
-    rest = [t for t in terms if t.kind != "torque_ripple"]
+    rest = [t for t in terms if not _on_samples(t)]
     bare = replace_torque(problem, problem.torque - result.ripple)
     return describe_unknowns(bare, rest, nameless, result.fit.noise)
 
@@ -257,18 +262,24 @@ def _unknowns(problem: Problem, result: SearchResult, terms: Sequence[Term]) -> 
 def _held_out(
     problem: Problem, terms: Sequence[Term], result: SearchResult, keep: Sequence[Term]
 ) -> HeldOut:
-    """Held-out residual; a ripple's coefficients come from the residual at the full rate."""
-    waves = [t for t in terms if t.kind == "torque_ripple"]
-    rest = [t for t in terms if t.kind != "torque_ripple"]
+    """Held-out residual; a line's coefficients come from the residual at the full rate."""
+    waves = [t for t in terms if _on_samples(t)]
+    rest = [t for t in terms if not _on_samples(t)]
     if not waves:
         return held_out_residual(problem, rest, result.fit.sigma, keep)
     torque = problem.torque - result.ripple
     held = held_out_residual(replace_torque(problem, torque), rest, result.fit.sigma, keep)
-    for t in waves:
-        own = np.zeros_like(torque)
-        own[:, t.joints[0]] = result.ripple[:, t.joints[0]]
-        held.torque[t] = own
+    for hypothesis in (h for h in result.findings if h.torque is not None):
+        for t in (c.term for c in hypothesis.candidates if c.term in waves):
+            own = np.zeros_like(torque)
+            own[:, t.joints[0]] = hypothesis.torque[:, t.joints[0]]
+            held.torque[t] = own
     return held
+
+
+def _on_samples(term: Term) -> bool:
+    """Whether a term is a line in a spectrum, which averaged rows do not show."""
+    return term.effect.search == "spectrum"
 
 
 def _comparison(

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from skidyn._progress import track
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate, catalogue_candidates
-from skidyn.diagnosis._clock import clock_line
+from skidyn.diagnosis._clock import LOWEST, clock_line
 from skidyn.diagnosis._followed_signals import followed_signals
 from skidyn.diagnosis._hypothesis import (
     UNKNOWN,
@@ -30,7 +29,7 @@ from skidyn.diagnosis._rule import (
     variance_inflation,
 )
 from skidyn.diagnosis._screen import Screen
-from skidyn.diagnosis._spectrum import find_lines
+from skidyn.diagnosis._spectrum import SLOWEST, Line, find_lines, find_vibrations
 from skidyn.diagnosis._split import split_effects
 from skidyn.effects import FunctionOfSignals, NamelessEffect, Term, get_effect, nameless_kinds
 from skidyn.evidence import Problem
@@ -93,6 +92,7 @@ class _Search:
         self.problem = problem
         self.settings = settings
         self.kinds = list(kinds)
+        self.nameless = nameless
         self.ripple = np.zeros_like(problem.torque)
         self.chosen: list[Candidate] = []
         self.findings: list[Hypothesis] = []
@@ -358,7 +358,7 @@ class _Search:
         rough = self._greedy_by_kind() + self._splits()
         rough.sort(key=lambda item: item[1])
         ranking = self._finals([candidates for candidates, _ in rough[: self.settings.finalists]])
-        ranking += [self._against_functions(h, ranking) for h in self._ripples()]
+        ranking += [self._against_functions(h, ranking) for h in self._lines()]
         ranking += self._recordings()
         return sorted(ranking, key=lambda h: -h.score)
 
@@ -564,22 +564,41 @@ class _Search:
             count += len(np.unique(self.problem.signals.trajectory)) // 2
         return count
 
-    def _ripples(self) -> list[Hypothesis]:
-        """Torque ripple, judged on the residual at the full rate."""
-        if "torque_ripple" not in self.kinds:
-            return []
+    def _lines(self) -> list[Hypothesis]:
+        """Torque ripple and vibration, judged on the residual at the full rate."""
         problem = self.problem
-        terms = problem.terms + (c.term for c in self.chosen)
-        fit = replace(self.fit, terms=terms)
+        fit = replace(self.fit, terms=problem.terms + (c.term for c in self.chosen))
         residual = problem.torque - self.ripple - problem.explained(fit)
-        best: dict[int, Any] = {}
-        known = [c for h in self.findings for c in h.candidates if c.kind == "torque_ripple"]
-        for line in find_lines(problem, residual):
-            old = [c for c in known if c.joints == (line.joint,)]
-            if any(abs(c.term.shape["N"] - line.waves) < 1 for c in old):
+        found = []
+        if "torque_ripple" in self.kinds:
+            # A few waves a turn are what a nameless function left of its own edges.
+            lines = [
+                line
+                for line in find_lines(problem, residual)
+                if line.term.shape["N"] >= RESOLVED or not self._follows_position(line.joint)
+            ]
+            found.append(self._of_lines("torque_ripple", "N", 1.0, lines))
+        if self.nameless:
+            lines = find_vibrations(problem, residual)
+            found.append(self._of_lines(UNKNOWN, "frequency", 0.1, lines))
+        return [h for h in found if h is not None]
+
+    def _of_lines(
+        self, kind: str, position: str, width: float, lines: Sequence[Line]
+    ) -> Hypothesis | None:
+        """The strongest line of every joint that is large enough, more than chance and new."""
+        problem = self.problem
+        known = [c for h in self.findings if h.torque is not None for c in h.candidates]
+        best: dict[int, Line] = {}
+        for line in lines:
+            at = line.term.shape[position]
+            if any(
+                c.term.kind == line.term.kind
+                and c.joints == (line.joint,)
+                and abs(c.term.shape[position] - at) < width
+                for c in known
+            ):
                 continue
-            if line.waves < RESOLVED and self._follows_position(line.joint):
-                continue  # what the nameless function left of its own edges
             n_rows = int(problem.rows.counts[line.joint])
             strong = line.gain.sum() > self.settings.least_share * n_rows
             if (
@@ -589,23 +608,19 @@ class _Search:
             ):
                 best[line.joint] = line
         if not best:
-            return []
+            return None
         gain, torque = np.zeros(problem.n_joints), np.zeros_like(problem.torque)
         candidates = []
         for joint, line in best.items():
             gain[joint] = line.gain.sum()
-            term = Term("torque_ripple", (joint,), {"N": line.waves})
-            columns = term.torque_columns(problem.signals)[joint]
-            torque[:, joint] = columns @ line.coefficients
-            candidates.append(Candidate("torque_ripple", term, problem.term_rows(term)))
+            torque[:, joint] = line.torque
+            variables = ("time",) if kind == UNKNOWN else ()
+            rows = problem.term_rows(line.term)
+            candidates.append(Candidate(kind, line.term, rows, variables))
         count = 3 * len(candidates)
         score = float(gain.sum()) - 2 * count
         chances = tuple(best[c.joints[0]].chance for c in candidates)
-        return [
-            Hypothesis(
-                "torque_ripple", tuple(candidates), gain, score, count, chances, torque=torque
-            )
-        ]
+        return Hypothesis(kind, tuple(candidates), gain, score, count, chances, torque=torque)
 
     def _follows_position(self, joint: int) -> bool:
         """Whether a nameless function of the joint's own position was added."""
@@ -620,7 +635,7 @@ class _Search:
         Few waves per turn follow any torque that depends on the position, a bump for example.
         """
         rivals = [h for h in ranking if h.kind == UNKNOWN and set(h.joints) & set(ripple.joints)]
-        if not rivals:
+        if not rivals or ripple.kind == UNKNOWN:
             return ripple
         before = profile_error(self.problem, self.blocks, self.sigma, self.target)
         blocks = [*self.blocks, *(c.rows for c in ripple.candidates)]
@@ -698,7 +713,7 @@ def _nameless_candidates(problem: Problem, residual: Array) -> list[Candidate]:
         assert isinstance(effect, NamelessEffect)
         for joints in effect.sites(problem.signals):
             joint = joints[0]
-            if effect.not_shown(problem.signals, joint):
+            if effect.search == "spectrum" or effect.not_shown(problem.signals, joint):
                 continue
             shapes = effect.grid(problem.signals, joints)
             if isinstance(effect, FunctionOfSignals):
@@ -710,8 +725,9 @@ def _nameless_candidates(problem: Problem, residual: Array) -> list[Candidate]:
                     residual[:, joint],
                     problem.rows.sliding[:, joint],
                     problem.motion.rate,
+                    (LOWEST, SLOWEST),
                 )
-                shapes = [] if line is None else [{"frequency": line}]
+                shapes = [] if line is None else [{"frequency": line.frequency}]
             for shape in shapes:
                 term = Term(kind, joints, shape)
                 names = effect.variables(joint, shape)

@@ -311,7 +311,7 @@ def _duel(diagnosis: Diagnosis, first: Hypothesis, second: Hypothesis, duration:
     assert robot is not None
     findings = diagnosis.result.findings
     rest = [c.term for h in findings if h is not first for c in h.candidates]
-    rest = [t for t in rest if t.kind != "torque_ripple"]
+    rest = [t for t in rest if t.effect.search != "spectrum"]
     terms: list[list[Term]] = [
         [*problem.terms, *rest, *(c.term for c in h.candidates)] for h in (first, second)
     ]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Torque ripple: lines in the spectrum of the residual over joint angle, at the full rate."""
+"""Lines in spectra of the residual at the full rate: torque ripple over the angle, vibration."""
 
 from __future__ import annotations
 
@@ -10,13 +10,17 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from skidyn._signals import Array
+from skidyn.diagnosis._clock import clock_line
 from skidyn.diagnosis._rule import SHORTEST_BLOCK, chance_of_score
+from skidyn.effects import Term
 from skidyn.evidence import Problem
 
 #: Angle covered by the spectrum in rad and its number of bins; sets resolution and range.
 SPAN, BINS = 4 * np.pi, 32768
 #: Waves per rad searched.
 LOWEST, HIGHEST = 8.0, 420.0
+#: Slowest vibration in Hz: what is slower shows in averaged rows (window of 1/8 s).
+SLOWEST = 8.0
 #: A line lower than this, in units of the local noise, is not looked at.
 LEAST_HEIGHT = 8.0
 #: Width in bins of the running median that gives the local noise level.
@@ -25,27 +29,27 @@ MEDIAN_WIDTH = 161
 
 @dataclass(frozen=True)
 class Line:
-    """A line in the spectrum of a joint's residual over its angle.
+    """A line in the spectrum of a joint's residual over its angle or over the clock.
 
     Attributes
     ----------
     joint : int
         Joint, from 0.
-    waves : float
-        Periods per rad times 2 pi: the N of sin(N q).
+    term : Term
+        Its sine and cosine.
     chance : float
-        Of so high a line over all waves of the joint if there were none.
+        Of so high a line anywhere in the spectrum of the joint if there were none.
     gain : ndarray of shape (n_folds,)
         Twice the held-out log-likelihood gain, by fold.
-    coefficients : ndarray of shape (2,)
-        Of sin(N q) and cos(N q), N m.
+    torque : ndarray of shape (n_samples,), N m or N
+        The wave.
     """
 
     joint: int
-    waves: float
+    term: Term
     chance: float
     gain: Array
-    coefficients: Array
+    torque: Array
 
 
 def find_lines(problem: Problem, residual: Array) -> list[Line]:
@@ -74,12 +78,40 @@ def find_lines(problem: Problem, residual: Array) -> list[Line]:
                 continue
             # Power over its level is exponentially distributed; any wave of a joint may be highest.
             chance = min(1.0, 2 * HIGHEST * float(np.exp(-height)))
-            line = _test_line(problem, joint, waves, chance, use, r, fold)
-            if line.gain.sum() > 0 and _explained_share(q[use], r[use], line) <= 0.2:
+            term = Term("torque_ripple", (joint,), {"N": waves})
+            line = _test_line(problem, term, chance, 2 * HIGHEST, use, r, fold)
+            if line.gain.sum() > 0 and _explained_share(r[use], line.torque[use]) <= 0.2:
                 # A weak line cannot gain more than its height over the local noise tells.
                 cap = 2.4 * height / line.gain.sum()
                 line = replace(line, gain=line.gain * min(1.0, cap))
             lines.append(line)
+    return lines
+
+
+def find_vibrations(problem: Problem, residual: Array) -> list[Line]:
+    """The strongest wave in time of each joint that averaged rows are too slow for.
+
+    Parameters
+    ----------
+    problem : Problem
+        Motion and the samples that slide.
+    residual : ndarray of shape (n_samples, n_joints), N m or N
+        Measured torque less the model.
+
+    Returns
+    -------
+    list of Line
+    """
+    signals, lines = problem.signals, []
+    if signals.time is None:
+        return []
+    fold = problem.sample_folds(int(np.argmax(problem.rows.counts)))
+    for joint in range(problem.n_joints):
+        use, r = problem.rows.sliding[:, joint], residual[:, joint]
+        found = clock_line(signals, r, use, problem.motion.rate, (SLOWEST, np.inf))
+        if found is not None:
+            term = Term("vibration", (joint,), {"frequency": found.frequency})
+            lines.append(_test_line(problem, term, found.chance, 1.0, use, r, fold))
     return lines
 
 
@@ -134,15 +166,15 @@ def sample_blocks(problem: Problem) -> tuple[NDArray[np.int64], int]:
 
 def _test_line(
     problem: Problem,
-    joint: int,
-    waves: float,
+    term: Term,
     chance: float,
+    tried: float,
     use: NDArray[np.bool_],
     r: Array,
     fold: NDArray[np.int64],
 ) -> Line:
-    q = problem.signals.q[:, joint]
-    block = np.column_stack([np.sin(waves * q), np.cos(waves * q)])
+    (joint,) = term.joints
+    block = term.torque_columns(problem.signals)[joint]
     grams, cross = [], []
     for f in np.unique(fold[use]):
         here = use & (fold == f)
@@ -154,7 +186,7 @@ def _test_line(
     steps, count = sample_blocks(problem)
     sums: Array = np.stack([np.bincount(steps[use], z * left, count) for z in block[use].T], axis=1)
     by_blocks = chance_of_score(np.asarray(right), sums[np.any(sums != 0, axis=1)])
-    chance = max(chance, min(1.0, 2 * HIGHEST * by_blocks))
+    chance = max(chance, min(1.0, tried * by_blocks))
     drop = []
     for g, c in zip(grams, cross, strict=True):
         b = np.linalg.lstsq(total - g, right - c, rcond=None)[0]
@@ -163,9 +195,8 @@ def _test_line(
     change = np.array(drop)
     gain = use.sum() * np.log(before / max(before - change.sum(), 1e-12 * before))
     shares = change / change.sum() * gain if change.sum() > 0 else 0 * change
-    return Line(joint, waves, chance, shares, both)
+    return Line(joint, term, chance, shares, block @ both)
 
 
-def _explained_share(q: Array, r: Array, line: Line) -> float:
-    wave = line.coefficients @ np.array([np.sin(line.waves * q), np.cos(line.waves * q)])
+def _explained_share(r: Array, wave: Array) -> float:
     return 1 - float(np.sum((r - wave) ** 2) / np.sum(r**2))

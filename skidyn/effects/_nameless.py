@@ -325,16 +325,44 @@ class FunctionOfThreeSignals(FunctionOfSignals):
 
 
 class ClockPeriodic(NamelessEffect):
-    """A torque periodic in time: a fan, mains hum, a pump."""
+    """A torque periodic in time, of any wave form: a pump, a cam, a controller that cycles."""
 
     kind = "clock_periodic"
     drawn_against = "time"
     title = "Periodic in time"
+    formula = r"\sum_h a_h\sin(2\pi h f t) + b_h\cos(2\pi h f t)"
+    coefficients = _coefficients(8)
+    depends_on = ("time",)
+    needs = ("time",)
+    search = "clock"
+    #: Waves per period: a square wave has the odd ones.
+    harmonics: ClassVar[tuple[int, ...]] = (1, 2, 3, 5)
+    #: Highest frequency in Hz that averaged rows show; waves above it are left out.
+    highest: ClassVar[float] = 8.0
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        phase = 2 * np.pi * shape["frequency"] * signals.clock
+        shown = [float(h * shape["frequency"] <= self.highest) for h in self.harmonics]
+        waves = [
+            s * wave(h * phase)
+            for h, s in zip(self.harmonics, shown, strict=True)
+            for wave in (np.sin, np.cos)
+        ]
+        return np.column_stack(waves)
+
+
+class Vibration(NamelessEffect):
+    """A wave in time that is faster than any motion: a fan, mains hum, a loose part."""
+
+    kind = "vibration"
+    drawn_against = "time"
+    title = "Vibration"
     formula = r"a\sin(2\pi f t) + b\cos(2\pi f t)"
     coefficients = _coefficients(2)
     depends_on = ("time",)
     needs = ("time",)
-    search = "clock"
+    # As with torque ripple: averaging over windows of time would remove it.
+    search = "spectrum"
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         phase = 2 * np.pi * shape["frequency"] * signals.clock
@@ -352,4 +380,5 @@ NAMELESS: tuple[type[NamelessEffect], ...] = (
     FunctionOfTwoSignals,
     FunctionOfThreeSignals,
     ClockPeriodic,
+    Vibration,
 )
