@@ -31,10 +31,13 @@ class ClockLine:
     frequency : float, Hz
     chance : float
         Of so high a line at any frequency of the band if there were none.
+    height : float
+        Power over that of the noise near it, summed over the segments.
     """
 
     frequency: float
     chance: float
+    height: float
 
 
 def clock_line(
@@ -90,7 +93,8 @@ def clock_line(
     if chance > WORTH:
         return None
     spans = [float(np.ptp(signals.clock[rows])) for rows in segments]
-    return ClockLine(_refined(signals, clean, float(frequency[inside][best]), max(spans)), chance)
+    refined = _refined(signals, clean, float(frequency[inside][best]), max(spans))
+    return ClockLine(refined, chance, float(ratio[best]) - m)
 
 
 def _length(signals: Signals, rows: slice, rate: float) -> int:

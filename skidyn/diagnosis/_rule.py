@@ -81,6 +81,8 @@ class Settings:
         Torque ripple must do this share of what a function of the signals does on averaged rows.
     max_findings : int
         Kinds added at most.
+    names_for_one : int
+        So many named effects together may take the place of one nameless function.
     finalists : int
         Kinds compared with noise re-estimated.
     refined : int
@@ -101,6 +103,7 @@ class Settings:
     family_share: float = 0.95
     ripple_share: float = 0.8
     max_findings: int = 4
+    names_for_one: int = 3
     finalists: int = 8
     refined: int = 4
 

@@ -165,6 +165,8 @@ class _Search:
             ranking.remove(best)
             if self._richer_known(best):
                 continue
+            if best.kind == UNKNOWN and best.torque is None:
+                best = self._first_of_names(best, ranking) or best
             judged = self.judged(best)
             if judged is not None and not self.shadow(judged):
                 return replace(judged, margin=_margin(judged, offered))
@@ -360,7 +362,8 @@ class _Search:
         ranking = self._finals([candidates for candidates, _ in rough[: self.settings.finalists]])
         ranking += [self._against_functions(h, ranking) for h in self._lines()]
         ranking += self._recordings()
-        return sorted(ranking, key=lambda h: -h.score)
+        # A vibration is no rival of anything that follows the motion: it comes last.
+        return sorted(ranking, key=lambda h: (_is_vibration(h), -h.score))
 
     def pick(self, ranking: list[Hypothesis]) -> Hypothesis | None:
         """The best explanation, or a simpler one that is as good within its standard error."""
@@ -424,6 +427,60 @@ class _Search:
         return profile_error(
             self.problem, blocks, self.sigma, self.target, within=within, soft=soft
         )
+
+    def _first_of_names(
+        self, nameless: Hypothesis, ranking: Sequence[Hypothesis]
+    ) -> Hypothesis | None:
+        """The first of a few named effects that together do what a nameless function does.
+
+        Several names beside each other compete with it at no higher price: a function of signals
+        holds any sum of effects of its joints.
+        """
+        joints, found, chosen, pool = set(nameless.joints), [], self.chosen, self.pool
+        self.pool = [c for c in pool if c.kind != UNKNOWN and set(c.joints) & joints]
+        try:
+            while len(found) < self.settings.names_for_one:
+                named = [h for h in ranking if self._may_stand_in(h, nameless)]
+                if not named:
+                    return None
+                best = self._simplest_of_family(named[0], named)
+                found.append(best)
+                if sum(h.n_parameters for h in found) > nameless.n_parameters:
+                    return None
+                self.chosen = [*self.chosen, *best.candidates]
+                if self._as_good(self._errors_so_far(), nameless):
+                    return found[0]
+                taken = {c.site for c in best.candidates}
+                self.pool = [c for c in self.pool if c.site not in taken]
+                rough = sorted(self._greedy_by_kind(), key=lambda item: item[1])
+                rough = rough[: self.settings.refined]
+                ranking = self._finals([candidates for candidates, _ in rough])
+                ranking.sort(key=lambda h: -h.score)
+        finally:
+            self.chosen, self.pool = chosen, pool
+        return None
+
+    def _may_stand_in(self, hypothesis: Hypothesis, nameless: Hypothesis) -> bool:
+        return bool(
+            hypothesis.kind != UNKNOWN
+            and hypothesis.errors is not None
+            and not _within(hypothesis)
+            and set(hypothesis.joints) & set(nameless.joints)
+        )
+
+    def _errors_so_far(self) -> Array:
+        soft = [0.0] * len(self.problem.terms) + [c.term.effect.softness for c in self.chosen]
+        return profile_error(self.problem, self.blocks, self.sigma, self.target, soft=soft)
+
+    def _as_good(self, errors: Array, nameless: Hypothesis) -> bool:
+        """Whether errors are as small as those of a nameless function, to an imperfect formula."""
+        assert nameless.errors is not None
+        joints = list(nameless.joints)
+        left = nameless.errors.sum(0)
+        removed = left * np.expm1(np.maximum(nameless.gain, 0) / self._counts)
+        weight = 1 / np.maximum(left[joints], 1e-300)
+        behind = float(weight @ (errors.sum(0) - left)[joints])
+        return behind <= self.settings.form_tolerance * float(weight @ removed[joints])
 
     def _simplest_of_family(self, best: Hypothesis, ranking: list[Hypothesis]) -> Hypothesis:
         """Members of a family differ only in motion made for it: the simplest near one is named."""
@@ -570,6 +627,7 @@ class _Search:
         fit = replace(self.fit, terms=problem.terms + (c.term for c in self.chosen))
         residual = problem.torque - self.ripple - problem.explained(fit)
         found = []
+        least = self.settings.least_share
         if "torque_ripple" in self.kinds:
             # A few waves a turn are what a nameless function left of its own edges.
             lines = [
@@ -577,14 +635,16 @@ class _Search:
                 for line in find_lines(problem, residual)
                 if line.term.shape["N"] >= RESOLVED or not self._follows_position(line.joint)
             ]
-            found.append(self._of_lines("torque_ripple", "N", 1.0, lines))
+            found.append(self._of_lines("torque_ripple", "N", 1.0, lines, least))
         if self.nameless:
+            # On samples, of which there are many more than rows.
+            least = self.settings.least_drop * len(residual) / max(1, problem.rows.counts.max())
             lines = find_vibrations(problem, residual)
-            found.append(self._of_lines(UNKNOWN, "frequency", 0.1, lines))
+            found.append(self._of_lines(UNKNOWN, "frequency", 0.1, lines, least))
         return [h for h in found if h is not None]
 
     def _of_lines(
-        self, kind: str, position: str, width: float, lines: Sequence[Line]
+        self, kind: str, position: str, width: float, lines: Sequence[Line], least: float
     ) -> Hypothesis | None:
         """The strongest line of every joint that is large enough, more than chance and new."""
         problem = self.problem
@@ -599,8 +659,7 @@ class _Search:
                 for c in known
             ):
                 continue
-            n_rows = int(problem.rows.counts[line.joint])
-            strong = line.gain.sum() > self.settings.least_share * n_rows
+            strong = line.gain.sum() > least * int(problem.rows.counts[line.joint])
             if (
                 strong
                 and self.significant(line.chance)
@@ -673,6 +732,10 @@ def _some_recordings(candidate: Candidate) -> bool:
     return candidate.term.trajectories is not None
 
 
+def _is_vibration(hypothesis: Hypothesis) -> bool:
+    return hypothesis.kind == UNKNOWN and hypothesis.torque is not None
+
+
 def _within(hypothesis: Hypothesis) -> bool:
     return any(map(_some_recordings, hypothesis.candidates))
 
@@ -688,6 +751,7 @@ def _margin(best: Hypothesis, ranking: Sequence[Hypothesis]) -> float:
         and own & set(h.joints)
         and (not family or _family(h) != family)
         and (_within(best) or not _within(h))  # errors of single recordings are smaller
+        and not _is_vibration(h)
     ]
     if not rivals or best.score <= 0:
         return 1.0

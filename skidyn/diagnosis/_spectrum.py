@@ -80,11 +80,8 @@ def find_lines(problem: Problem, residual: Array) -> list[Line]:
             chance = min(1.0, 2 * HIGHEST * float(np.exp(-height)))
             term = Term("torque_ripple", (joint,), {"N": waves})
             line = _test_line(problem, term, chance, 2 * HIGHEST, use, r, fold)
-            if line.gain.sum() > 0 and _explained_share(r[use], line.torque[use]) <= 0.2:
-                # A weak line cannot gain more than its height over the local noise tells.
-                cap = 2.4 * height / line.gain.sum()
-                line = replace(line, gain=line.gain * min(1.0, cap))
-            lines.append(line)
+            weak = _explained_share(r[use], line.torque[use]) <= 0.2
+            lines.append(_capped(line, height) if weak else line)
     return lines
 
 
@@ -111,8 +108,15 @@ def find_vibrations(problem: Problem, residual: Array) -> list[Line]:
         found = clock_line(signals, r, use, problem.motion.rate, (SLOWEST, np.inf))
         if found is not None:
             term = Term("vibration", (joint,), {"frequency": found.frequency})
-            lines.append(_test_line(problem, term, found.chance, 1.0, use, r, fold))
+            line = _test_line(problem, term, found.chance, 1.0, use, r, fold)
+            lines.append(_capped(line, found.height))
     return lines
+
+
+def _capped(line: Line, height: float) -> Line:
+    """A line whose gain is no more than its height over the local noise tells."""
+    total = float(line.gain.sum())
+    return replace(line, gain=line.gain * min(1.0, 2.4 * height / total)) if total > 0 else line
 
 
 def _spectrum(q: Array, r: Array) -> tuple[Array, Array]:
