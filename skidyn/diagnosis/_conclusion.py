@@ -198,17 +198,20 @@ def _vague(
 ) -> tuple[Hypothesis, list[Candidate]] | None:
     """The last finding with terms whose coefficients may all be zero when folds are left out."""
     for hypothesis in reversed(findings):
-        if hypothesis.kind == UNKNOWN or hypothesis.torque is not None:
+        if hypothesis.kind == UNKNOWN and hypothesis.torque is None:
             continue
         terms = []
         for candidate in hypothesis.candidates:
             if candidate.term.trajectories is not None and len(candidate.term.trajectories) == 1:
                 continue  # no fold but its own recording tells of it
-            shapes = {s.name for s in candidate.term.effect.shapes}
+            effect = candidate.term.effect
+            others = {s.name for s in effect.shapes} | {
+                name for name, unit in effect.units().items() if unit == "rad"
+            }
             found = [
                 value
                 for name, value in intervals[candidate.term].items()
-                if name not in shapes and isinstance(value, tuple)
+                if name not in others and isinstance(value, tuple)
             ]
             if found and all(low <= 0 <= high for _, low, high in found):
                 terms.append(candidate)

@@ -401,10 +401,11 @@ class _Search:
         for rival in ranking[1:]:
             if rival.kind == UNKNOWN or rival.errors is None or _within(rival):
                 continue
-            joints = sorted(set(best.joints) & set(rival.joints))
-            own = sum(c.width for c in best.candidates if set(c.joints) & set(joints))
+            covered = [c for c in best.candidates if set(c.joints) <= set(rival.joints)]
+            joints = sorted({j for c in covered for j in c.joints})
             # What differs between recordings is one finding a joint; a function of signals is not.
-            enough = rival.n_parameters <= own if single else len(joints) == len(best.joints)
+            width = sum(c.width for c in covered)
+            enough = rival.n_parameters <= width if single else len(joints) == len(best.joints)
             if not joints or not enough:
                 continue
             errors = rival.errors
