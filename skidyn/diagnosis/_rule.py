@@ -72,6 +72,8 @@ class Settings:
         tenth of its size. A nameless function that does better by no more than this does not take
         the place of a name, and a later finding that removes no more on the same joints is the
         shadow of the earlier ones.
+    nameless_tolerance : float
+        The same for what a nameless function leaves: its form is only near the true one.
     simpler_share : float
         A simpler kind is named if it falls behind by less than this share.
     family_share : float
@@ -99,11 +101,12 @@ class Settings:
     least_share: float = 0.006
     least_drop: float = 0.002
     form_tolerance: float = 0.015
+    nameless_tolerance: float = 0.15
     simpler_share: float = 0.05
     family_share: float = 0.95
     ripple_share: float = 0.8
     max_findings: int = 4
-    names_for_one: int = 3
+    names_for_one: int = 2
     finalists: int = 8
     refined: int = 4
 

@@ -262,7 +262,13 @@ class _Search:
         own = self._removed(self.left, hypothesis.gain)[joints]
         earlier = (self.start - self.left)[joints]
         weight = 1 / np.maximum(self.left[joints], 1e-300)
-        return bool(weight @ own < self.settings.form_tolerance * (weight @ earlier))
+        nameless = any(
+            h.kind == UNKNOWN and h.torque is None and set(h.joints) & set(joints)
+            for h in self.findings
+        )
+        settings = self.settings
+        tolerance = settings.nameless_tolerance if nameless else settings.form_tolerance
+        return bool(weight @ own < tolerance * (weight @ earlier))
 
     def _removed(self, errors: Array, gain: Array) -> Array:
         """Squared error of every joint that a gain of log-likelihood takes away."""

@@ -111,9 +111,9 @@ class FunctionOfVelocity(_Spline):
     drawn_against = "dq"
     title = "Function of velocity"
     formula = r"f(\dot q_j)"
-    coefficients = _coefficients(10)
+    coefficients = _coefficients(24)
     depends_on = ("dq_own",)
-    signal, n_splines = "dq", 10
+    signal, n_splines = "dq", 24
 
 
 class FrictionOverPosition(NamelessEffect):
