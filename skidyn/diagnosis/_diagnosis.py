@@ -8,7 +8,6 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
 from sklearn.base import clone
 from threadpoolctl import threadpool_limits
 
@@ -18,13 +17,19 @@ from skidyn._signals import Array, Signals, read_signals
 from skidyn.diagnosis._conclusion import conclude
 from skidyn.diagnosis._correction import open_model
 from skidyn.diagnosis._hypothesis import SearchResult
-from skidyn.diagnosis._limits import Limit, find_limits
+from skidyn.diagnosis._limits import Gates, Limit, find_limits, without_withdrawn
 from skidyn.diagnosis._result import Diagnosis
 from skidyn.diagnosis._reversals import look_at_reversals
-from skidyn.diagnosis._rule import Settings
+from skidyn.diagnosis._rule import (
+    CORRELATION_TIMES,
+    SHORTEST_BLOCK,
+    Settings,
+    correlation_time,
+    time_blocks,
+)
 from skidyn.diagnosis._search import search
 from skidyn.effects import Term, list_effects, make_terms
-from skidyn.evidence import Problem, make_problem
+from skidyn.evidence import Fit, Problem, make_problem
 from skidyn.measurement import (
     Measurement,
     check_measurement,
@@ -180,6 +185,10 @@ def _diagnose(
     least = settings.least_drop
     diagnosis = conclude(wider, completed, limits, sliding, torque, notes, least, model, (X, tau))
     diagnosis.checks = checks
+    kept = {c.site for h in diagnosis.result.findings for c in h.candidates}
+    found = [c for h in completed.findings for c in h.candidates]
+    withdrawn = [c for c in found if c.site not in kept]
+    diagnosis.limits = without_withdrawn(diagnosis.limits, withdrawn)
     return diagnosis
 
 
@@ -189,14 +198,29 @@ def _limits(
     """What could still hide beside everything that was found, among the sliding samples."""
     found = [c.term for h in completed.findings for c in h.candidates]
     blocks = [problem.term_rows(t) for t in (*problem.terms, *found)]
-    return find_limits(
-        problem,
-        result.candidates,
-        blocks,
-        result.fit.noise,
-        result.inflation,
-        float(chi2.isf(settings.level / result.n_tests, 1)),
-    )
+    counts = problem.rows.counts
+    fit = result.fit
+    everywhere = range(problem.n_joints)
+    correlated = correlation_time(problem, fit.residual, everywhere)
+    _, n_blocks = time_blocks(problem, max(SHORTEST_BLOCK, CORRELATION_TIMES * correlated))
+    gain = sum((h.gain for h in result.findings), np.zeros(problem.n_joints))
+    earlier = counts * np.expm1(np.maximum(gain, 0.0) / np.maximum(counts, 1))
+    gates = Gates(settings, result.n_tests, n_blocks - 1, counts, _whiteness(problem, fit), earlier)
+    return find_limits(problem, result.candidates, blocks, fit.noise, result.inflation, gates)
+
+
+def _whiteness(problem: Problem, fit: Fit) -> Array:
+    """Variance of the residual of a sliding sample over that of an averaged row, by joint."""
+    residual = problem.torque - problem.explained(fit)
+    ones = np.ones(len(residual))
+    ratio = np.ones(problem.n_joints)
+    for j, r in enumerate(fit.residual):
+        use = problem.rows.sliding[:, j]
+        if len(r) and use.any():
+            weight = problem.rows.average(ones, j)
+            row = np.mean((r / weight) ** 2)
+            ratio[j] = np.mean(residual[use, j] ** 2) / row if row > 0 else 1.0
+    return ratio
 
 
 def _check_rows(problem: Problem) -> None:

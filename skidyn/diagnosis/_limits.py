@@ -4,15 +4,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.stats import norm
+from scipy.stats import norm, t as student
 
 from skidyn._signals import Array
 from skidyn._text import inside
 from skidyn.diagnosis._candidates import Candidate
+from skidyn.diagnosis._rule import Settings
 from skidyn.effects import get_effect, list_effects
 from skidyn.evidence import Normal, Problem, column_sizes
 
@@ -62,13 +63,71 @@ class Limit:
         return asdict(self)
 
 
+@dataclass(frozen=True)
+class Gates:
+    """What an effect must remove of a joint's squared error, in units of its noise.
+
+    A limit is the size that passes every gate of the rule, not significance alone.
+
+    Parameters
+    ----------
+    settings : Settings
+        Thresholds of the search.
+    n_tests : int
+        Candidates tried.
+    free : int
+        Blocks of time that the test has, less one.
+    counts : ndarray of shape (n_joints,)
+        Averaged rows.
+    whiteness : ndarray of shape (n_joints,)
+        Variance of a sample over that of an averaged row: what a share of the error of samples is
+        on rows.
+    earlier : ndarray of shape (n_joints,)
+        Squared error that earlier findings removed, in units of the noise that is left.
+    """
+
+    settings: Settings
+    n_tests: int
+    free: int
+    counts: Array
+    whiteness: Array
+    earlier: Array
+
+    def needed(self, joint: int, n_parameters: int, inflation: float) -> float:
+        """Size of a column, over the noise, with which the effect is found.
+
+        Parameters
+        ----------
+        joint : int
+            Joint, from 0.
+        n_parameters : int
+            Coefficients and shape parameters of the effect.
+        inflation : float
+            Variance inflation of the residual.
+
+        Returns
+        -------
+        float
+        """
+        s = self.settings
+        chance = s.level / self.n_tests / 2
+        drop = max(
+            inflation * float(student.isf(chance, max(self.free, 2))) ** 2,
+            s.least_gain + 2 * inflation * n_parameters,
+            float(s.least_share * self.counts[joint]),
+            float(s.least_drop * self.whiteness[joint] * self.counts[joint]),
+            float(s.form_tolerance * self.earlier[joint]),
+        )
+        return float(np.sqrt(drop) + norm.ppf(POWER) * np.sqrt(inflation))
+
+
 def find_limits(
     problem: Problem,
     candidates: Sequence[Candidate],
     blocks: Sequence[dict[int, Array]],
     sigma: Array,
     inflation: Array,
-    least_gain: float,
+    gates: Gates,
 ) -> list[Limit]:
     """Limits of the effects on single joints that were tried and not found.
 
@@ -82,8 +141,8 @@ def find_limits(
         Columns of the final model beside the rigid body.
     sigma, inflation : ndarray of shape (n_joints,)
         Noise of one row and its variance inflation.
-    least_gain : float
-        Twice the log-likelihood gain at which a finding is reported.
+    gates : Gates
+        What an effect must remove to be a finding.
 
     Returns
     -------
@@ -92,7 +151,6 @@ def find_limits(
     design = [a / s for a, s in zip(problem.design(blocks), sigma, strict=True)]
     gram = np.asarray(sum(a.T @ a for a in design))
     model = Normal(gram, np.zeros(len(gram)), column_sizes(gram))
-    needed = np.sqrt(least_gain) + norm.ppf(POWER)
     power = [float(np.sum(t**2)) / s**2 for t, s in zip(problem.target, sigma, strict=True)]
     largest: dict[tuple[str, int], list[tuple[Candidate, float]]] = {}
     for candidate in candidates:
@@ -102,7 +160,8 @@ def find_limits(
             continue
         joint = candidate.joints[0]
         own, swept = _information(candidate, design, sigma, model)
-        size = needed * np.sqrt(inflation[joint] / swept) if swept > NEW_SHARE * own else np.inf
+        needed = gates.needed(joint, candidate.width + candidate.n_shapes, float(inflation[joint]))
+        size = needed / np.sqrt(swept) if swept > NEW_SHARE * own else np.inf
         # More than all that the torque holds is no limit.
         told = size if size**2 * own < power[joint] else np.inf
         largest.setdefault((effect.kind, joint), []).append((candidate, float(told)))
@@ -159,6 +218,35 @@ def _information(
     others = swept[1:, 1:] + 1e-9 * np.diag(np.diag(own)[1:] + 1e-300)
     rest = swept[0, 0] - swept[0, 1:] @ np.linalg.solve(others, swept[1:, 0])
     return float(own[0, 0]), float(max(rest, 0.0))
+
+
+def without_withdrawn(limits: Sequence[Limit], withdrawn: Sequence[Candidate]) -> list[Limit]:
+    """Limits less those of effects that were found and withdrawn for removing too little.
+
+    Parameters
+    ----------
+    limits : sequence of Limit
+        All limits.
+    withdrawn : sequence of Candidate
+        What was found and taken back.
+
+    Returns
+    -------
+    list of Limit
+        Of these effects no size is stated.
+    """
+    taken = {(c.kind, j + 1) for c in withdrawn for j in c.joints}
+    return [
+        replace(
+            limit,
+            largest_hidden=None,
+            sentence=f"A trace of {inside(get_effect(limit.kind).title)} on joint {limit.joint} "
+            "shows, but removes too little error to be a finding; no limit is stated for it.",
+        )
+        if (limit.kind, limit.joint) in taken
+        else limit
+        for limit in limits
+    ]
 
 
 def _not_shown(problem: Problem) -> list[Limit]:

@@ -48,6 +48,9 @@ NAMELESS_PRICE = 6
 #: Functions of the signals among which a nameless candidate was chosen, for each candidate tried.
 NAMELESS_TRIED = 20
 
+#: No rival is told to be further behind than by so many standard errors.
+MOST_LEAD = 10.0
+
 #: Waves per turn from which a nameless function of position cannot stand for torque ripple.
 RESOLVED = 40.0
 
@@ -169,7 +172,9 @@ class _Search:
                 best = self._first_of_names(best, ranking) or best
             judged = self.judged(best)
             if judged is not None and not self.shadow(judged):
-                return replace(judged, margin=_margin(judged, offered))
+                rivals = _rivals(judged, offered)
+                margin, lead = _margin(judged, rivals), _lead(judged, rivals)
+                return replace(judged, margin=margin, lead=lead)
         return None
 
     def _richer_known(self, hypothesis: Hypothesis) -> bool:
@@ -747,12 +752,12 @@ def _within(hypothesis: Hypothesis) -> bool:
     return any(map(_some_recordings, hypothesis.candidates))
 
 
-def _margin(best: Hypothesis, ranking: Sequence[Hypothesis]) -> float:
-    """Share of the best score by which the other explanations of the same joints fall short."""
+def _rivals(best: Hypothesis, ranking: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Other explanations of the same joints, members of the same family apart."""
     own = set(best.joints)
     family = _family(best)
-    rivals = [
-        h.score
+    return [
+        h
         for h in ranking
         if h.kind != best.kind
         and own & set(h.joints)
@@ -760,9 +765,26 @@ def _margin(best: Hypothesis, ranking: Sequence[Hypothesis]) -> float:
         and (_within(best) or not _within(h))  # errors of single recordings are smaller
         and not _is_vibration(h)
     ]
+
+
+def _margin(best: Hypothesis, rivals: Sequence[Hypothesis]) -> float:
+    """Share of the best score by which the rivals fall short."""
     if not rivals or best.score <= 0:
         return 1.0
-    return 1.0 - max(rivals) / best.score
+    return 1.0 - max(h.score for h in rivals) / best.score
+
+
+def _lead(best: Hypothesis, rivals: Sequence[Hypothesis]) -> float:
+    """Standard errors, over the folds, by which the nearest rival's error is larger."""
+    leads = [MOST_LEAD]
+    for rival in rivals:
+        if best.errors is None or rival.errors is None or rival.errors.shape != best.errors.shape:
+            continue
+        variance = np.maximum(best.errors.sum(0), 1e-300)
+        behind = ((rival.errors - best.errors) / variance).sum(1)
+        error = float(behind.std(ddof=1)) * np.sqrt(len(behind))
+        leads.append(float(behind.sum()) / error if error > 0 else MOST_LEAD)
+    return min(leads)
 
 
 def _family(hypothesis: Hypothesis) -> str:
