@@ -16,9 +16,6 @@ from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._comparison import Comparison
 from skidyn.diagnosis._confidence import confidence
 from skidyn.diagnosis._episodes import (
-    LEAST_HELD,
-    LEAST_NOISE,
-    LEAST_RANGE,
     Episode,
     away_from_reversals,
     find_episodes,
@@ -36,7 +33,12 @@ from skidyn.diagnosis._intervals import parameter_intervals
 from skidyn.diagnosis._limits import Limit
 from skidyn.diagnosis._remainder import Remainder, find_remainder, torque_range
 from skidyn.diagnosis._result import Diagnosis, Verdict
-from skidyn.diagnosis._rule import false_discovery_rate
+from skidyn.diagnosis._rule import (
+    EPISODE_LEAST_HELD,
+    EPISODE_LEAST_NOISE,
+    EPISODE_LEAST_RANGE,
+    false_discovery_rate,
+)
 from skidyn.diagnosis._search import replace_torque
 from skidyn.diagnosis._unknown import UnknownTorque, describe_unknowns
 from skidyn.effects import Term
@@ -110,11 +112,13 @@ def conclude(
     share = predictable_share(problem, result.fit.residual)
     rmse = np.array(history[-1]["rmse"])
     parts = find_remainder(problem, held.residual, torque, rmse, share)
-    least = np.maximum(LEAST_RANGE * torque_range(torque), LEAST_NOISE * parts.noise)
+    least = np.maximum(
+        EPISODE_LEAST_RANGE * torque_range(torque), EPISODE_LEAST_NOISE * parts.noise
+    )
     smooth = away_from_reversals(problem, result.fit.residual, sliding)
     # On a joint with a finding, what is large in places is the trace of its imperfect formula.
     taken = {j - 1 for f in findings for j in f.joints}
-    share_held = np.array([np.inf if j in taken else LEAST_HELD for j in range(len(rmse))])
+    share_held = np.array([np.inf if j in taken else EPISODE_LEAST_HELD for j in range(len(rmse))])
     episodes, inside = find_episodes(problem, smooth, least, share_held)
     if episodes:
         findings.append(_episodic(episodes, inside, result.fit.residual))

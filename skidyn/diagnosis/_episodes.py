@@ -18,23 +18,15 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.diagnosis._noise import MEDIAN
+from skidyn.diagnosis._rule import (
+    EPISODE_EXCESS,
+    EPISODE_FORCE_SHARE,
+    EPISODE_LEAST_EXCESS,
+    EPISODE_LEAST_SUM,
+    EPISODE_MOST_ROWS,
+    EPISODE_SLIDING,
+)
 from skidyn.evidence import Problem
-
-#: Squared residual, in units of the noise, above which a row counts as excess, and the least sum of
-#: the excess of an episode: several rows in a row far beyond what quiet rows show.
-EXCESS, LEAST_SUM = 4.0, 60.0
-#: Largest share of a joint's rows in episodes, and least share of its excess that they hold: with
-#: more it does not come and go.
-MOST_ROWS, LEAST_EXCESS = 0.4, 0.6
-#: An episode must reach this share of the range of the joint's torque, and so many times its noise.
-LEAST_RANGE, LEAST_NOISE = 0.01, 2.0
-#: Share of the squared residual of a joint that its episodes must hold: what remains of a torque
-#: that follows the motion is large in places, too.
-LEAST_HELD = 0.6
-#: Share of a row's weight that falls on sliding samples: dry friction at reversals is no episode.
-SLIDING = 0.9
-#: A force at one link must explain this share of the squared torque of all joints.
-FORCE_SHARE = 0.8
 
 
 @dataclass(frozen=True)
@@ -149,7 +141,7 @@ def away_from_reversals(
     kept = []
     for j, r in enumerate(residual):
         share = problem.rows.average(sliding[:, j].astype(float), j) / problem.rows.average(ones, j)
-        kept.append(np.where(share >= SLIDING, r, 0.0))
+        kept.append(np.where(share >= EPISODE_SLIDING, r, 0.0))
     return kept
 
 
@@ -163,7 +155,7 @@ def _rows_of_episodes(
     quiet = float(np.median(np.abs(residual))) / MEDIAN
     if quiet <= 0:
         return chosen
-    excess = (residual / quiet) ** 2 - EXCESS
+    excess = (residual / quiet) ** 2 - EPISODE_EXCESS
     weight = problem.rows.average(np.ones(problem.signals.n_samples), joint)
     for order in _runs(problem, joint):
         _take(excess[order], order, chosen)
@@ -173,7 +165,7 @@ def _rows_of_episodes(
         return np.zeros_like(chosen)
     total = float(np.maximum(excess, 0.0).sum())
     held = float(np.maximum(excess[chosen], 0.0).sum())
-    fits = chosen.mean() <= MOST_ROWS and held >= LEAST_EXCESS * total
+    fits = chosen.mean() <= EPISODE_MOST_ROWS and held >= EPISODE_LEAST_EXCESS * total
     fits &= float(np.sum(residual[chosen] ** 2)) >= share * float(np.sum(residual**2))
     return chosen if fits else np.zeros_like(chosen)
 
@@ -192,11 +184,11 @@ def _take(excess: Array, order: NDArray[np.int64], chosen: NDArray[np.bool_]) ->
         total = np.concatenate([[0.0], np.cumsum(left)])
         lowest = np.minimum.accumulate(total)
         end = int(np.argmax(total - lowest))
-        if total[end] - lowest[end] < LEAST_SUM:
+        if total[end] - lowest[end] < EPISODE_LEAST_SUM:
             return
         start = int(np.argmin(total[: end + 1]))
         chosen[order[start:end]] = True
-        left[start:end] = -EXCESS
+        left[start:end] = -EPISODE_EXCESS
 
 
 def _spans(
@@ -268,7 +260,7 @@ def _force(
     if samples.sum() < 6:
         return None, None
     rows = [_between(problem, j, trajectory, start, end) for j in range(problem.n_joints)]
-    best: tuple[float, str | None, tuple[float, ...] | None] = (FORCE_SHARE, None, None)
+    best: tuple[float, str | None, tuple[float, ...] | None] = (EPISODE_FORCE_SHARE, None, None)
     total = sum(float(residual[j][rows[j]] @ residual[j][rows[j]]) for j in range(problem.n_joints))
     third = np.minimum((s.clock - start) / max(end - start, 1e-9) * 3, 2.999).astype(int)
     for name in robot.body_names[max(joints) :]:

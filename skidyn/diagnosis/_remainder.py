@@ -15,14 +15,13 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.diagnosis._noise import MEDIAN, sensor_noise
+from skidyn.diagnosis._rule import (
+    REMAINDER_PREDICTABLE_SHARE,
+    REMAINDER_SHARE_OF_RANGE,
+    REMAINDER_TIMES_NOISE,
+)
 from skidyn.evidence import Problem, smooth_motion
 
-#: Times the noise, and share of the torque's range, above which a remainder is material: smoothing
-#: and coloured noise leave up to half as much again as the fast noise, and robots that move well
-#: leave some hundredths of the range.
-TIMES_NOISE, SHARE_OF_RANGE = 3.0, 0.05
-#: Share of the torque's range above which something predictable is material if it exceeds noise.
-PREDICTABLE_SHARE = 0.01
 #: Quantiles between which the range of the torque lies.
 RANGE = (0.005, 0.995)
 #: Samples on which the noise of the positions is followed to the torque.
@@ -106,8 +105,8 @@ def find_remainder(
     predictable = np.sqrt(np.minimum(share * rmse**2, excess))
     left = np.sqrt(np.maximum(excess - predictable**2, 0.0))
     span = torque_range(torque)
-    material = (rmse > TIMES_NOISE * noise) & (left > SHARE_OF_RANGE * span)
-    material |= (predictable > noise) & (predictable > PREDICTABLE_SHARE * span)
+    material = (rmse > REMAINDER_TIMES_NOISE * noise) & (left > REMAINDER_SHARE_OF_RANGE * span)
+    material |= (predictable > noise) & (predictable > REMAINDER_PREDICTABLE_SHARE * span)
     return Remainder(sensor, position, predictable, left, material)
 
 

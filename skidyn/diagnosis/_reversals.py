@@ -15,7 +15,14 @@ from dataclasses import replace
 import numpy as np
 
 from skidyn.diagnosis._hypothesis import SearchResult
-from skidyn.diagnosis._rule import Settings
+from skidyn.diagnosis._rule import (
+    REVERSAL_AWAY,
+    REVERSAL_FEWEST_ROWS,
+    REVERSAL_LEAST_SHARE,
+    REVERSAL_SHARE_OF_FRICTION,
+    REVERSAL_STANDS_OUT,
+    Settings,
+)
 from skidyn.diagnosis._search import search
 from skidyn.effects import get_effect
 from skidyn.evidence import (
@@ -28,16 +35,6 @@ from skidyn.evidence import (
 )
 
 FAMILY = "hysteresis"
-#: A joint is looked at if its error close to reversals is more than this share of its dry
-#: friction, what the uncertain velocity there may leave,
-SHARE_OF_FRICTION = 0.12
-#: and if its mean squared error there exceeds that of sliding by this factor.
-STANDS_OUT = 2.0
-#: Rows at reversals that a joint must have for its error there to be judged, and the share of a
-#: row's weight that lies away from them.
-FEWEST_ROWS, AWAY = 20, 0.6
-#: Least share of a joint's squared error that hysteresis must remove there.
-LEAST_SHARE = 0.06
 
 
 def look_at_reversals(
@@ -80,7 +77,7 @@ def look_at_reversals(
     known = [c.term for h in others if h.torque is None for c in h.candidates]
     wider = with_reversals(problem, (*problem.terms, *known), joints)
     wider.torque = problem.torque - result.ripple
-    gates = replace(settings, least_share=LEAST_SHARE, max_findings=room)
+    gates = replace(settings, least_share=REVERSAL_LEAST_SHARE, max_findings=room)
     second = search(wider, family, gates, nameless=False, joints=joints)
     if not new & {j for h in second.findings for j in h.joints}:
         return problem, result
@@ -121,12 +118,15 @@ def failing_joints(problem: Problem, result: SearchResult) -> list[int]:
         weight = rows.average(np.ones(n), j)
         away = rows.average(problem.rows.sliding[:, j].astype(float), j) / weight
         square = (rows.average(residual[:, j], j) / weight) ** 2
-        turning = away < AWAY
-        if min(turning.sum(), (~turning).sum()) < FEWEST_ROWS:
+        turning = away < REVERSAL_AWAY
+        if min(turning.sum(), (~turning).sum()) < REVERSAL_FEWEST_ROWS:
             continue
         error, sliding = square[turning].mean(), square[~turning].mean()
         level = np.mean(friction[close[:, j], j] ** 2)
-        if error > STANDS_OUT * sliding and error > SHARE_OF_FRICTION**2 * level > 0:
+        if (
+            error > REVERSAL_STANDS_OUT * sliding
+            and error > REVERSAL_SHARE_OF_FRICTION**2 * level > 0
+        ):
             failing.append(j)
     return failing
 

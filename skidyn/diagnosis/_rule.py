@@ -47,8 +47,49 @@ MOST_LAGS, SMALL = 12, 0.05
 #: Blocks needed beyond the coefficients that are tested; and blocks, beyond twice the coefficients,
 #: that are made at least where the residual stays alike for long.
 FEWEST_BLOCKS, ENOUGH_BLOCKS = 6, 8
+#: Waves per turn from which a nameless function of position cannot stand for torque ripple.
+RESOLVED = 40.0
+#: No rival is told to be further behind than by so many standard errors.
+MOST_LEAD = 10.0
 #: A column of which less than this share is new to the model is not tested.
 NEW_SHARE = 1e-6
+
+# Torques that come and go (``_episodes.py``); no false one: ``nothing_hidden.py``.
+#: Squared residual, in units of the noise, above which a row counts as excess, and the least sum of
+#: the excess of an episode: several rows in a row far beyond what quiet rows show.
+EPISODE_EXCESS, EPISODE_LEAST_SUM = 4.0, 60.0
+#: Largest share of a joint's rows in episodes, and least share of its excess that they hold: with
+#: more it does not come and go.
+EPISODE_MOST_ROWS, EPISODE_LEAST_EXCESS = 0.4, 0.6
+#: An episode must reach this share of the range of the joint's torque, and so many times its noise.
+EPISODE_LEAST_RANGE, EPISODE_LEAST_NOISE = 0.01, 2.0
+#: Share of the squared residual of a joint that its episodes must hold: what remains of a torque
+#: that follows the motion is large in places, too.
+EPISODE_LEAST_HELD = 0.6
+#: Share of a row's weight that falls on sliding samples: dry friction at reversals is no episode.
+EPISODE_SLIDING = 0.9
+#: A force at one link must explain this share of the squared torque of all joints.
+EPISODE_FORCE_SHARE = 0.8
+
+# When what is left is material (``_remainder.py``); ``real_recordings.py``, ``nothing_hidden.py``.
+#: Times the noise, and share of the torque's range, above which a remainder is material: smoothing
+#: and coloured noise leave up to half as much again as the fast noise, and robots that move well
+#: leave some hundredths of the range.
+REMAINDER_TIMES_NOISE, REMAINDER_SHARE_OF_RANGE = 3.0, 0.05
+#: Share of the torque's range above which something predictable is material if it exceeds noise.
+REMAINDER_PREDICTABLE_SHARE = 0.01
+
+# Hysteresis that shows at reversals only (``_reversals.py``); ``practice.py``.
+#: A joint is looked at if its error close to reversals is more than this share of its dry
+#: friction, what the uncertain velocity there may leave,
+REVERSAL_SHARE_OF_FRICTION = 0.12
+#: and if its mean squared error there exceeds that of sliding by this factor.
+REVERSAL_STANDS_OUT = 2.0
+#: Rows at reversals that a joint must have for its error there to be judged, and the share of a
+#: row's weight that lies away from them.
+REVERSAL_FEWEST_ROWS, REVERSAL_AWAY = 20, 0.6
+#: Least share of a joint's squared error that hysteresis must remove there.
+REVERSAL_LEAST_SHARE = 0.06
 
 
 @dataclass(frozen=True)
@@ -81,6 +122,16 @@ class Settings:
         one's score is named.
     ripple_share : float
         Torque ripple must do this share of what a function of the signals does on averaged rows.
+    member : float
+        Chance at which one of several recordings differs, once all together are more than chance.
+    nameless_price : int
+        Coefficients that a nameless function is charged for at most: its held-out error has paid
+        for them once already.
+    nameless_tried : int
+        Functions of the signals among which a nameless candidate was chosen, for each that is
+        tried.
+    shapes_tested : int
+        Candidates of a kind, joints and shapes, that are tested before the kind is given up.
     max_findings : int
         Kinds added at most.
     names_for_one : int
@@ -105,6 +156,10 @@ class Settings:
     simpler_share: float = 0.05
     family_share: float = 0.95
     ripple_share: float = 0.8
+    member: float = 0.05
+    nameless_price: int = 6
+    nameless_tried: int = 20
+    shapes_tested: int = 4
     max_findings: int = 4
     names_for_one: int = 2
     finalists: int = 8

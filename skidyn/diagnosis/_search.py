@@ -23,6 +23,8 @@ from skidyn.diagnosis._hypothesis import (
 from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
 from skidyn.diagnosis._recordings import choose, recording_candidates
 from skidyn.diagnosis._rule import (
+    MOST_LEAD,
+    RESOLVED,
     Settings,
     Tester,
     false_discovery_rate,
@@ -35,24 +37,6 @@ from skidyn.effects import FunctionOfSignals, NamelessEffect, Term, get_effect, 
 from skidyn.evidence import Problem
 
 Mask = NDArray[np.bool_]
-
-#: Chance at which one of several recordings differs, once all together are more than chance.
-MEMBER = 0.05
-
-#: Candidates of a kind, joints and shapes, that are tested before the kind is given up.
-SHAPES_TESTED = 4
-
-#: Coefficients that a nameless function is charged for at most.
-NAMELESS_PRICE = 6
-
-#: Functions of the signals among which a nameless candidate was chosen, for each candidate tried.
-NAMELESS_TRIED = 20
-
-#: No rival is told to be further behind than by so many standard errors.
-MOST_LEAD = 10.0
-
-#: Waves per turn from which a nameless function of position cannot stand for torque ripple.
-RESOLVED = 40.0
 
 
 def search(
@@ -227,7 +211,7 @@ class _Search:
             c
             for c in hypothesis.candidates
             if self.chance(c, [*self.chosen, *(o for o in hypothesis.candidates if o is not c)])
-            <= MEMBER
+            <= self.settings.member
         ]
         if not kept:
             return None
@@ -250,7 +234,7 @@ class _Search:
 
     def tried(self, kind: str) -> int:
         """Candidates tried; nameless ones were chosen among products of functions as well."""
-        return self.n_tests * (NAMELESS_TRIED if kind == UNKNOWN else 1)
+        return self.n_tests * (self.settings.nameless_tried if kind == UNKNOWN else 1)
 
     def chance(self, candidate: Candidate, others: Sequence[Candidate]) -> float:
         """Chance of a candidate's coefficients beside the model and other candidates."""
@@ -310,7 +294,8 @@ class _Search:
             kept = tuple(
                 c
                 for c in old.candidates
-                if (chance := self.chance(c, [o for o in self.chosen if o is not c])) <= MEMBER
+                if (chance := self.chance(c, [o for o in self.chosen if o is not c]))
+                <= self.settings.member
                 and (together or self.significant(chance, c.kind))
             )
             if kept and newest is not None and self._needless(old, without):
@@ -551,7 +536,7 @@ class _Search:
 
     def _first_significant(self, drops: Array, order: Array, tester: Tester) -> int | None:
         """The first of the best few candidates that is large enough and more than chance."""
-        for i in np.argsort(-order)[:SHAPES_TESTED]:
+        for i in np.argsort(-order)[: self.settings.shapes_tested]:
             candidate = self.pool[i]
             n_rows = int(self.problem.rows.counts[list(candidate.joints)].sum())
             if not drops[i] > self.settings.least_share * n_rows:
@@ -622,7 +607,7 @@ class _Search:
             score = float(gain.sum()) - price * count
             if kind == UNKNOWN:
                 # The error held out has paid for its coefficients already.
-                score = float(gain.sum()) - price * min(count, NAMELESS_PRICE)
+                score = float(gain.sum()) - price * min(count, self.settings.nameless_price)
             ranking.append(Hypothesis(kind, tuple(candidates), gain, score, count, errors=after))
         return [h for h in ranking if h.score > self.settings.least_gain]
 
