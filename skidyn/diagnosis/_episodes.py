@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import binary_closing
 
 from skidyn._signals import Array
 from skidyn.diagnosis._noise import MEDIAN
@@ -24,6 +25,7 @@ from skidyn.diagnosis._rule import (
     EPISODE_LEAST_EXCESS,
     EPISODE_LEAST_SUM,
     EPISODE_MOST_ROWS,
+    EPISODE_QUIET,
     EPISODE_SLIDING,
 )
 from skidyn.evidence import Problem
@@ -187,7 +189,9 @@ def _take(excess: Array, order: NDArray[np.int64], chosen: NDArray[np.bool_]) ->
         if total[end] - lowest[end] < EPISODE_LEAST_SUM:
             return
         start = int(np.argmin(total[: end + 1]))
-        chosen[order[start:end]] = True
+        # What is quiet for a while between two pushes belongs to neither.
+        inside = binary_closing(np.pad(left[start:end] > 0, EPISODE_QUIET), np.ones(EPISODE_QUIET))
+        chosen[order[start:end]] = inside[EPISODE_QUIET:-EPISODE_QUIET]
         left[start:end] = -EPISODE_EXCESS
 
 

@@ -61,6 +61,8 @@ EPISODE_EXCESS, EPISODE_LEAST_SUM = 4.0, 60.0
 #: Largest share of a joint's rows in episodes, and least share of its excess that they hold: with
 #: more it does not come and go.
 EPISODE_MOST_ROWS, EPISODE_LEAST_EXCESS = 0.4, 0.6
+#: So many quiet rows in a row end an episode.
+EPISODE_QUIET = 5
 #: An episode must reach this share of the range of the joint's torque, and so many times its noise.
 EPISODE_LEAST_RANGE, EPISODE_LEAST_NOISE = 0.01, 2.0
 #: Share of the squared residual of a joint that its episodes must hold: what remains of a torque
