@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How sure a name is: fit the weights on one folder of answers, print the reliability on others.
+"""How sure a name is: the reliability of the stated probabilities, and weights fitted to them.
 
     python benchmarks/diagnosis/confidence.py TRUTH.json REPORTS [TRUTH.json REPORTS ...]
 
-``REPORTS`` holds one ``report.json`` a log, as ``skidyn diagnose --out`` writes it, named after its
-case. The first pair is for the weights, all of them are for the table.
+``REPORTS`` holds one ``report.json`` a log, as ``benchmarks/diagnosis/practice.py --reports`` writes it,
+named after its case. The names of an effect on several joints count once.
 """
 
 from __future__ import annotations
@@ -16,54 +16,64 @@ from pathlib import Path
 import numpy as np
 from sklearn.linear_model import LogisticRegression
 
-from skidyn.diagnosis._confidence import confidence
+BINS = (0.0, 0.6, 0.75, 0.85, 0.9, 0.95, 1.0)
+#: These act on the tool or the base: any joint is right.
+ANYWHERE = {"payload", "external_wrench", "base_tilt", "environment_contact"}
 
-BINS = (0.0, 0.5, 0.7, 0.8, 0.9, 1.0)
+
+def right(effect: dict, hidden: dict) -> bool:
+    """Whether a name is that of a hidden effect on one of its joints."""
+    true = [*hidden["effects"], *hidden.get("nuisance", [])]
+    for e in true:
+        lacks = e["kind"] in ("viscous", "coulomb") and e["kind"] not in hidden["base_model"]
+        anywhere = lacks or e["kind"] in ANYWHERE or not e["joints"]
+        if effect["kind"] in {e["kind"], *e.get("accept", [])}:
+            if anywhere or set(effect["joints"]) & set(e["joints"]):
+                return True
+    return False
 
 
-def names(truth: Path, reports: Path) -> list[tuple[float, float, bool]]:
-    """Margin, what is left over the noise, and whether the name is right, of every finding."""
+def names(truth: Path, reports: Path) -> list[tuple[float, bool, list[float]]]:
+    """Stated probability, whether the name is right, and what tells, of every name."""
     cases = json.loads(truth.read_text())
     table = {t["case"]: t for t in (cases.values() if isinstance(cases, dict) else cases)}
     rows = []
     for file in sorted(reports.glob("*.json")):
         if file.stem not in table:
             continue
-        report, hidden = json.loads(file.read_text()), table[file.stem]
+        report, seen = json.loads(file.read_text()), set()
         ratio = np.array(report["rmse_after"]) / np.maximum(report["noise_floor"], 1e-300)
-        true = [*hidden["effects"], *hidden.get("nuisance", [])]
         for effect in report["effects"]:
-            if effect["when"]:  # no name: it comes and goes
+            if effect["confidence"] is None or effect["kind"] in seen:
                 continue
-            right = any(
-                effect["kind"] in {e["kind"], *e.get("accept", [])}
-                and (not e["joints"] or set(effect["joints"]) & set(e["joints"]))
-                for e in true
-            )
-            left = float(ratio[[j - 1 for j in effect["joints"]]].max())
-            rows.append((effect["margin"], left, right))
+            seen.add(effect["kind"])
+            left = max(1.0, float(ratio[[j - 1 for j in effect["joints"]]].max()))
+            tells = [min(max(effect["margin"], 0.0), 1.0), np.log(left)]
+            tells.append(float(effect["trajectories"] is not None))
+            rows.append((effect["confidence"], right(effect, table[file.stem]), tells))
     return rows
 
 
 def main() -> None:
     paths = [Path(p) for p in sys.argv[1:]]
-    pairs = list(zip(paths[::2], paths[1::2], strict=True))
-    first = names(*pairs[0])
-    x = np.array([[min(max(m, 0.0), 1.0), np.log(max(r, 1.0))] for m, r, _ in first])
-    right = np.array([ok for _, _, ok in first])
-    if len(set(right)) == 2:
-        fit = LogisticRegression(C=10.0).fit(x, right)
-        weights = (*fit.intercept_, *fit.coef_[0])
-        print("weights (constant, margin, left):", ", ".join(f"{w:.2f}" for w in weights))
-    for truth, reports in pairs:
-        rows = names(truth, reports)
-        p = np.array([confidence(m, r) for m, r, _ in rows])
-        ok = np.array([good for _, _, good in rows])
-        print(f"{reports}: {len(rows)} names, {ok.mean():.3f} right")
-        for low, high in zip(BINS[:-1], BINS[1:], strict=True):
-            here = (p >= low) & (p < high)
-            if here.any():
-                print(f"  stated {p[here].mean():.2f}: {ok[here].mean():.2f} of {here.sum()}")
+    rows = []
+    for truth, reports in zip(paths[::2], paths[1::2], strict=True):
+        rows += names(truth, reports)
+    stated, good = np.array([p for p, _, _ in rows]), np.array([ok for _, ok, _ in rows])
+    print(f"{len(rows)} names, {good.sum()} right")
+    for low, high in zip(BINS[:-1], BINS[1:], strict=True):
+        here = (stated >= low) & (stated < high)
+        if here.any():
+            print(
+                f"  stated {low:.2f} to {high:.2f}, {stated[here].mean():.2f} on average: "
+                f"{good[here].mean():.2f} right of {here.sum()}"
+            )
+    sure = stated >= 0.9
+    print(f"  stated 0.9 or more: {np.sum(~good[sure])} wrong of {sure.sum()}")
+    if 0 < good.sum() < len(good):
+        fit = LogisticRegression(C=3.0).fit(np.array([t for _, _, t in rows]), good)
+        weights = ", ".join(f"{w:.2f}" for w in (*fit.intercept_, *fit.coef_[0]))
+        print(f"weights (constant, margin, left, some recordings) of these: {weights}")
 
 
 if __name__ == "__main__":

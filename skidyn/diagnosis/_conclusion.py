@@ -123,7 +123,7 @@ def conclude(
     if episodes:
         findings.append(_episodic(episodes, inside, result.fit.residual))
     ratio = rmse / np.maximum(parts.noise, 1e-300)
-    findings = [_sure(f, ratio) for f in findings]
+    findings = [_sure(f, ratio, problem.whole_trajectories) for f in findings]
     return Diagnosis(
         _verdict(findings, parts),
         robot.joint_names,
@@ -321,12 +321,13 @@ def _drop(before: Sequence[float], after: Sequence[float], joints: Sequence[int]
     return float(np.mean([1 - (a / b) ** 2 for b, a in pairs]))
 
 
-def _sure(finding: Finding, ratio: Array) -> Finding:
+def _sure(finding: Finding, ratio: Array, whole: bool) -> Finding:
     """The finding with the probability that its name is right."""
     if not finding.terms:
         return finding
     joints = [j - 1 for j in finding.joints]
-    return replace(finding, confidence=confidence(finding.margin, float(ratio[joints].max())))
+    left, some = float(ratio[joints].max()), finding.trajectories is not None
+    return replace(finding, confidence=confidence(finding.margin, left, whole, some))
 
 
 def _episodic(

@@ -57,8 +57,6 @@ class Finding:
     margin : float
         Share of its gain that the best other explanation of the same joints falls short of;
         negative where a simpler name was preferred.
-    lead : float
-        Standard errors over the recordings by which the nearest other explanation is behind.
     confidence : float or None
         Probability that the name is right.
     trajectories : tuple of int or None
@@ -88,7 +86,6 @@ class Finding:
     code: str
     terms: tuple[Term, ...]
     margin: float = 1.0
-    lead: float = 10.0
     confidence: float | None = None
     trajectories: tuple[int, ...] | None = None
     when: list[Episode] = field(default_factory=list)
@@ -117,7 +114,6 @@ class Finding:
             "rivals": list(self.rivals),
             "separating_motion": self.separating_motion,
             "margin": self.margin,
-            "lead": self.lead,
             "confidence": self.confidence,
             "trajectories": None if self.trajectories is None else list(self.trajectories),
             "when": [episode.to_dict() for episode in self.when],
@@ -217,7 +213,6 @@ def make_finding(
         code,
         (term,),
         hypothesis.margin,
-        hypothesis.lead,
         None,
         term.trajectories,
     )

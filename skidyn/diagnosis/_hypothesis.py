@@ -34,8 +34,6 @@ class Hypothesis:
         Candidates among which it was chosen.
     margin : float
         Share of its gain that the best other explanation of the same joints falls short of.
-    lead : float
-        Standard errors over the folds by which the nearest other explanation is behind.
     errors : ndarray of shape (n_folds, n_joints) or None
         Held-out squared error with it; None where it was judged otherwise.
     torque : ndarray of shape (n_samples, n_joints) or None
@@ -50,7 +48,6 @@ class Hypothesis:
     chances: tuple[float, ...] = ()
     tried: int = 1
     margin: float = 1.0
-    lead: float = 10.0
     errors: Array | None = None
     torque: Array | None = None
 

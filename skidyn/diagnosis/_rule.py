@@ -49,8 +49,6 @@ MOST_LAGS, SMALL = 12, 0.05
 FEWEST_BLOCKS, ENOUGH_BLOCKS = 6, 8
 #: Waves per turn from which a nameless function of position cannot stand for torque ripple.
 RESOLVED = 40.0
-#: No rival is told to be further behind than by so many standard errors.
-MOST_LEAD = 10.0
 #: A column of which less than this share is new to the model is not tested.
 NEW_SHARE = 1e-6
 

@@ -23,7 +23,6 @@ from skidyn.diagnosis._hypothesis import (
 from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
 from skidyn.diagnosis._recordings import choose, recording_candidates
 from skidyn.diagnosis._rule import (
-    MOST_LEAD,
     RESOLVED,
     Settings,
     Tester,
@@ -157,8 +156,7 @@ class _Search:
             judged = self.judged(best)
             if judged is not None and not self.shadow(judged):
                 rivals = _rivals(judged, offered)
-                margin, lead = _margin(judged, rivals), _lead(judged, rivals)
-                return replace(judged, margin=margin, lead=lead)
+                return replace(judged, margin=_margin(judged, rivals))
         return None
 
     def _richer_known(self, hypothesis: Hypothesis) -> bool:
@@ -757,19 +755,6 @@ def _margin(best: Hypothesis, rivals: Sequence[Hypothesis]) -> float:
     if not rivals or best.score <= 0:
         return 1.0
     return 1.0 - max(h.score for h in rivals) / best.score
-
-
-def _lead(best: Hypothesis, rivals: Sequence[Hypothesis]) -> float:
-    """Standard errors, over the folds, by which the nearest rival's error is larger."""
-    leads = [MOST_LEAD]
-    for rival in rivals:
-        if best.errors is None or rival.errors is None or rival.errors.shape != best.errors.shape:
-            continue
-        variance = np.maximum(best.errors.sum(0), 1e-300)
-        behind = ((rival.errors - best.errors) / variance).sum(1)
-        error = float(behind.std(ddof=1)) * np.sqrt(len(behind))
-        leads.append(float(behind.sum()) / error if error > 0 else MOST_LEAD)
-    return min(leads)
 
 
 def _family(hypothesis: Hypothesis) -> str:
