@@ -3,8 +3,8 @@
 
     python benchmarks/diagnosis/confidence.py TRUTH.json REPORTS [TRUTH.json REPORTS ...]
 
-``REPORTS`` holds one ``report.json`` a log, as ``benchmarks/diagnosis/practice.py --reports`` writes it,
-named after its case. The names of an effect on several joints count once.
+``REPORTS`` holds one ``report.json`` a log, as ``practice.py --reports`` writes it, named after its
+case. The names of an effect on several joints count once.
 """
 
 from __future__ import annotations

@@ -4,8 +4,8 @@
 Four things tell: by how much of its gain the best other explanation falls short, what is left on
 its joints once it is added, in units of the noise, whether whole recordings could be left out to
 judge it, and whether it acts in some recordings only. The weights are those of a logistic
-regression on names found in logs of seeds apart (``benchmarks/diagnosis/confidence.py``), whole logs
-and logs cut down to one to five of their recordings, held near round values; the same benchmark
+regression on names found in logs of other seeds (``benchmarks/diagnosis/confidence.py``), whole
+and cut down to one to five of their recordings, held near round values; the same benchmark
 prints the reliability on other logs.
 """
 
