@@ -15,6 +15,7 @@ from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._comparison import Comparison
 from skidyn.diagnosis._confidence import confidence
+from skidyn.diagnosis._correction import refitted_errors
 from skidyn.diagnosis._episodes import (
     Episode,
     away_from_reversals,
@@ -95,13 +96,17 @@ def conclude(
         result = _without(problem, result, *useless)
     held = steps[-1].held
     history = [step.entry for step in steps]
+    shown = [entry["rmse"] for entry in history]
+    if not hasattr(model, "with_effects") or not hasattr(model, "effects"):
+        shown, remark = _refitted(problem, result, model, data, shown)
+        notes = [*notes, remark]
     rivals = {s.added.kind: rivals_of(s) for s in result.steps if s.added is not None}
     unknowns = _unknowns(problem, result, terms)
     findings = []
     for i, hypothesis in enumerate(result.findings):
         others = rivals.get(hypothesis.kind, ())
         for candidate, chance in zip(hypothesis.candidates, hypothesis.chances, strict=True):
-            drop = _drop(history[i]["rmse"], history[i + 1]["rmse"], candidate.joints)
+            drop = _drop(shown[i], shown[i + 1], candidate.joints)
             joints = [j + 1 for j in candidate.joints]
             own = [u for u in unknowns if hypothesis.kind == UNKNOWN and u.joint in joints]
             q = false_discovery_rate(chance, hypothesis.tried)
@@ -142,6 +147,27 @@ def conclude(
         share,
         unknowns,
         parts=parts,
+    )
+
+
+def _refitted(
+    problem: Problem, result: SearchResult, model: Any, data: tuple[Any, Any], errors: list[Any]
+) -> tuple[list[Any], str]:
+    """Errors that count for a model that is not physics, and what is to be said of its names."""
+    assert problem.robot is not None
+    remark = (
+        "This model is not a rigid-body model: the names below say how this model errs on this "
+        "log, which need not be what the robot has. "
+    )
+    found = result.findings
+    steps = [_found_terms(problem, found[:k]) for k in range(len(found) + 1)]
+    again = refitted_errors(model, problem.robot, steps, *data) if found else None
+    if again is None:
+        return errors, remark + "What an effect removes is of this very model, not refitted."
+    return (
+        [[float(e) for e in step] for step in again],
+        remark
+        + "What an effect removes is what copies of it, refitted with it, show on rows left out.",
     )
 
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,12 +11,14 @@ import numpy as np
 from sklearn.base import BaseEstimator, MetaEstimatorMixin, RegressorMixin, clone
 from sklearn.compose import TransformedTargetRegressor
 from sklearn.exceptions import NotFittedError
+from sklearn.model_selection import GroupKFold
 from sklearn.pipeline import Pipeline
+from sklearn.utils import _safe_indexing
 from sklearn.utils.validation import check_is_fitted
 
 from skidyn._compat import BaseSearchCV
 from skidyn._signals import Array, Signals, read_signals
-from skidyn.effects import make_terms
+from skidyn.effects import Term, make_terms
 from skidyn.evidence import Problem, make_problem
 from skidyn.identification import named_recordings, recognise, remember
 from skidyn.robots import Robot
@@ -165,6 +167,59 @@ class CorrectedRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         load = self.robot.inverse_dynamics(s.q, s.dq, s.ddq)
         problem.signals = s.with_(load=load, model_torque=own, smooth_torque=own)
         return problem
+
+
+#: Copies of a model that is not physics are refitted on so many folds at most.
+REFITS = 4
+
+
+def refitted_errors(
+    regressor: Any, robot: Robot, steps: Sequence[Sequence[Term]], X: Any, y: Any
+) -> list[Array] | None:
+    """Error of copies of a regressor, refitted with more and more effects, on rows left out.
+
+    A model that is not physics bends toward whatever it lacks, so that what an effect removes from
+    the residual of the fitted model need not be what a refitted one shows.
+
+    Parameters
+    ----------
+    regressor : regressor
+        Predicts torque, N m or N.
+    robot : Robot
+        Robot.
+    steps : sequence of sequence of Term
+        Effects beside the regressor at every step.
+    X : DataFrame or array of shape (n_samples, n_features)
+        Motion, with time and trajectory.
+    y : array-like of shape (n_samples, n_joints)
+        Measured torque, N m or N.
+
+    Returns
+    -------
+    list of ndarray of shape (n_joints,), N m or N, or None
+        Root mean square at every step; None for a regressor that cannot be refitted, and for a
+        single trajectory, of which nothing can be left out.
+    """
+    if not (hasattr(regressor, "fit") and hasattr(regressor, "get_params")):
+        return None
+    torque = np.asarray(y, dtype=float)
+    torque = torque.reshape(len(torque), -1)
+    keys: dict[str, Any] = {
+        name: getattr(regressor, name, "auto") for name in ("trajectory", "time")
+    }
+    groups = read_signals(X, torque, robot, **keys)[0].trajectory
+    n_folds = min(REFITS, len(np.unique(groups)))
+    if n_folds < 2:
+        return None
+    total = [np.zeros(torque.shape[1]) for _ in steps]
+    for train, test in GroupKFold(n_folds).split(torque, groups=groups):
+        own = clone(regressor).fit(_safe_indexing(X, train), _safe_indexing(y, train))
+        for k, terms in enumerate(steps):
+            model = CorrectedRegressor(own, robot, list(terms))
+            model.fit_effects(_safe_indexing(X, train), torque[train])
+            predicted = model.predict(_safe_indexing(X, test)).reshape(len(test), -1)
+            total[k] += np.sum((predicted - torque[test]) ** 2, axis=0)
+    return [np.sqrt(t / len(torque)) for t in total]
 
 
 @dataclass(frozen=True)

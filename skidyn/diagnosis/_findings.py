@@ -252,7 +252,10 @@ def _sentence(
         many = "y" if len(trajectories) == 1 else "ies"
         where += f" in trajector{many} {', '.join(map(str, trajectories))}"
     what = next((_value(name, row) for name, row in parameters.items()), "")
-    return f"{title} on {where}{what}. Adding it removes {drop:.0%} of the held-out squared error."
+    fall = f"Adding it removes {drop:.0%} of the held-out squared error."
+    if drop <= 0:
+        fall = "A model refitted with it errs no less on data left out."
+    return f"{title} on {where}{what}. {fall}"
 
 
 def _value(name: str, row: dict[str, Any]) -> str:

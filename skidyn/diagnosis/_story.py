@@ -187,6 +187,7 @@ def _line(diagnosis: Diagnosis, k: int, rows: Sequence[dict[str, Any]]) -> dict[
         "fell": 0.0 if best is None else fell(best),
         "what": finding.title,
         "where": where(finding.joints, len(rows)) + trajectories_told(finding),
+        "only": trajectories_told(finding),
         "when": episodes_told(finding.when),
         "size": sizes(finding),
         "sure": sure(finding),
@@ -209,7 +210,7 @@ def _together(group: Sequence[dict[str, Any]]) -> dict[str, Any]:
     joints = sorted({joint for card in group for joint in card["joints"]})
     best = max(group, key=lambda card: card["fell"])
     sizes_told = [
-        f"{card['size'].split(', ')[0]} (joint {card['joints'][0]})"
+        f"{card['size'].split(', ')[0]} (joint {card['joints'][0]}{card['only']})"
         for card in sorted(group, key=lambda card: card["joints"])
         if card["size"]
     ]
@@ -220,7 +221,7 @@ def _together(group: Sequence[dict[str, Any]]) -> dict[str, Any]:
         **best,
         "card": group[0]["card"],
         "joints": joints,
-        "where": joints_told(joints),
+        "where": joints_told(joints) + (" in some trajectories" if best["only"] else ""),
         "size": ", ".join(sizes_told[:LISTED] + more),
         "sure": doubtful["sure"],
         "doubtful": doubtful["doubtful"],
@@ -291,10 +292,9 @@ def where(joints: Sequence[int], n_joints: int) -> str:
 
 def trajectories_told(finding: Finding) -> str:
     """The trajectories of a finding that only some of them have."""
-    which = finding.parameters.get("trajectories", {}).get("value")
+    which = finding.trajectories
     if not which:
         return ""
-    which = which if isinstance(which, list) else [which]
     return f" in trajector{'y' if len(which) == 1 else 'ies'} {', '.join(map(str, which))}"
 
 

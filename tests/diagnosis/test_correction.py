@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from sklearn.base import clone
+from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.compose import TransformedTargetRegressor
 from sklearn.linear_model import Ridge
 from sklearn.model_selection import GridSearchCV, GroupKFold, cross_val_score
@@ -72,3 +72,31 @@ def test_the_search_is_one_of_scikit_learn():
     assert not hasattr(EffectSearchCV(RBDRegressor(LOG.robot), refit=False), "predict")
     with pytest.raises(ValueError, match="takes no effects"):
         EffectSearchCV(Ridge()).fit(LOG.X, LOG.y)
+
+
+def test_names_for_a_model_that_is_not_physics_are_said_to_be_of_the_model():
+    X, y = LOG.X, LOG.y
+
+    class Bodies(RegressorMixin, BaseEstimator):
+        """Predicts what a rigid body does, whatever it is fitted to."""
+
+        def fit(self, X, y):
+            self.bodies_ = RBDRegressor(LOG.robot).fit(X, y)
+            return self
+
+        def predict(self, X):
+            return self.bodies_.predict(X)
+
+    diagnosis = diagnose(Bodies().fit(X, y), X, y, robot=LOG.robot, effects=KINDS)
+
+    assert any("not a rigid-body model" in note for note in diagnosis.notes)
+    (finding,) = diagnosis.findings
+    by_hand = []
+    for train, test in GroupKFold(4).split(y, groups=X["trajectory"]):
+        own = Bodies().fit(X.iloc[train], y[train])
+        added = type(diagnosis.model)(own, LOG.robot, finding.terms)
+        better = added.fit_effects(X.iloc[train], y[train]).predict(X.iloc[test])
+        pairs = [(model - y[test]) ** 2 for model in (own.predict(X.iloc[test]), better)]
+        by_hand.append([pair[:, 1].sum() for pair in pairs])
+    before, after = np.sum(by_hand, axis=0)
+    np.testing.assert_allclose(finding.error_drop, 1 - after / before, rtol=1e-6)
