@@ -284,6 +284,7 @@ def _unknowns(problem: Problem, result: SearchResult, terms: Sequence[Term]) -> 
         for h in result.findings
         if h.kind == UNKNOWN and h.torque is None
         for c in h.candidates
+        if c.term.effect.nameless
     ]
     if not nameless:
         return []

@@ -38,6 +38,9 @@ from skidyn.measurement import (
 )
 from skidyn.robots import Robot
 
+#: Checks of the clock after which a wave in time may be of the logger.
+UNSTEADY = {"repeated_rows", "interpolated_rows", "clock_jitter"}
+
 
 def diagnose(
     model: Any,
@@ -178,7 +181,8 @@ def _diagnose(
     else:
         problem = _residual_problem(signals, residual, robot, smooth, settings)
     _check_rows(problem)
-    result = search(problem, kinds, settings)
+    steady = not {check.check for check in checks} & UNSTEADY
+    result = search(problem, kinds, settings, vibration=steady)
     wider, completed = look_at_reversals(problem, result, kinds, settings)
     limits = _limits(problem, result, completed, settings)
     sliding = problem.rows.sliding

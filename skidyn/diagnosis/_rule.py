@@ -75,7 +75,7 @@ EPISODE_FORCE_SHARE = 0.8
 #: Times the noise, and share of the torque's range, above which a remainder is material: smoothing
 #: and coloured noise leave up to half as much again as the fast noise, and robots that move well
 #: leave some hundredths of the range.
-REMAINDER_TIMES_NOISE, REMAINDER_SHARE_OF_RANGE = 3.0, 0.05
+REMAINDER_TIMES_NOISE, REMAINDER_SHARE_OF_RANGE = 2.0, 0.02
 #: Share of the torque's range above which something predictable is material if it exceeds noise.
 REMAINDER_PREDICTABLE_SHARE = 0.01
 
@@ -124,6 +124,10 @@ class Settings:
         Torque ripple must do this share of what a function of the signals does on averaged rows.
     member : float
         Chance at which one of several recordings differs, once all together are more than chance.
+    most_recordings : int
+        Recordings of a joint that may have an effect of a size of their own under its name.
+    white : float
+        Inflation of the variance by autocorrelation up to which what remains is white.
     nameless_price : int
         Coefficients that a nameless function is charged for at most: its held-out error has paid
         for them once already.
@@ -157,6 +161,8 @@ class Settings:
     family_share: float = 0.95
     ripple_share: float = 0.8
     member: float = 0.05
+    most_recordings: int = 2
+    white: float = 2.0
     nameless_price: int = 6
     nameless_tried: int = 20
     shapes_tested: int = 4

@@ -45,6 +45,7 @@ def search(
     *,
     nameless: bool = True,
     joints: Sequence[int] | None = None,
+    vibration: bool = True,
 ) -> SearchResult:
     """Find the missing effects.
 
@@ -60,12 +61,15 @@ def search(
         Whether nameless functions of the signals compete.
     joints : sequence of int, optional
         Joints, from 0, on which effects are tried; all by default.
+    vibration : bool, default=True
+        Whether waves in time are looked for, which a wrong clock makes by itself.
 
     Returns
     -------
     SearchResult
     """
     searcher = _Search(problem, kinds, settings, nameless)
+    searcher.vibration = vibration and nameless
     if joints is not None:
         searcher.pool = [c for c in searcher.pool if set(c.joints) <= set(joints)]
     return searcher.run()
@@ -78,7 +82,7 @@ class _Search:
         self.problem = problem
         self.settings = settings
         self.kinds = list(kinds)
-        self.nameless = nameless
+        self.vibration = nameless
         self.ripple = np.zeros_like(problem.torque)
         self.chosen: list[Candidate] = []
         self.findings: list[Hypothesis] = []
@@ -356,8 +360,8 @@ class _Search:
         ranking = self._finals([candidates for candidates, _ in rough[: self.settings.finalists]])
         ranking += [self._against_functions(h, ranking) for h in self._lines()]
         ranking += self._recordings()
-        # A vibration is no rival of anything that follows the motion: it comes last.
-        return sorted(ranking, key=lambda h: (_is_vibration(h), -h.score))
+        # What says least comes last: differences between recordings, and vibration.
+        return sorted(ranking, key=lambda h: (_says_little(h), -h.score))
 
     def pick(self, ranking: list[Hypothesis]) -> Hypothesis | None:
         """The best explanation, or a simpler one that is as good within its standard error."""
@@ -631,7 +635,7 @@ class _Search:
                 if line.term.shape["N"] >= RESOLVED or not self._follows_position(line.joint)
             ]
             found.append(self._of_lines("torque_ripple", "N", 1.0, lines, least))
-        if self.nameless:
+        if self.vibration:
             # On samples, of which there are many more than rows.
             least = self.settings.least_drop * len(residual) / max(1, problem.rows.counts.max())
             lines = find_vibrations(problem, residual)
@@ -708,8 +712,23 @@ class _Search:
             pool = [c for c in self.by_recording if c.kind == kind]
             chosen = choose(pool, lambda more: self.tester([*self.chosen, *more]), self.significant)
             if chosen:
-                found.append(chosen)
+                found += self._same_or_own(chosen)
         return self._finals(found)
+
+    def _same_or_own(self, chosen: Sequence[Candidate]) -> list[list[Candidate]]:
+        """Effects of few recordings by their name, those of many without one.
+
+        Sizes of its own in many recordings are what any slow torque that is missing leaves, unless
+        what remains of the joint is white.
+        """
+        most, white = self.settings.most_recordings, self.settings.white
+        few, many = [], []
+        for joints, part in _by_joints(chosen).items():
+            named = len(part) <= most or self._price(part) <= white
+            few += part if named else []
+            many += [] if named else part
+        many = [replace(c, kind=UNKNOWN, variables=("trajectory",)) for c in many]
+        return [part for part in (few, many) if part]
 
 
 def replace_torque(problem: Problem, torque: Array) -> Problem:
@@ -727,8 +746,20 @@ def _some_recordings(candidate: Candidate) -> bool:
     return candidate.term.trajectories is not None
 
 
+def _by_joints(candidates: Sequence[Candidate]) -> dict[tuple[int, ...], list[Candidate]]:
+    parts: dict[tuple[int, ...], list[Candidate]] = {}
+    for candidate in candidates:
+        parts.setdefault(candidate.joints, []).append(candidate)
+    return parts
+
+
 def _is_vibration(hypothesis: Hypothesis) -> bool:
     return hypothesis.kind == UNKNOWN and hypothesis.torque is not None
+
+
+def _says_little(hypothesis: Hypothesis) -> bool:
+    """Whether an explanation is one in name only: a vibration, or what differs between runs."""
+    return _is_vibration(hypothesis) or (hypothesis.kind == UNKNOWN and _within(hypothesis))
 
 
 def _within(hypothesis: Hypothesis) -> bool:

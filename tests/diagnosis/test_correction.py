@@ -89,7 +89,7 @@ def test_names_for_a_model_that_is_not_physics_are_said_to_be_of_the_model():
 
     diagnosis = diagnose(Bodies().fit(X, y), X, y, robot=LOG.robot, effects=KINDS)
 
-    assert any("not a rigid-body model" in note for note in diagnosis.notes)
+    assert any("not a rigid-body model" in note for note in diagnosis.warnings)
     (finding,) = diagnosis.findings
     by_hand = []
     for train, test in GroupKFold(4).split(y, groups=X["trajectory"]):
