@@ -723,7 +723,7 @@ class _Search:
         """
         most, white = self.settings.most_recordings, self.settings.white
         few, many = [], []
-        for joints, part in _by_joints(chosen).items():
+        for part in _by_joints(chosen):
             named = len(part) <= most or self._price(part) <= white
             few += part if named else []
             many += [] if named else part
@@ -746,11 +746,11 @@ def _some_recordings(candidate: Candidate) -> bool:
     return candidate.term.trajectories is not None
 
 
-def _by_joints(candidates: Sequence[Candidate]) -> dict[tuple[int, ...], list[Candidate]]:
+def _by_joints(candidates: Sequence[Candidate]) -> list[list[Candidate]]:
     parts: dict[tuple[int, ...], list[Candidate]] = {}
     for candidate in candidates:
         parts.setdefault(candidate.joints, []).append(candidate)
-    return parts
+    return list(parts.values())
 
 
 def _is_vibration(hypothesis: Hypothesis) -> bool:
