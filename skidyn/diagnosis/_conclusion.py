@@ -235,9 +235,9 @@ def _vague(
             if candidate.term.trajectories is not None and len(candidate.term.trajectories) == 1:
                 continue  # no fold but its own recording tells of it
             effect = candidate.term.effect
-            others = {s.name for s in effect.shapes} | {
-                name for name, unit in effect.units().items() if unit == "rad"
-            }
+            others = {s.name for s in effect.shapes}
+            if hypothesis.torque is not None:  # a line has a phase whatever its size
+                others |= {name for name, unit in effect.units().items() if unit == "rad"}
             found = [
                 value
                 for name, value in intervals[candidate.term].items()
