@@ -8,9 +8,9 @@ import threading
 import pytest
 
 from skidyn import save_model
-from skidyn._exceptions import SkidynError
 from skidyn._writing import keep, keeping_inputs, replacing, write_text
 from skidyn.datasets import load_planar_arm
+from skidyn.exceptions import SkidynError
 from skidyn.export import write_urdf
 from skidyn.report import write_comparison, write_json
 

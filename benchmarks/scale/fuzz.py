@@ -369,9 +369,9 @@ def main() -> int:
         print(name, tried, accepted, refused, len(crashes), round(took), flush=True)
         seen = set()
         for data, text in crashes:
-            last = text.strip().splitlines()[-1][:70]
-            if last not in seen:
-                seen.add(last)
+            place = [line for line in text.splitlines() if line.startswith("  File ")][-1]
+            if place not in seen:
+                seen.add(place)
                 print(f"--- {data[:120]!r}\n{text[-900:]}")
     return int(total > 0)
 

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import Any
 
@@ -41,10 +40,7 @@ def run(options: argparse.Namespace) -> None:
         session = Session(model, frame, tau)
 
     def ready(address: str) -> None:
-        if options.json:
-            print(json.dumps({"address": address}), flush=True)
-        else:
-            print(f"open {address}", flush=True)
+        print(f"open {address}", flush=True)
         if not options.no_browser:
             webbrowser.open(address)
 

@@ -17,11 +17,14 @@ from skidyn.logs._files import Channel, stack_rows, table_from_arrays
 
 #: Types that are read as a dictionary and its places: a text may be named again and again.
 _TEXT = ("string", "large_string", "binary", "large_binary", "dictionary")
+_OTHER_TEXT = ("string_view", "binary_view", "fixed_size_binary")
 #: Values that are decoded at once.
 _AT_ONCE = 2**22
 #: Bytes of one value in memory, by the type it is stored as; text is kept once and numbered.
 _WIDTH = {"INT96": 12}
 _LEAST_WIDTH = 8
+#: Bytes that an object of Python takes beside its content, text or an array.
+_OBJECT = 112
 #: What a file says of a column that is not of its own: the rows of pandas.
 _INDEX = "__index_level_"
 
@@ -102,17 +105,50 @@ def _joined(batches: Iterator[Any], budget: Budget) -> dict[str, np.ndarray]:
     for batch in batches:
         for name in names:
             column = batch.column(name)
-            values = _array(column)
-            budget.take(max(values.nbytes, column.nbytes))
-            parts[name].append(values)
+            budget.take(_decoded(column))
+            parts[name].append(_array(column))
     empty = [np.empty(0)]
     return {name: np.concatenate(parts.pop(name) or empty) for name in names}
 
 
+def _decoded(column: Any) -> int:
+    """Bytes of a column once it is an array: runs, or nothing at all, take no room in a file."""
+    types = import_optional("pyarrow.types", extra="io")
+    kind, size = column.type, _LEAST_WIDTH * len(column)
+    if types.is_dictionary(kind):
+        return size + _decoded(column.dictionary)
+    if _is_list(kind):
+        return size + _OBJECT * len(column) + _decoded(column.flatten())
+    if any(getattr(types, f"is_{text}")(kind) for text in (*_TEXT, *_OTHER_TEXT)):
+        return size + _OBJECT * len(column) + int(column.nbytes)
+    return max(size, int(column.nbytes))
+
+
+def _is_list(kind: Any) -> bool:
+    types = import_optional("pyarrow.types", extra="io")
+    return bool(types.is_list(kind) or types.is_large_list(kind) or types.is_fixed_size_list(kind))
+
+
+def _is_plain(kind: Any) -> bool:
+    """Whether values of a type are single ones, which nothing repeats or nests."""
+    types = import_optional("pyarrow.types", extra="io")
+    return not (
+        types.is_nested(kind) or types.is_dictionary(kind) or types.is_run_end_encoded(kind)
+    )
+
+
 def _array(column: Any) -> np.ndarray:
-    """Values of a column: numbers, dates, times since something, or objects."""
+    """Values of a column: numbers, dates, times since something, or objects.
+
+    Structures, and lists or repeated values that are more than numbers or text, become None: they
+    are no signals, and small files can nest and repeat them without end.
+    """
     types = import_optional("pyarrow.types", extra="io")
     kind = column.type
+    runs = types.is_run_end_encoded(kind)
+    inner = kind.value_type if runs or types.is_dictionary(kind) or _is_list(kind) else kind
+    if not _is_plain(inner) or (runs and not types.is_primitive(inner)):
+        return np.full(len(column), None, dtype=object)
     if types.is_dictionary(kind):
         words = np.array([*column.dictionary.to_pylist(), None], dtype=object)
         return np.asarray(words[column.indices.fill_null(len(words) - 1).to_numpy()])

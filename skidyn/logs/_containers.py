@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,9 @@ from skidyn._names import SPELLINGS
 from skidyn._optional import import_optional
 from skidyn.logs._bounds import Budget, check_size, try_in_another_process
 from skidyn.logs._files import Channel, of_one_length, table_from_arrays
+
+#: Groups within groups; the time that names take grows as the square of their depth.
+DEEPEST = 32
 
 
 def read_hdf5_channels(path: Path, max_bytes: int, topics: Sequence[str] | None) -> list[Channel]:
@@ -30,8 +33,7 @@ def read_hdf5_channels(path: Path, max_bytes: int, topics: Sequence[str] | None)
     except OSError as error:
         raise LogError(f"{path}: cannot be read as HDF5: {error}") from error
     with file:
-        datasets: list[Any] = []
-        file.visititems(lambda _, item: datasets.append(item) if hasattr(item, "shape") else None)
+        datasets = list(_datasets(file, path, set()))
         budget = Budget(path, max_bytes)
         for item in datasets:
             budget.take(item.nbytes)
@@ -56,6 +58,25 @@ def read_hdf5_channels(path: Path, max_bytes: int, topics: Sequence[str] | None)
     if not channels:
         raise LogError(f"{path}: no numeric datasets{_asked(topics, list(groups))}.")
     return _runs(_with_clock(channels, path), path)
+
+
+def _datasets(group: Any, path: Path, seen: set[Any], depth: int = 0) -> Iterator[Any]:
+    """Datasets of a group and of those within, each once; links to other files are not followed."""
+    h5py = import_optional("h5py", extra="io")
+    if depth > DEEPEST:
+        raise LogError(f"{path}: {group.name[:60]} lies more than {DEEPEST} groups deep")
+    for name in group:
+        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+            continue
+        item = group[name]
+        address = h5py.h5o.get_info(item.id).addr
+        if address in seen:
+            continue
+        seen.add(address)
+        if isinstance(item, h5py.Dataset):
+            yield item
+        elif isinstance(item, h5py.Group):
+            yield from _datasets(item, path, seen, depth + 1)
 
 
 def _refuse_other_files(path: Path, datasets: Sequence[Any]) -> None:
@@ -220,7 +241,7 @@ def _runs(channels: list[Channel], path: Path) -> list[Channel]:
     import pandas as pd
 
     ordered = sorted(channels, key=lambda c: [int(n) for n in re.findall(r"\d+", c.name)])
-    tables = [c.table.assign(trajectory=k) for k, c in enumerate(ordered, 1)]
+    tables = [c.table.assign(trajectory=k) for k, c in enumerate(ordered)]
     warn_about_log(
         f"{path}: {', '.join(c.name for c in ordered)} hold the same columns; each is a trajectory"
     )

@@ -26,8 +26,9 @@ from skidyn.logs._bounds import (
 )
 from skidyn.logs._files import Channel, table_from_arrays
 
-#: Largest message of one topic, bytes: states of joints take some hundred.
-LARGEST_MESSAGE = 64 * 2**20
+#: Largest message in JSON, bytes: states of joints take some hundred, and what is read of a
+#: message takes up to fifty times as much as its text.
+LARGEST_MESSAGE = 2**20
 #: Topic, message type, time of recording in ns, message.
 Message = tuple[str, str, int, Any]
 

@@ -7,6 +7,7 @@ Semantics".
 
 from __future__ import annotations
 
+import re
 import warnings
 import xml.etree.ElementTree as ElementTree
 
@@ -57,7 +58,12 @@ def parse_sdf(data: bytes, model: str | None) -> Description:
             )
     refuse_repeated_names(element.iter("link"))
     refuse_repeated_names(element.findall("joint"))
-    version = tuple(int(part) for part in root.get("version", "1.9").split(".")[:2])
+    stated = root.get("version", "1.9")
+    if not re.fullmatch(r"\d{1,3}(\.\d{1,3})*", stated, flags=re.ASCII):
+        raise RobotDescriptionError(
+            f"The version of the SDF is {stated[:20]!r}; expected one as 1.9."
+        )
+    version = tuple(int(part) for part in stated.split(".")[:2])
     return _Reader(element, version).read()
 
 
@@ -102,12 +108,23 @@ class _Reader:
             joints[f"{name}_base"] = fixed_joint(f"{name}_base", _WORLD, name, self.pose(name))
         return Description(self.model.get("name") or "robot", links, joints)
 
-    def pose(self, name: str, asked: tuple[str, ...] = ()) -> Pose:
+    def pose(self, name: str) -> Pose:
         """Pose of a link, joint or frame in the frame of the model."""
-        if name in self._poses:
-            return self._poses[name]
-        if name in asked:
-            raise RobotDescriptionError(f"The pose of {name!r} is relative to itself.")
+        way: dict[str, str] = {}  # frame, and that which it is relative to
+        at = name
+        while at not in self._poses:
+            if at in way:
+                raise RobotDescriptionError(f"The pose of {at!r} is relative to itself.")
+            way[at] = self._base(at)
+            at = way[at]
+        for frame, base in reversed(way.items()):
+            element = self._elements[frame]
+            own = _own_pose(element, f"{element.tag} {frame!r}")
+            self._poses[frame] = _compose(self._poses[base], own)
+        return self._poses[name]
+
+    def _base(self, name: str) -> str:
+        """Frame to which the pose of a frame is relative."""
         if name not in self._elements:
             raise RobotDescriptionError(
                 f"A pose is relative to {name!r}, which the model does not describe."
@@ -120,9 +137,7 @@ class _Reader:
         elif element.tag == "frame":
             default = element.get("attached_to") or ""
         relative = only(element, "pose", what)
-        base = (relative.get("relative_to") if relative is not None else None) or default
-        self._poses[name] = _compose(self.pose(base, (*asked, name)), _own_pose(element, what))
-        return self._poses[name]
+        return (relative.get("relative_to") if relative is not None else None) or default
 
     def _link(self, element: ElementTree.Element) -> Link:
         name = element.get("name", "")

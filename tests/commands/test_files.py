@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -158,6 +159,44 @@ def test_and_so_they_are_in_a_report(report, tmp_path, name, value, capsys):
     words = ["add", "--from", str(crafted), "--effect", "dahl"]
     assert cli.main(words) == cli.BAD_INPUT
     assert f"{name} is" in capsys.readouterr().err
+
+
+@pytest.fixture
+def evil_model(tmp_path):
+    """A stored model that calls a function of skidyn which writes a file."""
+
+    def node(loader, module, name, content):
+        place = {"__loader__": loader, "__module__": module, "__class__": name}
+        return {**place, "content": content, "protocol": 2}
+
+    told = (str(tmp_path / "harm"), "harm")
+    words = [node("JsonNode", "builtins", "str", json.dumps(word)) for word in told]
+    given = node("TupleNode", "builtins", "tuple", words)
+    crafted = node("ConstructorFromReduceNode", "skidyn._writing", "write_text", given)
+    with zipfile.ZipFile(tmp_path / "evil.skops", "w") as archive:
+        archive.writestr("schema.json", json.dumps(crafted))
+    return tmp_path / "evil.skops"
+
+
+def test_a_model_that_names_a_function_is_refused_by_the_commands(work, report, evil_model, capsys):
+    words = ["compare", str(work / "log.csv"), "--urdf", str(work / "arm.urdf")]
+    assert cli.main([*words, "--model", str(evil_model)]) == cli.BAD_INPUT
+    assert "not trusted: skidyn._writing.write_text" in capsys.readouterr().err
+    content = json.loads(report.read_text())
+    content["provenance"]["options"]["model"] = str(evil_model)
+    crafted = report.with_name("evil.json")
+    crafted.write_text(json.dumps(content))
+    assert cli.main(["add", "--from", str(crafted), "--effect", "dahl"]) == cli.BAD_INPUT
+    assert "not trusted: skidyn._writing.write_text" in capsys.readouterr().err
+    assert not (evil_model.parent / "harm").exists()
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, '{"provenance": ' * 50_000, "NaN", "[1]", "\x00"])
+def test_what_is_no_report_is_one_line(tmp_path, text, capsys):
+    (tmp_path / "report.json").write_text(text)
+    words = ["add", "--from", str(tmp_path / "report.json"), "--effect", "dahl"]
+    assert cli.main(words) == cli.BAD_INPUT
+    assert capsys.readouterr().err.count("\n") == 1
 
 
 def shell(words, **options):

@@ -6,8 +6,8 @@ import re
 import numpy as np
 import pytest
 
-from skidyn._exceptions import SkidynError
 from skidyn.datasets import make_hidden_effect_log
+from skidyn.exceptions import SkidynError
 from skidyn.export import merge_mjcf, merge_urdf
 from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot

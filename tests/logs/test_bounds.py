@@ -16,6 +16,9 @@ import pytest
 pytest.importorskip("pandas", reason="needs skidyn[io]")
 pytest.importorskip("resource", reason="the memory of a process is known where there is this")
 
+from skidyn.exceptions import LogError
+from skidyn.logs import read_log
+
 MIB = 2**20
 #: The bound that the reader is given, what is promised beyond it, and what a bomb unpacks to.
 BOUND, OVERHEAD, BOMB = 16 * MIB, 128 * MIB, 256 * MIB
@@ -39,6 +42,45 @@ def text_in_parquet(path):
 def feather(path):
     pa, feather = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.feather")
     feather.write_feather(pa.table({"q1": np.zeros(BOMB // 8)}), path, compression="zstd")
+
+
+def runs_of_feather(path):
+    """One value that is there as often as it is said to be."""
+    pa = pytest.importorskip("pyarrow")
+    rows = BOMB // 8
+    _arrow(path, pa.RunEndEncodedArray.from_arrays(pa.array([rows], pa.int32()), pa.array([1.0])))
+
+
+def nothing_of_feather(path):
+    """Values that are not there, of which a file needs to know the number only."""
+    pa = pytest.importorskip("pyarrow")
+    _arrow(path, pa.nulls(BOMB // 8))
+
+
+def text_of_feather(path):
+    """Short texts, of which Python makes objects ten times as large."""
+    pa = pytest.importorskip("pyarrow")
+    _arrow(path, pa.array([f"{k % 10:04d}" for k in range(BOMB // 256)]))
+
+
+def _arrow(path, column):
+    import pyarrow as pa
+
+    table = pa.table({"q1": column})
+    options = pa.ipc.IpcWriteOptions(compression="zstd")
+    with (
+        pa.OSFile(str(path), "wb") as file,
+        pa.ipc.new_file(file, table.schema, options=options) as out,
+    ):
+        out.write_table(table)
+
+
+def lists_of_feather(path):
+    """One long list, named again and again."""
+    pa = pytest.importorskip("pyarrow")
+    lists = pa.array([np.zeros(MIB // 8)])
+    places = pa.array(np.zeros(BOMB // MIB, np.int32))
+    _arrow(path, pa.DictionaryArray.from_arrays(places, lists))
 
 
 def npz(path):
@@ -146,6 +188,9 @@ def packed_text(path):
 BOMBS = {
     "a.parquet": parquet,
     "a.feather": feather,
+    "runs.feather": runs_of_feather,
+    "nothing.feather": nothing_of_feather,
+    "text.feather": text_of_feather,
     "a.npz": npz,
     "a.h5": hdf5,
     "chunk.h5": chunk_of_hdf5,
@@ -184,7 +229,8 @@ def test_bombs_are_refused_within_the_bound(tmp_path):
         size = sum(f.stat().st_size for f in [tmp_path / name, *(tmp_path / name).glob("*")])
         assert size < BOMB / 50
     text_in_parquet(tmp_path / "text.parquet")
-    names = [*BOMBS, "text.parquet"]
+    lists_of_feather(tmp_path / "lists.feather")
+    names = [*BOMBS, "lists.feather", "text.parquet"]
     done = subprocess.run(
         [sys.executable, "-c", _READ, str(BOUND), *(str(tmp_path / name) for name in names)],
         capture_output=True,
@@ -194,10 +240,47 @@ def test_bombs_are_refused_within_the_bound(tmp_path):
     assert done.returncode == 0, done.stderr[-2000:]
     answers = [json.loads(line) for line in done.stdout.splitlines()]
     assert len(answers) == len(names)
-    for path, said, taken in answers[:-1]:
+    for path, said, taken in answers[:-2]:
         assert said.startswith(f"refused {path}"), said
         assert "unpacks to" in said or "fields" in said or "not a ROS 2 bag" in said, said
         assert taken < BOUND + OVERHEAD, path
+    path, said, taken = answers[-2]  # no signal is made of dictionaries of lists
+    assert said.startswith(f"refused {path}") and taken < BOUND + OVERHEAD
     path, said, taken = answers[-1]  # a text that is named again and again is kept once
     assert said == "read 4000"
     assert taken < BOUND + OVERHEAD
+
+
+def test_groups_within_groups_without_end_are_refused(tmp_path):
+    """The library takes the square of the depth for its names: minutes at 3000."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "deep.h5", "w") as file:
+        group = file
+        for _ in range(200):
+            group = group.create_group("a")
+        group["q1"] = np.zeros(3)
+    with pytest.raises(LogError, match="more than 32 groups deep"):
+        read_log(tmp_path / "deep.h5", check=False)
+
+
+def test_groups_that_hold_themselves_are_read_once(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "loop.h5", "w") as file:
+        for name in ("time", "q1", "tau1"):
+            file[name] = np.arange(3.0)
+        file["again/root"], file["again/soft"] = file["/"], h5py.SoftLink("/")
+    assert len(read_log(tmp_path / "loop.h5", check=False)) == 3
+
+
+def test_a_message_of_json_without_end_is_refused(tmp_path):
+    """Its objects take fifty times the text, so that it must be far smaller than the log may be."""
+    writer = pytest.importorskip("mcap.writer")
+    with (tmp_path / "log.mcap").open("wb") as file:
+        out = writer.Writer(file, compression=writer.CompressionType.ZSTD)
+        out.start()
+        schema = out.register_schema("JointState", "jsonschema", b"{}")
+        channel = out.register_channel("/joint_states", "json", schema)
+        out.add_message(channel, 0, b'{"name": [' + b"{}," * MIB + b"0]}", 0)
+        out.finish()
+    with pytest.raises(LogError, match="no state of joints is so long"):
+        read_log(tmp_path / "log.mcap", check=False)

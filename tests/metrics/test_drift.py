@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from sklearn.linear_model import LinearRegression
 
-from skidyn._exceptions import SkidynError
+from skidyn.exceptions import SkidynError
 from skidyn.metrics import Drift, drift
 
 FOLDS = [(np.arange(100), np.arange(100, 200)), (np.arange(100, 200), np.arange(100))]

@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 
+from skidyn.exceptions import RobotDescriptionError
 from skidyn.robots import Robot
 
 INERTIA = (
@@ -103,3 +104,18 @@ def test_a_model_of_a_world_is_chosen_by_name():
 def test_wrong_models_are_refused(old, new, message):
     with pytest.raises(ValueError, match=message):
         Robot.from_sdf(ARM.replace(old, new))
+
+
+def test_frames_upon_frames_need_no_recursion():
+    frames = "".join(f'<frame name="f{k}" attached_to="f{k + 1}"/>' for k in range(3000))
+    text = ARM.replace('relative_to="shelf"', 'relative_to="f0"')
+    text = text.replace("<frame ", frames + '<frame name="f3000" attached_to="shelf"/><frame ', 1)
+    np.testing.assert_allclose(
+        Robot.from_sdf(text).inertial_parameters, Robot.from_sdf(ARM).inertial_parameters
+    )
+
+
+@pytest.mark.parametrize("version", ["", "1.x", "1." + "9" * 5000, "1....9"])
+def test_a_version_that_is_none_is_named(version):
+    with pytest.raises(RobotDescriptionError, match="The version of the SDF is"):
+        Robot.from_sdf(ARM.replace('version="1.9"', f'version="{version}"'))

@@ -246,3 +246,16 @@ def test_huge_tree_needs_no_recursion():
     for i in range(n):
         parts += [link(f"l{i + 1}", 1), joint(f"j{i}", f"l{i}", f"l{i + 1}", "continuous", "")]
     assert Robot.from_urdf(robot(*parts)).n_joints == n
+
+
+@pytest.mark.parametrize("size", ["1e200", "1e308", "1e-200", "1e-310"])
+def test_an_axis_of_any_length_is_a_direction(size):
+    text = robot(TWO, joint("j", "a", "b", inside=f'{LIMIT}<axis xyz="{size} 0 {size}"/>'))
+    np.testing.assert_allclose(Robot.from_urdf(text).tree.axes, [[0.5**0.5, 0, 0.5**0.5]])
+
+
+def test_attributes_that_nobody_knows_are_passed_over_in_silence(capfd):
+    more = " ".join(f'x{k}="{k}"' for k in range(500))
+    text = robot(TWO, joint("j", "a", "b")).replace("<robot ", f"<robot {more} ", 1)
+    assert Robot.from_urdf(text).chain.n_joints == 1
+    assert capfd.readouterr() == ("", "")

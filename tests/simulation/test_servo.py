@@ -5,9 +5,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from skidyn._exceptions import SkidynError
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.effects import Term
+from skidyn.exceptions import SkidynError
 from skidyn.identification import RBDRegressor
 from skidyn.simulation import Controller, fit_servo, servo_torque, simulate, simulation_errors
 
