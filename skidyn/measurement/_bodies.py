@@ -122,10 +122,12 @@ class TorqueScale(Check):
             return
         here = fits.nominal(Reading()).gain
         gains = {k: float(g) for k, g in enumerate(here) if np.isfinite(g) and g > 0}
-        told = ", ".join(f"{measurement.joint_names[k]} {gain:.3g}" for k, gain in gains.items())
         values = np.array(list(gains.values()))
-        every = bool(np.all(values < USUAL[0]) or np.all(values > USUAL[1]))
-        typical = float(np.median(values))
+        sure = np.array(list(known.values()))
+        every = _one_sided(values) or (len(sure) > 1 and _one_sided(sure))
+        typical = float(np.median(sure if len(sure) > 1 else values))
+        gains = gains if _one_sided(values) else known
+        told = ", ".join(f"{measurement.joint_names[k]} {gain:.3g}" for k, gain in gains.items())
         unit = next((u for f, u in UNITS.items() if abs(np.log(typical / f)) < 0.3), None)
         if every and unit is not None:
             yield self.suspicion(
@@ -156,6 +158,11 @@ class TorqueScale(Check):
                     odd,
                     _gain_remedy({k: known[k] for k in odd}),
                 )
+
+
+def _one_sided(gains: Array) -> bool:
+    """Whether all multiples are too small, or all too large, to be those of wrong masses."""
+    return bool(np.all(gains < USUAL[0]) or np.all(gains > USUAL[1]))
 
 
 def _gain_remedy(gains: dict[int, float]) -> tuple[str, str]:

@@ -210,6 +210,7 @@ class RepeatedRows(Check):
         count = measurement.repeated
         if count > REPEATED * measurement.n_samples:
             share = count / measurement.n_samples
+            measurement.stale = True
             yield self.suspicion(
                 "rows repeat the one before",
                 f"in {count} of {measurement.n_samples} rows no position changes although joints "

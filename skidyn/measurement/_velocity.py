@@ -150,6 +150,8 @@ class VelocityDelay(Check):
     suspects = "velocities that are late against the positions: filtered, or another clock"
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        if measurement.stale:
+            return  # what is held or interpolated is late by itself
         lags = [
             _lag(measurement.signals, k)
             for k, (slope, likeness) in enumerate(measurement.velocities)
