@@ -93,6 +93,10 @@ def signs(*quantities: str) -> Spoil:
         if "q" in quantities and f"ddq{k}" in log.columns:
             names.append(f"ddq{k}")
         changed = log.assign(**{name: -log[name] for name in names})
+        if "q" in quantities and not felt(
+            log, robot, robot.gravity_torque(joints_of(changed, "q", robot))
+        ):
+            return None  # it looks the same from either side
         return Spoiled(changed, robot, (check,), f"--flip {','.join(told)}", (k,))
 
     return spoil

@@ -182,6 +182,7 @@ class ClockJitter(Check):
                 "suspected",
             )
         elif found.margin > TOLD:
+            measurement.stale = True
             yield self.suspicion(
                 "the stamps of the clock jitter, not the samples",
                 f"they lie {size} around even steps of {1e3 * step:.4g} ms, and with even steps "

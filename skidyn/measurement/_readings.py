@@ -22,6 +22,8 @@ WEAKEST, DECISIVE, HALF = 3.0, 60.0, 0.5
 OVERWHELMING = 100.0
 #: Changes of one joint that gain alike up to this, or this share, cannot be told apart.
 TIED, ALIKE = 3.0, 0.05
+#: Share of the gain up to which another kind of change of the same joints may be meant as well.
+RIVALS = 0.2
 #: What a change must gain with identified bodies. Negative masses could take the place of torque
 #: with the other sign or of gravity that points up or is absent, so that these gain little.
 NEEDED = {
@@ -162,7 +164,7 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
         plain &= NEEDED[change.kind] < 0 or (change.kind == "zero" and _carries(fits, change))
         if strong and (plain or confirmed >= NEEDED[change.kind]):
             alike = [c for c in judged if c.kind != change.kind and _same_place(c, change)]
-            tied = max(TIED, ALIKE * change.gain)
+            tied = max(TIED, RIVALS * change.gain)
             rivals = tuple(dict.fromkeys(c.kind for c in alike if change.gain - c.gain < tied))
             accepted.append(replace(change, confirmed=confirmed, rivals=rivals))
     # both are likelihoods of the same torque; turning all of it round changes nothing identified
