@@ -85,7 +85,7 @@ def felt(log: pd.DataFrame, robot: Robot, pull: np.ndarray) -> bool:
 
 
 def signs(*quantities: str) -> Spoil:
-    def spoil(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled:
+    def spoil(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled | None:
         k = moved(log, robot, rng, turning="q" in quantities) + 1
         names = [f"{quantity}{k}" for quantity in quantities]
         told = [f"{name}" for name in names if not (name.startswith("dq") and len(names) > 1)]

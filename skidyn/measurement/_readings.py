@@ -145,9 +145,11 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
     if absent is not None and absent.gain >= LEAST:
         if _without_gravity(fits, reading, here):
             # identified bodies make up for what is left of it
-            if any(c.kind == "gravity" and c.gain > absent.gain - TIED for c in judged):
+            restored = _restored_gain(fits, absent.reading)
+            tied = any(c.kind == "gravity" and c.gain > absent.gain - TIED for c in judged)
+            if tied and restored < LEAST:
                 return replace(absent, rivals=("gravity",))  # along it no joint feels a change
-            return replace(absent, restorable=_restorable(fits, absent.reading))
+            return replace(absent, restorable=restored > 0)
     before = fits.identified(reading)
     accepted = []
     for change in judged:
@@ -327,10 +329,10 @@ def _without_gravity(fits: Fits, reading: Reading, here: Outcome) -> bool:
     return best is not None and abs(float(best @ own / (own @ own))) < LEFT_OVER
 
 
-def _restorable(fits: Fits, without: Reading) -> bool:
-    """Whether gravity was taken off with the stated bodies rather than with those of the robot."""
+def _restored_gain(fits: Fits, without: Reading) -> float:
+    """Log-likelihood gained if stated bodies, and not the robot's own, took gravity off."""
     whole = fits.with_gravity(without).identified(replace(without, gravity=None))
-    return float(whole.margin(fits.identified(without)).sum()) > 0
+    return float(whole.margin(fits.identified(without)).sum())
 
 
 def fitted_gravity(fits: Fits, reading: Reading, here: Outcome) -> Array | None:

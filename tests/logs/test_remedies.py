@@ -126,3 +126,30 @@ def test_sign_from_the_command(read):
 def test_what_cannot_be_mended_is_refused_by_name(read, options, words):
     with pytest.raises(LogError, match=words):
         read(LOG, robot=ROBOT, **options)
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_gravity_that_was_taken_off_is_given_back(read):
+    pull = ROBOT.gravity_torque(LOG[["q1", "q2"]].to_numpy())
+    taken = LOG.assign(tau1=LOG["tau1"] - pull[:, 0], tau2=LOG["tau2"] - pull[:, 1])
+    mended = read(taken, robot=ROBOT, restore_gravity=True)
+    np.testing.assert_allclose(mended[["tau1", "tau2"]], LOG[["tau1", "tau2"]], atol=1e-9)
+    with pytest.raises(LogError, match="give robot="):
+        read(taken, restore_gravity=True)
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_recordings_that_were_joined_become_trajectories(read):
+    joined = LOG.assign(time=np.arange(len(LOG)) * 0.01, trajectory=0)
+    mended = read(joined, split_leaps=True)
+    assert mended["trajectory"].tolist() == LOG["trajectory"].tolist()
+    assert any(note.startswith("split_leaps: 2 of") for note in mended.attrs["notes"])
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_rows_that_hold_all_torques_are_left_out(read):
+    held = LOG.copy()
+    held[["tau1", "tau2"]] = LOG[["tau1", "tau2"]].to_numpy()[np.arange(len(LOG)) // 4 * 4]
+    mended = read(held, drop_repeated=True)
+    assert len(mended) < 0.3 * len(LOG)
+    assert mended["tau1"].isin(LOG["tau1"]).all()

@@ -91,3 +91,4 @@ def test_a_file_is_read_by_its_path(tmp_path):
     path = tmp_path / "arm.xml"
     path.write_text(ARM)
     assert Robot.from_mjcf(path).joint_names == Robot.from_mjcf(ARM.encode()).joint_names
+    assert Robot.from_file(path).joint_names == Robot.from_mjcf(path).joint_names

@@ -119,3 +119,8 @@ def test_frames_upon_frames_need_no_recursion():
 def test_a_version_that_is_none_is_named(version):
     with pytest.raises(RobotDescriptionError, match="The version of the SDF is"):
         Robot.from_sdf(ARM.replace('version="1.9"', f'version="{version}"'))
+
+
+def test_a_file_says_its_format_itself():
+    text = "<?xml version='1.0'?><!-- <robot> of a hall -->" + ARM.strip()
+    assert Robot.from_file(text).joint_names == Robot.from_sdf(ARM).joint_names
