@@ -138,9 +138,17 @@ class Measurement:
         """Slope and correlation of integrated velocity on position, by joint."""
         s = self.signals
         return [
-            velocity_consistency(s.clock, s.q[:, k], s.dq[:, k], s.segments)
+            velocity_consistency(s.clock, self._unwrapped(k), s.dq[:, k], s.segments)
             for k in range(self.n_joints)
         ]
+
+    def _unwrapped(self, k: int) -> Array:
+        """Position without leaps by a turn, where it stays within one."""
+        q = self.signals.q[:, k].copy()
+        if not self.signals.prismatic[k] and np.ptp(q) < 1.1 * 2 * np.pi:
+            for rows in self.signals.segments:
+                q[rows] = np.unwrap(q[rows])
+        return q
 
     @cached_property
     def velocity_scale(self) -> float:
