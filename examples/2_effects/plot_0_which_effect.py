@@ -11,7 +11,7 @@ the two torques is the torque of the effect. A report of
 
 # %%
 # Friction, hysteresis, springs, the transmission and the torque sensor, in this order. Dots are
-# samples; their colour is the direction of motion, which tells friction from everything else.
+# samples; their colour is the direction of motion, which separates friction from everything else.
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -60,7 +60,7 @@ figure.supylabel("torque of the effect in N m (blue: forward, orange: backward)"
 plt.show()
 
 # %%
-# What tells the families apart:
+# What separates the families:
 #
 # * **Friction** changes its sign with the direction: two branches, one per colour. Plain Coulomb
 #   friction has two level branches; Stribeck friction rises towards zero velocity, a nonlinear

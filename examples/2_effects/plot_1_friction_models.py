@@ -3,7 +3,7 @@
 Which friction model?
 =====================
 
-The honest answer is a table: fit the candidates, predict trajectories that were left out, compare.
+The answer is a table: fit the candidates, predict trajectories that were left out, compare.
 A model that is too poor for the joint loses; one that is richer than needed hardly does. Four arms
 are simulated that differ only in the friction of joint 1.
 """

@@ -136,7 +136,7 @@ def _pair(options: argparse.Namespace) -> list[argparse.Namespace] | None:
         both = [argparse.Namespace(report=n, json=options.json, urdf=options.urdf) for n in reports]
         return [recorded_options(side) for side in both]
     if not options.urdf:
-        raise SkidynError("--urdf wants the description of the robot")
+        raise SkidynError("--urdf is missing: the description of the robot")
     if not options.against and not options.against_model:
         return None
     other = {"logs": options.against or options.logs}

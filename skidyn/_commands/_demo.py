@@ -33,7 +33,7 @@ def run(options: argparse.Namespace) -> None:
     from skidyn.identification import RBDRegressor
 
     say = (lambda *words: None) if options.json else print
-    say("1. A Panda arm is simulated with two effects that no model below knows of.")
+    say("1. A Panda arm is simulated with two effects that no model below contains.")
     say("   Two of its trajectories are put aside: nothing is fitted to them.")
     log = load_demo_log()
     aside = log.X["trajectory"] >= log.X["trajectory"].max() - 1

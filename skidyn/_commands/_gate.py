@@ -74,9 +74,9 @@ def _check(options: argparse.Namespace) -> None:
     if not options.fail_above > 0:
         raise SkidynError(f"--fail-above {options.fail_above:g}: a ratio of errors is above 0")
     if not options.against:
-        raise SkidynError("--fail-above wants a healthy recording: --against LOG [LOG ...]")
+        raise SkidynError("--fail-above needs a healthy recording: --against LOG [LOG ...]")
     if not options.urdf:
-        raise SkidynError("--urdf wants the description of the robot")
+        raise SkidynError("--urdf is missing: the description of the robot")
     if options.against_model or options.html or options.names:
         raise SkidynError("--fail-above makes no page: leave out --against-model, --html, --names")
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``skidyn separate``: design the motion that tells a finding from its rival."""
+"""``skidyn separate``: design the motion that separates a finding from its rival."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ effect as the truth, and the answer says whether both were recognised.
 def add_parser(commands: Any) -> None:
     """Add the command to the parser."""
     parser = command(
-        commands, "separate", run, "design the motion that tells two effects apart", DESCRIPTION
+        commands, "separate", run, "design the motion that separates two effects", DESCRIPTION
     )
     with_report(parser)
     parser.add_argument("--out", type=Motion, required=True, metavar="CSV", help="motion to write")

@@ -174,8 +174,8 @@ def make_finding(
         title = f"{effect.family.capitalize()}, best described by {title}"
     formulas = [u for u in unknowns if u.proposal is not None]
     if formulas:
-        code = 'model = diagnosis.add("formula")'
-    elif unknown or term.trajectories is not None:
+        code = f'model = diagnosis.add("formula", joints={[u.joint for u in formulas]})'
+    elif term.trajectories is not None:
         code = "model = diagnosis.model"
     else:
         code = f'model = diagnosis.add("{hypothesis.kind}", joints={list(joints)})'

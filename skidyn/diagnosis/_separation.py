@@ -89,16 +89,16 @@ class SeparatingMotion:
         which = f"{joints} {', '.join(map(str, self.joints))}"
         if self.gain < LEAST_GAIN:
             return (
-                f"No motion of {which} within the limits tells {self.kind} from {self.rival}: with "
+                f"No motion of {which} within the limits separates {self.kind} from {self.rival}: with "
                 "the coefficients that this log gives them, one does what the other does."
             )
         text = (
-            f"This motion of {which} ({self.time[-1]:.0f} s) tells {self.kind} from {self.rival}: "
+            f"This motion of {which} ({self.time[-1]:.0f} s) separates {self.kind} from {self.rival}: "
             f"what the rival cannot explain is {self.gain:.3g} in units of the noise, against "
             f"{self.gain_of_log:.3g} in as much of the log."
         )
         if all(self.confirmed.values()):
-            return text + " Simulated recordings of it were told apart both ways."
+            return text + " In simulated recordings of it both were recognised."
         wrong = " and ".join(k for k, right in self.confirmed.items() if not right)
         return text + f" A simulated recording was still not recognised with {wrong} as the truth."
 

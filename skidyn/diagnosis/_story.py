@@ -23,7 +23,7 @@ SURE = 0.9
 #: Parameters in one line, by the number of joints that have their own.
 TOLD = {1: 3, 2: 2, 3: 1}
 #: Joints whose sizes stand in one line.
-LISTED = 3
+LISTED = 2
 #: A headline names up to this many findings.
 SHORT = 2
 
@@ -210,7 +210,7 @@ def _together(group: Sequence[dict[str, Any]]) -> dict[str, Any]:
         for card in sorted(group, key=lambda card: card["joints"])
         if card["size"]
     ]
-    more = ["..."] if len(sizes_told) > LISTED else []
+    more = len(sizes_told) - LISTED
     doubtful = next((card for card in group if card["doubtful"]), best)
     change = best["change"]
     return {
@@ -218,7 +218,7 @@ def _together(group: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "card": group[0]["card"],
         "joints": joints,
         "where": joints_told(joints) + (" in some trajectories" if best["only"] else ""),
-        "size": ", ".join(sizes_told[:LISTED] + more),
+        "size": ", ".join(sizes_told[:LISTED]) + (f" and {more} more" if more > 0 else ""),
         "sure": doubtful["sure"],
         "doubtful": doubtful["doubtful"],
         "change": change if change.startswith("joint") else f"joint {best['joints'][0]}: {change}",

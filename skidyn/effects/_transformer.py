@@ -172,7 +172,7 @@ def _refuse(term: Term, columns: Columns) -> None:
         what = ", ".join(beyond) or f"scope {effect.scope!r}"
         raise EffectError(
             f"{term.kind} does not follow from the motion of one joint alone ({what}); "
-            "use RBDRegressor, which knows the robot and its torque"
+            "use RBDRegressor, which holds the robot and its torque"
         )
     if term.is_open:
         example = ", ".join(f"{s.name!r}: .." for s in effect.shapes) or ".."

@@ -190,7 +190,7 @@ def _inside_box(
         if not (box_low[k] < 0 < box_high[k] or box_low[k] == 0 == box_high[k]):
             raise ValueError(
                 f"{name!r} is its own mirror image at {axis} = 0, and so is its centre of mass; "
-                f"centre_of_mass wants it between {box_low[k]} and {box_high[k]} m"
+                f"centre_of_mass requires it to be between {box_low[k]} and {box_high[k]} m"
             )
         centre[k] = 0.0
     return np.asarray(centre)

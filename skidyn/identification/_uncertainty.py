@@ -244,7 +244,7 @@ def find_bands(model: RBDRegressor) -> PredictionBands:
     """
     if not hasattr(model, "bands_"):
         raise SkidynError(
-            "this model knows no errors of single samples: it was made from evidence or in parts. "
+            "this model holds no errors of single samples: it was made from evidence or in parts. "
             "Use fit for bands around predictions"
         )
     return model.bands_

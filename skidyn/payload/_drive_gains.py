@@ -233,7 +233,7 @@ def _estimate(runs: Runs, robot: Robot, known: Array, nominal: Array) -> DriveGa
     if hardly.any():
         names = ", ".join(np.array(robot.joint_names)[hardly])
         notes.append(
-            f"These runs hardly show the gain of {names}: little ties its current to the load. "
+            f"These runs show little of the gain of {names}: little ties its current to the load. "
             "Turn the load about it, out of balance."
         )
     body = known.copy()

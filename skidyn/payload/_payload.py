@@ -28,7 +28,7 @@ from skidyn.robots import Robot
 
 CONFOUNDED = (
     "Mass and drive gains scale alike: gains that are 1 % too large make every parameter 1 % too "
-    "large. Only a known load tells them apart (estimate_drive_gains)."
+    "large. Only a known load separates them (estimate_drive_gains)."
 )
 #: Times the noise of the joints is estimated anew and the fit repeated.
 PASSES = 3

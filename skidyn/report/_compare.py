@@ -87,7 +87,7 @@ def summarize_comparison(
     """
     labels = [str(name) for name in names]
     if len(labels) != 2 or labels[0] == labels[1]:
-        raise SkidynError(f"a comparison wants two different names, got {labels}")
+        raise SkidynError(f"a comparison needs two different names, got {labels}")
     both = (first, second)
     if first.joint_names != second.joint_names:
         raise SkidynError(

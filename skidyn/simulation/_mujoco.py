@@ -71,7 +71,7 @@ def _force(task: Any, ends: Any, share: float, data: Any, own: list[int], moment
     if task.controller is None:
         return np.asarray(task.torque[a] + share * (task.torque[b] - task.torque[a]))
     if task.controller.delay:
-        raise SkidynError("engine='mujoco' knows no delay of the reference; use engine='own'")
+        raise SkidynError("engine='mujoco' has no delay of the reference; use engine='own'")
     wanted = task.reference[a] + share * (task.reference[b] - task.reference[a])
     rate = task.rate[a] + share * (task.rate[b] - task.rate[a])
     q, dq = data.qpos[own], data.qvel[own]

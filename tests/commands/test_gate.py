@@ -49,7 +49,7 @@ def test_a_worn_joint_fails_by_name(here, capsys, tmp_path):
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        (["--fail-above", "2"], "wants a healthy recording"),
+        (["--fail-above", "2"], "needs a healthy recording"),
         (["--junit", "x.xml"], "give both"),
         (["--against", "healthy.csv", "--fail-above", "0"], "above 0"),
         (["--against", "healthy.csv", "--fail-above", "2", "--html", "x.html"], "makes no page"),
