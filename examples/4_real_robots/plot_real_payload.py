@@ -3,8 +3,8 @@
 A payload that comes, and a hand that is not there
 ==================================================
 
-Two loads that the model does not contain. A UR10e repeats its motion with 2.805 kg at the flange; and
-the description of a Panda has a hand of 0.73 kg that the recorded arm does not carry.
+Two loads that the model does not contain. A UR10e repeats its motion with 2.805 kg at the flange;
+and the description of a Panda has a hand of 0.73 kg that the recorded arm does not carry.
 """
 
 # %%

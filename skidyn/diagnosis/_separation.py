@@ -89,13 +89,13 @@ class SeparatingMotion:
         which = f"{joints} {', '.join(map(str, self.joints))}"
         if self.gain < LEAST_GAIN:
             return (
-                f"No motion of {which} within the limits separates {self.kind} from {self.rival}: with "
-                "the coefficients that this log gives them, one does what the other does."
+                f"No motion of {which} within the limits separates {self.kind} from {self.rival}: "
+                "with the coefficients that this log gives them, one does what the other does."
             )
         text = (
-            f"This motion of {which} ({self.time[-1]:.0f} s) separates {self.kind} from {self.rival}: "
-            f"what the rival cannot explain is {self.gain:.3g} in units of the noise, against "
-            f"{self.gain_of_log:.3g} in as much of the log."
+            f"This motion of {which} ({self.time[-1]:.0f} s) separates {self.kind} from "
+            f"{self.rival}: what the rival cannot explain is {self.gain:.3g} in units of the noise, "
+            f"against {self.gain_of_log:.3g} in as much of the log."
         )
         if all(self.confirmed.values()):
             return text + " In simulated recordings of it both were recognised."

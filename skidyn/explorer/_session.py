@@ -295,8 +295,8 @@ class Session:
         away = np.sort(np.abs(rows.time[j][rows.trajectory[j] == trajectory] - time))
         if not len(away):
             raise EffectError(
-                f"joint {joint} does not slide in trajectory {trajectory}: effects cannot be judged "
-                "there; choose another trajectory"
+                f"joint {joint} does not slide in trajectory {trajectory}: effects cannot be "
+                "judged there; choose another trajectory"
             )
         half = max(STRETCH / 2, float(away[min(LEAST_ROWS, len(away)) - 1]))
         return time - half, time + half
