@@ -19,6 +19,7 @@ from skidyn._commands._output import (
     run_diagnosis,
 )
 from skidyn._exceptions import SkidynError
+from skidyn._text import digits
 from skidyn._writing import writable
 
 if TYPE_CHECKING:
@@ -164,15 +165,21 @@ def _diagnosed(options: argparse.Namespace) -> Diagnosis:
 def _print_pair(summary: dict[str, Any]) -> None:
     report = summary["report"]
     (a, b), (first, second) = report["sides"], report["names"]
+    print(f"{summary['headline']}.")
     print(summary["sentence"])
-    print("held-out error on sliding samples (N m, N for sliders)")
-    print(f"  A = {first}, B = {second}")
-    print(f"  {'':24s} {'as given':>19s} {'with findings':>19s}")
-    print(f"  {'':24s} {'A':>9s} {'B':>9s} {'A':>9s} {'B':>9s}")
+    print()
+    print(f"held-out error: A is {first}, B is {second}")
+    heads = "".join(f"{head:>9s}" for head in ("A", "B", "noise"))
+    print(f"  {'joint':28s}{heads}      {'A':>9s}{'B':>9s}  with the findings")
     for j, name in enumerate(report["joints"]):
-        row = (a["rmse_before"][j], b["rmse_before"][j], a["rmse_after"][j], b["rmse_after"][j])
-        print(f"  {name:24s} " + " ".join(f"{value:9.4g}" for value in row))
+        given = (a["rmse_before"][j], b["rmse_before"][j], a["noise"][j])
+        added = (a["rmse_after"][j], b["rmse_after"][j])
+        cells = ["".join(f"{digits(value):>9s}" for value in part) for part in (given, added)]
+        print(f"  {f'{name} ({j + 1})':28s}{cells[0]} {report['units'][j]:3s}  {cells[1]}")
+    if report["findings"]:
+        print()
+        print("What is missing")
     for finding in report["findings"]:
         title = " or ".join(dict.fromkeys(filter(None, finding["titles"])))
-        where = "both" if len(finding["in"]) == 2 else f"only {finding['in'][0]}"
-        print(f"  joint {finding['joint']}: {title} ({where})")
+        where = "in both" if len(finding["in"]) == 2 else f"only in {finding['in'][0]}"
+        print(f"  {title} on joint {finding['joint']}: {where}")

@@ -7,7 +7,10 @@ import argparse
 from collections.abc import Iterator
 from typing import Any
 
-from skidyn._commands._terminal import TeachingFormatter
+from skidyn._commands._arguments import Input, Output, command
+from skidyn._commands._export import SUFFIXES
+from skidyn._commands._input import embedded_robots
+from skidyn._commands._output import print_json
 
 DESCRIPTION = """\
 Print the script with which a shell completes commands, options, files, and kinds of effects, also
@@ -23,34 +26,32 @@ To try it in a running bash:
 The script is made once and costs nothing afterwards. It needs shtab: pip install skidyn[shell]
 """
 
-#: What the values of arguments are, by their names in the options.
-FILES = ("logs", "urdf", "report", "out", "html", "against", "unloaded")
-KIND = ("effect", "finding", "rival")
-KIND_LISTS = ("model", "effects", "against_model")
+#: What the values of arguments are, by their names in the options; all other files by their type.
+#: Words with an s may be several, separated by commas.
+WORDS = {
+    "effect": "kind", "finding": "kind", "rival": "kind", "model": "kinds", "effects": "kinds",
+    "against_model": "kinds", "format": "formats", "robot": "robot",
+}  # fmt: skip
 
-#: Functions of the shells that complete kinds; the second keeps what stands before a comma.
+#: Functions of the shells; the one for several words keeps what stands before a comma.
 _BASH = """\
-_skidyn_kind() { compgen -W "KINDS" -- "$1"; }
-_skidyn_kinds() {
+_skidyn_NAME() { compgen -W "WORDS" -- "$1"; }
+_skidyn_NAMEs() {
   local head=""
   [[ "$1" == *,* ]] && head="${1%,*},"
-  compgen -P "$head" -W "KINDS" -- "${1##*,}"
+  compgen -P "$head" -W "WORDS" -- "${1##*,}"
 }
 """
 _ZSH = """\
-_skidyn_kind() { compadd -- KINDS }
-_skidyn_kinds() { _sequence compadd - KINDS }
+_skidyn_NAME() { compadd -- WORDS }
+_skidyn_NAMEs() { _sequence compadd - WORDS }
 """
 
 
 def add_parser(commands: Any) -> None:
-    parser = commands.add_parser(
-        "completion",
-        help="print the script for completion in a shell",
-        description=DESCRIPTION,
-        formatter_class=TeachingFormatter,
+    parser = command(
+        commands, "completion", run, "print the script for completion in a shell", DESCRIPTION
     )
-    parser.set_defaults(run=run)
     parser.add_argument("shell", choices=("bash", "zsh", "tcsh"))
 
 
@@ -60,22 +61,35 @@ def run(options: argparse.Namespace) -> None:
     from skidyn.effects import list_effects
 
     shtab = import_optional("shtab", extra="shell")
-    kinds = " ".join(["rigid_body", *list_effects()])
-    words = f"({kinds})"
+    known = {
+        "kind": ["rigid_body", *list_effects()],
+        "format": list(SUFFIXES),
+        "robot": embedded_robots(),
+    }
     parser = make_parser()
     for action in _actions(parser):
-        if action.dest in FILES:
+        if action.dest in WORDS:
+            name = WORDS[action.dest]
+            function, words = f"_skidyn_{name}", f"({' '.join(known[name.removesuffix('s')])})"
+            action.complete = {"bash": function, "zsh": function, "tcsh": words}
+        elif isinstance(action.type, type) and issubclass(action.type, (Input, Output)):
             action.complete = shtab.FILE
         elif action.dest == "folder":
             action.complete = shtab.DIRECTORY
-        elif action.dest in (*KIND, *KIND_LISTS):
-            function = "_skidyn_kind" if action.dest in KIND else "_skidyn_kinds"
-            action.complete = {"bash": function, "zsh": function, "tcsh": words}
-    preamble = {"bash": _BASH, "zsh": _ZSH}
-    preamble = {shell: text.replace("KINDS", kinds) for shell, text in preamble.items()}
+    preamble = {
+        shell: "".join(
+            text.replace("NAME", name).replace("WORDS", " ".join(words))
+            for name, words in known.items()
+        )
+        for shell, text in (("bash", _BASH), ("zsh", _ZSH))
+    }
     script = shtab.complete(parser, shell=options.shell, preamble=preamble)
     # shtab writes "one or more" so that zsh takes it for "one"
-    print(script.replace('"(*):', '"*:') if options.shell == "zsh" else script)
+    script = script.replace('"(*):', '"*:') if options.shell == "zsh" else script
+    if options.json:
+        print_json({"shell": options.shell, "script": script})
+    else:
+        print(script)
 
 
 def _actions(parser: argparse.ArgumentParser) -> Iterator[Any]:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +41,10 @@ def run(options: argparse.Namespace) -> None:
         session = Session(model, frame, tau)
 
     def ready(address: str) -> None:
-        print(f"open {address}", flush=True)
+        if options.json:
+            print(json.dumps({"address": address}), flush=True)
+        else:
+            print(f"open {address}", flush=True)
         if not options.no_browser:
             webbrowser.open(address)
 

@@ -152,16 +152,18 @@ def read_robot(options: argparse.Namespace) -> Robot:
 def embedded_robot(name: str) -> Robot:
     from skidyn import datasets
 
-    loader = getattr(datasets, f"load_{name}", None)
-    if loader is None or name in ("recording", "demo_log"):
-        known = sorted(
-            n.removeprefix("load_")
-            for n in datasets.__all__
-            if n.startswith("load_") and n not in ("load_recording", "load_demo_log")
-        )
+    known = embedded_robots()
+    if name not in known:
         raise SkidynError(f"no embedded robot {name!r}; there are {', '.join(known)}")
-    robot: Robot = loader()
+    robot: Robot = getattr(datasets, f"load_{name}")()
     return robot
+
+
+def embedded_robots() -> list[str]:
+    from skidyn import datasets
+
+    names = (n.removeprefix("load_") for n in datasets.__all__ if n.startswith("load_"))
+    return sorted(set(names) - {"recording", "demo_log"})
 
 
 def json_option(name: str, text: str | None) -> Any:

@@ -207,4 +207,4 @@ def print_regimes(diagnosis: Diagnosis) -> None:
     for failure in diagnosis.failures:
         print(f"  {failure.sentence}")
     if not diagnosis.failures:
-        print("  No joint errs by more than its noise.")
+        print("  No joint has an error above its noise.")

@@ -49,5 +49,8 @@ from skidyn.diagnosis._comparison import (
 from skidyn.diagnosis._diagnosis import own_terms as own_terms
 from skidyn.diagnosis._intervals import parameter_intervals as parameter_intervals
 from skidyn.diagnosis._profile import refine as refine
+from skidyn.diagnosis._remainder import noise_level as noise_level
 from skidyn.diagnosis._screen import CANDIDATE_RIDGE as CANDIDATE_RIDGE
+from skidyn.diagnosis._spectrum import find_lines as find_lines
+from skidyn.diagnosis._split import split_effects as split_effects
 from skidyn.diagnosis._story import sure as sure

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from skidyn._signals import Array
-from skidyn._text import digits
+from skidyn._text import digits, listed
 from skidyn.diagnosis._comparison import Comparison, regimes
 
 #: A joint fails where its error on judged rows exceeds the noise by this factor: logs without an
@@ -103,7 +103,7 @@ class Failure:
 
     Examples
     --------
-    >>> failure = Failure(4, "elbow", 0.63, 0.16, 3.9, (), "Joint 4 (elbow) errs by 0.63 N m.")
+    >>> failure = Failure(4, "elbow", 0.63, 0.16, 3.9, (), "elbow (joint 4): error 0.63 N m.")
     >>> failure.ratio
     3.9
     """
@@ -180,8 +180,8 @@ def find_failures(comparison: Comparison, noise: ArrayLike) -> list[Failure]:
         places = _places(comparison, j, float(levels[j]))
         name, unit = comparison.joint_names[j], comparison.units[j]
         sentence = (
-            f"Joint {j + 1} ({name}) errs by {digits(rmse)} {unit}, {ratio:.2g} times its noise "
-            f"of {digits(levels[j])} {unit}. {_told(places)}"
+            f"{name} (joint {j + 1}): error {digits(rmse)} {unit}, {ratio:.2g} times its noise of "
+            f"{digits(levels[j])} {unit}. {_told(places)}"
         )
         found.append(Failure(j + 1, name, float(rmse), float(levels[j]), ratio, places, sentence))
     return sorted(found, key=lambda f: (-f.ratio, f.joint))
@@ -208,16 +208,16 @@ def find_rest_errors(comparison: Comparison) -> list[RestError]:
             continue
         residual, unit = comparison.residual[here, j], comparison.units[j]
         rmse, stiction, beyond = float(np.sqrt(np.mean(residual**2))), None, None
-        text = f"Joint {j + 1} ({name}) errs by {rmse:.2g} {unit} at rest"
+        text = f"{name} (joint {j + 1}): error {rmse:.2g} {unit} at rest"
         if comparison.dry_friction is None:
-            text += "; this model does not tell how much of it dry friction may hold"
+            text += "; from this model it is not known how much of it dry friction can hold"
         else:
             friction = comparison.dry_friction[:, j]
             stiction = float(np.abs(friction).max())
             # what the model says of friction at rest is one of many possible values
             free = residual + friction[here]
             beyond = float(np.sqrt(np.mean(np.maximum(np.abs(free) - stiction, 0.0) ** 2)))
-            text += f"; dry friction may hold ±{stiction:.2g} {unit} of it"
+            text += f"; dry friction can hold up to ±{stiction:.2g} {unit} of it"
             if beyond > 0.1 * rmse:
                 text += f", and {beyond:.2g} {unit} exceeds that"
         found.append(RestError(j + 1, name, rmse, stiction, beyond, float(here.mean()), text + "."))
@@ -338,4 +338,4 @@ def _told(places: Sequence[Place]) -> str:
         f"{p.share_of_excess:.0%} lies {p.where} ({p.share_of_time:.0%} of the time)"
         for p in places
     ]
-    return f"Of its excess over the noise, {', '.join(parts)}."
+    return f"Of the excess over the noise, {listed(parts)}."

@@ -91,6 +91,11 @@ class Finding:
     when: list[Episode] = field(default_factory=list)
     curves: list[dict[str, Any]] = field(default_factory=list, repr=False)
 
+    def _repr_html_(self) -> str:
+        from skidyn.diagnosis._notebook import finding_card
+
+        return finding_card(self)
+
     def to_dict(self) -> dict[str, Any]:
         """As in the report file.
 

@@ -5,7 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from html import escape
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+from skidyn._text import joints_told
+from skidyn.diagnosis._story import sizes, sure
+
+if TYPE_CHECKING:
+    from skidyn.diagnosis._findings import Finding
 
 BEFORE, AFTER, NOISE = "#c44e00", "#0072b2", "currentColor"
 
@@ -44,6 +50,32 @@ def notebook(story: Mapping[str, Any]) -> str:
     last = [text for text in (story["quiet"], story["left"]) if text]
     parts += [f"<p style='margin:.2em 0'>{escape(text)}</p>" for text in last]
     return f"<div>{''.join(parts)}</div>"
+
+
+def finding_card(finding: Finding) -> str:
+    """A finding as HTML: what, where, its size, how sure, and the line that adds it.
+
+    Parameters
+    ----------
+    finding : Finding
+        From a diagnosis.
+
+    Returns
+    -------
+    str
+        Every text is escaped.
+    """
+    size = sizes(finding)
+    parts = [
+        f"<b>{escape(finding.title)}</b> on {escape(joints_told(finding.joints))}"
+        f"{': ' + escape(size) if size else ''}",
+        f"{escape(sure(finding))}; removes {finding.error_drop:.0%} of the squared error there",
+    ]
+    if finding.rivals and finding.separating_motion:
+        motion = escape(finding.separating_motion)
+        parts.append(f"A recording with {motion} would tell them apart.")
+    parts.append(f"<code>{escape(finding.code)}</code>")
+    return "".join(f"<p style='margin:.2em 0'>{part}</p>" for part in parts)
 
 
 def _finding(line: Mapping[str, Any]) -> str:

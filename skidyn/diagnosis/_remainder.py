@@ -110,6 +110,24 @@ def find_remainder(
     return Remainder(sensor, position, predictable, left, material)
 
 
+def noise_level(problem: Problem, residual: Array) -> Array:
+    """Noise of torque and position sensors together, with which errors are compared.
+
+    Parameters
+    ----------
+    problem : Problem
+        Motion and rows.
+    residual : ndarray of shape (n_samples, n_joints), N m or N
+        Held-out residual of a model.
+
+    Returns
+    -------
+    ndarray of shape (n_joints,), N m or N
+    """
+    sensor = np.nan_to_num(sensor_noise(problem.signals, residual))
+    return np.asarray(np.hypot(sensor, position_noise(problem)))
+
+
 def position_noise(problem: Problem) -> Array:
     """Torque that the noise of the logged positions makes in the rigid body, (n_joints,).
 

@@ -94,8 +94,8 @@ class SeparatingMotion:
             )
         text = (
             f"This motion of {which} ({self.time[-1]:.0f} s) separates {self.kind} from "
-            f"{self.rival}: what the rival cannot explain is {self.gain:.3g} in units of the noise, "
-            f"against {self.gain_of_log:.3g} in as much of the log."
+            f"{self.rival}: what the rival cannot explain is {self.gain:.3g} in units of the "
+            f"noise, against {self.gain_of_log:.3g} in as much of the log."
         )
         if all(self.confirmed.values()):
             return text + " In simulated recordings of it both were recognised."

@@ -127,14 +127,18 @@ def _verdict(
             "Judged on data that the fit has not seen, adding "
             f"{'it' if len(lines) == 1 else 'them'} changes the error as shown below."
         )
+        open_ends = (
+            f"; part of the error on {joints_told(material)} is not explained" if material else ""
+        )
         if len(lines) <= SHORT:
             told = [f"{_brief(line['what'])} on {line['where']}" for line in lines]
-            return mark, f"Missing: {listed(told)}", text
-        worst = max(rows, key=lambda row: row["ratios"][0] if row["ratios"][0] > 0 else 0.0)
+            return mark, f"Missing: {listed(told)}{open_ends}", text
+        best = max(lines, key=lambda line: line["fell"])
+        top = f"{_brief(best['what'])} on {best['where']}"
         what = [f"{named} known effect{'s' if named > 1 else ''}"] if named else []
         what += ["something without a name"] if nameless else []
         verb = "is" if named + bool(nameless) == 1 else "are"
-        headline = f"{listed(what)} {verb} missing, most of all on joint {worst['joint']}"
+        headline = f"{listed(what)} {verb} missing, most of all {top}{open_ends}"
         return mark, headline[:1].upper() + headline[1:], text
     if material:
         return (

@@ -64,6 +64,8 @@ class FoldedModel:
         Fits without each fold.
     whole : object
         Fit to all.
+    own : ndarray of shape (p,) of bool
+        Coefficients that one recording alone can tell: they are not held out with it.
     """
 
     blocks: list[Block]
@@ -71,6 +73,7 @@ class FoldedModel:
     weight: Array
     fits: list[Normal]
     whole: Normal
+    own: NDArray[np.bool_]
 
 
 class Ranking:
@@ -112,7 +115,9 @@ class Ranking:
         )
         self._cross: dict[int, tuple[Block, Array]] = {}
 
-    def model(self, blocks: Sequence[Block], sigma: Array) -> FoldedModel:
+    def model(
+        self, blocks: Sequence[Block], sigma: Array, own: NDArray[np.bool_] | None = None
+    ) -> FoldedModel:
         """Fit a model to all folds and without each fold.
 
         Parameters
@@ -121,6 +126,8 @@ class Ranking:
             Columns beside the rigid body.
         sigma : ndarray of shape (n_joints,)
             Noise of one row of every joint.
+        own : ndarray of shape (p,) of bool, optional
+            Coefficients that one recording alone can tell; none by default.
 
         Returns
         -------
@@ -132,13 +139,17 @@ class Ranking:
         gram, right = grams.sum(0), cross.sum(0)
         size = column_sizes(gram)
         fits = [Normal(gram - g, right - r, size) for g, r in zip(grams, cross, strict=True)]
-        return FoldedModel(list(blocks), design, weight, fits, Normal(gram, right, size))
+        own = np.zeros(len(size), dtype=bool) if own is None else own
+        return FoldedModel(list(blocks), design, weight, fits, Normal(gram, right, size), own)
 
     def residual(self, model: FoldedModel, joint: int) -> Array:
         """Residual of every row of a joint, counted from 0, under the fit without its fold."""
         y, a = self.target[joint], model.design[joint]
         pairs = zip(model.fits, self._folds[joint], strict=True)
-        return np.concatenate([y[rows] - a[rows] @ fit.solution for fit, rows in pairs])
+        whole = model.whole.solution
+        return np.concatenate(
+            [y[rows] - a[rows] @ np.where(model.own, whole, fit.solution) for fit, rows in pairs]
+        )
 
     def noise(self, model: FoldedModel) -> Array:
         """Root mean square of the residual rows of every joint under the fit to all folds."""

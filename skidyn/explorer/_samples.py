@@ -27,7 +27,8 @@ class Samples:
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         fold = problem.sample_folds(int(np.argmax(problem.rows.counts)))
-        self._fold = fold
+        #: Fold of every sample.
+        self.fold = fold
         self._of_fold = [np.flatnonzero(fold == f) for f in range(problem.n_folds)]
         self._columns: dict[Term, dict[int, Array]] = {}
 
@@ -50,7 +51,7 @@ class Samples:
         residual = np.array(self.problem.torque)
         self._take_rigid_body(residual, coefficients)
         for term, place in TermSum(terms).slices(len(self.problem.rigid_index)):
-            own = np.array([left[place] for left in coefficients])[self._fold]
+            own = np.array([left[place] for left in coefficients])[self.fold]
             if term.trajectories is not None:
                 own = whole[None, place]
             for j, block in self._term_columns(term).items():

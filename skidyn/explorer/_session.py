@@ -17,20 +17,22 @@ from skidyn._text import measure
 from skidyn.diagnosis import (
     Candidate,
     catalogue_candidates,
+    noise_level,
     own_terms,
     parameter_intervals,
     refine,
 )
-from skidyn.effects import Term, get_effect, list_effects
-from skidyn.evidence import make_problem
+from skidyn.effects import Term, TermSum, get_effect, list_effects
+from skidyn.evidence import jackknife, make_problem
+from skidyn.explorer._beside import Offer, Ripple, fit_ripple, loads, ripples
 from skidyn.explorer._ranking import FoldedModel, HeldOutRows, Ranking
 from skidyn.explorer._samples import Samples
 from skidyn.explorer._script import script
 from skidyn.identification import RBDRegressor
 from skidyn.report import rows_with_peaks
 
-#: Parameters of an addition that are told, and the median size of a normal variable.
-TOLD, MEDIAN = 3, 0.6744897501960817
+#: Parameters of an addition that are told, and half the width of a 95 % interval.
+TOLD, NORMAL = 3, 1.96
 #: Points of a curve, and effects in a ranking.
 POINTS, RANKED = 1500, 8
 #: A click stands for this long, s, and for at least so many averaged rows.
@@ -57,6 +59,10 @@ class RankedEffect:
         takes most of the noise away.
     drop_here : float
         The same in the chosen stretch of time; as ``drop`` where none is chosen.
+    trajectories : tuple of int, default=()
+        Recordings that have it, of a payload or a force at the tool; empty for all. Such an effect
+        is judged on interleaved quarters of the recordings, a torque ripple on single samples; the
+        drop of both is that of the whole log.
 
     Examples
     --------
@@ -70,6 +76,7 @@ class RankedEffect:
     joints: tuple[int, ...]
     drop: float
     drop_here: float
+    trajectories: tuple[int, ...] = ()
 
 
 class Session:
@@ -142,15 +149,8 @@ class Session:
 
     @cached_property
     def noise(self) -> Array:
-        """Fast noise of the torque sensors, N m or N; no model can be better.
-
-        Third differences of the residual leave what is faster than any motion; noise that is
-        correlated over several samples is not in it.
-        """
-        residual = self._steps[0].residual
-        parts = [np.diff(residual[rows], n=3, axis=0) for rows in self.problem.signals.segments]
-        size: Array = np.median(np.abs(np.concatenate(parts)), axis=0) / MEDIAN / np.sqrt(20)
-        return size
+        """Noise of torque and position sensors, N m or N, as a diagnosis takes it."""
+        return noise_level(self.problem, self._steps[0].residual)
 
     @property
     def worst(self) -> int:
@@ -168,7 +168,10 @@ class Session:
         """
         if not self.added:
             return []
-        intervals = parameter_intervals(self.problem, self.terms, self._steps[-1].noise)
+        rest = [t for t in self.terms if not _is_fine(t)]
+        intervals = parameter_intervals(self.problem, rest, self._steps[-1].noise)
+        for term, ripple in self._steps[-1].ripples.items():
+            intervals[term] = _ripple_intervals(term, ripple)
         slides = self.problem.signals.prismatic
         return [
             ", ".join(
@@ -348,7 +351,32 @@ class Session:
                 float(drop[at]),
                 float(here[at]),
             )
+        for offer in self._offers(j):
+            effect, share = offer.candidate.term.effect, float(offer.drop[j])
+            which = offer.candidate.term.trajectories
+            inside = trajectory is None or which is None or trajectory in which
+            if share >= LEAST_DROP and inside:
+                best[offer.candidate.kind] = RankedEffect(
+                    offer.candidate.kind,
+                    effect.title,
+                    effect.formula,
+                    tuple(k + 1 for k in offer.candidate.joints),
+                    share,
+                    share,
+                    which or (),
+                )
         return sorted(best.values(), key=_order)[:RANKED]
+
+    def _offers(self, joint: int) -> list[Offer]:
+        """Ripples and loads that would take something of a joint's error; worked out once."""
+        step = self._steps[-1]
+        if step.offers is None:
+            blocks = [self.problem.term_rows(t) for t in self.terms if not _is_fine(t)]
+            step.offers = [
+                *ripples(self.problem, step.residual, self._samples.fold),
+                *loads(self.problem, blocks, step.noise, self._target),
+            ]
+        return [o for o in step.offers if o.drop[joint] > 0 and not self._has(o.candidate)]
 
     # ------------------------------------------------------------------ what is done
     def add(self, kind: str, joint: int, *, refined: bool = True) -> dict[str, Any]:
@@ -382,6 +410,7 @@ class Session:
             for at, i in enumerate(found.index)
             if self._pool[i].kind == kind and not self._has(self._pool[i])
         ]
+        pool += [(o.drop[j], o.candidate) for o in self._offers(j) if o.candidate.kind == kind]
         if not pool:
             raise EffectError(
                 f"{kind} cannot be added to joint {joint}: this log does not show it there, its "
@@ -402,7 +431,7 @@ class Session:
         last = self._steps[-1]
         if last.coarse is not None:
             self._steps.pop()
-            blocks = [self.problem.term_rows(t) for t in self.terms]
+            blocks = [self.problem.term_rows(t) for t in self.terms if not _is_fine(t)]
             noise = self._steps[-1].noise
             better = refine(self.problem, blocks, [last.coarse], noise, self._target)[0]
             self._push(better, last.entry["joint"])
@@ -544,9 +573,16 @@ class Session:
     def _step(
         self, new: tuple[Term, ...], terms: tuple[Term, ...], sigma: Array, joint: int | None
     ) -> _Step:
-        model = self._ranking.model([self.problem.term_rows(t) for t in terms], sigma)
+        rest = [t for t in terms if not _is_fine(t)]
+        model = self._ranking.model(
+            [self.problem.term_rows(t) for t in rest], sigma, self._of_recordings(rest)
+        )
         left = [f.solution for f in model.fits]
-        residual = self._samples.residual(terms, left, model.whole.solution)
+        residual = self._samples.residual(rest, left, model.whole.solution)
+        fitted: dict[Term, Ripple] = {}
+        for term in filter(_is_fine, terms):
+            fitted[term] = fit_ripple(self.problem, term, residual, self._samples.fold)
+            residual[:, term.joints[0]] -= fitted[term].torque
         sliding = self.problem.rows.sliding
         squares = np.sum(residual**2 * sliding, axis=0)
         rmse = np.sqrt(squares / np.maximum(sliding.sum(axis=0), 1))
@@ -556,7 +592,15 @@ class Session:
             "joints": [j + 1 for j in new[0].joints] if new else [],
             "rmse": [float(x) for x in rmse],
         }
-        return _Step(new, model, self._ranking.noise(model), residual, entry)
+        return _Step(new, model, self._ranking.noise(model), residual, entry, ripples=fitted)
+
+    def _of_recordings(self, terms: Sequence[Term]) -> NDArray[np.bool_]:
+        """Coefficients that one recording alone can tell, and that are not held out with it."""
+        rigid = len(self.problem.rigid_index)
+        own = np.zeros(rigid + TermSum(terms).width, dtype=bool)
+        for term, place in TermSum(terms).slices(rigid):
+            own[place] = term.trajectories is not None
+        return own
 
     def _rows_in(
         self, joint: int, trajectory: int | None, span: tuple[float, float] | None
@@ -581,6 +625,21 @@ class _Step:
     entry: dict[str, Any]
     coarse: Candidate | None = None
     rows: dict[int, HeldOutRows] = field(default_factory=dict)
+    offers: list[Offer] | None = None
+    ripples: dict[Term, Ripple] = field(default_factory=dict)
+
+
+def _is_fine(term: Term) -> bool:
+    """Whether an effect is faster than averaged rows."""
+    return term.effect.search == "spectrum"
+
+
+def _ripple_intervals(term: Term, ripple: Ripple) -> dict[str, Any]:
+    """Parameters of a ripple; its amplitude with a 95 % interval."""
+    told: dict[str, Any] = dict(term.parameters(ripple.whole))
+    size, spread = told["A"], NORMAL * float(jackknife(np.hypot(*ripple.left_out.T)))
+    told["A"] = (size, size - spread, size + spread)
+    return told
 
 
 def _holes(values: Array) -> list[float | None]:

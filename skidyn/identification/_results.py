@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import block_diag
 from scipy.optimize import lsq_linear
+from sklearn.utils import estimator_html_repr
 from sklearn.utils.validation import check_is_fitted
 
 from skidyn._exceptions import SkidynError
@@ -17,6 +18,7 @@ from skidyn.evidence import Evidence
 from skidyn.identification._consistency import make_consistent
 from skidyn.identification._constraints import BodyConstraints
 from skidyn.identification._identifiability import essential_parameters, open_combinations
+from skidyn.identification._notebook import model_table
 from skidyn.identification._regression import Solution
 from skidyn.robots import Robot, find_base_parameters
 
@@ -38,6 +40,14 @@ class Results:
     consistent: bool | BodyConstraints
     parameters: str
     estimator: str
+
+    def _html_repr(self) -> str:
+        """As scikit-learn draws it in a notebook; below that, of a fitted model, its numbers."""
+        drawn = str(estimator_html_repr(self))
+        if not hasattr(self, "coef_std_"):
+            return drawn
+        stated = {row["name"]: (row["value"], row["std"]) for row in self.parameter_table()}
+        return drawn + model_table(self.robot_, self.effect_terms_, stated, self.noise_std_)
 
     def parameter_table(self) -> list[dict[str, Any]]:
         """Every coefficient with its standard error.

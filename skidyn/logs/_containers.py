@@ -241,7 +241,7 @@ def _runs(channels: list[Channel], path: Path) -> list[Channel]:
     import pandas as pd
 
     ordered = sorted(channels, key=lambda c: [int(n) for n in re.findall(r"\d+", c.name)])
-    tables = [c.table.assign(trajectory=k) for k, c in enumerate(ordered)]
+    tables = [c.table.assign(trajectory=k) for k, c in enumerate(ordered, 1)]
     warn_about_log(
         f"{path}: {', '.join(c.name for c in ordered)} hold the same columns; each is a trajectory"
     )

@@ -199,9 +199,8 @@ def read_log(
         joints = match.joint_names
         notes += [note.removeprefix(f"{file}: ") for note in match.notes]
         _, number = np.unique(table["trajectory"], return_inverse=True)
-        table["trajectory"] = number + len(files) if tables else table["trajectory"]
-        if not tables and (len(found) > 1 or found[0].files[1:]):
-            table["trajectory"] = number
+        if tables or len(found) > 1 or found[0].files[1:]:
+            table["trajectory"] = number + len(files) + 1
         files += [str(file)] * (int(number.max()) + 1)
         tables.append(table)
     frame = pandas.concat(tables, ignore_index=True) if len(tables) > 1 else tables[0]

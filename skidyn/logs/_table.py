@@ -204,11 +204,12 @@ def _clean(
         if len(number) and np.abs(number).max() > LARGEST_NUMBER:
             raise LogError(
                 f"{source}: the trajectory column holds {number[np.abs(number).argmax()]:g}; "
-                f"numbers up to {LARGEST_NUMBER} can be told apart. Number the trajectories from 0."
+                f"numbers up to {LARGEST_NUMBER} can be told apart. Number the trajectories from 1."
             )
         number = number.astype(np.int64)
     else:
         number, restarts = split_at_restarts(time)
+        number += 1  # as files and joints are counted
         if restarts:
             match.notes.append(
                 f"{source}: the clock starts anew {restarts} time(s); each is a trajectory"
@@ -265,7 +266,7 @@ def _split(
     )
     pieces = after[-1] + 1 - len(np.unique(before))
     if pieces > 0:
-        table["trajectory"] = after
+        table["trajectory"] = after + 1
         match.notes.append(
             f"{source}: cut at {pieces} gap(s) or rest(s) into {after[-1] + 1} trajectories"
         )

@@ -13,6 +13,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Array
+from skidyn._text import digits
 from skidyn.evidence import jackknife, linear_terms, without_each
 from skidyn.identification import RBDRegressor, make_consistent
 from skidyn.payload._runs import (
@@ -75,6 +76,10 @@ class PayloadEstimate:
         The payload's size as every joint by itself weighs it, as a share of the common one, and
         its standard error; NaN for joints that do not feel it. Shares that differ beyond their
         errors tell of drive gains, not of the payload.
+    joint_names : tuple of str
+        Names of the joints.
+    units : tuple of str
+        Units of their torques, ``"N m"`` or ``"N"``.
 
     Examples
     --------
@@ -96,21 +101,31 @@ class PayloadEstimate:
     first_moment_interval: Array
     by_joint: Array
     by_joint_std: Array
+    joint_names: tuple[str, ...]
+    units: tuple[str, ...]
 
     @property
     def text(self) -> str:
         """The result in words."""
-        return "\n".join([*self._body(), *self._joints(), *self.notes])
+        return "\n".join([*self._body(), *self._errors(), *self._joints(), *self.notes])
+
+    def _errors(self) -> list[str]:
+        """Errors of the joints that the payload loads, without it and with it."""
+        rows = zip(self.joint_names, self.units, self.rmse_before, self.rmse_after, strict=True)
+        return ["error of the loaded runs without the payload and with it:"] + [
+            f"  {name} ({j}): {digits(before)} → {digits(after)} {unit}"
+            for j, (name, unit, before, after) in enumerate(rows, 1)
+        ]
 
     def _joints(self) -> list[str]:
         felt = np.flatnonzero(np.isfinite(self.by_joint))
         if len(felt) < 2:
             return []
         shares = ", ".join(
-            f"joint {j + 1} {100 * self.by_joint[j]:.0f} +- {100 * self.by_joint_std[j]:.0f}"
+            f"joint {j + 1} {100 * self.by_joint[j]:.0f} ± {100 * self.by_joint_std[j]:.0f}"
             for j in felt
         )
-        return [f"as every joint weighs it, in % of this: {shares}"]
+        return [f"weighed by single joints, in % of this: {shares}"]
 
     def _body(self) -> list[str]:
         if not np.isfinite(self.mass):
@@ -124,7 +139,7 @@ class PayloadEstimate:
             return [
                 f"payload at {self.link}: its mass does not show in this motion, its first moment "
                 f"does, in kg m (95 %):  {shown}",
-                "with the centre of mass, com, it is weighed by this",
+                "give its centre of mass (com), and its mass follows from this",
             ]
         low, high = self.mass_interval
         return [
@@ -170,6 +185,8 @@ class PayloadEstimate:
             "first_moment_interval": self.first_moment_interval.tolist(),
             "by_joint": self.by_joint.tolist(),
             "by_joint_std": self.by_joint_std.tolist(),
+            "joints": list(self.joint_names),
+            "units": list(self.units),
             "rmse_before": self.rmse_before.tolist(),
             "rmse_after": self.rmse_after.tolist(),
             "notes": list(self.notes),
@@ -340,6 +357,8 @@ def _estimate(runs: Runs, link: str, notes: list[str], com: Array | None = None)
         "first_moment_interval": moments,
         "by_joint": shares,
         "by_joint_std": share_std,
+        "joint_names": tuple(runs.problem.robot.joint_names),
+        "units": tuple("N" if slides else "N m" for slides in runs.problem.signals.prismatic),
     }
     if is_open[0]:
         nothing = np.full((3, 3), np.nan)

@@ -320,23 +320,11 @@ def _sentence(report: dict[str, Any]) -> str:
     if mean is not None:
         less = sum(row["ratio"] < 1 for row in report["ratios"])
         text += (
-            f"As given, {second} has {_change(mean, first)} in the mean over joints, and the "
-            f"smaller one on {less} of {len(report['ratios'])} joints. "
+            f"As given, {second} has {_change(mean, first)} in the mean over joints; its error is "
+            f"the smaller one on {less or 'none'} of {len(report['ratios'])} joints. "
         )
-    findings = report["findings"]
-    if not findings:
-        return text + "Nothing is found missing in either."
-    parts = []
-    for name in report["names"]:
-        own = [row for row in findings if row["in"] == [name]]
-        if own:
-            parts.append(f"only in “{name}”: {_listed(own)}")
-    if not parts:
-        return text + f"The same effects are missing in both: {_listed(findings)}."
-    shared = [row for row in findings if len(row["in"]) == 2]
-    if shared:
-        parts.append(f"in both: {_listed(shared)}")
-    return text + "Missing " + "; ".join(parts) + "."
+    shared = [row for row in report["findings"] if len(row["in"]) == 2]
+    return text + (f"Missing in both: {_brief(shared)}." if shared else "")
 
 
 def _change(ratio: float, first: str) -> str:
@@ -344,14 +332,3 @@ def _change(ratio: float, first: str) -> str:
         return f"the same held-out error as {first}"
     size = "smaller" if ratio < 1 else "larger"
     return f"a held-out error {abs(ratio - 1):.0%} {size} than {first}"
-
-
-def _listed(rows: Sequence[dict[str, Any]]) -> str:
-    joints: dict[str, list[int]] = {}
-    for row in rows:
-        title = " or ".join(dict.fromkeys(filter(None, row["titles"])))
-        joints.setdefault(title, []).append(row["joint"])
-    return ", ".join(
-        f"{title} (joint{'s' if len(on) > 1 else ''} {', '.join(map(str, sorted(on)))})"
-        for title, on in joints.items()
-    )

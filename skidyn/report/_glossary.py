@@ -29,8 +29,8 @@ MEANINGS = {
     "rival": "Another effect that explains this recording nearly as well. The motion that is named "
     "with it would tell them apart.",
     "q-value": "Share of false findings to be expected among those reported at this level.",
-    "trajectory": "One piece of motion of the log, by the number that the log gives it. Errors are "
-    "held out by whole trajectories where there are enough of them.",
+    "trajectory": "One piece of motion of the log, by the number that the log gives it, or counted "
+    "from 1. Errors are held out by whole trajectories where there are enough of them.",
 }
 
 #: Words of the page of a fleet alone.

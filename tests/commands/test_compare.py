@@ -46,7 +46,7 @@ def test_two_reports(here, capsys, tmp_path):
     capsys.readouterr()
     assert cli.main(["compare", str(tmp_path / "a.json"), str(tmp_path / "b.json")]) == cli.DONE
     told = capsys.readouterr().out
-    assert "A = a, B = b" in told and "two different recordings" in told
+    assert "A is a, B is b" in told and "two different recordings" in told
 
 
 @pytest.mark.parametrize(

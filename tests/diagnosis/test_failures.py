@@ -39,7 +39,7 @@ def test_joints_are_ranked_by_error_over_noise_not_by_error(bare):
     found = find_failures(both, [NOISE, NOISE / 4])
     assert [f.joint for f in found] == [2, 1]
     assert found[0].ratio == pytest.approx(found[0].rmse / found[0].noise)
-    assert "Joint 2 " in found[0].sentence and "N m" in found[0].sentence
+    assert "(joint 2)" in found[0].sentence and "N m" in found[0].sentence
 
 
 def test_an_error_at_rest_or_at_reversals_is_no_failure(bare):

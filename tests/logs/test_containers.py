@@ -25,7 +25,7 @@ def quiet_read(*args, **options):
 def assert_read(frame, runs=1):
     for name, values in (("time", T), ("q2", Q[:, 1]), ("tau1", Q[:, 0] + 1)):
         np.testing.assert_allclose(frame[name], np.tile(values, runs), atol=1e-12)
-    assert frame["trajectory"].tolist() == [k for k in range(runs) for _ in range(N)]
+    assert frame["trajectory"].tolist() == [k for k in range(1, runs + 1) for _ in range(N)]
 
 
 def fill(group, signals=SIGNALS):

@@ -45,7 +45,7 @@ def test_csv_with_any_separator(tmp_path, separator):
     source.to_csv(tmp_path / "log.csv", sep=separator, index=False)
     frame = quiet_read(tmp_path / "log.csv")
     assert_same(frame, source)
-    assert frame["trajectory"].unique().tolist() == [0]
+    assert frame["trajectory"].unique().tolist() == [1]
 
 
 def test_csv_with_decimal_comma_and_comment(tmp_path):
@@ -191,7 +191,7 @@ def test_several_files_are_trajectories(tmp_path):
     for k in range(3):
         table(50).to_csv(tmp_path / f"{k}.csv", index=False)
     frame = quiet_read([tmp_path / f"{k}.csv" for k in range(3)])
-    assert frame["trajectory"].value_counts().to_dict() == {0: 50, 1: 50, 2: 50}
+    assert frame["trajectory"].value_counts().to_dict() == {1: 50, 2: 50, 3: 50}
     assert [file[-5:] for file in frame.attrs["files"]] == ["0.csv", "1.csv", "2.csv"]
 
 
@@ -208,7 +208,7 @@ def test_long_gap_begins_a_trajectory(tmp_path):
     source.to_csv(tmp_path / "log.csv", index=False)
     with pytest.warns(LogWarning, match="cut at 1 gap"):
         frame = read_log(tmp_path / "log.csv", check=False)
-    assert frame["trajectory"].tolist() == [0] * 100 + [1] * 100
+    assert frame["trajectory"].tolist() == [1] * 100 + [2] * 100
     assert quiet_read(tmp_path / "log.csv", split_gaps=None)["trajectory"].nunique() == 1
 
 
@@ -228,7 +228,7 @@ def test_rests_can_be_cut(tmp_path):
     log.to_csv(tmp_path / "log.csv", index=False)
     frame = quiet_read(tmp_path / "log.csv", split_dwells=0.5)
     assert frame["trajectory"].nunique() == 2
-    assert 140 < int(np.argmax(frame["trajectory"] == 1)) < 160
+    assert 140 < int(np.argmax(frame["trajectory"] == 2)) < 160
 
 
 def test_units_are_converted_on_request(tmp_path):

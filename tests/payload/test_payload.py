@@ -55,6 +55,7 @@ def test_body_that_can_exist(found):
 def test_says_what_cannot_be_told_apart(found):
     assert "Mass and drive gains scale alike" in found.text
     assert found.text.startswith("payload at wrist_3_link")
+    assert " → " in found.text and found.text.count(" N m\n") >= 6  # errors of the six joints
     again = json.loads(json.dumps(found.to_dict()))
     assert again["mass"] == found.mass and again["text"] == str(found)
 
@@ -175,5 +176,5 @@ def test_joint_with_another_drive_gain_is_named(runs, found):
     assert not any("drive gain before" in note for note in found.notes)
     loaded, unloaded = (frame.assign(tau2=frame["tau2"] * 1.3) for frame in (loaded, unloaded))
     wrong = identify_payload(log.robot, loaded, unloaded, effects=FRICTION)
-    assert "as every joint weighs it" in wrong.text
+    assert "weighed by single joints" in wrong.text
     assert any("drive gain" in note and "Joint" in note for note in wrong.notes)

@@ -31,7 +31,7 @@ def test_two_models_of_one_log_share_their_rows(fakes):
     assert set(table["columns"]) == {"measured", "first", "second"}
     ratio = summary["report"]["ratios"][0]
     assert ratio["low"] < ratio["ratio"] < ratio["high"]
-    assert "only in “usual”: Dahl friction (joints 1, 2)" in summary["sentence"]
+    assert "Only in “usual”: Dahl friction on joints 1 and 2" in summary["headline"]
 
 
 def test_two_logs_keep_their_own_times(fakes):

@@ -2,6 +2,7 @@
 """The page in a real browser: opens from disk without an error, zooms, shows values."""
 
 import json
+from pathlib import Path
 
 import pytest
 
@@ -163,6 +164,13 @@ def test_dark_and_light(open_page, fakes):
     dark = page.evaluate(background)
     page.click("#theme")
     assert page.evaluate(background) == "rgb(255, 255, 255)" != dark
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_text_has_the_contrast_of_aa(open_page, fakes, scheme):
+    page = open_page(fakes.make_diagnosis("unknown"), color_scheme=scheme)
+    found = page.evaluate(Path(__file__).with_name("contrast.js").read_text("utf-8"))
+    assert found["seen"] > 100 and found["poor"] == {}
 
 
 def test_prints_in_full_on_white(open_page, fakes):

@@ -123,7 +123,7 @@
       bar.append(fill, mark); cell.append(bar);
       const now = node("td", short(last[j]) + (worse ? " ▲" : ""));
       if (worse) now.title = "worse than the model as given";
-      row.append(node("td", `${j + 1} ${name.replaceAll("_", "_\u200b")}`), node("td", short(first[j])), now, node("td", short(state.noise[j])), cell);
+      row.append(node("td", `${name.replaceAll("_", "_\u200b")} (${j + 1})`), node("td", short(first[j])), now, node("td", short(state.noise[j])), cell);
       return row;
     }));
     el("added").replaceChildren(...state.history.slice(1).map((h, k) => {
@@ -141,7 +141,8 @@
     const share = span ? e.drop_here : e.drop;
     button.dataset.kind = e.kind;
     button.append(node("span", e.title), node("span", percent(share)));
-    button.append(node("small", `on ${on(e.joints)}: takes ${percent(e.drop)} of the squared residual of joint ${joint()}`
+    const which = e.trajectories.length ? ` in trajector${e.trajectories.length > 1 ? "ies" : "y"} ${e.trajectories.join(", ")}` : "";
+    button.append(node("small", `on ${on(e.joints)}${which}: takes ${percent(e.drop)} of the squared residual of joint ${joint()}`
       + (span ? ` in the whole log, ${percent(e.drop_here)} in the chosen time` : "")));
     fill.style.width = 100 * Math.max(0, Math.min(1, share)) + "%";
     bar.append(fill); button.append(bar);
@@ -166,7 +167,7 @@
     el("where").textContent = `(joint ${joint()}, ${place})`;
     el("whole").hidden = el("chosen").hidden = !span;
     el("effects").replaceChildren(...answer.effects.map(effect));
-    if (!answer.effects.length) el("effects").append(node("li", `Nothing more helps joint ${joint()}: no effect on offer lowers its held-out error by 1 %.`));
+    if (!answer.effects.length) el("effects").append(node("li", `Nothing more helps joint ${joint()}: no effect of the catalogue lowers its held-out error by 1 % or more.`));
     el("effects").removeAttribute("aria-busy");
     redraw();
     document.body.dataset.ranked = `${joint()} ${span ? "span" : "all"} ${state.history.length}`;
@@ -280,7 +281,7 @@
 
   async function start() {
     state = await ask("state");
-    el("joint").replaceChildren(...state.joints.map((name, j) => new Option(`${j + 1} ${name}`, j + 1)));
+    el("joint").replaceChildren(...state.joints.map((name, j) => new Option(`${name} (${j + 1})`, j + 1)));
     el("trajectory").replaceChildren(...state.trajectories.map((k) => new Option(k, k)));
     el("joint").value = state.worst;
     for (const id of ["joint", "trajectory"]) el(id).addEventListener("change", look);
