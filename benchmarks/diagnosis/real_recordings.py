@@ -132,7 +132,8 @@ def screw_drive_3() -> Diagnosis:
         runs = [str(r) for r in archive["traj_name"] if str(r).startswith("drive3")]
     frame = load_recording(file, run=runs).frame
     robot = chain(("continuous", "0 0 1", "0 0 0", 0.01, "0 0 0"))
-    columns = ["time", "trajectory", "q1", "dq1"]
+    frame["ddq1"] = 0.0  # every run has one speed
+    columns = ["time", "trajectory", "q1", "dq1", "ddq1"]
     model = RBDRegressor(robot, ("viscous", "coulomb", "offset"))
     return diagnose(model, frame[columns], torques(frame, 1), smooth=False)
 

@@ -138,8 +138,6 @@ class Settings:
         Candidates of a kind, joints and shapes, that are tested before the kind is given up.
     max_findings : int
         Kinds added at most.
-    names_for_one : int
-        So many named effects together may take the place of one nameless function.
     finalists : int
         Kinds compared with noise re-estimated.
     refined : int
@@ -167,7 +165,6 @@ class Settings:
     nameless_tried: int = 20
     shapes_tested: int = 4
     max_findings: int = 4
-    names_for_one: int = 2
     finalists: int = 8
     refined: int = 4
 

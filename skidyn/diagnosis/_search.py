@@ -155,8 +155,6 @@ class _Search:
             ranking.remove(best)
             if self._richer_known(best):
                 continue
-            if best.kind == UNKNOWN and best.torque is None:
-                best = self._first_of_names(best, ranking) or best
             judged = self.judged(best)
             if judged is not None and not self.shadow(judged):
                 rivals = _rivals(judged, offered)
@@ -427,60 +425,6 @@ class _Search:
             self.problem, blocks, self.sigma, self.target, within=within, soft=soft
         )
 
-    def _first_of_names(
-        self, nameless: Hypothesis, ranking: Sequence[Hypothesis]
-    ) -> Hypothesis | None:
-        """The first of a few named effects that together do what a nameless function does.
-
-        Several names beside each other compete with it at no higher price: a function of signals
-        holds any sum of effects of its joints.
-        """
-        joints, found, chosen, pool = set(nameless.joints), [], self.chosen, self.pool
-        self.pool = [c for c in pool if c.kind != UNKNOWN and set(c.joints) & joints]
-        try:
-            while len(found) < self.settings.names_for_one:
-                named = [h for h in ranking if self._may_stand_in(h, nameless)]
-                if not named:
-                    return None
-                best = self._simplest_of_family(named[0], named)
-                found.append(best)
-                if sum(h.n_parameters for h in found) > nameless.n_parameters:
-                    return None
-                self.chosen = [*self.chosen, *best.candidates]
-                if self._as_good(self._errors_so_far(), nameless):
-                    return found[0]
-                taken = {c.site for c in best.candidates}
-                self.pool = [c for c in self.pool if c.site not in taken]
-                rough = sorted(self._greedy_by_kind(), key=lambda item: item[1])
-                rough = rough[: self.settings.refined]
-                ranking = self._finals([candidates for candidates, _ in rough])
-                ranking.sort(key=lambda h: -h.score)
-        finally:
-            self.chosen, self.pool = chosen, pool
-        return None
-
-    def _may_stand_in(self, hypothesis: Hypothesis, nameless: Hypothesis) -> bool:
-        return bool(
-            hypothesis.kind != UNKNOWN
-            and hypothesis.errors is not None
-            and not _within(hypothesis)
-            and set(hypothesis.joints) & set(nameless.joints)
-        )
-
-    def _errors_so_far(self) -> Array:
-        soft = [0.0] * len(self.problem.terms) + [c.term.effect.softness for c in self.chosen]
-        return profile_error(self.problem, self.blocks, self.sigma, self.target, soft=soft)
-
-    def _as_good(self, errors: Array, nameless: Hypothesis) -> bool:
-        """Whether errors are as small as those of a nameless function, to an imperfect formula."""
-        assert nameless.errors is not None
-        joints = list(nameless.joints)
-        left = nameless.errors.sum(0)
-        removed = left * np.expm1(np.maximum(nameless.gain, 0) / self._counts)
-        weight = 1 / np.maximum(left[joints], 1e-300)
-        behind = float(weight @ (errors.sum(0) - left)[joints])
-        return behind <= self.settings.form_tolerance * float(weight @ removed[joints])
-
     def _simplest_of_family(self, best: Hypothesis, ranking: list[Hypothesis]) -> Hypothesis:
         """Members of a family differ only in motion made for it: the simplest near one is named."""
         family = _family(best)
@@ -711,9 +655,16 @@ class _Search:
                 continue
             pool = [c for c in self.by_recording if c.kind == kind]
             chosen = choose(pool, lambda more: self.tester([*self.chosen, *more]), self.significant)
+            chosen = [c for c in chosen if self._can_be(c, chosen)]
             if chosen:
                 found += self._same_or_own(chosen)
         return self._finals(found)
+
+    def _can_be(self, candidate: Candidate, chosen: Sequence[Candidate]) -> bool:
+        """Whether a candidate's coefficients have a sign that its effect can have."""
+        others = [*self.chosen, *(c for c in chosen if c is not candidate)]
+        coefficients = self.tester(others).test(candidate.rows).coefficients
+        return not np.any(coefficients * candidate.term.signs < 0)
 
     def _same_or_own(self, chosen: Sequence[Candidate]) -> list[list[Candidate]]:
         """Effects of few recordings by their name, those of many without one.
