@@ -164,7 +164,8 @@ def lwr4_twice() -> Diagnosis:
     columns = ["time", "trajectory", *(f"{s}{j}" for s in ("q", "dq") for j in range(1, 8))]
     robot = Robot.from_urdf(folder / "kuka_lwr4_min.urdf")
     other.time_column = "time"
-    return diagnose(_Plain(other), one[columns], torques(one, 7), robot=robot)
+    # The stamps lie 30 us around even steps, which changes nothing here.
+    return diagnose(_Plain(other), one[columns], torques(one, 7), robot=robot, force=True)
 
 
 class _Plain(RegressorMixin, BaseEstimator):

@@ -209,14 +209,14 @@ def _useless(
     """The last finding with terms that leave the error of samples as large, and these terms.
 
     They helped averaged rows. The squared error, which few samples may rule, and the mean absolute
-    one count alike.
+    one count alike; a squared error that does not fall at all is promised to nobody.
     """
     for k in reversed(range(len(findings))):
         errors = [(_mean_error(step.comparison), step.entry["rmse"]) for step in steps[k : k + 2]]
         terms = []
         for candidate in findings[k].candidates:
             drops = [_drop(a, b, candidate.joints) for a, b in zip(*errors, strict=True)]
-            if float(np.mean(drops)) < least:
+            if float(np.mean(drops)) < least or drops[1] <= 0:
                 terms.append(candidate)
         if terms:
             return findings[k], terms
