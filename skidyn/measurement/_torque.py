@@ -164,6 +164,10 @@ def _magnitude_gain(fits: Fits, k: int) -> float:
     return best - plain if np.isfinite(best) else 0.0
 
 
+#: Share of the torque left over that another zero must take off to be certain.
+MOSTLY = 0.8
+
+
 class Columns(Check):
     """Signs, order and zero of joints, and gravity, that are not those of the robot."""
 
@@ -195,6 +199,8 @@ class Columns(Check):
             f"{best.gain:.0f} (log-likelihood), and leaves {100 * best.drop:.0f} % less of it"
         )
         certainty: Certainty = "certain" if _sure(changes) else "suspected"
+        if kind == "zero" and min(change.drop for change in changes) < MOSTLY:
+            certainty = "suspected"  # an offset or a spring that is missing looks like it
         rivals = {_RIVALS[rival] for change in changes for rival in change.rivals}
         if rivals:
             certainty = "suspected"
