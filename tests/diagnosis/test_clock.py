@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Waves in time of any frequency that the log resolves, and of any form, are told by their clock."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.diagnosis import diagnose
+from skidyn.identification import RBDRegressor
+
+
+@pytest.fixture(scope="module")
+def log():
+    return make_hidden_effect_log(load_planar_arm(), None, noise="low", random_state=5)
+
+
+@pytest.mark.parametrize("frequency", [1.37, 6.1, 37.3])
+@pytest.mark.parametrize("square", [False, True])
+def test_a_wave_in_time_is_told_with_its_frequency(log, frequency, square):
+    time = log.X["time"].to_numpy()
+    wave = np.sin(2 * np.pi * frequency * time)
+    torque = np.array(log.y)
+    torque[:, 1] += 2 * log.noise_std[1] * (np.sign(wave) if square else np.sqrt(2) * wave)
+
+    diagnosis = diagnose(RBDRegressor(log.robot), log.X, torque)
+
+    assert diagnosis.verdict == "unknown"
+    first = diagnosis.findings[0]
+    assert (first.joints, first.variables) == ((2,), ("time",))
+    np.testing.assert_allclose(first.terms[0].shape["frequency"], frequency, atol=0.01)
+    # A square wave has harmonics that the log does not resolve.
+    assert diagnosis.rmse_after[1] < (1.6 if square else 1.25) * log.noise_std[1]
+
+
+def test_a_log_without_a_wave_has_none(log):
+    assert diagnose(RBDRegressor(log.robot), log.X, log.y).verdict == "complete"
