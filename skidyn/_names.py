@@ -195,8 +195,8 @@ def _expand(
     if "{joint}" in value:
         if robot_joints is not None:
             return [value.replace("{joint}", joint) for joint in robot_joints]
-        first, *others = map(re.escape, value.split("{joint}"))
-        pattern = first + "(.+)" + r"\1".join(others)  # wherever it stands, one name
+        before, *after = map(re.escape, value.split("{joint}"))
+        pattern = before + "(.+)" + r"\1".join(after)  # wherever it stands, one name
         found = [name for name in names if re.fullmatch(pattern, name)]
         if not found:
             raise LogError(f"columns: no column is like {value!r}. There are: {_listed(names)}.")

@@ -139,14 +139,20 @@ def link_of(
     Raises
     ------
     RobotDescriptionError
-        The mass is negative or the inertia is not positive definite.
+        The mass is negative, the inertia is not positive definite, or one of them is no number.
     """
     what = f"link {name!r}"
     if mass < 0:
         raise RobotDescriptionError(f"The mass of {what} is {mass:g} kg; it must not be negative.")
+    with np.errstate(over="ignore", invalid="ignore"):
+        central = inertial_vector(mass, np.zeros(3), inertia)
+        parameters = transform_inertial(central, rotation, center)
+    if not np.isfinite(parameters).all():
+        raise RobotDescriptionError(
+            f"The mass or inertia of {what} is too large to be a number; check its size and units."
+        )
     _check_inertia(inertia, what)
-    central = inertial_vector(mass, np.zeros(3), inertia)
-    return Link(name, transform_inertial(central, rotation, center))
+    return Link(name, parameters)
 
 
 def symmetric(xx: float, xy: float, xz: float, yy: float, yz: float, zz: float) -> np.ndarray:

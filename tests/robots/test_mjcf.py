@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 
+from skidyn.exceptions import RobotDescriptionError
 from skidyn.robots import Robot
 
 mujoco = pytest.importorskip("mujoco")
@@ -92,3 +93,10 @@ def test_a_file_is_read_by_its_path(tmp_path):
     path.write_text(ARM)
     assert Robot.from_mjcf(path).joint_names == Robot.from_mjcf(ARM.encode()).joint_names
     assert Robot.from_file(path).joint_names == Robot.from_mjcf(path).joint_names
+
+
+def test_a_body_of_infinite_size_is_named():
+    text = """<mujoco><worldbody><body name="a"><joint name="j" axis="0 1 0"/>
+    <geom size="inf" mass="1"/></body></worldbody></mujoco>"""
+    with pytest.raises(RobotDescriptionError):
+        Robot.from_mjcf(text)

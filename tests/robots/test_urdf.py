@@ -6,6 +6,7 @@ import warnings
 import numpy as np
 import pytest
 
+from skidyn.exceptions import RobotDescriptionError
 from skidyn.robots import Robot
 
 GOOD_INERTIA = '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>'
@@ -259,3 +260,11 @@ def test_attributes_that_nobody_knows_are_passed_over_in_silence(capfd):
     text = robot(TWO, joint("j", "a", "b")).replace("<robot ", f"<robot {more} ", 1)
     assert Robot.from_urdf(text).chain.n_joints == 1
     assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("mass", ["1e300", "1.7e308"])
+def test_a_body_whose_inertia_is_no_number_is_named(mass):
+    far = f'<inertial><origin xyz="1e10 0 0"/><mass value="{mass}"/>{GOOD_INERTIA}</inertial>'
+    text = robot(link("a"), f'<link name="b">{far}</link>', joint("j", "a", "b"))
+    with pytest.raises(RobotDescriptionError, match="inertia of link 'b' is too large"):
+        Robot.from_urdf(text)
