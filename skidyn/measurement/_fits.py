@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -38,6 +39,10 @@ FREEDOM, ROUNDS = 4.0, 5
 MOST_ALIKE = 0.875
 #: Fewest rows of a joint for a fit.
 FEWEST = 25
+#: Samples of a robot of one joint whose regressor is held at a time.
+CHUNK = 12288
+#: Motions of which columns are kept.
+KEPT = 2
 #: What of a reading does not concern the motion.
 _PLAIN: dict[str, Any] = {"flip_torque": frozenset(), "torque_order": None}
 
@@ -140,9 +145,8 @@ class Fits:
     left_out: frozenset[int] = frozenset()
     _known: dict[Reading, Outcome] = field(default_factory=dict, repr=False)
     _moved: dict[Reading, Array] = field(default_factory=dict, repr=False)
-    _fitted: dict[tuple[Reading, int, int, float, int], RobustFit] = field(
-        default_factory=dict, repr=False
-    )
+    _parts: dict[Reading, tuple[Array, Array]] = field(default_factory=dict, repr=False)
+    _fitted: dict[tuple[Any, ...], RobustFit] = field(default_factory=dict, repr=False)
 
     @property
     def n_joints(self) -> int:
@@ -152,7 +156,20 @@ class Fits:
     def without(self, joints: Sequence[int]) -> Fits:
         """The same rows without the torque of some joints."""
         left_out = self.left_out | frozenset(joints)
+        if left_out == self.left_out:
+            return self  # with all that was fitted so far
         return Fits(self.robot, self.signals, self.torque, self.moving, self.recorded, left_out)
+
+    def thinned(self, count: int) -> Fits:
+        """Some of the rows, evenly over the log: enough to see what may be wrong."""
+        step = self.n_rows // count
+        if step < 2:
+            return self
+        rows = np.arange(0, self.n_rows, step)
+        samples = (rows[:, None] * SAMPLES + np.arange(SAMPLES)).ravel()
+        recorded = replace(self.recorded, picked=self.recorded.picked[samples])
+        signals, torque = self.signals.take(samples), self.torque[samples]
+        return Fits(self.robot, signals, torque, self.moving[rows], recorded, self.left_out)
 
     def scaled(self, gains: Mapping[int, float]) -> Fits:
         """The same rows with columns of the torque divided by gains."""
@@ -228,40 +245,80 @@ class Fits:
         n = self.n_joints
         likelihood, gain, scale = np.zeros(n), np.full(n, np.nan), np.ones(n)
         residual = [np.zeros(0) for _ in range(n)]
-        for j in range(n):
-            column, sign = self.torque_column(reading, j)
-            if not self.usable(column):
-                continue
-            fit = self._joint_fit(replace(reading, **_PLAIN), j, column, sign, rounds)
+        read = [(j, *self.torque_column(reading, j)) for j in range(n)]
+        read = [key for key in read if self.usable(key[1])]
+        fits = self._joint_fits(replace(reading, **_PLAIN), read, rounds)
+        for (_, column, _), fit in zip(read, fits, strict=True):
             likelihood[column], gain[column] = fit.likelihood, fit.coefficients[0]
             scale[column], residual[column] = fit.scale, fit.residual
         return Outcome(likelihood, gain, residual, scale)
 
-    def _joint_fit(
-        self, motion: Reading, joint: int, column: int, sign: float, rounds: int
-    ) -> RobustFit:
-        """Fit of a joint to a column of the torque; readings share most of these fits."""
-        key = (motion, joint, column, sign, rounds)
-        if key not in self._fitted:
-            y, use = self._rows(column)
-            columns = self.columns(motion)[use, :, joint]
-            self._fitted[key] = fit_admissible(columns, sign * y[use], rounds)
-        return self._fitted[key]
+    def _joint_fits(
+        self, motion: Reading, read: Sequence[tuple[int, int, float]], rounds: int
+    ) -> list[RobustFit]:
+        """Fits of joints to columns of the torque; readings share most of these fits."""
+        new = [key for key in read if (motion, *key, rounds) not in self._fitted]
+        if new:
+            joints, columns, signs = (np.array(x) for x in zip(*new, strict=True))
+            own = self.columns(motion)[:, :, joints].transpose(2, 0, 1)
+            y, use = (signs * self._mean_torque[:, columns]).T, self.moving[:, columns].T
+            found = (
+                fit_at_once(own, y, use)
+                if rounds == 1
+                else [
+                    fit_admissible(a[w], t[w], rounds) for a, t, w in zip(own, y, use, strict=True)
+                ]
+            )
+            for key, fit in zip(new, found, strict=True):
+                self._fitted[motion, *key, rounds] = fit
+        return [self._fitted[motion, *key, rounds] for key in read]
 
     def coefficients(self, joint: int) -> Array:
         """Of a joint read as it is: multiple of its own torque, viscous, dry, rotor inertia."""
-        return self._joint_fit(Reading(), joint, joint, 1.0, ROUNDS).coefficients
+        return self._joint_fits(Reading(), [(joint, joint, 1.0)], ROUNDS)[0].coefficients
 
     def columns(self, motion: Reading) -> Array:
         """Mean columns of every joint, shape (n_rows, 4, n_joints)."""
         if motion not in self._moved:
             s = self.motion(motion)
-            own = self.robot.inverse_dynamics(s.q, s.dq, s.ddq, gravity=motion.gravity)
+            own = self._own_torque(motion, s)
             sign = np.tanh(s.dq / (SIGN_BLUR * s.unit))
-            stacked = np.stack([own, s.dq, sign, s.ddq], axis=1)
-            self._moved.clear()  # readings come one after the other; only the last is needed
-            self._moved[motion] = self.average(stacked)
+            parts = [own, *(self.average(x) for x in (s.dq, sign, s.ddq))]
+            while len(self._moved) >= KEPT:  # readings come one after the other
+                del self._moved[next(iter(self._moved))]
+            self._moved[motion] = np.stack(parts, axis=1)
         return self._moved[motion]
+
+    def _own_torque(self, motion: Reading, s: Signals) -> Array:
+        """Mean torque of the robot as described, in rows."""
+        if motion.gravity is None:
+            return self.average(self.robot.inverse_dynamics(s.q, s.dq, s.ddq))
+        still, pulls = self.gravity_parts(motion)
+        return np.asarray(still + np.tensordot(motion.gravity, pulls, 1))
+
+    def gravity_parts(self, motion: Reading) -> tuple[Array, Array]:
+        """Mean torque of the robot without gravity, and that of a unit of gravity along each axis.
+
+        Torque is linear in gravity, in which many readings of one motion differ.
+
+        Parameters
+        ----------
+        motion : Reading
+            Its gravity does not count.
+
+        Returns
+        -------
+        still : ndarray of shape (n_rows, n_joints)
+        pulls : ndarray of shape (3, n_rows, n_joints)
+        """
+        motion = replace(motion, gravity=None, **_PLAIN)
+        if motion not in self._parts:
+            s = self.motion(motion)
+            still = self.robot.inverse_dynamics(s.q, s.dq, s.ddq, gravity=(0.0, 0.0, 0.0))
+            pulls = [self.robot.gravity_torque(s.q, gravity=tuple(axis)) for axis in np.eye(3)]
+            self._parts.clear()
+            self._parts[motion] = self.average(still), np.array([self.average(p) for p in pulls])
+        return self._parts[motion]
 
     def identified(self, reading: Reading) -> Outcome:
         """Fit with bodies that are identified, alike for all joints."""
@@ -274,7 +331,7 @@ class Fits:
         robot = self.robot
         if reading.gravity is not None:
             robot = replace(robot, gravity=np.asarray(reading.gravity))
-        regressor = self.average(robot.torque_regressor(s.q, s.dq, s.ddq))
+        regressor = self._mean_regressor(robot, s)
         read = [self.torque_column(reading, j) for j in range(self.n_joints)]
         joints = [j for j, (column, _) in enumerate(read) if self.usable(column)]
         p = regressor.shape[2]
@@ -289,6 +346,14 @@ class Fits:
             targets.append(read[j][1] * y[use])
         columns = [read[j][0] for j in joints]
         return self._spread(columns, fit_together(designs, targets))
+
+    def _mean_regressor(self, robot: Robot, s: Signals) -> Array:
+        """Mean torque regressor, shape (n_rows, n_joints, n_parameters), chunk by chunk."""
+        step = SAMPLES * max(1, CHUNK // (SAMPLES * robot.n_joints))
+        parts = [slice(start, start + step) for start in range(0, s.n_samples, step)]
+        return np.concatenate(
+            [self.average(robot.torque_regressor(s.q[p], s.dq[p], s.ddq[p])) for p in parts]
+        )
 
     def _spread(self, columns: Sequence[int], fits: Sequence[RobustFit]) -> Outcome:
         n = self.n_joints
@@ -393,6 +458,63 @@ def fit_admissible(columns: Array, y: Array, rounds: int = ROUNDS) -> RobustFit:
         scale = float(np.sqrt(np.mean(weight * residual**2))) + 1e-12
         weight = (FREEDOM + 1) / (FREEDOM + (residual / scale) ** 2)
     return RobustFit(coefficients / size, scale, residual, student(residual, scale))
+
+
+def fit_at_once(columns: Array, y: Array, use: NDArray[np.bool_]) -> list[RobustFit]:
+    """First round of :func:`fit_admissible` for many joints, four columns each.
+
+    Parameters
+    ----------
+    columns : ndarray of shape (n_fits, n_rows, 4)
+    y : ndarray of shape (n_fits, n_rows), N m or N
+    use : ndarray of shape (n_fits, n_rows) of bool
+        Rows that count.
+
+    Returns
+    -------
+    list of RobustFit
+    """
+    weight = use.astype(float)
+    total = weight.sum(1)
+    a = columns * weight[:, :, None]
+    size = np.sqrt(np.sum(a**2, axis=1))
+    size[size == 0] = 1.0
+    a = a / size[:, None]
+    b = a - weight[:, :, None] * (a.sum(1) / total[:, None])[:, None]
+    z = weight * (y - np.sum(weight * y, axis=1, keepdims=True) / total[:, None])
+    gram = b.transpose(0, 2, 1) @ b
+    p = gram.shape[1]
+    gram += (1e-9 * np.trace(gram, axis1=1, axis2=2) / p + 1e-300)[:, None, None] * np.eye(p)
+    coefficients = _not_negative(gram, np.matmul(z[:, None], b)[:, 0])
+    residual = z - np.matmul(b, coefficients[:, :, None])[:, :, 0]
+    scale = np.sqrt(np.sum(residual**2, axis=1) / total) + 1e-12
+    return [
+        RobustFit(c, float(s), r[w], student(r[w], float(s)))
+        for c, s, r, w in zip(coefficients / size, scale, residual, use, strict=True)
+    ]
+
+
+def _not_negative(gram: Array, right: Array) -> Array:
+    """Least squares without negative coefficients: the best of all sets of columns that give none.
+
+    Parameters
+    ----------
+    gram : ndarray of shape (n_fits, p, p)
+    right : ndarray of shape (n_fits, p)
+
+    Returns
+    -------
+    ndarray of shape (n_fits, p)
+    """
+    p = gram.shape[1]
+    sets = np.array(list(product((0.0, 1.0), repeat=p)))  # (2**p, p)
+    left_out = np.eye(p) * (1 - sets)[:, None, :]
+    solved = np.linalg.solve(
+        gram[:, None] * (sets[:, :, None] * sets[:, None]) + left_out,
+        (right[:, None] * sets)[..., None],
+    )[..., 0]
+    drop = np.where((solved >= 0).all(2), np.sum(solved * right[:, None], axis=2), -np.inf)
+    return np.asarray(solved[np.arange(len(gram)), np.argmax(drop, axis=1)])
 
 
 def fit_together(designs: Sequence[Array], targets: Sequence[Array]) -> list[RobustFit]:

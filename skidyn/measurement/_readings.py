@@ -47,6 +47,8 @@ UPRIGHT = 0.995
 OFFSETS = np.deg2rad([-135, -90, -45, 45, 90, 135, 180])
 #: Rounds of the fits that only rank, and how many changes are looked at more closely.
 SCREENED, FINALISTS = 1, 12
+#: Rows of these fits at least, and at most over the number of joints.
+FEWEST_ROWS, MOST_ROWS = 150, 2800
 
 
 @dataclass(frozen=True)
@@ -116,9 +118,10 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
 
     Few rounds tell which alternatives to look at more closely.
     """
-    here, rough = fits.nominal(reading), fits.nominal(reading, SCREENED)
+    here, few = fits.nominal(reading), fits.thinned(max(FEWEST_ROWS, MOST_ROWS // fits.n_joints))
+    rough = few.nominal(reading, SCREENED)
     screened = [
-        (float(fits.nominal(change.reading, SCREENED).margin(rough).sum()), change)
+        (float(few.nominal(change.reading, SCREENED).margin(rough).sum()), change)
         for change in _alternatives(fits, reading, here)
     ]
     screened = sorted(screened, key=lambda pair: -pair[0])[:FINALISTS]
@@ -150,11 +153,11 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
             if tied and restored < LEAST:
                 return replace(absent, rivals=("gravity",))  # along it no joint feels a change
             return replace(absent, restorable=restored > 0)
-    before = fits.identified(reading)
     accepted = []
     for change in judged:
         if change.kind == "no_gravity":
             continue
+        before = fits.identified(reading)
         confirmed = float(fits.identified(change.reading).margin(before).sum())
         # stated bodies that are a little wrong make residuals alike over seconds, so that a short
         # log gains little by them whatever is read wrongly; identified ones then decide
@@ -338,18 +341,17 @@ def _restored_gain(fits: Fits, without: Reading) -> float:
 def fitted_gravity(fits: Fits, reading: Reading, here: Outcome) -> Array | None:
     """Gravity that explains the torque best with the bodies of the description, m/s^2."""
     s = fits.motion(reading)
-    still = fits.robot.inverse_dynamics(s.q, s.dq, s.ddq, gravity=(0.0, 0.0, 0.0))
-    pulls = [fits.robot.gravity_torque(s.q, gravity=tuple(axis)) for axis in np.eye(3)]
+    still, pulls = fits.gravity_parts(reading)
     blocks, targets = [], []
     for j in range(fits.n_joints):
         column, sign = fits.torque_column(reading, j)
         use = fits.moving[:, column]
         if not fits.usable(column):
             continue
-        y = sign * fits.average(fits.torque[:, column])[use] - fits.average(still[:, j])[use]
+        y = sign * fits.average(fits.torque[:, column])[use] - still[use, j]
         own = np.column_stack([fits.average(friction(s, j))[use], np.ones(int(use.sum()))])
         basis, _ = np.linalg.qr(own)
-        pull = np.column_stack([fits.average(p[:, j])[use] for p in pulls])
+        pull = pulls[:, use, j].T
         blocks.append((pull - basis @ (basis.T @ pull)) / here.scale[column])
         targets.append((y - basis @ (basis.T @ y)) / here.scale[column])
     if not blocks:
