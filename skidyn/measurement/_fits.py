@@ -28,7 +28,7 @@ from scipy.special import gammaln
 
 from skidyn._signals import SIGN_BLUR, Array, Signals
 from skidyn.evidence import REST, smooth_motion
-from skidyn.robots import Robot
+from skidyn.robots import Robot, base_parameter_index
 
 #: Width of a row in s and the samples in it; rows used at most, over all stretches of the log.
 WIDTH, SAMPLES, MOST_ROWS = 0.125, 6, 1200
@@ -89,17 +89,15 @@ class Outcome:
         Residual of the rows of every column, N m or N.
     scale : ndarray of shape (n_joints,)
         Scale of the residual.
+    inflation : ndarray of shape (n_joints,)
+        By how much neighbouring rows that are alike make the likelihood look surer.
     """
 
     likelihood: Array
     gain: Array
     residual: list[Array]
     scale: Array
-
-    @property
-    def inflation(self) -> Array:
-        """By how much neighbouring rows that are alike make the likelihood look surer."""
-        return np.array([_inflation(r) for r in self.residual])
+    inflation: Array
 
     def margin(self, other: Outcome) -> Array:
         """By how much this reading is more likely than another, by joint."""
@@ -242,16 +240,13 @@ class Fits:
 
     def nominal(self, reading: Reading, rounds: int = ROUNDS) -> Outcome:
         """Fit with the bodies that the robot's description states."""
-        n = self.n_joints
-        likelihood, gain, scale = np.zeros(n), np.full(n, np.nan), np.ones(n)
-        residual = [np.zeros(0) for _ in range(n)]
-        read = [(j, *self.torque_column(reading, j)) for j in range(n)]
+        read = [(j, *self.torque_column(reading, j)) for j in range(self.n_joints)]
         read = [key for key in read if self.usable(key[1])]
         fits = self._joint_fits(replace(reading, **_PLAIN), read, rounds)
-        for (_, column, _), fit in zip(read, fits, strict=True):
-            likelihood[column], gain[column] = fit.likelihood, fit.coefficients[0]
-            scale[column], residual[column] = fit.scale, fit.residual
-        return Outcome(likelihood, gain, residual, scale)
+        columns = [column for _, column, _ in read]
+        outcome = self._spread(columns, fits)
+        outcome.gain[columns] = [fit.coefficients[0] for fit in fits]
+        return outcome
 
     def _joint_fits(
         self, motion: Reading, read: Sequence[tuple[int, int, float]], rounds: int
@@ -331,37 +326,41 @@ class Fits:
         robot = self.robot
         if reading.gravity is not None:
             robot = replace(robot, gravity=np.asarray(reading.gravity))
-        regressor = self._mean_regressor(robot, s)
+        base = base_parameter_index(robot)
+        regressor = self._mean_regressor(robot, s, base)
         read = [self.torque_column(reading, j) for j in range(self.n_joints)]
         joints = [j for j, (column, _) in enumerate(read) if self.usable(column)]
-        p = regressor.shape[2]
-        designs, targets = [], []
+        p = len(base)
+        designs, places, targets = [], [], []
         for k, j in enumerate(joints):
             y, use = self._rows(read[j][0])
             own = np.column_stack([friction(s, j), np.ones(len(s.q))])
-            block = np.zeros((int(use.sum()), p + 4 * len(joints)))
-            block[:, :p] = regressor[use, j]
-            block[:, p + 4 * k : p + 4 * k + 4] = self.average(own)[use]
-            designs.append(block)
+            felt = np.flatnonzero(regressor[:, j].any(axis=0))  # bodies that the joint moves
+            designs.append(np.hstack([regressor[use, j][:, felt], self.average(own)[use]]))
+            places.append(np.append(felt, p + 4 * k + np.arange(4)))
             targets.append(read[j][1] * y[use])
         columns = [read[j][0] for j in joints]
-        return self._spread(columns, fit_together(designs, targets))
+        return self._spread(columns, fit_together(designs, places, targets))
 
-    def _mean_regressor(self, robot: Robot, s: Signals) -> Array:
-        """Mean torque regressor, shape (n_rows, n_joints, n_parameters), chunk by chunk."""
+    def _mean_regressor(self, robot: Robot, s: Signals, index: NDArray[np.int64]) -> Array:
+        """Some columns of the mean regressor, (n_rows, n_joints, len(index)), chunk by chunk."""
         step = SAMPLES * max(1, CHUNK // (SAMPLES * robot.n_joints))
         parts = [slice(start, start + step) for start in range(0, s.n_samples, step)]
         return np.concatenate(
-            [self.average(robot.torque_regressor(s.q[p], s.dq[p], s.ddq[p])) for p in parts]
+            [
+                self.average(robot.torque_regressor(s.q[p], s.dq[p], s.ddq[p])[:, :, index])
+                for p in parts
+            ]
         )
 
     def _spread(self, columns: Sequence[int], fits: Sequence[RobustFit]) -> Outcome:
         n = self.n_joints
-        likelihood, scale = np.zeros(n), np.ones(n)
+        likelihood, scale, inflation = np.zeros(n), np.ones(n), np.ones(n)
         residual = [np.zeros(0) for _ in range(n)]
         for c, fit in zip(columns, fits, strict=True):
             likelihood[c], scale[c], residual[c] = fit.likelihood, fit.scale, fit.residual
-        return Outcome(likelihood, np.full(n, np.nan), residual, scale)
+            inflation[c] = fit.inflation
+        return Outcome(likelihood, np.full(n, np.nan), residual, scale, inflation)
 
 
 @dataclass(frozen=True)
@@ -372,6 +371,11 @@ class RobustFit:
     scale: float
     residual: Array
     likelihood: float
+
+    @cached_property
+    def inflation(self) -> float:
+        """By how much neighbouring rows that are alike make the likelihood look surer."""
+        return _inflation(self.residual)
 
 
 def friction(signals: Signals, joint: int) -> Array:
@@ -517,13 +521,31 @@ def _not_negative(gram: Array, right: Array) -> Array:
     return np.asarray(solved[np.arange(len(gram)), np.argmax(drop, axis=1)])
 
 
-def fit_together(designs: Sequence[Array], targets: Sequence[Array]) -> list[RobustFit]:
-    """Robust fit of several joints with common coefficients."""
+def fit_together(
+    designs: Sequence[Array], places: Sequence[NDArray[np.int64]], targets: Sequence[Array]
+) -> list[RobustFit]:
+    """Robust fit of several joints with common coefficients.
+
+    Parameters
+    ----------
+    designs : sequence of ndarray of shape (n_rows_k, n_columns_k)
+        Columns of each joint that do not vanish.
+    places : sequence of ndarray of shape (n_columns_k,)
+        Their places among all coefficients.
+    targets : sequence of ndarray of shape (n_rows_k,), N m or N
+
+    Returns
+    -------
+    list of RobustFit
+    """
     if not designs:
         return []
-    size = np.sqrt(sum((d**2).sum(axis=0) for d in designs))
+    size = np.zeros(1 + max(int(place.max()) for place in places))
+    for d, place in zip(designs, places, strict=True):
+        size[place] += (d**2).sum(axis=0)
+    size = np.sqrt(size)
     size[size == 0] = 1.0
-    scaled = [d / size for d in designs]
+    scaled = [d / size[place] for d, place in zip(designs, places, strict=True)]
     scales = [float(np.std(y)) + 1e-12 for y in targets]
     weights = [np.ones(len(y)) for y in targets]
     residuals = list(targets)
@@ -531,14 +553,16 @@ def fit_together(designs: Sequence[Array], targets: Sequence[Array]) -> list[Rob
     for _ in range(ROUNDS + 2):
         gram = 1e-9 * np.eye(len(size)) * sum(float(w.sum()) for w in weights)
         cross = np.zeros(len(size))
-        for d, y, s, w in zip(scaled, targets, scales, weights, strict=True):
+        for d, place, y, s, w in zip(scaled, places, targets, scales, weights, strict=True):
             weighted = d * (w / s**2)[:, None]
-            gram += weighted.T @ d
-            cross += weighted.T @ y
+            gram[np.ix_(place, place)] += weighted.T @ d
+            cross[place] += weighted.T @ y
         diagonal = np.sqrt(np.diag(gram))
         gram = gram / diagonal[:, None] / diagonal + 1e-10 * np.eye(len(size))
         coefficients = cho_solve(cho_factor(gram), cross / diagonal) / diagonal
-        residuals = [y - d @ coefficients for d, y in zip(scaled, targets, strict=True)]
+        residuals = [
+            y - d @ coefficients[place] for d, place, y in zip(scaled, places, targets, strict=True)
+        ]
         scales = [
             float(np.sqrt(np.mean(w * r**2))) + 1e-12
             for w, r in zip(weights, residuals, strict=True)
@@ -547,8 +571,8 @@ def fit_together(designs: Sequence[Array], targets: Sequence[Array]) -> list[Rob
             (FREEDOM + 1) / (FREEDOM + (r / s) ** 2) for r, s in zip(residuals, scales, strict=True)
         ]
     return [
-        RobustFit(coefficients / size, s, r, student(r, s))
-        for r, s in zip(residuals, scales, strict=True)
+        RobustFit(coefficients[place] / size[place], s, r, student(r, s))
+        for place, r, s in zip(places, residuals, scales, strict=True)
     ]
 
 
