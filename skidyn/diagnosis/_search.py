@@ -542,6 +542,7 @@ class _Search:
         ranking = []
         for i, candidates in enumerate(track(rough, f"{self._round}: refining the best")):
             kind = candidates[0].kind
+            candidates = [replace(c, rows=self.problem.term_rows(c.term)) for c in candidates]
             within = any(_some_recordings(c) for c in candidates)
             if i < self.settings.refined:
                 candidates = refine(self.problem, self.blocks, candidates, self.sigma, self.target)
@@ -776,5 +777,5 @@ def _nameless_candidates(problem: Problem, residual: Array) -> list[Candidate]:
             for shape in shapes:
                 term = Term(kind, joints, shape)
                 names = effect.variables(joint, shape)
-                candidates.append(Candidate(UNKNOWN, term, problem.term_rows(term), names))
+                candidates.append(Candidate(UNKNOWN, term, problem.screening_rows(term), names))
     return candidates

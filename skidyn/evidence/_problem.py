@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from skidyn.evidence._folds import Normal, nearest_folds
 from skidyn.evidence._kinematics import SmoothedMotion, as_given, smooth_motion
 from skidyn.evidence._rows import (
     FEWEST_SAMPLES,
+    WINDOW,
     Rows,
     every_sample,
     sliding_samples,
@@ -29,6 +31,8 @@ from skidyn.robots import Robot, base_parameter_index
 RANK_TOLERANCE = 2e-6
 #: Folds: whole trajectories where there are more than this many, else blocks of them.
 FEW_TRAJECTORIES, FEWEST_BLOCKS, MOST_FOLDS = 6, 8, 20
+#: Samples of a window from which an effect can be told: more of them are passed over at first.
+ENOUGH_SAMPLES = 16
 #: Share of the smoother's half width that is left out around rest and reversals, and the samples
 #: left out where a model of hysteresis says what happens between the two.
 MARGIN, SHORT_MARGIN = 0.75, 1
@@ -107,6 +111,7 @@ class Problem:
     rigid_rows: list[Array] = field(default_factory=list)
     logged: Signals | None = None
     _cache: dict[Term, dict[int, Array]] = field(default_factory=dict, repr=False)
+    _thinned: dict[int, list[Any]] = field(default_factory=dict, repr=False)
 
     @property
     def n_joints(self) -> int:
@@ -123,6 +128,27 @@ class Problem:
         if term not in self._cache:
             self._cache[term] = self.average(term.torque_columns(self.signals))
         return self._cache[term]
+
+    def screening_rows(self, term: Term) -> dict[int, Array]:
+        """As :meth:`term_rows`, from no more samples of a fast log than tell: to choose by.
+
+        A window of a log at 1 kHz holds 125 samples, of which every seventh has the same mean.
+        """
+        step = (
+            int(self.motion.rate * WINDOW / ENOUGH_SAMPLES) if self.signals.time is not None else 1
+        )
+        if step < 2 or term in self._cache:
+            return self.term_rows(term)
+        index, few = self.signals.once(("every", step), lambda: self._every(step))
+        if step not in self._thinned:
+            self._thinned[step] = self.rows.thinned(index)
+        columns = term.torque_columns_at(self.signals, index, few)
+        return {j: np.asarray(self._thinned[step][j] @ block) for j, block in columns.items()}
+
+    def _every(self, step: int) -> tuple[NDArray[np.int64], Signals]:
+        parts = [np.arange(rows.start, rows.stop, step) for rows in self.signals.segments]
+        index = np.concatenate(parts)
+        return index, self.signals.take(index)
 
     def average(self, columns: dict[int, Array]) -> dict[int, Array]:
         """Averaged rows of columns given at every sample."""
@@ -378,6 +404,7 @@ def with_reversals(problem: Problem, terms: Iterable[Term], joints: Sequence[int
         rigid_rows=[np.zeros((n, 0)) for n in rows.counts],
         rigid_index=np.zeros(0, dtype=np.int64),
         _cache={},
+        _thinned={},
     )
     if wider.rigid_body:
         _add_rigid_body(wider)

@@ -67,6 +67,28 @@ class Rows:
         """Rows of a joint from values at every sample, shape (n_samples,) or (n_samples, k)."""
         return np.asarray(self.weights[joint] @ values)
 
+    def thinned(self, index: NDArray[np.int64]) -> list[csc_matrix]:
+        """Weights on some samples alone, by joint; those of every row sum up to as much as before.
+
+        Parameters
+        ----------
+        index : ndarray of shape (n,) of int
+            Samples that are kept.
+
+        Returns
+        -------
+        list of csc_matrix of shape (n_rows_j, n)
+        """
+        thin = [w[:, index] for w in self.weights]
+        sums = [
+            (np.asarray(w.sum(1)).ravel(), np.asarray(t.sum(1)).ravel())
+            for w, t in zip(self.weights, thin, strict=True)
+        ]
+        return [
+            csc_matrix(diags(all_ / np.where(some > 0, some, 1.0)) @ t)
+            for (all_, some), t in zip(sums, thin, strict=True)
+        ]
+
     def weighted(self, weight: Array) -> Rows:
         """The same rows, each multiplied by the root of the mean weight of its samples.
 
