@@ -29,6 +29,8 @@ from skidyn.evidence import Problem
 
 #: Rows looked at, and signals of a set, at most.
 MOST_ROWS, MOST_SIGNALS = 2000, 3
+#: Trees after which a first look tells whether there is anything, and all of them.
+TREES = (15, 50)
 #: Share of the squared residual that must be predictable, and the chance that it only seems so.
 LEAST_SHARE, CHANCE = 0.03, 0.005
 #: A signal counts if shuffling it costs this share of what shuffling the strongest one costs.
@@ -91,13 +93,19 @@ def _by_trees(
     trees, seen = [], np.zeros(len(y), dtype=bool)
     for out in parts:
         learner = HistGradientBoostingRegressor(
-            max_iter=50, learning_rate=0.15, max_leaf_nodes=12, early_stopping=False, random_state=0
+            learning_rate=0.15,
+            max_leaf_nodes=12,
+            early_stopping=False,
+            warm_start=True,
+            random_state=0,
         )
-        trees.append(learner.fit(X[~out], y[~out]))
-        left[out] = (y[out] - learner.predict(X[out])) ** 2
         seen |= out
-        if left[seen].sum() >= np.sum(y[seen] ** 2):
-            return []  # noise: trees that follow it do worse than none, and more would too
+        for count in TREES if not trees else TREES[-1:]:
+            learner.set_params(max_iter=count).fit(X[~out], y[~out])
+            left[out] = (y[out] - learner.predict(X[out])) ** 2
+            if left[seen].sum() >= np.sum(y[seen] ** 2):
+                return []  # noise: trees that follow it do worse than none, and more would too
+        trees.append(learner)
     if not _predictable(y, left, fold):
         return []
     for out, learner in zip(parts, trees, strict=True):
