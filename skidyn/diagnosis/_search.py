@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from operator import is_not
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,11 +90,12 @@ class _Search:
         base = problem.fit_own()
         self.fit = base
         self.pool = catalogue_candidates(problem, self.kinds)
-        if nameless:
+        if nameless and settings.max_findings:
             self.pool += _nameless_candidates(problem, problem.torque - problem.explained(base))
         self.by_recording = recording_candidates(problem, self.kinds)
-        self.n_tests = len(self.pool) + len(self.by_recording)
+        self.n_tests = max(1, len(self.pool) + len(self.by_recording))
         self.start = self.left = np.zeros(problem.n_joints)
+        self._kept_tester: tuple[list[Array], Tester | None] = ([], None)
 
     # ---------------------------------------------------------------- state of the model so far
     @property
@@ -241,9 +243,15 @@ class _Search:
         return self.tester(others).test(candidate.rows).chance
 
     def tester(self, others: Sequence[Candidate]) -> Tester:
+        """Tests beside the model and some candidates; the last one is kept for the next call."""
         own = [self.problem.term_rows(term) for term in self.problem.terms]
         blocks = [*own, *(c.rows for c in others)]
-        return Tester(self.problem, blocks, self.sigma, self.target)
+        made_of = [self.sigma, self.ripple, *(b[j] for b in blocks for j in b)]
+        kept, tester = self._kept_tester
+        if tester is None or len(kept) != len(made_of) or any(map(is_not, kept, made_of)):
+            tester = Tester(self.problem, blocks, self.sigma, self.target)
+            self._kept_tester = made_of, tester
+        return tester
 
     def shadow(self, hypothesis: Hypothesis) -> bool:
         """Whether an explanation is so small that earlier ones' imperfect formulas may leave it."""
