@@ -2,9 +2,9 @@
 import numpy as np
 import pytest
 
-from skidyn._signals import Signals
-from skidyn.datasets import load_planar_arm
-from skidyn.effects import make_terms
+from skidyn._signals import Signals, read_signals
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.effects import Term, get_effect, make_terms
 from skidyn.evidence import make_problem
 
 
@@ -47,3 +47,18 @@ def test_blocks_of_one_trajectory_share_no_sample(rate):
     for weights, fold in zip(made.rows.weights, made.fold, strict=True):
         used = [set(np.flatnonzero(abs(weights[fold == f]).sum(0) > 1e-12)) for f in set(fold)]
         assert sum(map(len, used)) == len(set().union(*used))
+
+
+@pytest.mark.parametrize("rate", [100.0, 1000.0])
+@pytest.mark.parametrize("kind", ["stribeck", "dahl", "joint_elasticity", "function_of_position"])
+def test_candidates_of_a_fast_log_are_screened_on_rows_near_those_of_all_samples(kind, rate):
+    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=2, duration=4.0, rate=rate)
+    signals, torque = read_signals(log.X, log.y, log.robot)
+    problem = make_problem(signals, torque, robot=log.robot, rigid_body=True, terms=[])
+    problem.fit_own()
+    shape = get_effect(kind).grid(problem.signals, (1,))[0]
+    term = Term(kind, (1,), shape)
+    quick, exact = problem.screening_rows(term), problem.term_rows(term)
+    for j, rows in exact.items():
+        error = np.abs(quick[j] - rows).max()
+        assert error <= (0.02 if rate > 200 else 0.0) * np.abs(rows).max()
