@@ -84,7 +84,7 @@ def catalogue_candidates(problem: Problem, kinds: Iterable[str]) -> list[Candida
         if effect.search == "trajectories" and not problem.rigid_body and problem.robot is not None:
             # With the URDF's own bodies even a load carried all the time shows.
             term = Term(kind, tuple(range(problem.n_joints)))
-            candidates.append(Candidate(kind, term, problem.screening_rows(term)))
+            candidates.append(Candidate(kind, term, problem.term_rows(term)))
             continue
         if effect.search != "grid" or ("robot" in effect.needs and problem.robot is None):
             continue
@@ -97,6 +97,6 @@ def catalogue_candidates(problem: Problem, kinds: Iterable[str]) -> list[Candida
                 continue
             for shape in effect.grid(problem.signals, joints):
                 term = Term(kind, joints, shape)
-                rows = problem.screening_rows(term)
+                rows = problem.term_rows(term)
                 candidates.append(Candidate(kind, term, rows, n_shapes=len(effect.shapes)))
     return candidates

@@ -241,37 +241,6 @@ class Effect:
         (joint,) = joints
         return {joint: self.columns(signals, joint, **shape)}
 
-    def torque_columns_at(
-        self,
-        signals: Signals,
-        rows: NDArray[np.int64],
-        few: Signals,
-        joints: Sequence[int],
-        **shape: Any,
-    ) -> dict[int, Array]:
-        """Columns at some samples, where what remembers has to look at all of them.
-
-        Parameters
-        ----------
-        signals : Signals
-            Motion.
-        rows : ndarray of shape (n,) of int
-            Samples wanted.
-        few : Signals
-            Motion at these samples.
-        joints : sequence of int
-            Joints of the term.
-        **shape : float
-            Values of the shape parameters.
-
-        Returns
-        -------
-        dict of int to ndarray of shape (n, n_coefficients)
-            By joint, from 0.
-        """
-        columns = self.torque_columns(signals, joints, **shape)
-        return {j: block[rows] for j, block in columns.items()}
-
     def not_shown(self, signals: Signals, joint: int) -> str | None:
         """Why this data cannot show the effect on a joint; None where it can.
 

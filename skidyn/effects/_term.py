@@ -158,36 +158,6 @@ class Term:
             By joint, from 0.
         """
         columns = self.effect.torque_columns(signals, self.joints, **self._own_shape)
-        return self._where_it_acts(columns, signals)
-
-    def torque_columns_at(
-        self, signals: Signals, rows: NDArray[np.int64], few: Signals
-    ) -> dict[int, Array]:
-        """Columns at some samples: what has no memory is computed there alone.
-
-        Parameters
-        ----------
-        signals : Signals
-            Motion.
-        rows : ndarray of shape (n,) of int
-            Samples wanted, evenly within each segment.
-        few : Signals
-            Motion at these samples.
-
-        Returns
-        -------
-        dict of int to ndarray of shape (n, width)
-            By joint, from 0.
-        """
-        if few.once(("remembers", self.kind), lambda: _remembers(self, few)):
-            columns = self.effect.torque_columns_at(
-                signals, rows, few, self.joints, **self._own_shape
-            )
-        else:
-            columns = self.effect.torque_columns(few, self.joints, **self._own_shape)
-        return self._where_it_acts(columns, few)
-
-    def _where_it_acts(self, columns: dict[int, Array], signals: Signals) -> dict[int, Array]:
         if self.trajectories is None:
             return columns
         here = np.isin(signals.trajectory, self.trajectories)[:, None]
@@ -319,11 +289,3 @@ def _is_pointwise(effect: Effect, term: Term) -> bool:
     signals = _trial(term, np.cos(0.7 * rows), 0 * rows)
     whole, part = _columns(term, signals), _columns(term, signals.take(rows[::2]))
     return whole is not None and part is not None and np.array_equal(whole[::2], part)
-
-
-def _remembers(term: Term, signals: Signals) -> bool:
-    """Whether columns along a real motion change where every second sample is left out."""
-    start = max(signals.segments, key=lambda rows: rows.stop - rows.start).start
-    rows = np.arange(start, min(start + 40, signals.n_samples))
-    whole, part = (_columns(term, signals.take(r)) for r in (rows, rows[::2]))
-    return whole is None or part is None or not np.allclose(whole[::2], part, rtol=1e-9)

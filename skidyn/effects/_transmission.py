@@ -8,7 +8,6 @@ from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from skidyn._local_polynomial import local_polynomial
 from skidyn._signals import Signals
@@ -114,34 +113,10 @@ def _differentiate_torque(signals: Signals, joint: int) -> tuple[Array, Array, A
     step = _STEP * signals.unit[joint]
     by_position = (inverse_dynamics(q + step * direction, dq, ddq) - here) / step
     by_velocity = (inverse_dynamics(q, dq + step * direction, ddq) - here) / step
-    return by_position, by_velocity, _inertia_column(signals, joint)
-
-
-def _inertia_column(signals: Signals, joint: int) -> Array:
-    """Column of the inertia matrix of a joint, shape (n_samples, n_joints)."""
-    robot, q = signals.robot, signals.q
-    assert robot is not None
-    direction = np.zeros(signals.n_joints)
-    direction[joint] = 1.0
-    return robot.inverse_dynamics(
-        q,
-        np.zeros_like(q),
-        np.broadcast_to(direction, q.shape),
-        gravity=(0.0, 0.0, 0.0),
-        parameters=signals.inertial_parameters,
+    by_acceleration = inverse_dynamics(
+        q, np.zeros_like(dq), np.broadcast_to(direction, q.shape), gravity=(0.0, 0.0, 0.0)
     )
-
-
-def _own_inertia(signals: Signals, joint: int) -> Array:
-    """Inertia that a link presents to its own joint, shape (n_samples,)."""
-    kept: dict[int, Any] = signals.once("torque slopes", dict)
-    if joint in kept:
-        return np.asarray(kept[joint][2][:, joint])
-    return np.asarray(
-        signals.once(
-            ("own inertia", joint), lambda: _inertia_column(signals, joint)[:, joint].copy()
-        )
-    )
+    return by_position, by_velocity, by_acceleration
 
 
 class _LinkSideEffect(Effect):
@@ -162,24 +137,14 @@ class _LinkSideEffect(Effect):
     ) -> dict[int, Array]:
         (joint,) = joints
         moves = _smooth_derivatives(self.displacement(signals, joint, **shape), signals)
-        return self._change(_torque_slopes(signals, joint), moves)
-
-    def torque_columns_at(
-        self,
-        signals: Signals,
-        rows: NDArray[np.int64],
-        few: Signals,
-        joints: Sequence[int],
-        **shape: Any,
-    ) -> dict[int, Array]:
-        (joint,) = joints
-        moves = _smooth_derivatives(self.displacement(signals, joint, **shape), signals)
-        return self._change(_torque_slopes(few, joint), [move[rows] for move in moves])
-
-    def _change(self, slopes: Sequence[Array], moves: Sequence[Array]) -> dict[int, Array]:
-        """Change of all torques by a displacement and its derivatives."""
-        change = -sum(slope * move[:, None] for slope, move in zip(slopes, moves, strict=True))
-        return {j: change[:, j : j + 1] for j in range(change.shape[1])}
+        slopes = _torque_slopes(signals, joint)
+        columns = {}
+        for j in range(signals.n_joints):
+            change = np.zeros(signals.n_samples)
+            for slope, move in zip(slopes, moves, strict=True):
+                change -= slope[:, j] * move
+            columns[j] = change[:, None]
+        return columns
 
 
 class JointElasticity(_LinkSideEffect):
@@ -230,7 +195,7 @@ class Backlash(_LinkSideEffect):
     def displacement(self, signals: Signals, joint: int, **shape: Any) -> Array:
         assert signals.load is not None
         # Inertia that the free link presents to its own joint.
-        inertia = _own_inertia(signals, joint)
+        inertia = _torque_slopes(signals, joint)[2][:, joint]
         # Identified parameters need not be consistent; an inertia that vanishes would fly at once.
         inertia = np.maximum(inertia, 0.05 * np.abs(np.median(inertia)))
         inertia = np.maximum(inertia, np.finfo(float).tiny)

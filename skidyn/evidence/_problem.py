@@ -31,7 +31,7 @@ from skidyn.robots import Robot, base_parameter_index
 RANK_TOLERANCE = 2e-6
 #: Folds: whole trajectories where there are more than this many, else blocks of them.
 FEW_TRAJECTORIES, FEWEST_BLOCKS, MOST_FOLDS = 6, 8, 20
-#: Samples of a window from which an effect can be told: more of them are passed over at first.
+#: Samples of a window from which a smooth function can be told: more are passed over at first.
 ENOUGH_SAMPLES = 16
 #: Share of the smoother's half width that is left out around rest and reversals, and the samples
 #: left out where a model of hysteresis says what happens between the two.
@@ -130,19 +130,19 @@ class Problem:
         return self._cache[term]
 
     def screening_rows(self, term: Term) -> dict[int, Array]:
-        """As :meth:`term_rows`, from no more samples of a fast log than tell: to choose by.
+        """As :meth:`term_rows`; of a nameless function from no more samples than tell.
 
-        A window of a log at 1 kHz holds 125 samples, of which every seventh has the same mean.
+        A window of a log at 1 kHz holds 125 samples. A function as smooth as these has the same
+        mean over every seventh. What jumps, or swings, does not.
         """
-        step = (
-            int(self.motion.rate * WINDOW / ENOUGH_SAMPLES) if self.signals.time is not None else 1
-        )
-        if step < 2 or term in self._cache:
+        clocked = self.signals.time is not None
+        step = int(self.motion.rate * WINDOW / ENOUGH_SAMPLES) if clocked else 1
+        if step < 2 or not term.effect.nameless or term in self._cache:
             return self.term_rows(term)
         index, few = self.signals.once(("every", step), lambda: self._every(step))
         if step not in self._thinned:
             self._thinned[step] = self.rows.thinned(index)
-        columns = term.torque_columns_at(self.signals, index, few)
+        columns = term.torque_columns(few)
         return {j: np.asarray(self._thinned[step][j] @ block) for j, block in columns.items()}
 
     def _every(self, step: int) -> tuple[NDArray[np.int64], Signals]:

@@ -49,16 +49,14 @@ def test_blocks_of_one_trajectory_share_no_sample(rate):
         assert sum(map(len, used)) == len(set().union(*used))
 
 
+@pytest.mark.parametrize("kind", ["friction_over_position", "function_of_position", "stribeck"])
 @pytest.mark.parametrize("rate", [100.0, 1000.0])
-@pytest.mark.parametrize("kind", ["stribeck", "dahl", "joint_elasticity", "function_of_position"])
-def test_candidates_of_a_fast_log_are_screened_on_rows_near_those_of_all_samples(kind, rate):
+def test_what_is_screened_on_few_samples_of_a_fast_log_is_near_what_all_samples_say(kind, rate):
     log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=2, duration=4.0, rate=rate)
     signals, torque = read_signals(log.X, log.y, log.robot)
-    problem = make_problem(signals, torque, robot=log.robot, rigid_body=True, terms=[])
-    problem.fit_own()
-    shape = get_effect(kind).grid(problem.signals, (1,))[0]
-    term = Term(kind, (1,), shape)
-    quick, exact = problem.screening_rows(term), problem.term_rows(term)
-    for j, rows in exact.items():
-        error = np.abs(quick[j] - rows).max()
-        assert error <= (0.02 if rate > 200 else 0.0) * np.abs(rows).max()
+    made = make_problem(signals, torque, robot=log.robot, rigid_body=True, terms=[])
+    term = Term(kind, (1,), get_effect(kind).grid(made.signals, (1,))[0])
+    quick, exact = made.screening_rows(term)[1], made.term_rows(term)[1]
+    named_or_slow = kind == "stribeck" or rate < 200
+    tolerance = 0.0 if named_or_slow else 0.005
+    assert np.linalg.norm(quick - exact) <= tolerance * np.linalg.norm(exact)
