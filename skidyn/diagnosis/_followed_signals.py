@@ -90,7 +90,8 @@ def _by_trees(
     left, cost = np.zeros(len(y)), np.zeros(len(names))
     rng = np.random.default_rng(0)
     parts = [fold % 4 == k for k in range(4)]
-    trees, seen = [], np.zeros(len(y), dtype=bool)
+    trees: list[HistGradientBoostingRegressor] = []
+    seen = np.zeros(len(y), dtype=bool)
     for out in parts:
         learner = HistGradientBoostingRegressor(
             learning_rate=0.15,

@@ -140,8 +140,8 @@ class Screen:
             errors[group.index[pick]] = _swept_errors(model, cross, own, target, ridge).T
             signs, limits = group.signs[pick], group.limits[pick]
             if signs.any() or np.isfinite(limits).any():
-                total = (x.sum(0, keepdims=True) for x in (cross, own, target))
-                gain = _gain([model.fitted], *total, ridge)[0][0]
+                a, b, c = (x.sum(0, keepdims=True) for x in (cross, own, target))
+                gain = _gain([model.fitted], a, b, c, ridge)[0][0]
                 forbidden = (gain * signs < 0) | (np.abs(gain) > limits)
                 errors[group.index[pick[forbidden.any(axis=1)]]] = np.inf
         return errors
@@ -227,8 +227,8 @@ def _gain(
 
 def _swept_errors(model: _Model, cross: Array, own: Array, target: Array, ridge: Array) -> Array:
     """Held-out error of every fold for the candidates of a group, (n_folds, n_candidates)."""
-    others = (x.sum(0) - x for x in (cross, own, target))
-    gain, swept = _gain(model.trained, *others, ridge)
+    rest = [x.sum(0) - x for x in (cross, own, target)]
+    gain, swept = _gain(model.trained, rest[0], rest[1], rest[2], ridge)
     # The same change judged on the fold left out.
     b, k = model.solutions[:, :, None], own.shape[2]
     remainder = model.cross[:, :, None] - np.matmul(model.gram, b)
