@@ -3,12 +3,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+import warnings
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array
+
+if TYPE_CHECKING:
+    from skidyn._keys import Keys
 
 #: Share of steps that go back in time, or to another trajectory, from which rows count as shuffled.
 SHUFFLED = 0.1
@@ -47,3 +51,33 @@ def has_one_motion(trajectory: NDArray[Any], time: Array) -> bool:
     """Whether ordered rows are of one motion each: hardly any moment occurs twice."""
     same = trajectory[1:] == trajectory[:-1]
     return bool(np.sum(same & (np.diff(time) == 0)) <= SHUFFLED * len(time))
+
+
+def time_order(X: NDArray[Any], keys: Keys) -> NDArray[np.intp] | None:
+    """Order of the rows by trajectory and time; None where they are in it, or have no time."""
+    return order_in_time(keys.trajectories(X), None if keys.time is None else X[:, keys.time])
+
+
+def order_of_log(estimator: Any, X: NDArray[Any], keys: Keys) -> NDArray[np.intp] | None:
+    """The same for a fit, with a warning where rows are shuffled."""
+    from skidyn.model_selection import LeakageWarning
+
+    order = time_order(X, keys)
+    if order is not None:
+        warnings.warn(
+            f"{type(estimator).__name__} predicts a row from the rows before it, but the rows of X "
+            "are not in the order of time, as after train_test_split or KFold(shuffle=True). They "
+            "are sorted by trajectory and time; rows whose predecessors are missing are predicted "
+            "without them. Hold out whole trajectories: TrajectoryKFold, GroupKFold or "
+            "GroupShuffleSplit, and resource='max_epochs' in HalvingGridSearchCV",
+            LeakageWarning,
+            stacklevel=4,
+        )
+    return order
+
+
+def taken(table: Any, order: NDArray[np.intp] | None) -> Any:
+    """Rows of a table in an order; the table itself where either is None."""
+    from sklearn.utils import _safe_indexing
+
+    return table if table is None or order is None else _safe_indexing(table, order)

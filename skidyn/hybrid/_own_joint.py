@@ -22,7 +22,8 @@ from sklearn.utils.validation import (
 from skidyn._columns import Columns, ColumnSpec, resolve_columns
 from skidyn._compat import HasMethods, fit_context
 from skidyn._exceptions import ColumnError
-from skidyn._keys import resolve_keys
+from skidyn._keys import Keys, resolve_keys
+from skidyn._order import order_of_log, taken, time_order
 from skidyn.effects import dahl_state
 
 Array = NDArray[np.float64]
@@ -127,6 +128,7 @@ class OwnJointRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         self._one_dimensional = y.ndim == 1
         targets = y.reshape(len(y), -1)
         self._columns = self._resolve(targets.shape[1])
+        order_of_log(self, X, self._keys())
         base = _cautious_boosting() if self.estimator is None else self.estimator
         features = self._features(X)
         weights = {}
@@ -161,13 +163,21 @@ class OwnJointRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     def _features(self, X: Array) -> list[Array]:
         columns = self._columns
         assert columns.ddq is not None
-        keys = resolve_keys(None, X.shape[1], trajectory=columns.trajectory, time=columns.time)
+        keys = self._keys()
+        order = time_order(X, keys)
+        X = taken(X, order)
         segments = keys.segments(X)
         own = []
         for q, dq, ddq in zip(columns.q, columns.dq, columns.ddq, strict=True):
             states = [dahl_state(X[:, q], segments, float(way)) for way in self.presliding]
             own.append(np.column_stack([X[:, [q, dq, ddq]], *states]))
-        return own
+        return own if order is None else [table[np.argsort(order)] for table in own]
+
+    def _keys(self) -> Keys:
+        columns = self._columns
+        return resolve_keys(
+            None, self.n_features_in_, trajectory=columns.trajectory, time=columns.time
+        )
 
     def predict(self, X: Any) -> Array:
         """Predict the torque of every row.

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -11,25 +11,36 @@ from numbers import Integral, Real
 from typing import Any, ClassVar
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils import check_random_state
 from sklearn.utils.parallel import Parallel, delayed
 from sklearn.utils.validation import _check_sample_weight, check_is_fitted, validate_data
+from torch import nn
 
 from skidyn._columns import ColumnSpec
 from skidyn._compat import (
     CallbackSupportMixin,
-    FitProgress,
     Interval,
     StrOptions,
     fit_context,
     fit_progress,
 )
 from skidyn._keys import Keys, resolve_keys
-from skidyn.neural_network._engine import Task, Training, TrainingPlan, run, train
-from skidyn.neural_network._network import LSTMNetwork, from_arrays
+from skidyn._order import order_of_log, taken, time_order
+from skidyn.neural_network._engine import (
+    Network,
+    Plan,
+    Task,
+    Training,
+    make_net,
+    networks_of,
+    run,
+    train,
+    weights_of,
+)
+from skidyn.neural_network._network import LSTMNetwork, Weights
+from skidyn.neural_network._parameters import SkorchParameters
 from skidyn.neural_network._stream import TorqueStream
 from skidyn.preprocessing import scaling_of
 
@@ -39,27 +50,11 @@ Array = NDArray[np.float64]
 SIDE_BY_SIDE = 10
 
 
-class SequenceRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
-    """Base of the recurrent regressors; subclasses state their parameters."""
+class SequenceRegressor(SkorchParameters, CallbackSupportMixin, RegressorMixin, BaseEstimator):
+    """Base of the recurrent regressors: one LSTM network, or one for each output."""
 
-    window: int
-    stride: int
-    hidden_size: int
-    max_epochs: int
-    learning_rate: float
-    weight_decay: float
-    betas: tuple[float, float]
-    batch_size: int
-    scaling: str
-    early_stopping: bool
-    validation_fraction: float
-    n_iter_no_change: int
-    resample: str | None
-    per_joint: bool
-    device: str
-    trajectory: ColumnSpec
-    time: ColumnSpec
-    random_state: Any
+    per_joint = False
+    _module: ClassVar[type[nn.Module]] = LSTMNetwork
 
     _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
         "window": [Interval(Integral, 1, None, closed="left")],
@@ -69,16 +64,14 @@ class SequenceRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         "dropout": [Interval(Real, 0, 1, closed="left")],
         "max_epochs": [Interval(Integral, 1, None, closed="left")],
         "learning_rate": [Interval(Real, 0, None, closed="neither")],
-        "weight_decay": [Interval(Real, 0, None, closed="left")],
-        "betas": [tuple],
         "batch_size": [Interval(Integral, 1, None, closed="left")],
-        "scaling": [StrOptions({"standard", "minmax"})],
-        "early_stopping": ["boolean"],
+        "optimizer": [callable, None],
+        "callbacks": [list, None],
         "validation_fraction": [Interval(Real, 0, 1, closed="neither")],
-        "n_iter_no_change": [Interval(Integral, 1, None, closed="left")],
+        "scaling": [StrOptions({"standard", "minmax"})],
         "resample": [StrOptions({"trajectory"}), None],
-        "per_joint": ["boolean"],
         "device": [str],
+        "verbose": ["verbose"],
         "trajectory": [str, Integral, None],
         "time": [str, Integral, None],
         "random_state": ["random_state"],
@@ -86,6 +79,57 @@ class SequenceRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
     # BaggingRegressor leaves the rows in order and bootstraps through weights only if they are
     # requested; with metadata routing on, this is the request
     __metadata_request__fit = {"sample_weight": True}
+
+    def __init__(
+        self,
+        *,
+        window: int = 4,
+        stride: int = 4,
+        hidden_size: int = 32,
+        dense_size: int = 0,
+        dropout: float = 0.0,
+        max_epochs: int = 100,
+        learning_rate: float = 0.03,
+        batch_size: int = 32,
+        optimizer: Any = None,
+        callbacks: list[Any] | None = None,
+        validation_fraction: float = 0.1,
+        scaling: str = "standard",
+        resample: str | None = None,
+        device: str = "cpu",
+        verbose: int = 0,
+        trajectory: ColumnSpec = "auto",
+        time: ColumnSpec = "auto",
+        random_state: Any = None,
+        **skorch: Any,
+    ) -> None:
+        self.window = window
+        self.stride = stride
+        self.hidden_size = hidden_size
+        self.dense_size = dense_size
+        self.dropout = dropout
+        self.max_epochs = max_epochs
+        self.learning_rate = learning_rate
+        self.batch_size = batch_size
+        self.optimizer = optimizer
+        self.callbacks = callbacks
+        self.validation_fraction = validation_fraction
+        self.scaling = scaling
+        self.resample = resample
+        self.device = device
+        self.verbose = verbose
+        self.trajectory = trajectory
+        self.time = time
+        self.random_state = random_state
+        self._set_skorch(skorch)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """State with weights as plain arrays in place of the net, as pickle and skops can store."""
+        state = dict(super().__getstate__())
+        if "_net" in state:
+            state["_weights"] = self.weights_
+            del state["_net"]
+        return state
 
     def __sklearn_tags__(self) -> Any:
         tags = super().__sklearn_tags__()
@@ -98,9 +142,18 @@ class SequenceRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         """Inputs of the network, in physical units."""
         return X[:, list(keys.features)]
 
-    def _network(self, n_inputs: int, n_outputs: int) -> LSTMNetwork:
-        dense_size, dropout = getattr(self, "dense_size", 0), getattr(self, "dropout", 0.0)
-        return LSTMNetwork(n_inputs, n_outputs, self.hidden_size, dense_size, dropout, self.window)
+    def _network(self, n_inputs: int, n_outputs: int, seed: int) -> dict[str, Any]:
+        """What the LSTM network is made with."""
+        sizes = {name: getattr(self, name) for name in ("hidden_size", "dense_size", "dropout")}
+        given = {k.removeprefix("module__"): v for k, v in self._skorch().items() if "module_" in k}
+        unknown = sorted(set(given) - set(sizes))
+        if unknown:
+            raise ValueError(
+                f"the network has no parameter {unknown[0]!r}; module__... may be "
+                f"{', '.join(sizes)}"
+            )
+        fixed = {"n_inputs": n_inputs, "n_outputs": n_outputs, "window": self.window, "seed": seed}
+        return fixed | sizes | given
 
     # ---- fit ----
 
@@ -130,11 +183,13 @@ class SequenceRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
             weight = _check_sample_weight(sample_weight, X, dtype=np.float64, copy=True)
         if not (weight > 0).any():
             raise ValueError("all sample weights are zero; at least one must be positive.")
+        order = order_of_log(self, X, keys)
+        X, y, weight = (taken(table, order) for table in (X, y, weight))
         trajectories = keys.trajectories(X)
         if self.resample == "trajectory":
             weight *= _trajectory_bootstrap(trajectories, weight, rng)
         validation = None
-        if self.early_stopping:
+        if self._plan().validates:
             validation = _held_out_rows(trajectories, weight, self.validation_fraction, rng)
         fit = PendingFit(self, X, y, weight, validation, keys, int(rng.randint(2**31 - 1)))
         pending = _PENDING.get()
@@ -153,35 +208,59 @@ class SequenceRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         self.output_offset_, self.output_scale_ = scaling_of(targets[used], self.scaling)
         scaled_inputs = ((inputs - self.input_offset_) / self.input_scale_).astype(np.float32)
         scaled_targets = (targets - self.output_offset_) / self.output_scale_
-        n_outputs = targets.shape[1]
-        groups = [[j] for j in range(n_outputs)] if self.per_joint else [list(range(n_outputs))]
         tasks = []
-        for k, outputs in enumerate(groups):
-            network = self._network(inputs.shape[1], len(outputs))
+        for k, outputs in enumerate(self._output_groups(targets.shape[1])):
             own_seed = (seed + k) % 2**31
-            network.initialise(own_seed, torch.device(self.device))
-            tasks.append(Task(network, scaled_inputs, scaled_targets[:, outputs], weight, own_seed))
+            made_with = self._network(inputs.shape[1], len(outputs), own_seed)
+            own = scaled_targets[:, outputs]
+            tasks.append(Task(self._module, made_with, scaled_inputs, own, weight, own_seed))
         return tasks
 
-    def _store(self, trainings: list[Training]) -> None:
-        """Keep what the networks have become."""
-        self.weights_ = [training.weights for training in trainings]
-        self.loss_curve_ = [loss for t in trainings for loss in t.loss_curve]
-        self.validation_curve_ = [loss for t in trainings for loss in t.validation_curve]
+    def _output_groups(self, n_outputs: int) -> list[list[int]]:
+        """Outputs of each network."""
+        return [[j] for j in range(n_outputs)] if self.per_joint else [list(range(n_outputs))]
+
+    def _store(self, training: Training, numbers: Sequence[int]) -> None:
+        """Keep what the networks have become; `numbers` are those of this estimator's."""
+        self.__dict__.pop("_net", None)
+        self._weights = [training.weights[k] for k in numbers]
+        if len(numbers) == len(training.weights):
+            self._net = training.net
+        self.loss_curve_ = [loss for k in numbers for loss in training.loss_curves[k]]
+        self.validation_curve_ = training.validation_curve
         self.n_iter_ = len(self.loss_curve_)
 
-    def _plan(self) -> TrainingPlan:
-        return TrainingPlan(
-            window=self.window,
-            stride=self.stride,
-            max_epochs=self.max_epochs,
-            batch_size=self.batch_size,
-            learning_rate=self.learning_rate,
-            weight_decay=self.weight_decay,
-            betas=self.betas,
-            patience=self.n_iter_no_change,
-            device=self.device,
-        )
+    @property
+    def net_(self) -> Any:
+        """The initialised net of skorch with the fitted weights."""
+        check_is_fitted(self)
+        if "_net" not in vars(self):
+            net = make_net(self._networks(), self._plan(), weights=self._weights)
+            self._net = net.initialize()
+        return self._net
+
+    @property
+    def weights_(self) -> list[Weights]:
+        """Weights of the network, or of one network per output."""
+        check_is_fitted(self)
+        return weights_of(self._net.module_) if "_net" in vars(self) else self._weights
+
+    def _networks(self) -> list[Network]:
+        """Class of each network, and what it was made with."""
+        return [(self._module, parameters) for parameters in self._made_with]
+
+    def _plan(self) -> Plan:
+        settings = {
+            "lr": self.learning_rate,
+            "max_epochs": self.max_epochs,
+            "batch_size": self.batch_size,
+            "optimizer": self.optimizer,
+            "callbacks": self.callbacks,
+            "device": self.device,
+            "verbose": self.verbose,
+        }
+        own = {k: v for k, v in self._skorch().items() if not k.startswith("module__")}
+        return Plan(self.window, self.stride, settings | own)
 
     def _keys(self) -> Keys:
         names = getattr(self, "feature_names_in_", None)
@@ -212,7 +291,11 @@ class SequenceRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         """
         check_is_fitted(self)
         X = validate_data(self, X, reset=False, dtype=np.float64)
-        return self._predict_array(X)
+        order = time_order(X, self._keys())
+        if order is None:
+            return self._predict_array(X)
+        torque: Array = self._predict_array(X[order])[np.argsort(order)]
+        return torque
 
     def _predict_array(self, X: Array) -> Array:
         torque = self._output(X)
@@ -222,13 +305,11 @@ class SequenceRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         """Output of the networks in physical units, (n_samples, n_outputs)."""
         keys = self._keys()
         inputs = (self._inputs(X, keys) - self.input_offset_) / self.input_scale_
-        parts = []
-        for weights in self.weights_:
-            network = self._network(inputs.shape[1], len(weights["output.bias"]))
-            from_arrays(network, weights)
-            parts.append(
-                run(network, inputs, keys.segments(X), self.window, self.stride, self.device)
-            )
+        module, segments = self.net_.module_, keys.segments(X)
+        parts = [
+            run(network, inputs, segments, self.window, self.stride, self.device)
+            for network in networks_of(module, self._networks())
+        ]
         return np.concatenate(parts, axis=1) * self.output_scale_ + self.output_offset_
 
     def stream(self) -> TorqueStream:
@@ -284,19 +365,19 @@ class PendingFit:
 
     def tasks(self) -> list[Task]:
         """Networks to be trained; scales the data."""
-        self.estimator._one_dimensional = self.y.ndim == 1
-        return self.estimator._tasks(self.X, self.y, self.weight, self.keys, self.seed)
+        model = self.estimator
+        model._one_dimensional = self.y.ndim == 1
+        tasks = model._tasks(self.X, self.y, self.weight, self.keys, self.seed)
+        model._made_with = [task.parameters for task in tasks]
+        return tasks
 
     def train(self) -> None:
         """Train this one alone."""
         model, tasks = self.estimator, self.tasks()
-        # networks that stop early do so at different times
-        groups = [tasks] if self.validation is None else [[task] for task in tasks]
-        segments, trainings = self.keys.segments(self.X), []
-        with fit_progress(model, model.max_epochs * len(groups), self.X, self.y) as progress:
-            for group in groups:
-                trainings += train(group, self.validation, segments, model._plan(), progress)
-        model._store(trainings)
+        segments, plan = self.keys.segments(self.X), model._plan()
+        with fit_progress(model, model.max_epochs, self.X, self.y) as progress:
+            training = train(tasks, self.validation, segments, plan, progress)
+        model._store(training, range(len(tasks)))
 
 
 _PENDING: ContextVar[list[PendingFit] | None] = ContextVar("pending", default=None)
@@ -319,7 +400,7 @@ def deferred_training() -> Iterator[list[PendingFit]]:
 
 def train_together(pending: list[PendingFit], n_jobs: int | None) -> None:
     """Train collected fits of clones, several side by side; `n_jobs` changes no bit of them."""
-    size = 1 if any(fit.validation is not None for fit in pending) else SIDE_BY_SIDE
+    size = SIDE_BY_SIDE if all(fit.estimator._plan().is_plain for fit in pending) else 1
     groups = [pending[i : i + size] for i in range(0, len(pending), size)]
     trained = Parallel(n_jobs=n_jobs)(delayed(_train_group)(group) for group in groups)
     for group, models in zip(groups, trained, strict=True):
@@ -334,10 +415,10 @@ def _train_group(group: list[PendingFit]) -> list[SequenceRegressor]:
         first = group[0]
         tasks = [fit.tasks() for fit in group]
         together = [task for own in tasks for task in own]
-        segments, quiet = first.keys.segments(first.X), FitProgress(first.estimator, None)
-        trainings = iter(train(together, None, segments, first.estimator._plan(), quiet))
+        training = train(together, None, first.keys.segments(first.X), first.estimator._plan())
+        numbers = iter(range(len(together)))
         for fit, own in zip(group, tasks, strict=True):
-            fit.estimator._store([next(trainings) for _ in own])
+            fit.estimator._store(training, [next(numbers) for _ in own])
     return [fit.estimator for fit in group]
 
 

@@ -15,10 +15,11 @@ from sklearn.compose import TransformedTargetRegressor
 from sklearn.ensemble import BaggingRegressor
 from sklearn.linear_model import RidgeCV
 from sklearn.model_selection import check_cv
+from sklearn.multioutput import MultiOutputRegressor
 from sklearn.neural_network import MLPRegressor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
-from sklearn.utils import check_random_state
+from sklearn.utils import check_random_state, get_tags
 from sklearn.utils.validation import (
     _check_sample_weight,
     check_is_fitted,
@@ -30,6 +31,7 @@ from skorch import NeuralNet
 from skidyn._columns import ColumnSpec
 from skidyn._compat import HasMethods, Interval, StrOptions, fit_context
 from skidyn._keys import Keys, resolve_keys
+from skidyn._order import order_of_log, taken, time_order
 from skidyn.model_selection import held_out_folds
 from skidyn.neural_network._base import SequenceRegressor, deferred_training, train_together
 from skidyn.neural_network._lstm import LSTMRegressor
@@ -57,11 +59,12 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     ----------
     estimator : estimator, default=None
         Member: a network of this package, any scikit-learn regressor or a skorch
-        ``NeuralNetRegressor``; :class:`LSTMRegressor` if None. Its key columns are set from those
-        given here; one that has no parameters for them does not see them. With ``per_joint=True``
-        of the member each output has networks of its own.
+        ``NeuralNetRegressor``, also inside a ``Pipeline``; :class:`LSTMRegressor` if None. Its key
+        columns are set from those given here; one that has no parameters for them does not see
+        them. With ``per_joint=True`` of the member each output has networks of its own.
     final_estimator : estimator, default=None
-        Meta-regressor; a linear one (ridge) if None.
+        Meta-regressor; a linear one (ridge) if None. One of a single output is fitted once for each
+        output.
     n_estimators : int, default=10
         Members.
     resample : {"window", "trajectory"}, default="window"
@@ -79,6 +82,8 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     n_jobs : int, default=None
         Processes. Ten networks are trained side by side in each, since most of a small network's
         step is overhead that they can share; so more processes serve more than ten members.
+        Members with callbacks, an optimiser of their own or ``verbose`` are trained one by one, and
+        come out the same.
     trajectory, time : int, str or None, default="auto"
         Key columns of X.
     random_state : int, RandomState or None, default=None
@@ -184,8 +189,8 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             stride=8,
             hidden_size=32,
             learning_rate=0.01,
-            weight_decay=0.0,
-            betas=(0.9, 0.999),
+            optimizer__weight_decay=0.0,
+            optimizer__betas=(0.9, 0.999),
             max_epochs=130,
             batch_size=32,
             per_joint=True,
@@ -229,6 +234,12 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         if sample_weight is not None:
             sample_weight = _check_sample_weight(sample_weight, X, dtype=np.float64)
         keys = self._keys()
+        folds = self._given_folds(table, y, groups)
+        order = order_of_log(self, X, keys)
+        if order is not None:
+            place = np.argsort(order)
+            folds = folds and [(np.sort(place[a]), np.sort(place[b])) for a, b in folds]
+            X, y, sample_weight = (taken(t, order) for t in (X, y, sample_weight))
         rng = check_random_state(self.random_state)
         bagging = self._bagging(keys, sample_weight is not None, int(rng.randint(2**31 - 1)))
         trajectories = keys.trajectories(X)
@@ -239,7 +250,7 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             inputs = _unseen_means(self.bagging_, X, unseen)
         else:
             inputs = np.full((len(X), y[:1].size), np.nan)
-            for train, test in self._folds(table, y, trajectories, groups):
+            for train, test in folds or self._folds(trajectories):
                 part = None if sample_weight is None else sample_weight[train]
                 again, _ = self._train(
                     bagging, X[train], y[train], part, trajectories[train], False
@@ -250,8 +261,12 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             inputs, honest = _member_mean(self.bagging_, X), np.ones(len(X), dtype=bool)
         self.n_stacked_ = int(honest.sum())
         head = RidgeCV() if self.final_estimator is None else clone(self.final_estimator)
-        if "random_state" in head.get_params():
-            head.set_params(random_state=int(rng.randint(2**31 - 1)))
+        inner = getattr(head, "regressor", None) or head  # TransformedTargetRegressor does not tell
+        if y.ndim == 2 and not get_tags(inner).target_tags.multi_output:
+            head = MultiOutputRegressor(head)
+        for name in ("random_state", "estimator__random_state"):
+            if name in head.get_params():
+                head.set_params(**{name: int(rng.randint(2**31 - 1))})
         weight = None if sample_weight is None else sample_weight[honest]
         self.final_estimator_ = _fit(head, inputs[honest], y[honest], weight)
         return self
@@ -284,8 +299,7 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
 
     def _bagging(self, keys: Keys, weighted: bool, seed: int) -> BaggingRegressor:
         member = LSTMRegressor() if self.estimator is None else clone(self.estimator)
-        if isinstance(member, NeuralNet):
-            member = SkorchMember(member)
+        member = _with_skorch_members(member)
         names = member.get_params()
         # BaggingRegressor hands arrays down, so the keys are given by position
         position = {"trajectory": keys.trajectory, "time": keys.time}
@@ -307,11 +321,13 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             random_state=seed,
         )
 
-    def _folds(
-        self, table: Any, y: Array, trajectories: NDArray[Any], groups: Any
-    ) -> Iterable[Any]:
-        if self.cv is not None and not isinstance(self.cv, Integral):
-            return list(check_cv(self.cv).split(table, y, groups))
+    def _given_folds(self, table: Any, y: Array, groups: Any) -> list[Any]:
+        """Folds of a cross-validator or list; none where `cv` is a number."""
+        if self.cv is None or isinstance(self.cv, Integral):
+            return []
+        return list(check_cv(self.cv).split(table, y, groups))
+
+    def _folds(self, trajectories: NDArray[Any]) -> Iterable[Any]:
         member = LSTMRegressor() if self.estimator is None else self.estimator
         guard = int(getattr(member, "window", 0))
         return held_out_folds(trajectories, int(self.cv or BLOCKS), guard=guard)
@@ -344,11 +360,23 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         """
         check_is_fitted(self)
         X = validate_data(self, X, reset=False, dtype=np.float64)
-        X = self._keys().for_learner(X, self.bagging_.estimator_)
+        keys = self._keys()
+        order = time_order(X, keys)
+        X = keys.for_learner(X if order is None else X[order], self.bagging_.estimator_)
         members = np.stack([member.predict(X) for member in self.bagging_.estimators_])
+        if order is not None:
+            members = members[:, np.argsort(order)]
         mean = members.mean(axis=0)
         torque = self.final_estimator_.predict(mean.reshape(len(X), -1)).reshape(mean.shape)
         return (torque, members.std(axis=0)) if return_std else torque
+
+
+def _with_skorch_members(member: Any) -> Any:
+    """A member in which nets of skorch, alone or as a part, take tables of double precision."""
+    if isinstance(member, NeuralNet):
+        return SkorchMember(member)
+    nets = {k: v for k, v in member.get_params().items() if isinstance(v, NeuralNet)}
+    return member.set_params(**{name: SkorchMember(net) for name, net in nets.items()})
 
 
 def _fit(estimator: Any, X: Any, y: Any, sample_weight: Array | None) -> Any:

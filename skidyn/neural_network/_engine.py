@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +16,14 @@ from skorch.helper import predefined_split
 from torch import nn
 
 from skidyn._compat import FitProgress
-from skidyn.neural_network._network import LSTMNetwork, Members, Weights, single_thread
+from skidyn.neural_network._network import (
+    LSTMNetwork,
+    Members,
+    Weights,
+    from_arrays,
+    single_thread,
+    to_arrays,
+)
 from skidyn.neural_network._stacked import StackedNetwork
 from skidyn.neural_network._windows import WindowLoader, WindowSet, window_rows, window_starts
 
@@ -24,25 +32,20 @@ Array = NDArray[np.float64]
 #: Rows that go through the network at once in prediction; more would only need memory.
 ROWS_AT_ONCE = 65536
 
+#: Class of a network and what it is made with.
+Network = tuple[type[nn.Module], dict[str, Any]]
+
 
 @dataclass(frozen=True)
-class TrainingPlan:
+class Plan:
     """How networks are trained.
 
     Attributes
     ----------
-    window, stride, max_epochs, batch_size : int
-        Rows of history and targets per window, passes over the log, windows per step.
-    learning_rate : float
-        First step size of Adam.
-    weight_decay : float
-        Share of the learning rate by which every step shrinks the weights.
-    betas : tuple of float
-        How long Adam remembers gradients and their squares.
-    patience : int
-        Epochs without improvement on the validation rows after which training ends.
-    device : str
-        Where the networks are trained.
+    window, stride : int
+        Rows of history and targets per window.
+    settings : dict
+        Parameters of skorch's net.
     slow_parameters : str
         Name of a parameter that moves at a tenth of the learning rate and does not shrink; empty
         for none.
@@ -50,14 +53,35 @@ class TrainingPlan:
 
     window: int
     stride: int
-    max_epochs: int
-    batch_size: int
-    learning_rate: float
-    weight_decay: float
-    betas: tuple[float, float]
-    patience: int
-    device: str
+    settings: dict[str, Any]
     slow_parameters: str = ""
+
+    @property
+    def callbacks(self) -> list[Any]:
+        """Callbacks of the user without the names that skorch allows for them."""
+        given = self.settings["callbacks"] or []
+        return [entry[1] if isinstance(entry, tuple) else entry for entry in given]
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether nothing looks at single networks, so that many can be trained as one."""
+        plain = self.settings["optimizer"] is None and not self.settings["callbacks"]
+        return plain and not self.settings["verbose"]
+
+    @property
+    def validates(self) -> bool:
+        """Whether a callback watches the loss on rows that are held out."""
+        watched = (getattr(callback, "monitor", None) for callback in self.callbacks)
+        return any(callable(name) or str(name).startswith("valid") for name in watched)
+
+    @property
+    def schedules(self) -> bool:
+        """Whether a callback ends the training early or sets its rate."""
+        return any(_is_a(c, EarlyStopping) or _is_a(c, LRScheduler) for c in self.callbacks)
+
+
+def _is_a(callback: Any, kind: type) -> bool:
+    return issubclass(callback if isinstance(callback, type) else type(callback), kind)
 
 
 @dataclass(frozen=True)
@@ -66,8 +90,10 @@ class Task:
 
     Attributes
     ----------
-    network : Module
-        Initialised; maps (n_windows, window + stride, n_inputs) to (n_windows, stride, n_outputs).
+    module : type
+        Maps (n_windows, window + stride, n_inputs) to (n_windows, stride, n_outputs).
+    parameters : dict
+        What it is made with.
     inputs, targets : ndarray of shape (n_samples, n_inputs) and (n_samples, n_outputs)
         Scaled.
     weight : ndarray of shape (n_samples,)
@@ -76,7 +102,8 @@ class Task:
         Draws the order of windows.
     """
 
-    network: nn.Module
+    module: type[nn.Module]
+    parameters: dict[str, Any]
     inputs: NDArray[Any]
     targets: NDArray[Any]
     weight: Array
@@ -89,26 +116,42 @@ class Training:
 
     Attributes
     ----------
-    weights : dict of str to ndarray
-        Weights of the network.
-    loss_curve, validation_curve : list of float
-        Mean squared error of scaled targets after each epoch; the second is empty without
-        validation rows.
+    net : NeuralNet
+        The net that was trained, of all networks together.
+    weights : list of dict of str to ndarray
+        Weights of each network.
+    loss_curves : list of list of float
+        Mean squared error of each network's scaled targets after each epoch.
+    validation_curve : list of float
+        That of the validation rows; empty without them.
     """
 
-    weights: Weights
-    loss_curve: list[float]
+    net: NeuralNet
+    weights: list[Weights]
+    loss_curves: list[list[float]]
     validation_curve: list[float]
 
 
-class _WeightedNet(NeuralNet):
+class SequenceNet(NeuralNet):
     """Mean squared error in which each target row has a weight (last column of the targets).
 
-    The members' errors are added up, so each member's gradient is that of its own error.
+    The errors of networks that are trained together are added up, so each one's gradient is that of
+    its own error.
     """
 
+    def get_loss(self, y_pred: Any, y_true: Any, X: Any = None, training: bool = False) -> Any:
+        weight = y_true[..., -1:]
+        squares = (weight * (y_pred - y_true[..., :-1]) ** 2).sum(dim=(-3, -2, -1))
+        losses = squares / (weight.sum(dim=(-3, -2, -1)).clamp_min(1e-12) * y_pred.shape[-1])
+        if training:
+            self.batch_losses_.append(losses.detach().reshape(-1))
+        return losses.sum()
+
+
+class _PlainNet(SequenceNet):
+    """The same without the detours by which skorch serves any optimiser, data and callback."""
+
     def train_step(self, batch: Any, **fit_params: Any) -> dict[str, Any]:
-        """One step, without the detours by which skorch serves any optimiser and data."""
         inputs, targets = batch
         self.optimizer_.zero_grad()
         loss = self.get_loss(self.module_(inputs), targets, training=True)
@@ -116,26 +159,20 @@ class _WeightedNet(NeuralNet):
         self.optimizer_.step()
         return {"loss": loss.detach()}
 
-    def get_loss(self, y_pred: Any, y_true: Any, X: Any = None, training: bool = False) -> Any:
-        weight = y_true[..., -1:]
-        squares = (weight * (y_pred - y_true[..., :-1]) ** 2).sum(dim=(1, 2, 3))
-        losses = squares / (weight.sum(dim=(1, 2, 3)).clamp_min(1e-12) * y_pred.shape[-1])
-        if training:
-            self.batch_losses_.append(losses.detach())
-        return losses.sum()
-
 
 class _Progress(Callback):
     """Hands skorch's epochs on to scikit-learn's callbacks; refuses a diverged fit."""
 
-    def __init__(self, progress: FitProgress) -> None:
+    def __init__(self, progress: FitProgress | None = None) -> None:
         self.progress = progress
         self.loss_curves: list[NDArray[Any]] = []
+        self.validation_curve: list[float] = []
 
     def on_epoch_begin(self, net: NeuralNet, **kwargs: Any) -> None:
         net.batch_losses_ = []
         net.module_.train()
-        self.progress.begin_step()
+        if self.progress is not None:
+            self.progress.begin_step()
 
     def on_epoch_end(self, net: NeuralNet, **kwargs: Any) -> None:
         losses = torch.stack(net.batch_losses_).mean(dim=0).cpu().numpy()
@@ -145,40 +182,98 @@ class _Progress(Callback):
                 "lower learning_rate."
             )
         self.loss_curves.append(losses.astype(np.float64))
-        if self.progress.end_step():
+        if net.train_split is not None:
+            self.validation_curve.append(net.history[-1, "valid_loss"])
+        if self.progress is not None and self.progress.end_step():
             raise KeyboardInterrupt  # skorch's way to end a fit cleanly
+
+
+def make_net(
+    networks: Sequence[Network],
+    plan: Plan,
+    callbacks: Sequence[Any] = (),
+    weights: Sequence[Weights] | None = None,
+    **more: Any,
+) -> NeuralNet:
+    """A net of skorch for networks that are trained side by side.
+
+    Most of a small network's step is overhead (gathering, optimiser, bookkeeping), which all
+    networks share.
+
+    Parameters
+    ----------
+    networks : sequence of (type, dict)
+        Class of each network, all of one architecture, and what it is made with.
+    plan : Plan
+        Settings.
+    callbacks : sequence
+        Callbacks before those of the plan.
+    weights : sequence of dict or None
+        Weights of each network; those drawn at random if None.
+    **more : dict
+        Further parameters of the net.
+
+    Returns
+    -------
+    NeuralNet
+        Not initialised.
+    """
+    settings = plan.settings.copy()
+    if settings["optimizer"] is None:
+        tuned = {"weight_decay": 0.05, "betas": (0.8, 0.95), "fused": True}
+        named = {f"optimizer__{name}": value for name, value in tuned.items()}
+        settings = named | settings | {"optimizer": torch.optim.AdamW}
+    if plan.slow_parameters:
+        slow = {"lr": 0.1 * settings["lr"], "weight_decay": 0.0}
+        settings["optimizer__param_groups"] = [(f"*{plan.slow_parameters}", slow)]
+    settings["callbacks"] = [*callbacks, *(settings["callbacks"] or [])]
+    own: dict[str, Any] = {}
+    if len(networks) == 1 and weights is None:
+        module: Any = networks[0][0]
+        own = {f"module__{name}": value for name, value in networks[0][1].items()}
+    elif len(networks) == 1:
+        module = made(networks, weights)[0]
+    else:
+        module = _side_by_side(made(networks, weights))
+    kind = _PlainNet if plan.is_plain else SequenceNet
+    return kind(module, criterion=nn.MSELoss, **own, **settings, **more)
+
+
+def made(networks: Sequence[Network], weights: Sequence[Weights] | None = None) -> list[nn.Module]:
+    """Networks, with given weights or new ones."""
+    modules = [kind(**parameters) for kind, parameters in networks]
+    for module, own in zip(modules, weights or (), strict=weights is not None):
+        from_arrays(module, own)
+    return modules
 
 
 def train(
     tasks: list[Task],
     validation: NDArray[np.bool_] | None,
     segments: list[slice],
-    plan: TrainingPlan,
-    progress: FitProgress,
-) -> list[Training]:
+    plan: Plan,
+    progress: FitProgress | None = None,
+) -> Training:
     """Train networks of one architecture side by side on one log.
-
-    Most of a small network's step is overhead (gathering, optimiser, bookkeeping), which all
-    networks share here.
 
     Parameters
     ----------
     tasks : list of Task
         Networks and what they learn.
     validation : ndarray of bool of shape (n_samples,) or None
-        Rows that only judge; training ends when they stop improving. For a single task.
+        Rows that only judge.
     segments : list of slice
         Rows that belong together.
-    plan : TrainingPlan
+    plan : Plan
         Settings.
-    progress : FitProgress
+    progress : FitProgress or None
         Told about every epoch.
 
     Returns
     -------
-    list of Training
+    Training
     """
-    device = torch.device(plan.device)
+    device = torch.device(plan.settings["device"])
 
     def table(parts: list[NDArray[Any]]) -> torch.Tensor:
         return torch.as_tensor(np.stack(parts, dtype=np.float32), device=device)
@@ -191,55 +286,48 @@ def train(
         return WindowSet(inputs, targets, segments, plan.window, plan.stride)
 
     follow = _Progress(progress)
-    callbacks: list[Any] = [follow]
+    callbacks: list[Any] = [("progress", follow)]
     split, weights = None, [task.weight for task in tasks]
-    if validation is None:
+    if not plan.schedules:
         # steps that shrink to nothing average the noise of small batches away
         cosine = torch.optim.lr_scheduler.CosineAnnealingLR
-        callbacks.append(LRScheduler(cosine, T_max=plan.max_epochs))
-    else:
-        callbacks.append(EarlyStopping(patience=plan.patience, load_best=True, sink=_silent))
+        callbacks.append(("cosine", LRScheduler(cosine, T_max=plan.settings["max_epochs"])))
+    if validation is not None:
         split = predefined_split(window_set([np.where(validation, w, 0.0) for w in weights]))
         weights = [np.where(validation, 0.0, w) for w in weights]
-    slow = [(f"*.{plan.slow_parameters}", {"lr": 0.1 * plan.learning_rate, "weight_decay": 0.0})]
-    net = _WeightedNet(
-        _side_by_side([task.network for task in tasks]),
-        criterion=nn.MSELoss,
-        optimizer=torch.optim.AdamW,
-        optimizer__weight_decay=plan.weight_decay,
-        optimizer__betas=plan.betas,
-        optimizer__param_groups=slow if plan.slow_parameters else [],
-        optimizer__fused=True,
-        lr=plan.learning_rate,
-        max_epochs=plan.max_epochs,
-        batch_size=plan.batch_size,
+    net = make_net(
+        [(task.module, task.parameters) for task in tasks],
+        plan,
+        callbacks,
         train_split=split,
         iterator_train=WindowLoader,
         iterator_train__generators=[np.random.default_rng(task.seed) for task in tasks],
         iterator_valid=WindowLoader,
-        callbacks=callbacks,
-        device=plan.device,
-        verbose=0,
     )
     with single_thread():
         net.fit(window_set(weights), None)
+    net.set_params(train_split=None)  # it holds the log
+    follow.progress = None
     curves = np.array(follow.loss_curves).T.tolist()
-    judged = net.history[:, "valid_loss"] if validation is not None else []
-    return [
-        Training(weights_of, curve, judged)
-        for weights_of, curve in zip(net.module_.arrays(), curves, strict=True)
-    ]
+    return Training(net, weights_of(net.module_), curves, follow.validation_curve)
+
+
+def weights_of(module: nn.Module) -> list[Weights]:
+    """Weights of each network of a module."""
+    together = isinstance(module, StackedNetwork | Members)
+    return module.arrays() if together else [to_arrays(module)]
+
+
+def networks_of(module: nn.Module, networks: Sequence[Network]) -> list[nn.Module]:
+    """Each network of a module, to be run alone."""
+    together = isinstance(module, StackedNetwork | Members)
+    return made(networks, weights_of(module)) if together else [module]
 
 
 def _side_by_side(networks: list[nn.Module]) -> nn.Module:
     """One module of many; torch's own LSTM kernel is the fastest for a single network."""
     plain = [network for network in networks if isinstance(network, LSTMNetwork)]
-    stacked = 1 < len(networks) == len(plain)
-    return StackedNetwork(plain) if stacked else Members(networks)
-
-
-def _silent(*args: Any, **kwargs: Any) -> None:
-    """Swallow skorch's messages."""
+    return StackedNetwork(plain) if len(plain) == len(networks) else Members(networks)
 
 
 def run(

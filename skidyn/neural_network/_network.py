@@ -32,43 +32,52 @@ def single_thread() -> Iterator[None]:
 class _SeededDropout(nn.Module):
     """Dropout that draws from its own generator, so that fits are reproducible in any process."""
 
-    def __init__(self, share: float) -> None:
+    def __init__(self, share: float, seed: int) -> None:
         super().__init__()
         self.share = share
-        self.generator: torch.Generator | None = None
+        self.seed = seed
+        self._generator: torch.Generator | None = None
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         if not self.training or self.share == 0:
             return x
-        kept = torch.empty_like(x).bernoulli_(1 - self.share, generator=self.generator)
+        if self._generator is None or self._generator.device != x.device:
+            self._generator = torch.Generator(x.device).manual_seed(self.seed)
+        kept = torch.empty_like(x).bernoulli_(1 - self.share, generator=self._generator)
         return x * kept / (1 - self.share)
 
 
 class LSTMNetwork(nn.Module):
     """One LSTM layer, optionally a fully connected layer with dropout, and a linear output.
 
+    Input weights begin as Glorot's, the recurrence orthogonal, the bias of the forget gate at 1,
+    other biases at 0.
+
     Parameters
     ----------
     n_inputs, n_outputs : int
         Widths.
-    hidden_size : int
-        Cells of the LSTM.
-    dense_size : int
-        Width of the fully connected layer; 0 leaves it and the dropout out.
-    dropout : float
-        Share of its outputs dropped in training.
     window : int
         Rows of history, for which there is no output.
+    hidden_size : int, default=32
+        Cells of the LSTM.
+    dense_size : int, default=0
+        Width of the fully connected layer; 0 leaves it and the dropout out.
+    dropout : float, default=0.0
+        Share of its outputs dropped in training.
+    seed : int, default=0
+        Draws initial weights and dropout.
     """
 
     def __init__(
         self,
         n_inputs: int,
         n_outputs: int,
-        hidden_size: int,
-        dense_size: int,
-        dropout: float,
         window: int,
+        hidden_size: int = 32,
+        dense_size: int = 0,
+        dropout: float = 0.0,
+        seed: int = 0,
     ) -> None:
         super().__init__()
         self.window = window
@@ -77,11 +86,8 @@ class LSTMNetwork(nn.Module):
             self.lstm = nn.LSTM(n_inputs, hidden_size, batch_first=True)
             self.dense = nn.Linear(hidden_size, dense_size) if dense_size else None
             self.output = nn.Linear(dense_size or hidden_size, n_outputs)
-        self.dropout = _SeededDropout(dropout)
+        self.dropout = _SeededDropout(dropout, seed)
         self.to_empty(device="cpu")
-
-    def initialise(self, seed: int, device: torch.device) -> None:
-        """Glorot input weights, orthogonal recurrence, forget-gate bias 1, other biases 0."""
         generator = torch.Generator().manual_seed(seed)
         for name, parameter in self.named_parameters():
             if "bias" in name:
@@ -90,10 +96,8 @@ class LSTMNetwork(nn.Module):
                 nn.init.orthogonal_(parameter, generator=generator)
             else:
                 nn.init.xavier_uniform_(parameter, generator=generator)
-        size = self.lstm.hidden_size
         with torch.no_grad():
-            self.lstm.get_parameter("bias_ih_l0")[size : 2 * size] = 1.0
-        self.dropout.generator = torch.Generator(device).manual_seed(seed)
+            self.lstm.get_parameter("bias_ih_l0")[hidden_size : 2 * hidden_size] = 1.0
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         """Outputs of the rows after the history of every window."""

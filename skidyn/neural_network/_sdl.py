@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from numbers import Integral
 from os import PathLike
@@ -12,19 +13,22 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from sklearn.base import clone
+from sklearn.model_selection import check_cv
 from sklearn.utils import _safe_indexing
 from sklearn.utils.validation import check_is_fitted, validate_data
+from skorch.callbacks import Checkpoint, TrainEndCheckpoint
 from torch import nn
 
-from skidyn._columns import Columns, ColumnSpec, column_names, resolve_columns
-from skidyn._compat import Interval, StrOptions
+from skidyn._columns import Columns, column_names, resolve_columns
+from skidyn._compat import HasMethods, Interval, StrOptions
 from skidyn._keys import Keys
+from skidyn._order import taken, time_order
 from skidyn.hybrid import TrainingRange, distances, fade, learned_weights
 from skidyn.identification import RBDRegressor
 from skidyn.model_selection import held_out_folds
 from skidyn.neural_network._base import SequenceRegressor
-from skidyn.neural_network._engine import Task, Training, TrainingPlan, run
-from skidyn.neural_network._network import LSTMNetwork, from_arrays
+from skidyn.neural_network._engine import Plan, Task, Training, run
+from skidyn.neural_network._network import LSTMNetwork
 from skidyn.neural_network._physics import BareRigidBody, IdentifiedPhysics, robot_of
 from skidyn.preprocessing import scaling_of
 from skidyn.robots import Robot
@@ -45,13 +49,14 @@ class _JointNetwork(nn.Module):
     """
 
     def __init__(
-        self, core: LSTMNetwork, directions: Array, n_features: int, n_joints: int, residual: bool
+        self, start: Array, n_features: int, residual: bool, trainable: bool, **core: Any
     ) -> None:
         super().__init__()
-        self.core = core
-        self.rigid_body = nn.Parameter(torch.tensor(directions, dtype=torch.float32))
+        self.core = LSTMNetwork(**core)
+        rigid_body = torch.tensor(start, dtype=torch.float32)
+        self.rigid_body = nn.Parameter(rigid_body, requires_grad=trainable)
         self.n_features = n_features
-        self.n_joints = n_joints
+        self.n_joints = core["n_outputs"]
         self.residual = residual
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
@@ -61,6 +66,12 @@ class _JointNetwork(nn.Module):
         torque = torque + regressor @ self.rigid_body
         output: torch.Tensor = self.core(torch.cat([features, torque], dim=-1))
         return output + torque[:, self.core.window :] if self.residual else output
+
+
+def _writes(callback: Any) -> bool:
+    """Whether a callback writes files, which are for the model and not for its held-out copies."""
+    own = callback[1] if isinstance(callback, tuple) else callback
+    return isinstance(own, Checkpoint | TrainEndCheckpoint)
 
 
 class SDLRegressor(SequenceRegressor):
@@ -87,49 +98,15 @@ class SDLRegressor(SequenceRegressor):
     residual : bool, default=True
         Add the physical torque to the network's output, so that the network learns what is
         missing. False is the paper's architecture, which only reads it.
-    cv : int or None, default=3
-        Folds, by trajectory (or by blocks of a single one), on which copies of the model are held
-        out to find ``learned_weight_``. None trusts the network wholly and trains once, as does
-        ``residual=False``.
-    window : int, default=4
-        Rows of history.
-    stride : int, default=4
-        Rows predicted at once.
-    hidden_size : int, default=32
-        Cells of the LSTM.
+    cv : int, cross-validator, iterable of splits or None, default=3
+        Folds, by trajectory (or by blocks of a single one) where it is a number, on which copies of
+        the model are held out to find ``learned_weight_``. None trusts the network wholly and
+        trains once, as does ``residual=False``.
     dense_size : int, default=32
         Width of the fully connected layer.
     dropout : float, default=0.1
         Share of the fully connected layer's outputs dropped in training.
-    max_epochs : int, default=100
-        Passes over the log.
-    learning_rate : float, default=0.03
-        First step size of Adam, which falls to zero along a cosine unless `early_stopping` is on; a
-        tenth of it for the coefficients of the physics.
-    weight_decay : float, default=0.05
-        Every step shrinks the network's weights by this share of the step size (AdamW), which
-        keeps a network from learning joints as functions of other joints. 0 is plain Adam.
-    betas : tuple of two float, default=(0.8, 0.95)
-        How much Adam keeps of its averages of the gradient and of its square from step to step.
-        torch's own ``(0.9, 0.999)`` want more steps than a log of minutes gives.
-    batch_size : int, default=32
-        Pieces per step.
-    scaling : {"standard", "minmax"}, default="standard"
-        Scaling of inputs and outputs; ``"minmax"`` is the paper's and learns far more slowly.
-    early_stopping : bool, default=False
-        Hold trajectories out, stop when they stop improving, keep the best weights.
-    validation_fraction : float, default=0.1
-        Share of the trajectories held out.
-    n_iter_no_change : int, default=10
-        Epochs without improvement before stopping.
-    resample : {None, "trajectory"}, default=None
-        Draw trajectories with replacement before training.
-    device : str, default="cpu"
-        Torch device.
-    trajectory, time : int, str or None, default="auto"
-        Key columns of X.
-    random_state : int, RandomState or None, default=None
-        Draws initial weights, order of windows, dropout and bootstrap.
+    {PARAMETERS}
 
     Attributes
     ----------
@@ -147,19 +124,10 @@ class SDLRegressor(SequenceRegressor):
         Rigid-body parameters in the model; see :attr:`skidyn.robots.Robot.inertial_parameters`.
     initial_inertial_parameters_ : ndarray of shape (n_bodies, 10)
         Least-squares values that the optimisation started from.
-    weights_ : list of dict of str to ndarray
-        Weights of the network.
-    loss_curve_, validation_curve_ : list of float
-        Mean squared error of the scaled outputs after each epoch.
-    n_iter_ : int
-        Epochs trained.
     radius_ : float
         Distance from the training samples that counts as outside, in standard deviations per
         feature (root mean square).
-    n_features_in_ : int
-        Columns of X.
-    feature_names_in_ : ndarray of str
-        Their names, where X has names.
+    {ATTRIBUTES}
 
     See Also
     --------
@@ -184,13 +152,19 @@ class SDLRegressor(SequenceRegressor):
     """
 
     _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
-        **{k: v for k, v in SequenceRegressor._parameter_constraints.items() if k != "per_joint"},
-        "cv": [Interval(Integral, 2, None, closed="left"), None],
+        **SequenceRegressor._parameter_constraints,
+        "cv": [
+            Interval(Integral, 2, None, closed="left"),
+            HasMethods(["split"]),
+            Iterable,
+            None,
+        ],
         "physics": [Robot, RBDRegressor, str, PathLike],
         "rigid_body": [StrOptions({"joint", "frozen"})],
         "residual": ["boolean"],
     }
-    per_joint = False  # the rigid body couples the joints
+
+    _module = _JointNetwork
 
     def __init__(
         self,
@@ -198,52 +172,18 @@ class SDLRegressor(SequenceRegressor):
         *,
         rigid_body: str = "joint",
         residual: bool = True,
-        cv: int | None = 3,
-        window: int = 4,
-        stride: int = 4,
-        hidden_size: int = 32,
+        cv: Any = 3,
         dense_size: int = 32,
         dropout: float = 0.1,
-        max_epochs: int = 100,
-        learning_rate: float = 0.03,
-        weight_decay: float = 0.05,
-        betas: tuple[float, float] = (0.8, 0.95),
-        batch_size: int = 32,
-        scaling: str = "standard",
-        early_stopping: bool = False,
-        validation_fraction: float = 0.1,
-        n_iter_no_change: int = 10,
-        resample: str | None = None,
-        device: str = "cpu",
-        trajectory: ColumnSpec = "auto",
-        time: ColumnSpec = "auto",
-        random_state: Any = None,
+        **parameters: Any,
     ) -> None:
+        super().__init__(dense_size=dense_size, dropout=dropout, **parameters)
         self.physics = physics
         self.rigid_body = rigid_body
         self.residual = residual
         self.cv = cv
-        self.window = window
-        self.stride = stride
-        self.hidden_size = hidden_size
-        self.dense_size = dense_size
-        self.dropout = dropout
-        self.max_epochs = max_epochs
-        self.learning_rate = learning_rate
-        self.weight_decay = weight_decay
-        self.betas = betas
-        self.batch_size = batch_size
-        self.scaling = scaling
-        self.early_stopping = early_stopping
-        self.validation_fraction = validation_fraction
-        self.n_iter_no_change = n_iter_no_change
-        self.resample = resample
-        self.device = device
-        self.trajectory = trajectory
-        self.time = time
-        self.random_state = random_state
 
-    def fit(self, X: Any, y: Any, sample_weight: Any = None) -> SDLRegressor:
+    def fit(self, X: Any, y: Any, sample_weight: Any = None, groups: Any = None) -> SDLRegressor:
         """Train the network and the physics, and find how much of what they learn to keep.
 
         Parameters
@@ -254,6 +194,8 @@ class SDLRegressor(SequenceRegressor):
             Torque.
         sample_weight : array-like of shape (n_samples,), default=None
             Weight of each row's squared error. Rows of weight zero still serve as history.
+        groups : array-like of shape (n_samples,), default=None
+            Groups of the rows for a `cv` that splits by groups, such as ``GroupKFold``.
 
         Returns
         -------
@@ -262,26 +204,36 @@ class SDLRegressor(SequenceRegressor):
         """
         self.__dict__.pop("learned_weight_", None)
         super().fit(X, y, sample_weight)
-        if self.residual and self.cv is not None and hasattr(self, "weights_"):
-            self.learned_weight_ = self._held_out_weight(X, y, sample_weight)
+        if self.residual and self.cv is not None and hasattr(self, "loss_curve_"):
+            self.learned_weight_ = self._held_out_weight(X, y, sample_weight, groups)
         return self
 
-    def _held_out_weight(self, X: Any, y: Any, sample_weight: Any) -> Array:
+    def _held_out_weight(self, X: Any, y: Any, sample_weight: Any, groups: Any) -> Array:
         """Weight of what is learned beyond the physics, from copies that have not seen a fold."""
         array = validate_data(self, X, reset=False, dtype=np.float64)
         table = array if column_names(X) is None else X
         target = np.asarray(y, dtype=np.float64)
-        torque = target.reshape(len(array), -1)
         counts = np.ones(len(array)) if sample_weight is None else np.asarray(sample_weight)
+        folds: Any = None
+        if not isinstance(self.cv, Integral):
+            folds = list(check_cv(self.cv).split(table, target, groups))
+        order = time_order(array, self._keys())
+        if order is not None:
+            place = np.argsort(order)
+            folds = folds and [(np.sort(place[a]), np.sort(place[b])) for a, b in folds]
+            array, table, target, counts = (taken(t, order) for t in (array, table, target, counts))
+        torque = target.reshape(len(array), -1)
         trajectories = self._keys().trajectories(array)
+        folds = folds or held_out_folds(trajectories, int(self.cv), guard=8)
         residual, learned = np.zeros(torque.shape), np.zeros(torque.shape)
         unit = np.zeros(len(array), dtype=int)
-        for k, (train, test) in enumerate(held_out_folds(trajectories, self.cv or 2, guard=8)):
+        for k, (train, test) in enumerate(folds):
             unit[test] = k
             train = train[counts[train] > 0]
             if not len(train):
                 continue
-            copy = clone(self).set_params(cv=None)
+            callbacks = [c for c in self.callbacks or () if not _writes(c)] or None
+            copy = clone(self).set_params(cv=None, callbacks=callbacks, verbose=0)
             copy.fit(_safe_indexing(table, train), target[train], counts[train])
             part = array[test]
             physics = copy._physics_torque(part)
@@ -354,25 +306,24 @@ class SDLRegressor(SequenceRegressor):
         self._scale, self._reference = training_range.scale, training_range.reference
 
         n_features, n_joints = features.shape[1], targets.shape[1]
-        core = self._network(n_features + n_joints, n_joints)
-        core.initialise(seed, torch.device(self.device))
-        network = _JointNetwork(core, self._start, n_features, n_joints, self.residual)
-        network.rigid_body.requires_grad_(self.rigid_body == "joint")
+        made_with = self._network(n_features + n_joints, n_joints, seed) | {
+            "start": self._start,
+            "n_features": n_features,
+            "residual": self.residual,
+            "trainable": self.rigid_body == "joint",
+        }
         inputs = self._joint_inputs(physics, X, features, torque)
         scaled_targets = (targets - self.output_offset_) / self.output_scale_
-        return [Task(network, inputs, scaled_targets, weight, seed)]
+        return [Task(self._module, made_with, inputs, scaled_targets, weight, seed)]
 
-    def _plan(self) -> TrainingPlan:
+    def _plan(self) -> Plan:
         return replace(super()._plan(), slow_parameters="rigid_body")
 
-    def _store(self, trainings: list[Training]) -> None:
-        super()._store(trainings)
-        learned = self.weights_[0].pop("rigid_body").astype(np.float64)
+    def _store(self, training: Training, numbers: Sequence[int]) -> None:
+        super()._store(training, numbers)
+        learned = self.weights_[0]["rigid_body"].astype(np.float64)
         if self.rigid_body == "frozen":
             learned = self._start  # in double precision
-        self.weights_ = [
-            {name.removeprefix("core."): array for name, array in self.weights_[0].items()}
-        ]
         self.initial_coef_ = self._directions @ self._start
         self.coef_ = self._directions @ learned
         del self._directions, self._start
@@ -480,8 +431,7 @@ class SDLRegressor(SequenceRegressor):
             (features - self.input_offset_) / self.input_scale_,
             (rigid_body - self.output_offset_) / self.output_scale_,
         ]
-        network = self._network(scaled.shape[1], rigid_body.shape[1])
-        from_arrays(network, self.weights_[0])
+        network = self.net_.module_.core
         output = run(network, scaled, keys.segments(X), self.window, self.stride, self.device)
         if self.residual:
             torque = rigid_body + output * self.output_scale_

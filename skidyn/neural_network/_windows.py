@@ -114,10 +114,10 @@ class WindowSet(torch.utils.data.Dataset[Any]):
 class WindowLoader:
     """Batches of windows, gathered at once instead of sample by sample.
 
-    A batch holds one batch of every member. All members have equally many batches, so that one
-    with fewer windows has smaller ones, filled up with windows that do not count. For training
-    (``generators`` given, one a member) the windows come in random order, and each pass cuts the
-    log at another phase, so that no alignment of the windows is learned.
+    A batch holds one batch of every member, or that of the only one. All members have equally many
+    batches, so that one with fewer windows has smaller ones, filled up with windows that do not
+    count. For training (``generators`` given, one a member) the windows come in random order, and
+    each pass cuts the log at another phase, so that no alignment of the windows is learned.
     """
 
     def __init__(
@@ -149,4 +149,5 @@ class WindowLoader:
         batches = padded[np.arange(data.n_members)[:, None, None], chosen]
         starts = torch.as_tensor(batches, device=data.inputs.device)
         for k in range(n_batches):
-            yield data.gather(starts[:, k], counts[:, k])
+            inputs, targets = data.gather(starts[:, k], counts[:, k])
+            yield (inputs, targets) if data.n_members > 1 else (inputs[0], targets[0])

@@ -6,11 +6,14 @@ import pytest
 import skorch
 import torch
 from sklearn.base import clone
-from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.linear_model import HuberRegressor, LassoCV, LinearRegression, Ridge, SGDRegressor
 from sklearn.model_selection import GridSearchCV, GroupKFold, cross_val_score
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
 from sklearn.utils.estimator_checks import parametrize_with_checks
+from skorch.callbacks import Callback, EarlyStopping
 
-from skidyn.model_selection import TrajectoryKFold
+from skidyn.model_selection import LeakageWarning, TrajectoryKFold
 from skidyn.neural_network import BLLRegressor, LSTMRegressor
 
 MEMBER = LSTMRegressor(window=6, hidden_size=8, max_epochs=3)
@@ -120,6 +123,54 @@ def test_any_skorch_network_is_a_member(one):
     assert bll.score(X, y) > 0.95
     again = clone(bll).set_params(n_jobs=2).fit(X, y)
     np.testing.assert_array_equal(again.predict(X), bll.predict(X))
+
+
+def test_a_net_of_skorch_inside_a_pipeline():
+    rng = np.random.default_rng(0)
+    X = np.c_[np.repeat(np.arange(6), 50), 100 * rng.normal(size=(300, 4))]
+    net = skorch.NeuralNetRegressor(
+        torch.nn.Linear,
+        module__in_features=4,
+        module__out_features=2,
+        max_epochs=20,
+        lr=0.1,
+        callbacks=[EarlyStopping(patience=5)],
+        verbose=0,
+    )
+    y = X[:, 1:3] / 100
+    member = make_pipeline(StandardScaler(), net)
+    bll = BLLRegressor(member, n_estimators=2, trajectory=0, random_state=0).fit(X, y)
+    assert bll.score(X, y) > 0.95
+
+
+@pytest.mark.parametrize("head", [LassoCV(), HuberRegressor(), SGDRegressor(), LinearRegression()])
+def test_any_linear_regressor_on_top(head, log):
+    X, y = log
+    bll = BLLRegressor(Ridge(), head, n_estimators=2, random_state=0).fit(X, y)
+    assert bll.predict(X).shape == y.shape
+    assert BLLRegressor(Ridge(), head, n_estimators=2).fit(X, y[:, 0]).predict(X).ndim == 1
+
+
+def test_members_trained_one_by_one_come_out_the_same(log):
+    """A callback that does nothing keeps members from being trained as one computation."""
+    X, y = log
+    bll = BLLRegressor(MEMBER, n_estimators=3, random_state=0).fit(X, y)
+    single = clone(bll).set_params(estimator__callbacks=[Callback()]).fit(X, y)
+    assert len(single.bagging_.estimators_[0].net_.history) == 3
+    assert bll.bagging_.estimators_[0].net_.initialized_
+    np.testing.assert_allclose(single.predict(X), bll.predict(X), rtol=1e-4, atol=1e-4)
+
+
+def test_shuffled_rows_are_sorted_with_a_warning(log):
+    X, y = log
+    splits = list(TrajectoryKFold(2).split(X, y))
+    order = np.random.default_rng(0).permutation(len(X))
+    place = np.argsort(order)
+    for cv, same in ((None, None), (splits, [(place[a], place[b]) for a, b in splits])):
+        bll = BLLRegressor(MEMBER, n_estimators=2, cv=cv, random_state=0).fit(X, y)
+        with pytest.warns(LeakageWarning, match="BLLRegressor predicts a row from the rows before"):
+            shuffled = clone(bll).set_params(cv=same).fit(X.iloc[order], y[order])
+        np.testing.assert_allclose(shuffled.predict(X.iloc[order]), bll.predict(X)[order])
 
 
 def test_members_without_keys_do_not_see_them(log):

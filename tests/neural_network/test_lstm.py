@@ -11,8 +11,10 @@ from sklearn.model_selection import GridSearchCV, GroupKFold, cross_val_predict,
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.utils.estimator_checks import parametrize_with_checks
+from skorch import NeuralNet
+from skorch.callbacks import Callback, Checkpoint, EarlyStopping, GradientNormClipping
 
-from skidyn.model_selection import TrajectoryKFold
+from skidyn.model_selection import LeakageWarning, TrajectoryKFold
 from skidyn.neural_network import LSTMRegressor, NDLRegressor
 
 SMALL = {"window": 8, "hidden_size": 12, "max_epochs": 15, "random_state": 0}
@@ -104,15 +106,78 @@ def test_rows_of_weight_zero_are_not_learned_but_read(log):
     assert np.abs(weighted.predict(X) - y).mean() < 1.0
 
 
-def test_early_stopping_holds_trajectories_out_and_keeps_the_best(log):
+@pytest.mark.parametrize("kind", [LSTMRegressor, NDLRegressor])
+def test_early_stopping_and_checkpoint_of_skorch(kind, log, tmp_path):
     X, y = log
-    model = LSTMRegressor(**SMALL | {"max_epochs": 200}, early_stopping=True, n_iter_no_change=3)
-    model.fit(X[::3], np.random.default_rng(0).normal(size=(len(X[::3]), 2)))
+    noise = np.random.default_rng(0).normal(size=(len(X[::3]), 2))
+    best = Checkpoint(dirname=tmp_path, load_best=True)
+    model = kind(**SMALL | {"max_epochs": 200}, callbacks=[EarlyStopping(patience=3), best])
+    model.fit(X[::3], noise)
     assert model.n_iter_ == len(model.validation_curve_) < 200
+    assert (tmp_path / "params.pt").exists()
+    # the weights of the best epoch
+    stored = torch.load(tmp_path / "params.pt", weights_only=True)
+    for name, tensor in model.net_.module_.state_dict().items():
+        assert torch.equal(tensor, stored[name])
+    assert len(model.net_.history) == 1 + int(np.argmin(model.validation_curve_))
     one = X["trajectory"] == 0
     assert model.fit(X[one], y[one]).n_iter_ > 0
     with pytest.raises(ValueError, match="too few"):
         model.fit(X[:1], y[:1])
+
+
+def test_parameters_named_as_in_skorch(log):
+    X, y = log
+    epochs = []
+
+    class Count(Callback):
+        def on_epoch_end(self, net, **kwargs):
+            epochs.append(net.history[-1, "train_loss"])
+
+    model = NDLRegressor(
+        **SMALL | {"max_epochs": 3},
+        callbacks=[("count", Count()), GradientNormClipping(1.0)],
+        optimizer=torch.optim.SGD,
+        optimizer__momentum=0.9,
+        module__dense_size=5,
+    )
+    search = GridSearchCV(model, {"optimizer__momentum": [0.0, 0.5]}, cv=TrajectoryKFold(2))
+    assert search.fit(X, y).best_params_["optimizer__momentum"] in (0.0, 0.5)
+    epochs.clear()
+    net = model.fit(X, y).net_
+    assert isinstance(net, NeuralNet) and net.initialized_ and len(net.history) == len(epochs) == 3
+    assert net.optimizer_.param_groups[0]["momentum"] == 0.9
+    assert net.module_.dense.out_features == net.get_params()["module__dense_size"] == 5
+    # predictions are those of the net: weights that are put into it count
+    before = model.predict(X)
+    with torch.no_grad():
+        net.module_.output.bias += 1.0
+    np.testing.assert_allclose(model.predict(X), before + model.output_scale_, rtol=1e-5)
+    again = pickle.loads(pickle.dumps(model))
+    np.testing.assert_array_equal(again.predict(X), model.predict(X))
+    assert again.net_.initialized_
+    with pytest.raises(TypeError, match="no parameter 'momentum'"):
+        NDLRegressor(momentum=0.9)
+    with pytest.raises(ValueError, match="no parameter 'layers'"):
+        NDLRegressor(module__layers=2).fit(X, y)
+
+
+def test_adamw_by_default_and_verbose(log, capsys):
+    model = LSTMRegressor(**SMALL | {"max_epochs": 2}, optimizer__weight_decay=0.0, verbose=1)
+    (group,) = model.fit(*log).net_.optimizer_.param_groups
+    assert (group["weight_decay"], group["betas"]) == (0.0, (0.8, 0.95))
+    assert "train_loss" in capsys.readouterr().out
+
+
+def test_shuffled_rows_are_sorted_with_a_warning(log):
+    X, y = log
+    model = LSTMRegressor(**SMALL | {"max_epochs": 2})
+    expected = model.fit(X, y).predict(X)
+    order = np.random.default_rng(0).permutation(len(X))
+    with pytest.warns(LeakageWarning, match="predicts a row from the rows before it"):
+        shuffled = clone(model).fit(X.iloc[order], y[order])
+    np.testing.assert_array_equal(shuffled.predict(X), expected)
+    np.testing.assert_array_equal(shuffled.predict(X.iloc[order]), expected[order])
 
 
 def test_tables_pipelines_and_searches(log):

@@ -6,12 +6,15 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn.base import clone
+from sklearn.model_selection import GroupKFold
 from sklearn.utils.estimator_checks import parametrize_with_checks
+from skorch.callbacks import Checkpoint, EarlyStopping
 
 from skidyn._columns import Columns
 from skidyn._keys import Keys
 from skidyn.datasets import load_planar_arm
 from skidyn.identification import RBDRegressor
+from skidyn.model_selection import LeakageWarning
 from skidyn.neural_network import SDLRegressor
 from skidyn.robots import Robot
 
@@ -157,7 +160,8 @@ def test_falls_back_on_the_rigid_body_far_from_the_data(arm_log, residual):
 
 def test_contract_of_columns_and_storage(arm_log):
     robot, X, y = arm_log
-    model = fitted(arm_log, max_epochs=2, early_stopping=True, resample="trajectory")
+    stop = EarlyStopping(patience=1)
+    model = fitted(arm_log, max_epochs=3, callbacks=[stop], resample="trajectory")
     expected = model.predict(X)
     np.testing.assert_array_equal(pickle.loads(pickle.dumps(model)).predict(X), expected)
     shuffled = X[X.columns[::-1]]
@@ -198,3 +202,34 @@ def test_physics_may_be_a_file(arm_log, tmp_path):
     path.write_text((files("skidyn.datasets") / "robots" / "planar_arm.urdf").read_text())
     _, X, y = arm_log
     assert fitted((None, X, y), str(path), max_epochs=1, cv=None).predict(X).shape == y.shape
+
+
+def test_groups_and_lists_of_splits(arm_log):
+    robot, X, y = arm_log
+    groups, cv = X["trajectory"].to_numpy() // 2, GroupKFold(2)
+    model = SDLRegressor(robot, cv=cv, max_epochs=1, random_state=0).fit(X, y, groups=groups)
+    given = clone(model).set_params(cv=list(cv.split(X, y, groups))).fit(X, y)
+    np.testing.assert_array_equal(given.predict(X), model.predict(X))
+
+
+def test_net_and_callbacks_of_skorch(arm_log, tmp_path):
+    robot, X, y = arm_log
+    stop = EarlyStopping(patience=1, threshold=0.5, threshold_mode="rel")
+    best = Checkpoint(dirname=tmp_path, load_best=True)
+    model = fitted(arm_log, max_epochs=50, callbacks=[stop, best], module__dropout=0.0)
+    assert model.n_iter_ < 50 and len(model.net_.history) <= model.n_iter_
+    assert len(model.learned_weight_) == 2  # held-out copies write no checkpoints of their own
+    stored = (tmp_path / "history.json").read_text()
+    assert stored.count("valid_loss_best") == len(model.net_.history)
+    assert model.net_.module_.core.dropout.share == 0.0
+
+
+def test_shuffled_rows_are_sorted_with_a_warning(arm_log):
+    robot, X, y = arm_log
+    X = X.assign(time=np.tile(np.arange(150) * 0.02, 8))
+    model = SDLRegressor(robot, max_epochs=1, hidden_size=4, random_state=0)
+    expected = model.fit(X, y).predict(X)
+    order = np.random.default_rng(0).permutation(len(X))
+    with pytest.warns(LeakageWarning, match="SDLRegressor predicts a row from the rows before it"):
+        shuffled = clone(model).fit(X.iloc[order], y[order])
+    np.testing.assert_allclose(shuffled.predict(X.iloc[order]), expected[order], atol=1e-9)

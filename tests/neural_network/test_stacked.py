@@ -9,10 +9,7 @@ from skidyn.neural_network._stacked import StackedNetwork
 
 @pytest.fixture(params=[0, 4], ids=["plain", "dense"])
 def networks(request):
-    members = [LSTMNetwork(3, 2, 5, request.param, 0.0, window=4) for _ in range(3)]
-    for seed, network in enumerate(members):
-        network.initialise(seed, torch.device("cpu"))
-    return members
+    return [LSTMNetwork(3, 2, 4, 5, request.param, seed=seed) for seed in range(3)]
 
 
 def test_outputs_and_gradients_are_those_of_torch(networks):
@@ -45,10 +42,8 @@ def test_each_network_can_be_taken_out_again(networks):
 
 
 def test_members_drop_units_of_their_own():
-    members = [LSTMNetwork(3, 2, 5, 8, 0.5, window=1) for _ in range(2)]
-    for network in members:
-        network.initialise(7, torch.device("cpu"))
-    members[1].dropout.generator.manual_seed(8)
+    members = [LSTMNetwork(3, 2, 1, 5, 8, 0.5, seed=7) for _ in range(2)]
+    members[1].dropout.seed = 8
     stacked = StackedNetwork(members)
     x = torch.ones(2, 4, 3, 3)
     assert not torch.equal(*stacked(x))
