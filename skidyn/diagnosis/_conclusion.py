@@ -55,7 +55,7 @@ def conclude(
     notes: list[str],
     least_drop: float,
     model: Any,
-    data: tuple[Any, Any],
+    data: tuple[Any, ...],
 ) -> Diagnosis:
     """Put the result of a search into a diagnosis.
 

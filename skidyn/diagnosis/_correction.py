@@ -71,7 +71,7 @@ class CorrectedRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         tags.target_tags.multi_output = True
         return tags
 
-    def fit(self, X: Any, y: Any) -> CorrectedRegressor:
+    def fit(self, X: Any, y: Any, sample_weight: Any = None) -> CorrectedRegressor:
         """Fit a copy of the regressor, then the effects to its residual.
 
         Parameters
@@ -80,17 +80,20 @@ class CorrectedRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             Motion, with time.
         y : array-like of shape (n_samples, n_joints)
             Torque, N m or N.
+        sample_weight : array-like of shape (n_samples,), default=None
+            Weight of every sample.
 
         Returns
         -------
         CorrectedRegressor
         """
         if not hasattr(self.regressor, "fit"):
-            return self.fit_effects(X, y)
-        self.regressor_ = clone(self.regressor, safe=False).fit(X, y)
-        return self._fit_effects(X, y)
+            return self.fit_effects(X, y, sample_weight)
+        weights = {} if sample_weight is None else {"sample_weight": sample_weight}
+        self.regressor_ = clone(self.regressor, safe=False).fit(X, y, **weights)
+        return self._fit_effects(X, y, sample_weight)
 
-    def fit_effects(self, X: Any, y: Any) -> CorrectedRegressor:
+    def fit_effects(self, X: Any, y: Any, sample_weight: Any = None) -> CorrectedRegressor:
         """Fit the effects to the residual of the fitted regressor as it is.
 
         Parameters
@@ -99,20 +102,22 @@ class CorrectedRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             Motion, with time.
         y : array-like of shape (n_samples, n_joints)
             Torque, N m or N.
+        sample_weight : array-like of shape (n_samples,), default=None
+            Weight of every sample.
 
         Returns
         -------
         CorrectedRegressor
         """
         self.regressor_ = self.regressor
-        return self._fit_effects(X, y)
+        return self._fit_effects(X, y, sample_weight)
 
-    def _fit_effects(self, X: Any, y: Any) -> CorrectedRegressor:
+    def _fit_effects(self, X: Any, y: Any, sample_weight: Any) -> CorrectedRegressor:
         torque = np.asarray(y, dtype=float)
         self._one_output = torque.ndim == 1
         self.effect_terms_ = make_terms(self.effects, self.robot.n_joints)
         self.__dict__.pop("recordings_", None)
-        problem = self._problem(X, torque.reshape(len(torque), -1))
+        problem = self._problem(X, torque.reshape(len(torque), -1), sample_weight)
         self.coef_ = np.zeros(0)
         if self.effect_terms_:
             self.coef_ = problem.fit(self.effect_terms_, passes=3).coefficients
@@ -150,7 +155,7 @@ class CorrectedRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         }
         return read_signals(X, torque, self.robot, **keys)
 
-    def _problem(self, X: Any, torque: Array) -> Problem:
+    def _problem(self, X: Any, torque: Array, weight: Any = None) -> Problem:
         own = self._own(X)
         signals, torque = self._signals(X, torque)
         if hasattr(self, "recordings_") and named_recordings(self.effect_terms_):
@@ -162,6 +167,7 @@ class CorrectedRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             rigid_body=False,
             terms=self.effect_terms_,
             subtract_urdf=False,
+            weight=None if weight is None else np.asarray(weight, dtype=float),
         )
         s = problem.signals
         load = self.robot.inverse_dynamics(s.q, s.dq, s.ddq)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from sklearn.base import clone
+from sklearn.utils.validation import _check_sample_weight
 from threadpoolctl import threadpool_limits
 
 from skidyn._columns import ColumnSpec
@@ -55,6 +56,7 @@ def diagnose(
     smooth: bool = True,
     settings: Settings | None = None,
     force: bool = False,
+    sample_weight: Any = None,
 ) -> Diagnosis:
     """Compare a model with measurements and learn which physical effects it lacks.
 
@@ -85,6 +87,8 @@ def diagnose(
     force : bool, default=False
         Go on although the log is certainly not what it claims
         (:func:`skidyn.measurement.check_measurement`).
+    sample_weight : array-like of shape (n_samples,), optional
+        Weight of every sample in all fits; those of weight 0 are left out.
 
     Returns
     -------
@@ -122,6 +126,7 @@ def diagnose(
             smooth,
             settings or Settings(),
             force,
+            sample_weight,
         )
         if opened.outer:
             diagnosis.opened = opened
@@ -141,6 +146,7 @@ def _diagnose(
     smooth: bool,
     settings: Settings,
     force: bool,
+    sample_weight: Any,
 ) -> Diagnosis:
     robot = robot if robot is not None else getattr(model, "robot", None)
     if robot is None:
@@ -156,6 +162,11 @@ def _diagnose(
         rate=rate,
         to_derive=smooth,
     )
+    weight = None
+    if sample_weight is not None:
+        weight = _check_sample_weight(
+            sample_weight, torque, dtype=np.float64, ensure_non_negative=True
+        )
     kinds = list_effects() if effects is None else list(effects)
     checks = check_measurement(Measurement(signals, torque, robot, robot.joint_names))
     if not force:
@@ -177,9 +188,10 @@ def _diagnose(
             rigid_body=getattr(model, "parameters", "identified") == "identified",
             terms=own_terms(model, robot, X, tau),
             smooth=smooth,
+            weight=weight,
         )
     else:
-        problem = _residual_problem(signals, residual, robot, smooth, settings)
+        problem = _residual_problem(signals, residual, robot, smooth, settings, weight)
     _check_rows(problem)
     steady = not {check.check for check in checks} & UNSTEADY
     result = search(problem, kinds, settings, vibration=steady)
@@ -187,7 +199,8 @@ def _diagnose(
     limits = _limits(problem, result, completed, settings)
     sliding = problem.rows.sliding
     least = settings.least_drop
-    diagnosis = conclude(wider, completed, limits, sliding, torque, notes, least, model, (X, tau))
+    data = (X, tau) if weight is None else (X, tau, weight)
+    diagnosis = conclude(wider, completed, limits, sliding, torque, notes, least, model, data)
     diagnosis.checks = checks
     kept = {c.site for h in diagnosis.result.findings for c in h.candidates}
     found = [c for h in completed.findings for c in h.candidates]
@@ -240,7 +253,12 @@ def _is_rigid_body_regressor(model: Any) -> bool:
 
 
 def _residual_problem(
-    signals: Signals, residual: Array, robot: Robot, smooth: bool, settings: Settings
+    signals: Signals,
+    residual: Array,
+    robot: Robot,
+    smooth: bool,
+    settings: Settings,
+    weight: Array | None,
 ) -> Problem:
     """Problem of a residual that some fitted model has left.
 
@@ -257,6 +275,7 @@ def _residual_problem(
             terms=terms,
             smooth=smooth,
             subtract_urdf=False,
+            weight=weight,
         )
 
     friction = ["viscous", "coulomb"]

@@ -98,6 +98,8 @@ class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     [None, 'stribeck']
     """
 
+    __metadata_request__fit = {"sample_weight": True, "groups": True}
+
     def __init__(
         self,
         estimator: Any,
@@ -124,7 +126,7 @@ class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         tags.target_tags.multi_output = True
         return tags
 
-    def fit(self, X: Any, y: Any, groups: Any = None) -> EffectSearchCV:
+    def fit(self, X: Any, y: Any, sample_weight: Any = None, groups: Any = None) -> EffectSearchCV:
         """Search for missing effects and fit the better model.
 
         Parameters
@@ -133,6 +135,9 @@ class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             Motion, with time and trajectory.
         y : array-like of shape (n_samples, n_joints)
             Torque, N m or N.
+        sample_weight : array-like of shape (n_samples,), default=None
+            Weight of every sample in all fits, as :class:`~skidyn.identification.RBDRegressor`
+            takes it; scores count all samples alike.
         groups : array-like of shape (n_samples,), default=None
             Groups of the rows for a `cv` that splits by groups.
 
@@ -149,7 +154,13 @@ class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
                 "as the last step of a Pipeline. diagnose(model, ...) judges any fitted regressor"
             )
         self.diagnosis_: Diagnosis = diagnose(
-            model, X, y, effects=self.effects, smooth=self.smooth, settings=self.settings
+            model,
+            X,
+            y,
+            effects=self.effects,
+            smooth=self.smooth,
+            settings=self.settings,
+            sample_weight=sample_weight,
         )
         findings = self.diagnosis_.findings
         self.best_effects_ = [t for f in findings for t in f.terms]
@@ -158,12 +169,15 @@ class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         if names is not None:
             self.feature_names_in_ = np.asarray(names, dtype=object)
         prefix = "".join(f"{pipeline.steps[-1][0]}__" for pipeline in opened.outer)
-        self._score_steps(X, y, groups, f"{prefix}effects", list(opened.model.effects))
+        weights = {} if sample_weight is None else {f"{prefix}sample_weight": sample_weight}
+        self._score_steps(X, y, groups, weights, f"{prefix}effects", list(opened.model.effects))
         if self.refit:
             self.best_estimator_ = self.diagnosis_.model
         return self
 
-    def _score_steps(self, X: Any, y: Any, groups: Any, name: str, start: list[Any]) -> None:
+    def _score_steps(
+        self, X: Any, y: Any, groups: Any, weights: dict[str, Any], name: str, start: list[Any]
+    ) -> None:
         """Scores of the models along the history, as scikit-learn's searches hold them."""
         history, findings = self.diagnosis_.history, self.diagnosis_.findings
         # One model a step, with the effects found up to it; what was added in several at once last.
@@ -188,6 +202,7 @@ class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
                     cv=folds,
                     scoring=self.scorer_,
                     n_jobs=self.n_jobs,
+                    params=weights,
                 )
                 for own in params
             ]

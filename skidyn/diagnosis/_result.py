@@ -98,7 +98,7 @@ class Diagnosis:
     limits: list[Limit]
     warnings: list[str]
     base_model: Any = field(repr=False)
-    data: tuple[Any, Any] = field(repr=False)
+    data: tuple[Any, ...] = field(repr=False)
     problem: Problem = field(repr=False)
     result: SearchResult = field(repr=False)
     predictable: Array = field(repr=False, default_factory=lambda: np.zeros(0))

@@ -118,6 +118,8 @@ class HybridRegressor(CallbackSupportMixin, MetaEstimatorMixin, RegressorMixin, 
     [False, True]
     """
 
+    __metadata_request__fit = {"sample_weight": True, "groups": True}
+
     _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
         "physics": [HasMethods(["fit", "predict"])],
         "learner": [HasMethods(["fit", "predict"]), None],

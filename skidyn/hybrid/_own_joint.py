@@ -75,6 +75,8 @@ class OwnJointRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     (50, 2)
     """
 
+    __metadata_request__fit = {"sample_weight": True}
+
     _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
         "estimator": [HasMethods(["fit", "predict"]), None],
         "presliding": ["array-like"],

@@ -172,6 +172,9 @@ class RBDRegressor(Results, RegressorMixin, BaseEstimator):
     True
     """
 
+    # With metadata routing on, weights that reach this model are for its fit.
+    __metadata_request__fit = {"sample_weight": True}
+
     def __init__(
         self,
         robot: Robot | str | os.PathLike[str],

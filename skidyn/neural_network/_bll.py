@@ -119,7 +119,7 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     ((200, 2), (200, 2))
     """
 
-    __metadata_request__fit = {"sample_weight": True}
+    __metadata_request__fit = {"sample_weight": True, "groups": True}
 
     _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
         "estimator": [HasMethods(["fit", "predict"]), None],

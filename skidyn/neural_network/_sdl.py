@@ -165,6 +165,7 @@ class SDLRegressor(SequenceRegressor):
     }
 
     _module = _JointNetwork
+    __metadata_request__fit = {"sample_weight": True, "groups": True}
 
     def __init__(
         self,
