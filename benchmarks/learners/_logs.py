@@ -25,7 +25,7 @@ from skidyn.preprocessing import ButterworthFilter, TimeDerivative
 from skidyn.robots import Robot
 
 Array = NDArray[np.float64]
-Run = tuple[Array, Array, Array | None, Array]
+Run = tuple[Array, Array, Array, Array]
 
 #: Published current gains of the UR10e, N m/A (De Luca's set; see the data's README).
 UR10E_GAIN = np.array([14.87, 13.26, 11.13, 10.62, 11.03, 11.47])
@@ -85,21 +85,18 @@ def urdf(*path: str) -> Robot:
 def table(
     runs: list[Run], rate: float, cutoff: float, keep_every: int
 ) -> tuple[pd.DataFrame, Array]:
-    """Runs (t, q, dq or None, tau) on a regular clock, low-passed, differentiated, thinned."""
+    """Runs (t, q, dq, tau) on a regular clock, low-passed, differentiated, thinned."""
     frames, torques = [], []
     for number, (t, q, dq, tau) in enumerate(runs):
         t, first = np.unique(t, return_index=True)
         clock = np.arange(t[0], t[-1], 1.0 / rate)
-        given = {"q": q, "tau": tau} | ({} if dq is None else {"dq": dq})
         frame = pd.DataFrame({"trajectory": number, "time": clock})
-        for signal in ("q", "dq", "tau"):
-            for j, column in enumerate(given.get(signal, np.empty((len(q), 0)))[first].T):
-                frame[f"{signal}{j + 1}"] = np.interp(clock, t, column)
+        for name, signal in (("q", q), ("dq", dq), ("tau", tau)):
+            for j, column in enumerate(signal[first].T):
+                frame[f"{name}{j + 1}"] = np.interp(clock, t, column)
         smooth = ButterworthFilter(cutoff).set_output(transform="pandas").fit_transform(frame)
         torque = smooth.filter(regex=r"^tau\d+$")
         motion = smooth.drop(columns=torque.columns)
-        if dq is None:
-            motion = TimeDerivative().set_output(transform="pandas").fit_transform(motion)
         motion = TimeDerivative().set_output(transform="pandas").fit_transform(motion)
         inside = slice(int(0.2 * rate), -int(0.2 * rate), keep_every)  # ends of the filter
         frames.append(motion[inside])
@@ -112,17 +109,18 @@ def runs_of(z: dict[str, Array], torque: str = "tau") -> list[Run]:
     found = []
     for k in np.unique(z["traj"]):
         rows = np.flatnonzero(z["traj"] == k)
-        dq = z["dq"][rows] if "dq" in z else None
-        found.append((z["t"][rows], z["q"][rows], dq, z[torque][rows]))
+        t, q = z["t"][rows], z["q"][rows]
+        dq = z["dq"][rows] if "dq" in z else np.gradient(q, t, axis=0)
+        found.append((t, q, dq, z[torque][rows]))
     return found
 
 
 def moving(run: Run) -> Run:
     """From the first to the last motion: how long a robot rested says nothing of a model."""
     t, q, dq, tau = run
-    speed = np.abs(np.gradient(q, t, axis=0) if dq is None else dq).max(axis=1)
+    speed = np.abs(dq).max(axis=1)
     rows = slice(*(np.flatnonzero(speed > 0.02)[[0, -1]] + [0, 1]))
-    return t[rows], q[rows], None if dq is None else dq[rows], tau[rows]
+    return t[rows], q[rows], dq[rows], tau[rows]
 
 
 def blocks(X: pd.DataFrame, n_blocks: int, n_folds: int) -> tuple[pd.DataFrame, NDArray[np.int64]]:
@@ -159,7 +157,8 @@ def panda() -> Log:
 def emps() -> Log:
     """One prismatic axis with a ball screw; 12 blocks of one recording in three folds."""
     z = recordings("emps", "emps.npz")
-    X, y = table([(z["t"], z["q"], None, z["tau"])], 1000.0, 30.0, 10)
+    dq = np.gradient(z["q"], z["t"], axis=0)
+    X, y = table([(z["t"], z["q"], dq, z["tau"])], 1000.0, 30.0, 10)
     X, fold = blocks(X, 12, 3)
     robot = Robot.from_urdf(
         '<robot name="emps"><link name="base"/><link name="carriage"><inertial><mass value="95"/>'

@@ -176,9 +176,12 @@ class OwnJointRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         return own if order is None else [table[np.argsort(order)] for table in own]
 
     def _keys(self) -> Keys:
-        columns = self._columns
+        names = getattr(self, "feature_names_in_", None)
         return resolve_keys(
-            None, self.n_features_in_, trajectory=columns.trajectory, time=columns.time
+            None if names is None else list(names),
+            self.n_features_in_,
+            trajectory=self.trajectory,
+            time=self.time,
         )
 
     def predict(self, X: Any) -> Array:

@@ -19,7 +19,7 @@ from sklearn.multioutput import MultiOutputRegressor
 from sklearn.neural_network import MLPRegressor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
-from sklearn.utils import check_random_state, get_tags
+from sklearn.utils import check_random_state
 from sklearn.utils.validation import (
     _check_sample_weight,
     check_is_fitted,
@@ -261,14 +261,10 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             inputs, honest = _member_mean(self.bagging_, X), np.ones(len(X), dtype=bool)
         self.n_stacked_ = int(honest.sum())
         head = RidgeCV() if self.final_estimator is None else clone(self.final_estimator)
-        inner = getattr(head, "regressor", None) or head  # TransformedTargetRegressor does not tell
-        if y.ndim == 2 and not get_tags(inner).target_tags.multi_output:
-            head = MultiOutputRegressor(head)
-        for name in ("random_state", "estimator__random_state"):
-            if name in head.get_params():
-                head.set_params(**{name: int(rng.randint(2**31 - 1))})
+        if "random_state" in head.get_params():
+            head.set_params(random_state=int(rng.randint(2**31 - 1)))
         weight = None if sample_weight is None else sample_weight[honest]
-        self.final_estimator_ = _fit(head, inputs[honest], y[honest], weight)
+        self.final_estimator_ = _fit_head(head, inputs[honest], y[honest], weight)
         return self
 
     def _train(
@@ -371,6 +367,19 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         return (torque, members.std(axis=0)) if return_std else torque
 
 
+def _fit_head(head: Any, X: Array, y: Array, weight: Array | None) -> Any:
+    """Fitted meta-regressor, once for each output where it takes no more than one.
+
+    Tags do not tell: MLPRegressor takes several outputs and says that it does not.
+    """
+    try:
+        return _fit(head, X, y, weight)
+    except ValueError:
+        if y.ndim == 1:
+            raise
+        return _fit(MultiOutputRegressor(clone(head)), X, y, weight)
+
+
 def _with_skorch_members(member: Any) -> Any:
     """A member in which nets of skorch, alone or as a part, take tables of double precision."""
     if isinstance(member, NeuralNet):
@@ -382,8 +391,9 @@ def _with_skorch_members(member: Any) -> Any:
 def _fit(estimator: Any, X: Any, y: Any, sample_weight: Array | None) -> Any:
     if sample_weight is None:
         return estimator.fit(X, y)
-    if not has_fit_parameter(estimator, "sample_weight"):
-        raise ValueError(f"{type(estimator).__name__} takes no sample_weight; fit without it.")
+    inner = estimator.estimator if isinstance(estimator, MultiOutputRegressor) else estimator
+    if not has_fit_parameter(inner, "sample_weight"):
+        raise ValueError(f"{type(inner).__name__} takes no sample_weight; fit without it.")
     return estimator.fit(X, y, sample_weight=sample_weight)
 
 

@@ -114,10 +114,11 @@ class WindowSet(torch.utils.data.Dataset[Any]):
 class WindowLoader:
     """Batches of windows, gathered at once instead of sample by sample.
 
-    A batch holds one batch of every member, or that of the only one. All members have equally many
-    batches, so that one with fewer windows has smaller ones, filled up with windows that do not
-    count. For training (``generators`` given, one a member) the windows come in random order, and
-    each pass cuts the log at another phase, so that no alignment of the windows is learned.
+    A batch holds one batch of every member, or that of the only one. There are as many batches as
+    all windows of the log make, so that what a member sees does not depend on the others: one with
+    fewer windows has smaller batches, filled up with windows that do not count. For training
+    (``generators`` given, one a member) the windows come in random order, and each pass cuts the
+    log at another phase, so that no alignment of the windows is learned.
     """
 
     def __init__(
@@ -138,7 +139,7 @@ class WindowLoader:
             cut = data.cut(member, phase)
             cuts.append(cut if generator is None else generator.permutation(cut))
         lengths = np.array([len(cut) for cut in cuts])[:, None]
-        n_batches = -(-lengths.max() // self.batch_size)
+        n_batches = min(-(-len(data) // self.batch_size), lengths.max())
         edges = np.arange(n_batches + 1) * lengths // n_batches
         size = np.diff(edges).max()
         padded = np.zeros((data.n_members, lengths.max() + size, 3), dtype=np.int64)

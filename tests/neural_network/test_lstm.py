@@ -28,6 +28,16 @@ SEQUENCE = {
 }
 
 
+class Recorder(Callback):
+    """A user's own callback."""
+
+    def on_train_begin(self, net, **kwargs):
+        self.losses = []
+
+    def on_epoch_end(self, net, **kwargs):
+        self.losses.append(net.history[-1, "train_loss"])
+
+
 @parametrize_with_checks(
     [
         LSTMRegressor(
@@ -128,23 +138,17 @@ def test_early_stopping_and_checkpoint_of_skorch(kind, log, tmp_path):
 
 def test_parameters_named_as_in_skorch(log):
     X, y = log
-    epochs = []
-
-    class Count(Callback):
-        def on_epoch_end(self, net, **kwargs):
-            epochs.append(net.history[-1, "train_loss"])
-
     model = NDLRegressor(
         **SMALL | {"max_epochs": 3},
-        callbacks=[("count", Count()), GradientNormClipping(1.0)],
+        callbacks=[("recorder", Recorder()), GradientNormClipping(1.0)],
         optimizer=torch.optim.SGD,
         optimizer__momentum=0.9,
         module__dense_size=5,
     )
     search = GridSearchCV(model, {"optimizer__momentum": [0.0, 0.5]}, cv=TrajectoryKFold(2))
     assert search.fit(X, y).best_params_["optimizer__momentum"] in (0.0, 0.5)
-    epochs.clear()
     net = model.fit(X, y).net_
+    epochs = dict(net.callbacks_)["recorder"].losses
     assert isinstance(net, NeuralNet) and net.initialized_ and len(net.history) == len(epochs) == 3
     assert net.optimizer_.param_groups[0]["momentum"] == 0.9
     assert net.module_.dense.out_features == net.get_params()["module__dense_size"] == 5
