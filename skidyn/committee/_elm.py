@@ -43,8 +43,11 @@ class ELMCommittee(RegressorMixin, BaseEstimator):
     n_hidden : int, default=500
         Hidden units of each member.
     p : float in (0, 1], default=0.5
-        Strength of the data against the prior: the ridge is ``(1 - p) / p`` on the mean second
-        moment of the activations.
+        Strength of the data against the prior: the ridge is ``(1 - p) / p`` on the covariance of the
+        activations.
+    fit_intercept : bool, default=True
+        Learn about the means of activations and torque, which the ridge then does not shrink. False
+        takes mean second moments as they are, as eq. 4 of [1]_ does.
     scaling : {"standard", "minmax", None}, default="standard"
         Scaling of the inputs before the random layer, fixed by the first call of ``fit`` or
         ``partial_fit``; None takes them as they are.
@@ -64,13 +67,20 @@ class ELMCommittee(RegressorMixin, BaseEstimator):
     coef_ : ndarray of shape (n_estimators, n_hidden, n_outputs), N m (N if prismatic)
         Weights of the output layers.
     intercept_ : ndarray of shape (n_estimators, n_outputs), N m (N if prismatic)
-        Outputs are learned about their mean, which the ridge does not shrink.
+        Mean torque less that of the activations; zero without `fit_intercept`.
     n_samples_seen_ : float
         Rows learned, or sum of their weights.
     n_features_in_ : int
         Columns of X.
     feature_names_in_ : ndarray of str
         Their names, where X has names.
+
+    Notes
+    -----
+    With the hidden activations :math:`h` and the torque :math:`\\tau` each member's output layer is
+    :math:`W = (\\operatorname{cov}(h, h) + \\frac{1 - p}{p} I)^{-1} \\operatorname{cov}(h, \\tau)`. Eq. 4 of
+    [1]_ has means of products in place of covariances (and prints :math:`E[\\tau \\tau^T]` where only
+    :math:`E[h \\tau^T]` has the dimensions of the output layer).
 
     References
     ----------
@@ -97,6 +107,7 @@ class ELMCommittee(RegressorMixin, BaseEstimator):
         "n_estimators": [Interval(Integral, 1, None, closed="left")],
         "n_hidden": [Interval(Integral, 1, None, closed="left")],
         "p": [Interval(Real, 0, 1, closed="right")],
+        "fit_intercept": ["boolean"],
         "scaling": [StrOptions({"standard", "minmax"}), None],
         "n_jobs": [Integral, None],
         "trajectory": [str, Integral, None],
@@ -110,6 +121,7 @@ class ELMCommittee(RegressorMixin, BaseEstimator):
         *,
         n_hidden: int = 500,
         p: float = 0.5,
+        fit_intercept: bool = True,
         scaling: str | None = "standard",
         n_jobs: int | None = None,
         trajectory: ColumnSpec = "auto",
@@ -119,6 +131,7 @@ class ELMCommittee(RegressorMixin, BaseEstimator):
         self.n_estimators = n_estimators
         self.n_hidden = n_hidden
         self.p = p
+        self.fit_intercept = fit_intercept
         self.scaling = scaling
         self.n_jobs = n_jobs
         self.trajectory = trajectory
@@ -233,13 +246,17 @@ class ELMCommittee(RegressorMixin, BaseEstimator):
         n = self.n_samples_seen_
         moments = self._moments[k] / n
         h_mean, t_mean = moments[:size, size], moments[size, size + 1 :]
-        covariance = moments[:size, :size] - np.outer(h_mean, h_mean)
+        second, cross = moments[:size, :size], moments[:size, size + 1 :]
+        if self.fit_intercept:
+            second, cross = second - np.outer(h_mean, h_mean), cross - np.outer(h_mean, t_mean)
+        else:
+            cross = cross + np.outer(h_mean, self._origin)
         # the share of the trace only keeps the factorisation possible where p = 1
-        ridge = (1 - self.p) / self.p + 1e-10 * np.trace(covariance)
-        covariance[np.diag_indices_from(covariance)] += max(ridge, np.finfo(float).tiny)
-        cross = moments[:size, size + 1 :] - np.outer(h_mean, t_mean)
-        self.coef_[k] = linalg.solve(covariance, cross, assume_a="pos")
-        self.intercept_[k] = self._origin + t_mean - h_mean @ self.coef_[k]
+        ridge = (1 - self.p) / self.p + 1e-10 * np.trace(second)
+        second[np.diag_indices_from(second)] += max(ridge, np.finfo(float).tiny)
+        self.coef_[k] = linalg.solve(second, cross, assume_a="pos")
+        if self.fit_intercept:
+            self.intercept_[k] = self._origin + t_mean - h_mean @ self.coef_[k]
 
     def predict(self, X: Any, return_std: bool = False) -> Any:
         """Predict the torque as the mean of the members.

@@ -102,6 +102,8 @@ class SDLRegressor(SequenceRegressor):
         Folds, by trajectory (or by blocks of a single one) where it is a number, on which copies of
         the model are held out to find ``learned_weight_``. None trusts the network wholly and
         trains once, as does ``residual=False``.
+    fade_out : bool, default=True
+        Fade into the physical torque far from the training samples.
     dense_size : int, default=32
         Width of the fully connected layer.
     dropout : float, default=0.1
@@ -162,6 +164,7 @@ class SDLRegressor(SequenceRegressor):
         "physics": [Robot, RBDRegressor, str, PathLike],
         "rigid_body": [StrOptions({"joint", "frozen"})],
         "residual": ["boolean"],
+        "fade_out": ["boolean"],
     }
 
     _module = _JointNetwork
@@ -174,6 +177,7 @@ class SDLRegressor(SequenceRegressor):
         rigid_body: str = "joint",
         residual: bool = True,
         cv: Any = 3,
+        fade_out: bool = True,
         dense_size: int = 32,
         dropout: float = 0.1,
         **parameters: Any,
@@ -183,6 +187,7 @@ class SDLRegressor(SequenceRegressor):
         self.rigid_body = rigid_body
         self.residual = residual
         self.cv = cv
+        self.fade_out = fade_out
 
     def fit(self, X: Any, y: Any, sample_weight: Any = None, groups: Any = None) -> SDLRegressor:
         """Train the network and the physics, and find how much of what they learn to keep.
@@ -438,6 +443,8 @@ class SDLRegressor(SequenceRegressor):
             torque = rigid_body + output * self.output_scale_
         else:
             torque = output * self.output_scale_ + self.output_offset_
+        if not self.fade_out:
+            return self._weighted(X, torque)
         kept = fade(self._novelty(features))[:, None]
         return self._weighted(X, kept * torque + (1 - kept) * last_resort)
 

@@ -50,12 +50,15 @@ def test_partial_fit_is_exact(data, p):
     np.testing.assert_allclose(online.predict(X), committee.predict(X), rtol=1e-4, atol=1e-4)
 
 
-def test_output_layer_is_the_ridge_of_the_paper(data):
+@pytest.mark.parametrize("intercept", [True, False])
+def test_output_layer_is_the_ridge_of_the_paper(data, intercept):
     X, y = data
-    p = 0.999
-    committee = ELMCommittee(1, n_hidden=50, p=p, scaling=None, random_state=0).fit(X, y)
+    y, p = y + 3.0, 0.999
+    committee = ELMCommittee(
+        1, n_hidden=50, p=p, fit_intercept=intercept, scaling=None, random_state=0
+    ).fit(X, y)
     hidden = np.maximum(X @ committee.hidden_weights_[0] + committee.hidden_bias_[0], 0)
-    ridge = Ridge(alpha=len(X) * (1 - p) / p).fit(hidden, y)
+    ridge = Ridge(alpha=len(X) * (1 - p) / p, fit_intercept=intercept).fit(hidden, y)
     np.testing.assert_allclose(committee.predict(X), ridge.predict(hidden), rtol=1e-6, atol=1e-6)
 
 
