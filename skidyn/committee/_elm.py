@@ -28,7 +28,7 @@ LARGEST_SINGLE_PRECISION_P = 0.99
 
 
 class ELMCommittee(RegressorMixin, BaseEstimator):
-    """Committee of extreme learning machines, learned exactly in one pass or online.
+    r"""Committee of extreme learning machines, learned exactly in one pass or online.
 
     Each member has a random hidden layer of rectifiers that stays as it is; only the linear output
     layer is learned, by ridge regression on the hidden activations. All that the fit needs of the
@@ -43,8 +43,8 @@ class ELMCommittee(RegressorMixin, BaseEstimator):
     n_hidden : int, default=500
         Hidden units of each member.
     p : float in (0, 1], default=0.5
-        Strength of the data against the prior: the ridge is ``(1 - p) / p`` on the covariance of the
-        activations.
+        Strength of the data against the prior: the ridge is ``(1 - p) / p`` on the covariance of
+        the activations.
     fit_intercept : bool, default=True
         Learn about the means of activations and torque, which the ridge then does not shrink. False
         takes mean second moments as they are, as eq. 4 of [1]_ does.
@@ -77,10 +77,14 @@ class ELMCommittee(RegressorMixin, BaseEstimator):
 
     Notes
     -----
-    With the hidden activations :math:`h` and the torque :math:`\\tau` each member's output layer is
-    :math:`W = (\\operatorname{cov}(h, h) + \\frac{1 - p}{p} I)^{-1} \\operatorname{cov}(h, \\tau)`. Eq. 4 of
-    [1]_ has means of products in place of covariances (and prints :math:`E[\\tau \\tau^T]` where only
-    :math:`E[h \\tau^T]` has the dimensions of the output layer).
+    With the hidden activations :math:`h` and the torque :math:`\tau` each member's output layer is
+
+    .. math::
+
+        W = (\operatorname{cov}(h, h) + \tfrac{1 - p}{p} I)^{-1} \operatorname{cov}(h, \tau).
+
+    Eq. 4 of [1]_ has means of products in place of covariances, and prints :math:`E[\tau \tau^T]`
+    where only :math:`E[h \tau^T]` has the dimensions of the output layer.
 
     References
     ----------
