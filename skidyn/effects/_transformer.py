@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable
 from typing import Any
 
@@ -13,6 +14,7 @@ from sklearn.utils.validation import _check_feature_names_in, check_is_fitted, v
 
 from skidyn._columns import Columns, ColumnSpec, _key_column, resolve_columns
 from skidyn._exceptions import ColumnError, EffectError
+from skidyn._keys import Keys, resolve_keys
 from skidyn._signals import Array, signals_from
 from skidyn.effects._catalogue import make_terms
 from skidyn.effects._term import Term
@@ -111,7 +113,7 @@ class FrictionTransformer(TransformerMixin, BaseEstimator):
         """
         check_is_fitted(self)
         X = validate_data(self, X, reset=False, dtype=np.float64)
-        signals = signals_from(X, self.columns_)
+        signals = signals_from(X, self.columns_, to_derive=self.columns_.ddq is None)
         blocks = [t.torque_columns(signals)[t.joints[0]] for t in self.terms_]
         return np.hstack([X, *blocks])
 
@@ -140,6 +142,9 @@ class FrictionTransformer(TransformerMixin, BaseEstimator):
         given = getattr(self, "feature_names_in_", None)
         names = None if given is None else [str(name) for name in given]
         joints = self._joints(names, n_features)
+        keys = resolve_keys(names, n_features, trajectory=self.trajectory, time=self.time)
+        if names is None and self.n_joints is None and len(keys.features) % 3:
+            return _with_further_columns(keys)
         return resolve_columns(
             names, n_features, joints, trajectory=self.trajectory, time=self.time
         )
@@ -162,6 +167,26 @@ class FrictionTransformer(TransformerMixin, BaseEstimator):
                 f"n_joints={self.n_joints}, but X has the columns of {len(found)} joint(s)"
             )
         return found
+
+
+def _with_further_columns(keys: Keys) -> Columns:
+    """Columns by position of a table that is wider than the motion of its joints."""
+    own = keys.features
+    if len(own) < 2:
+        raise ColumnError(
+            f"X has {len(own)} feature(s); the motion of a joint is its position, velocity and "
+            "acceleration (q, dq, ddq)."
+        )
+    n = max(1, len(own) // 3)
+    ddq = own[2 * n : 3 * n] or None
+    warnings.warn(
+        f"X has {len(own)} columns without names, which is no multiple of 3: they are taken for q, "
+        f"dq{'' if ddq is None else ', ddq'} of {n} joint(s), and {max(0, len(own) - 3 * n)} "
+        "further column(s) handed on. Name the columns q1.., dq1.., ddq1.., or give n_joints.",
+        UserWarning,
+        stacklevel=4,
+    )
+    return Columns(own[:n], own[n : 2 * n], ddq, keys.trajectory, keys.time)
 
 
 def _refuse(term: Term, columns: Columns) -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from numbers import Integral
 from typing import Any, ClassVar
@@ -129,7 +130,8 @@ class OwnJointRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         X, y = validate_data(self, X, y, multi_output=True, y_numeric=True, dtype=np.float64)
         self._one_dimensional = y.ndim == 1
         targets = y.reshape(len(y), -1)
-        self._columns = self._resolve(targets.shape[1])
+        self._n_outputs = targets.shape[1]
+        self._columns = self._resolve(self._n_outputs)
         order_of_log(self, X, self._keys())
         base = _cautious_boosting() if self.estimator is None else self.estimator
         features = self._features(X)
@@ -144,9 +146,19 @@ class OwnJointRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         )
         return self
 
-    def _resolve(self, n_joints: int) -> Columns:
+    def _resolve(self, n_joints: int) -> Columns | None:
         names = getattr(self, "feature_names_in_", None)
         joints = self.joint_names
+        features = self._keys().features
+        if names is None and joints is None and len(features) != 3 * n_joints:
+            warnings.warn(
+                f"X has {len(features)} columns without names; the motion of {n_joints} joint(s) "
+                f"has {3 * n_joints} (q, dq, ddq). Every joint is learned from all columns, "
+                "without pre-sliding states.",
+                UserWarning,
+                stacklevel=4,
+            )
+            return None
         if joints is None:
             joints = [str(j + 1) for j in range(n_joints)]
         try:
@@ -164,6 +176,8 @@ class OwnJointRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
 
     def _features(self, X: Array) -> list[Array]:
         columns = self._columns
+        if columns is None:
+            return [X[:, list(self._keys().features)]] * self._n_outputs
         assert columns.ddq is not None
         keys = self._keys()
         order = time_order(X, keys)

@@ -96,6 +96,8 @@ class LSTMNetwork(nn.Module):
                 nn.init.orthogonal_(parameter, generator=generator)
             else:
                 nn.init.xavier_uniform_(parameter, generator=generator)
+        # torch's LSTM adds two biases; learned twice, a gate would move twice as fast as the rest
+        self.lstm.get_parameter("bias_hh_l0").requires_grad_(False)
         with torch.no_grad():
             self.lstm.get_parameter("bias_ih_l0")[hidden_size : 2 * hidden_size] = 1.0
 
