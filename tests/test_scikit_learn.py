@@ -1,0 +1,321 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Every estimator inside scikit-learn's own tools gives the numbers of a hand-written loop."""
+
+import pickle
+import warnings
+
+import numpy as np
+import pandas as pd
+import pytest
+import sklearn
+from sklearn.base import clone
+from sklearn.compose import TransformedTargetRegressor
+from sklearn.ensemble import BaggingRegressor, StackingRegressor, VotingRegressor
+from sklearn.experimental import enable_halving_search_cv  # noqa: F401
+from sklearn.inspection import PartialDependenceDisplay, partial_dependence, permutation_importance
+from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.metrics import (
+    mean_absolute_error,
+    mean_squared_error,
+    r2_score,
+    root_mean_squared_error,
+)
+from sklearn.model_selection import (
+    GridSearchCV,
+    GroupKFold,
+    HalvingGridSearchCV,
+    LeaveOneGroupOut,
+    RandomizedSearchCV,
+    cross_val_predict,
+    cross_val_score,
+    cross_validate,
+    learning_curve,
+    train_test_split,
+)
+from sklearn.multioutput import MultiOutputRegressor
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import FunctionTransformer, StandardScaler
+
+import skidyn
+from skidyn.committee import ELMCommittee
+from skidyn.diagnosis import EffectSearchCV
+from skidyn.effects import FrictionTransformer
+from skidyn.hybrid import HybridRegressor, OwnJointRegressor
+from skidyn.identification import RBDRegressor
+from skidyn.model_selection import LeakageWarning, TrajectoryKFold
+from skidyn.neural_network import BLLRegressor, LSTMRegressor, NDLRegressor, SDLRegressor
+from skidyn.preprocessing import (
+    ButterworthFilter,
+    CurrentToTorque,
+    SignalScaler,
+    SmoothDerivatives,
+    TimeDerivative,
+)
+from skidyn.robots import Robot
+
+PENDULUM = Robot.from_urdf(
+    '<robot name="pendulum"><link name="base"/><link name="rod"><inertial>'
+    '<origin xyz="0.2 0 0"/><mass value="1.5"/>'
+    '<inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+    '<joint name="j1" type="revolute"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/>'
+    '<limit lower="-3" upper="3" effort="50" velocity="3"/></joint></robot>'
+)
+NET = {"window": 2, "hidden_size": 4, "max_epochs": 1, "random_state": 0}
+LSTM = LSTMRegressor(**NET)
+#: Each estimator, and a parameter to search.
+REGRESSORS = {
+    "RBD": (RBDRegressor(PENDULUM), {"parameters": ["identified", "nominal"]}),
+    "OwnJoint": (OwnJointRegressor(Ridge()), {"estimator__alpha": [0.1, 100.0]}),
+    "Hybrid": (HybridRegressor(RBDRegressor(PENDULUM), Ridge(), cv=2), {"alpha": [0.05, 1.0]}),
+    "ELM": (ELMCommittee(2, n_hidden=10, random_state=0), {"p": [0.5, 0.9]}),
+    "LSTM": (LSTM, {"hidden_size": [2, 4]}),
+    "NDL": (NDLRegressor(**NET, dense_size=3), {"optimizer__weight_decay": [0.0, 0.05]}),
+    "SDL": (SDLRegressor(PENDULUM, **NET, cv=2), {"residual": [True, False]}),
+    "BLL": (BLLRegressor(LSTM, n_estimators=2, random_state=0), {"estimator__window": [1, 2]}),
+}
+SCORERS = {
+    "r2": r2_score,
+    "neg_mean_absolute_error": lambda y, p: -mean_absolute_error(y, p),
+    "neg_mean_squared_error": lambda y, p: -mean_squared_error(y, p),
+    "neg_root_mean_squared_error": lambda y, p: -root_mean_squared_error(y, p),
+}
+SAME = {"rtol": 1e-9, "atol": 1e-9}
+
+
+def make_log(n_trajectories=4, n_rows=60):
+    """A pendulum with friction."""
+    t, frames = np.arange(n_rows) * 0.02, []
+    for k in range(n_trajectories):
+        speed = 2.0 + 0.7 * k
+        q, dq, ddq = np.sin(speed * t), speed * np.cos(speed * t), -(speed**2) * np.sin(speed * t)
+        frames.append(pd.DataFrame({"trajectory": k, "time": t, "q1": q, "dq1": dq, "ddq1": ddq}))
+    X = pd.concat(frames, ignore_index=True)
+    y = PENDULUM.inverse_dynamics(*(X[[s]].to_numpy() for s in ("q1", "dq1", "ddq1")))[:, 0]
+    noise = np.random.default_rng(0).normal(size=len(X))
+    return X, 1.2 * y + 0.5 * np.tanh(X["dq1"].to_numpy() / 0.05) + 0.05 * noise
+
+
+X, Y = make_log()
+GROUPS = X["trajectory"].to_numpy()
+SPLITS = list(GroupKFold(2).split(X, Y, GROUPS))
+
+
+@pytest.fixture(params=REGRESSORS)
+def model(request):
+    return clone(REGRESSORS[request.param][0])
+
+
+@pytest.fixture
+def grid(request, model):
+    return REGRESSORS[request.node.callspec.params["model"]][1]
+
+
+@pytest.fixture(autouse=True)
+def remarks():
+    """Two trajectories are few for a hybrid, and some of these tools shuffle rows."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "the learned part is left off")
+        warnings.simplefilter("ignore", LeakageWarning)
+        yield
+
+
+def by_hand(model, splits=SPLITS, score=r2_score):
+    """Scores of a plain loop over folds."""
+    return [
+        score(Y[test], clone(model).fit(X.iloc[train], Y[train]).predict(X.iloc[test]))
+        for train, test in splits
+    ]
+
+
+def test_cross_validate_with_four_scorers(model):
+    found = cross_validate(model, X, Y, groups=GROUPS, cv=GroupKFold(2), scoring=list(SCORERS))
+    fitted = [clone(model).fit(X.iloc[train], Y[train]) for train, _ in SPLITS]
+    for name, score in SCORERS.items():
+        expected = [
+            score(Y[test], m.predict(X.iloc[test]))
+            for m, (_, test) in zip(fitted, SPLITS, strict=True)
+        ]
+        np.testing.assert_allclose(found[f"test_{name}"], expected, **SAME)
+
+
+def test_leave_one_group_out_and_learning_curve(model):
+    cv = LeaveOneGroupOut()
+    scores = cross_val_score(model, X, Y, groups=GROUPS, cv=cv)
+    np.testing.assert_allclose(scores, by_hand(model, cv.split(X, Y, GROUPS)), **SAME)
+    sizes, _, scores = learning_curve(model, X, Y, cv=SPLITS, train_sizes=[0.5, 1.0])
+    assert len(sizes) == 2
+    half = [(train[: sizes[0]], test) for train, test in SPLITS]
+    np.testing.assert_allclose(scores, [by_hand(model, half), by_hand(model)], **SAME)
+
+
+def test_searches(model, grid):
+    (name, values), *_ = grid.items()
+    expected = [np.mean(by_hand(clone(model).set_params(**{name: value}))) for value in values]
+    every = {"cv": TrajectoryKFold(2), "refit": False}
+    search = GridSearchCV(model, grid, **every).fit(X, Y)
+    np.testing.assert_allclose(search.cv_results_["mean_test_score"], expected, **SAME)
+    search = RandomizedSearchCV(model, grid, n_iter=2, random_state=0, **every).fit(X, Y)
+    order = [values.index(p[name]) for p in search.cv_results_["params"]]
+    np.testing.assert_allclose(search.cv_results_["mean_test_score"], np.take(expected, order))
+    epochs = isinstance(model, LSTMRegressor | SDLRegressor)
+    limits = {"min_resources": 2, "max_resources": 4} if epochs else {"min_resources": 100}
+    resource = "max_epochs" if epochs else "n_samples"
+    halving = HalvingGridSearchCV(model, grid, resource=resource, factor=2, **limits, **every)
+    assert np.isfinite(halving.fit(X, Y).cv_results_["mean_test_score"]).all()
+
+
+def test_inside_other_estimators(model):
+    own = clone(model).fit(X, Y).predict(X)
+    other = LinearRegression().fit(X, Y)
+    np.testing.assert_allclose(
+        make_pipeline(FunctionTransformer(), model).fit(X, Y).predict(X), own
+    )
+    voting = VotingRegressor([("a", model), ("b", LinearRegression())]).fit(X, Y)
+    np.testing.assert_allclose(voting.predict(X), (own + other.predict(X)) / 2, **SAME)
+    stacking = StackingRegressor([("a", model)], LinearRegression(), cv=TrajectoryKFold(2))
+    held_out = cross_val_predict(model, X, Y, cv=SPLITS)[:, None]
+    expected = LinearRegression().fit(held_out, Y).predict(own[:, None])
+    np.testing.assert_allclose(stacking.fit(X, Y).predict(X), expected, **SAME)
+    scaled = TransformedTargetRegressor(model, transformer=StandardScaler()).fit(X, Y)
+    by_loop = clone(model).fit(X, (Y - Y.mean()) / Y.std()).predict(X) * Y.std() + Y.mean()
+    np.testing.assert_allclose(scaled.predict(X), by_loop, rtol=1e-6, atol=1e-6)
+    if not isinstance(model, RBDRegressor):  # one joint alone tells no bodies
+        many = MultiOutputRegressor(model).fit(X, np.c_[Y, 2 * Y])
+        np.testing.assert_allclose(many.predict(X)[:, 0], own, **SAME)
+
+
+def test_bagging(model):
+    position = {"trajectory": 0, "time": 1}  # it hands arrays down
+    named = {
+        n: position[n.rpartition("__")[2]]
+        for n in model.get_params()
+        if n.rpartition("__")[2] in position
+    }
+    bag = BaggingRegressor(clone(model).set_params(**named), 2, random_state=0)
+    table = X.to_numpy()
+    members = [member.predict(table) for member in bag.fit(table, Y).estimators_]
+    np.testing.assert_allclose(bag.predict(table), np.mean(members, axis=0), **SAME)
+
+
+def test_inspection(model):
+    model.fit(X, Y)
+    importance = permutation_importance(model, X, Y, n_repeats=1, random_state=0)
+    assert importance.importances.shape == (5, 1) and np.isfinite(importance.importances).all()
+    found = partial_dependence(model, X, ["q1"], grid_resolution=3)
+    expected = [model.predict(X.assign(q1=value)).mean() for value in found["grid_values"][0]]
+    np.testing.assert_allclose(found["average"][0], expected, **SAME)
+
+
+def test_shuffled_rows(model):
+    train, test, y_train, _ = train_test_split(X, Y, random_state=0)
+    assert np.isfinite(clone(model).fit(train, y_train).predict(test)).all()
+
+
+def test_copies_files_and_single_precision(model, tmp_path):
+    expected = model.fit(X, Y).predict(X)
+    np.testing.assert_array_equal(clone(model).fit(X, Y).predict(X), expected)
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(model)).predict(X), expected)
+    stored = skidyn.save_model(tmp_path / "model.skops", model)
+    np.testing.assert_allclose(skidyn.load_model(stored).predict(X), expected, **SAME)
+    polars = pytest.importorskip("polars").from_pandas(X)
+    np.testing.assert_allclose(model.predict(polars), expected, **SAME)
+    single = clone(model).fit(X.astype(np.float32), Y.astype(np.float32))
+    error = single.predict(X.astype(np.float32)) - expected
+    assert np.sqrt(np.mean(error**2)) < 0.05 * Y.std()
+
+
+def test_two_processes():
+    for name in ("RBD", "LSTM", "BLL"):
+        model = REGRESSORS[name][0]
+        scores = cross_val_score(model, X, Y, cv=SPLITS, n_jobs=2)
+        np.testing.assert_allclose(scores, by_hand(model), **SAME)
+
+
+def test_metadata_routing():
+    weight = np.random.default_rng(0).uniform(0.5, 1.5, len(X))
+    for name in ("RBD", "OwnJoint", "Hybrid", "ELM", "LSTM", "SDL"):
+        model = REGRESSORS[name][0]
+        if name == "ELM":
+            model = clone(model).set_params(p=0.9)
+        expected = [
+            r2_score(
+                Y[test],
+                clone(model)
+                .fit(X.iloc[train], Y[train], sample_weight=weight[train])
+                .predict(X.iloc[test]),
+            )
+            for train, test in SPLITS
+        ]
+        with sklearn.config_context(enable_metadata_routing=True):
+            routed = clone(model)
+            if name == "ELM":
+                routed.set_fit_request(sample_weight=True)
+            routed.set_score_request(sample_weight=False)
+            scores = cross_val_score(
+                make_pipeline(FunctionTransformer(), routed),
+                X,
+                Y,
+                cv=GroupKFold(2),
+                params={"sample_weight": weight, "groups": GROUPS},
+            )
+        np.testing.assert_allclose(scores, expected, **SAME)
+
+
+@pytest.mark.parametrize(
+    "transformer",
+    [
+        FrictionTransformer(),
+        ButterworthFilter(5.0),
+        TimeDerivative(),
+        SmoothDerivatives(),
+        SignalScaler(),
+        CurrentToTorque(101, 0.125),
+    ],
+    ids=lambda t: type(t).__name__,
+)
+@pytest.mark.parametrize("tables", ["pandas", "polars"])
+def test_transformers(transformer, tables, tmp_path):
+    pytest.importorskip(tables)
+    table = X[["q1"]] if isinstance(transformer, CurrentToTorque) else X
+    if isinstance(transformer, TimeDerivative | SmoothDerivatives):
+        table = X.drop(columns="ddq1")
+    plain = clone(transformer).fit_transform(table)
+    framed = clone(transformer).set_output(transform=tables).fit_transform(table)
+    assert list(framed.columns) == list(clone(transformer).fit(table).get_feature_names_out())
+    np.testing.assert_allclose(np.asarray(framed), np.asarray(plain), **SAME)
+    fitted = clone(transformer).fit(table)
+    stored = skidyn.save_model(tmp_path / "model.skops", fitted)
+    for copy in (pickle.loads(pickle.dumps(fitted)), skidyn.load_model(stored)):
+        np.testing.assert_allclose(np.asarray(copy.transform(table)), np.asarray(plain), **SAME)
+    pipeline = make_pipeline(transformer, Ridge())
+    scores = cross_val_score(pipeline, table, Y, cv=SPLITS)
+    expected = [
+        r2_score(
+            Y[test],
+            Ridge()
+            .fit(clone(transformer).fit_transform(table.iloc[train]), Y[train])
+            .predict(clone(transformer).fit(table.iloc[train]).transform(table.iloc[test])),
+        )
+        for train, test in SPLITS
+    ]
+    np.testing.assert_allclose(scores, expected, **SAME)
+
+
+def test_effect_search():
+    table, torque = make_log(6, 200)
+    torque = torque + 1.5 * table["q1"].to_numpy()
+    search = EffectSearchCV(RBDRegressor(PENDULUM), effects=("spring",), cv=2)
+    groups = table["trajectory"].to_numpy()
+    splits = list(GroupKFold(2).split(table, torque, groups))
+    fitted = [clone(search).fit(table.iloc[train], torque[train]) for train, _ in splits]
+    expected = [
+        r2_score(torque[test], m.predict(table.iloc[test]))
+        for m, (_, test) in zip(fitted, splits, strict=True)
+    ]
+    scores = cross_val_score(search, table, torque, groups=groups, cv=GroupKFold(2))
+    np.testing.assert_allclose(scores, expected, **SAME)
+    again = pickle.loads(pickle.dumps(fitted[0]))
+    np.testing.assert_allclose(again.predict(table), fitted[0].predict(table), **SAME)
+    assert fitted[0].best_params_["effects"] and fitted[0].cv_results_["rank_test_score"].min() == 1
+    model = fitted[0].best_estimator_
+    assert PartialDependenceDisplay.from_estimator(model, table, ["q1"], grid_resolution=3)
