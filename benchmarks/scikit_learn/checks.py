@@ -3,9 +3,10 @@
 
     python benchmarks/scikit_learn/checks.py
 
-The tests run ``check_estimator`` on every estimator (``pytest -k test_scikit_learn_contract``), with
-the checks that cannot hold listed there with their reasons; a listed check that holds is an error.
-This prints what they list, for the table in the user guide.
+The tests run scikit-learn's common checks on every estimator
+(``pytest -k test_scikit_learn_contract``), with the checks that cannot hold listed there with their
+reasons; a listed check that holds is an error. This prints what they list, for the table in the
+user guide.
 """
 
 from __future__ import annotations
@@ -47,7 +48,8 @@ def main() -> None:
         row = table.setdefault(key, [public, kind is not public, 0, {}])
         row[2] += 1
         name = getattr(check, "func", check).__name__
-        row[3] |= {name: mark.kwargs["reason"] for mark in marks}
+        for mark in marks:
+            row[3][name] = mark.kwargs["reason"]
     merged: dict[str, list[Any]] = {}
     for public, wrapped, count, failed in table.values():
         row = merged.setdefault(public.__name__, [public, wrapped, 0, {}])
