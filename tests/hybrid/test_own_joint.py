@@ -9,7 +9,6 @@ from sklearn.utils.estimator_checks import parametrize_with_checks
 from skidyn.effects import dahl_state
 from skidyn.hybrid import OwnJointRegressor
 
-
 MEMORY = {
     "check_methods_sample_order_invariance": "pre-sliding friction remembers the path of the joint",
     "check_methods_subset_invariance": "pre-sliding friction remembers the path of the joint",
