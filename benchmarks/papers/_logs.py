@@ -21,7 +21,6 @@ from skidyn.diagnosis import EffectSearchCV
 from skidyn.evidence import hysteresis_joints, sliding_samples
 from skidyn.identification import RBDRegressor
 from skidyn.model_selection import PhaseKFold, TrajectoryKFold, held_out_folds
-from skidyn.neural_network._physics import effect_columns
 from skidyn.preprocessing import ButterworthFilter, TimeDerivative
 from skidyn.robots import Robot
 
@@ -121,7 +120,8 @@ class RecordedLog:
             rigid = [self.low_pass(np.ascontiguousarray(joint))[self.kept] for joint in regressor]
             self.cache["rigid", cutoff] = np.stack(rigid, axis=1)
         own: list[list[Array]] = [[] for _ in range(self.robot.n_joints)]
-        for block in effect_columns(model, s):
+        torque = model.rigid_body_torque(s.q, s.dq, s.ddq)
+        for _, block in model._effects(s.with_(robot=model.robot_), torque):
             for joint, values in block.items():
                 own[joint].append(self.low_pass(values)[self.kept])
         effects = [np.concatenate(blocks, axis=1) for blocks in own]

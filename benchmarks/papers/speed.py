@@ -158,7 +158,7 @@ def tune(X: NDArray, y: NDArray, epochs: int) -> None:
         print(f"{title:12s} {told:40s} {np.mean(scores):.4f}", flush=True)
 
     for rate, decay in product((0.015, 0.03, 0.06), (0.02, 0.05, 0.1)):
-        score("BLL", ours, learning_rate=rate, weight_decay=decay)
+        score("BLL", ours, learning_rate=rate, optimizer__weight_decay=decay)
     for optimiser, rate in product(("Adam", "AdamW"), (0.01, 0.03, 0.05)):
         score(f"naive {optimiser}", Naive, optimiser, lr=rate)
 

@@ -34,7 +34,9 @@ PARAMETERS = """\
     optimizer : type of torch.optim.Optimizer or None, default=None
         None is AdamW with ``weight_decay=0.05``, which keeps a network from learning joints as
         functions of other joints, and ``betas=(0.8, 0.95)``, since torch's own want more steps than
-        a log of minutes gives. ``optimizer__weight_decay=0.0`` makes it plain Adam.
+        a log of minutes gives. ``optimizer__weight_decay=0.0`` makes it plain Adam: parameters
+        named as in skorch are taken as well, ``optimizer__...``, ``callbacks__...`` and
+        ``module__...`` (`hidden_size`, `dense_size` and `dropout` of the network).
     callbacks : list of skorch callbacks or None, default=None
         Such as ``EarlyStopping`` and ``Checkpoint``. Rows are held out for those that watch the
         validation loss, as these two do.
@@ -56,9 +58,6 @@ PARAMETERS = """\
     random_state : int, RandomState or None, default=None
         Draws initial weights, order of windows, dropout, held-out trajectories and bootstrap. An
         integer gives bit-equal results whatever the number of processes.
-    **skorch : dict
-        ``module__...`` for the network (`hidden_size`, `dense_size`, `dropout`), ``optimizer__...``
-        for the optimiser and ``callbacks__...`` for the callbacks, named as in skorch.
 """
 
 #: What every recurrent regressor has after a fit; the line ``{ATTRIBUTES}`` stands for it.
@@ -101,8 +100,10 @@ class SkorchParameters:
             signature = inspect.signature(own)
             merged = dict(signature.parameters)
             if merged.pop("parameters", None) is not None:
-                inherited = inspect.signature(cls.__mro__[1].__init__).parameters  # type: ignore[misc]
-                merged = {**merged, **{k: v for k, v in inherited.items() if k not in merged}}
+                base: Any = cls.__mro__[1]
+                for name, parameter in inspect.signature(base.__init__).parameters.items():
+                    if parameter.kind is not parameter.VAR_KEYWORD:
+                        merged.setdefault(name, parameter)
                 ordered = sorted(merged.values(), key=lambda parameter: parameter.kind)
                 own.__signature__ = signature.replace(parameters=ordered)
         if cls.__doc__:
