@@ -240,8 +240,6 @@ def test_metadata_routing():
             expected.append(r2_score(Y[test], fitted.predict(X.iloc[test])))
         with sklearn.config_context(enable_metadata_routing=True):
             routed = clone(model)
-            if name == "ELM":
-                routed.set_fit_request(sample_weight=True)
             routed.set_score_request(sample_weight=False)
             scores = cross_val_score(
                 make_pipeline(FunctionTransformer(), routed),

@@ -29,7 +29,7 @@ Run = tuple[Array, Array, Array, Array]
 
 #: Published current gains of the UR10e, N m/A (De Luca's set; see the data's README).
 UR10E_GAIN = np.array([14.87, 13.26, 11.13, 10.62, 11.03, 11.47])
-#: Reduction ratios of the EMPS and of other drives are in the data: torque is at the joint.
+#: Effects of the physics beside the rigid body.
 PLAIN = ("viscous", "coulomb", "offset", "rotor_inertia")
 
 

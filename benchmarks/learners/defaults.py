@@ -87,7 +87,7 @@ def models(log: Log) -> dict[str, Callable[[], Any]]:
         "effect search": lambda: EffectSearchCV(rbd()),
         "SDL(RBD)": lambda: SDLRegressor(rbd(), random_state=0),
         "hybrid, own joints": lambda: HybridRegressor(rbd()),
-        "hybrid, boosting": lambda: HybridRegressor(rbd(), boosting()[1:][0]),
+        "hybrid, boosting": lambda: HybridRegressor(rbd(), boosting()[-1]),
         "hybrid, ELM": lambda: HybridRegressor(rbd(), ELMCommittee(random_state=0)),
         "hybrid, LSTM": lambda: HybridRegressor(rbd(), LSTMRegressor(random_state=0)),
         "hybrid, BLL": lambda: HybridRegressor(rbd(), BLLRegressor(random_state=0)),
@@ -100,9 +100,7 @@ def held_out_error(log: Log, make: Callable[[], Any]) -> float:
     """Mean over the joints of RMSE over standard deviation, on rows that were held out."""
     squares = np.zeros(log.y.shape)
     for train, test in log.splits():
-        y = log.y if log.y.shape[1] > 1 else log.y[:, 0]
-        y = log.y
-        model = make().fit(log.X.iloc[train], y[train])
+        model = make().fit(log.X.iloc[train], log.y[train])
         predicted = np.reshape(model.predict(log.X.iloc[test]), (len(test), -1))
         squares[test] = (log.y[test] - predicted) ** 2
     return float(np.mean(np.sqrt(squares.mean(axis=0)) / log.y.std(axis=0)))

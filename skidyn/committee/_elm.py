@@ -107,6 +107,8 @@ class ELMCommittee(RegressorMixin, BaseEstimator):
     True
     """
 
+    __metadata_request__fit = {"sample_weight": True}
+
     _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
         "n_estimators": [Interval(Integral, 1, None, closed="left")],
         "n_hidden": [Interval(Integral, 1, None, closed="left")],

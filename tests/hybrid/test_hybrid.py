@@ -22,7 +22,7 @@ from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from skidyn._compat import CallbackSupportMixin, FitProgress
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
-from skidyn.hybrid import HybridRegressor
+from skidyn.hybrid import HybridRegressor, OwnJointRegressor
 from skidyn.hybrid._gate import learned_weights
 from skidyn.hybrid._hybrid import _honest_residuals
 from skidyn.identification import RBDRegressor
@@ -34,7 +34,12 @@ FEATURES = ["q1", "q2", "dq1", "dq2"]  # what learners without key columns see
 TREES = ExtraTreesRegressor(15, min_samples_leaf=5, random_state=0)
 
 
-@parametrize_with_checks([HybridRegressor(Ridge(), ExtraTreesRegressor(10, random_state=0), cv=3)])
+@parametrize_with_checks(
+    [
+        HybridRegressor(Ridge(), learner, cv=3)
+        for learner in (ExtraTreesRegressor(10, random_state=0), OwnJointRegressor(Ridge()))
+    ]
+)
 def test_scikit_learn_contract(estimator, check):
     check(estimator)
 
