@@ -180,6 +180,7 @@ def _diagnose(
     if not once.all():
         signals, torque = signals.take(once), torque[once]
         residual = None if residual is None else residual[once]
+        weight = None if weight is None else weight[once]
     if residual is None:
         problem = make_problem(
             signals,

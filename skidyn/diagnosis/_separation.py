@@ -384,7 +384,7 @@ def _recognised(
 
 def _position_noise(diagnosis: Diagnosis) -> Array:
     """Noise of the logged positions: what the smoother takes off, (n_joints,), rad or m."""
-    model, (X, tau) = diagnosis.base_model, diagnosis.data
+    model, (X, tau, *_) = diagnosis.base_model, diagnosis.data
     robot = diagnosis.problem.robot
     assert robot is not None
     raw, _ = read_signals(
