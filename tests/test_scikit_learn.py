@@ -247,6 +247,7 @@ def test_metadata_routing():
                 Y,
                 cv=GroupKFold(2),
                 params={"sample_weight": weight, "groups": GROUPS},
+                error_score="raise",
             )
         np.testing.assert_allclose(scores, expected, **SAME)
 
