@@ -15,6 +15,7 @@ from sklearn.experimental import enable_halving_search_cv  # noqa: F401
 from sklearn.inspection import PartialDependenceDisplay, partial_dependence, permutation_importance
 from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.metrics import (
+    make_scorer,
     mean_absolute_error,
     mean_squared_error,
     r2_score,
@@ -240,13 +241,13 @@ def test_metadata_routing():
             expected.append(r2_score(Y[test], fitted.predict(X.iloc[test])))
         with sklearn.config_context(enable_metadata_routing=True):
             routed = clone(model)
-            routed.set_score_request(sample_weight=False)
             scores = cross_val_score(
                 make_pipeline(FunctionTransformer(), routed),
                 X,
                 Y,
                 cv=GroupKFold(2),
                 params={"sample_weight": weight, "groups": GROUPS},
+                scoring=make_scorer(r2_score).set_score_request(sample_weight=False),
                 error_score="raise",
             )
         np.testing.assert_allclose(scores, expected, **SAME)
