@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -56,24 +55,6 @@ def has_one_motion(trajectory: NDArray[Any], time: Array) -> bool:
 def time_order(X: NDArray[Any], keys: Keys) -> NDArray[np.intp] | None:
     """Order of the rows by trajectory and time; None where they are in it, or have no time."""
     return order_in_time(keys.trajectories(X), None if keys.time is None else X[:, keys.time])
-
-
-def order_of_log(estimator: Any, X: NDArray[Any], keys: Keys) -> NDArray[np.intp] | None:
-    """The same for a fit, with a warning where rows are shuffled."""
-    from skidyn.model_selection import LeakageWarning
-
-    order = time_order(X, keys)
-    if order is not None:
-        warnings.warn(
-            f"{type(estimator).__name__} predicts a row from the rows before it, but the rows of X "
-            "are not in the order of time, as after train_test_split or KFold(shuffle=True). They "
-            "are sorted by trajectory and time; rows whose predecessors are missing are predicted "
-            "without them. Hold out whole trajectories: TrajectoryKFold, GroupKFold or "
-            "GroupShuffleSplit, and resource='max_epochs' in HalvingGridSearchCV",
-            LeakageWarning,
-            stacklevel=4,
-        )
-    return order
 
 
 def taken(table: Any, order: NDArray[np.intp] | None) -> Any:

@@ -24,8 +24,9 @@ from skidyn._columns import Columns, ColumnSpec, resolve_columns
 from skidyn._compat import HasMethods, fit_context
 from skidyn._exceptions import ColumnError
 from skidyn._keys import Keys, resolve_keys
-from skidyn._order import order_of_log, taken, time_order
+from skidyn._order import taken, time_order
 from skidyn.effects import dahl_state
+from skidyn.model_selection import order_of_log
 
 Array = NDArray[np.float64]
 

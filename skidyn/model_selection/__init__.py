@@ -15,4 +15,5 @@ __all__ = [
 ]
 
 # For other packages of skidyn; no part of the public interface.
+from skidyn.model_selection._shuffled import order_of_log as order_of_log
 from skidyn.model_selection._split import held_out_folds as held_out_folds

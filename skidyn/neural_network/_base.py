@@ -27,7 +27,8 @@ from skidyn._compat import (
     fit_progress,
 )
 from skidyn._keys import Keys, resolve_keys
-from skidyn._order import order_of_log, taken, time_order
+from skidyn._order import taken, time_order
+from skidyn.model_selection import order_of_log
 from skidyn.neural_network._engine import (
     Network,
     Plan,

@@ -31,8 +31,8 @@ from skorch import NeuralNet
 from skidyn._columns import ColumnSpec
 from skidyn._compat import HasMethods, Interval, StrOptions, fit_context
 from skidyn._keys import Keys, resolve_keys
-from skidyn._order import order_of_log, taken, time_order
-from skidyn.model_selection import held_out_folds
+from skidyn._order import taken, time_order
+from skidyn.model_selection import held_out_folds, order_of_log
 from skidyn.neural_network._base import SequenceRegressor, deferred_training, train_together
 from skidyn.neural_network._lstm import LSTMRegressor
 from skidyn.neural_network._skorch_member import SkorchMember
