@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Waves in time of any frequency that the log resolves, and of any form, are told by their clock."""
+"""Waves in time of any frequency that the log resolves, of any form, are told by their clock."""
 
 from __future__ import annotations
 
