@@ -44,8 +44,6 @@ class Measurement:
         Robot as its description says; checks that need it are left out without it.
     joint_names : sequence of str
         Names for sentences and remedies.
-    leaps : ndarray of int
-        Rows to which positions leap; trajectories are taken to end there.
     unsigned, delay, readable, stale, scaled : optional
         What checks found that others want to know; filled in by them.
 
@@ -68,6 +66,7 @@ class Measurement:
     readable: bool = field(default=True, repr=False)
     stale: bool = field(default=False, repr=False)
     scaled: bool = field(default=False, repr=False)
+    #: Rows to which positions leap; trajectories are taken to end there.
     leaps: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
