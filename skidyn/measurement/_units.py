@@ -83,7 +83,8 @@ class ClockUnit(Check):
         value = float(f"{shared if best == 'q' else 1 / shared:.6g}")
         doubt = "" if told else "; it may as well be that of velocities or positions"
         return self.suspicion(
-            f"the scale of {what[best]} is off by a factor of {1 / value:.4g}",
+            "velocity is not the derivative of the position: the scale of "
+            f"{what[best]} is off by a factor of {1 / value:.4g}",
             f"integrated velocities are {shared:.4g} times the positions they lead to, alike in "
             f"all joints{doubt}",
             "certain" if told else "suspected",
