@@ -52,7 +52,7 @@ def test_two_reports(here, capsys, tmp_path):
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        (["log.csv"], "--urdf wants"),
+        (["log.csv"], "--urdf is missing"),
         (["a.json"], "two reports"),
         ([*LOG, "--html", "x.html"], "are for two"),
     ],
