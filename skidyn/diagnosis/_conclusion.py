@@ -122,7 +122,7 @@ def conclude(
     )
     smooth = away_from_reversals(problem, result.fit.residual, sliding)
     # On a joint with a finding, what is large in places is the trace of its imperfect formula.
-    taken = {j - 1 for f in findings for j in f.joints}
+    taken = {j for h in result.findings for c in h.candidates for j in c.rows}
     share_held = np.array([np.inf if j in taken else EPISODE_LEAST_HELD for j in range(len(rmse))])
     episodes, inside = find_episodes(problem, smooth, least, share_held)
     if episodes:
@@ -303,7 +303,9 @@ def _held_out(
         return held_out_residual(problem, rest, result.fit.sigma, keep)
     torque = problem.torque - result.ripple
     held = held_out_residual(replace_torque(problem, torque), rest, result.fit.sigma, keep)
-    for hypothesis in (h for h in result.findings if h.torque is not None):
+    for hypothesis in result.findings:
+        if hypothesis.torque is None:
+            continue
         for t in (c.term for c in hypothesis.candidates if c.term in waves):
             own = np.zeros_like(torque)
             own[:, t.joints[0]] = hypothesis.torque[:, t.joints[0]]

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import norm, t as student
 
 from skidyn._signals import Array
@@ -89,7 +90,7 @@ class Gates:
     settings: Settings
     n_tests: int
     free: int
-    counts: Array
+    counts: NDArray[np.int64]
     whiteness: Array
     earlier: Array
 

@@ -121,6 +121,8 @@ class Explorer:
         self, joint: int, trajectory: int | None = None, time: float | None = None
     ) -> dict[str, Any]:
         span = None
+        if trajectory is not None:
+            self.session.check_place(int(joint), int(trajectory))
         if time is not None and trajectory is not None:
             span = self.session.stretch(int(joint), int(trajectory), float(time))
         effects = self.session.ranked(int(joint), trajectory, span)

@@ -74,7 +74,10 @@ def is_held(torque: np.ndarray, moved: np.ndarray) -> np.ndarray:
     same = same[:, changing]
     together = np.all(same, axis=1) & moved
     share, single = together.sum() / moved.sum(), same[moved].mean(axis=0)
-    if share > HELD and share > AT_ONCE * single.max():
+    # Joints that hold for reasons of their own do so together now and then.
+    by_chance = float(np.prod(single))
+    at_once = share - by_chance > 0.5 * (float(single.min()) - by_chance)
+    if share > HELD and share > AT_ONCE * single.max() and at_once:
         again[1:] = together
     return again
 
@@ -179,6 +182,8 @@ def find_leaps(q: np.ndarray, time: np.ndarray, trajectory: np.ndarray) -> np.nd
     far &= ~(turns & (np.abs(moved) > np.pi))
     kept = []
     for row in np.flatnonzero(far.any(axis=1) & together):
+        if trajectory[max(0, row - 4)] != trajectory[min(n - 1, row + 5)]:
+            continue  # too close to the end of a trajectory for two parts
         stay, held = [], []
         for k in np.flatnonzero(far[row]):
             before, after = q[max(0, row - 4) : row + 1, k], q[row + 1 : row + 6, k]

@@ -149,8 +149,8 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
         if _without_gravity(fits, reading, here):
             # identified bodies make up for what is left of it
             restored = _restored_gain(fits, absent.reading)
-            tied = any(c.kind == "gravity" and c.gain > absent.gain - TIED for c in judged)
-            if tied and restored < LEAST:
+            another = any(c.kind == "gravity" and c.gain > absent.gain - TIED for c in judged)
+            if another and restored < LEAST:
                 return replace(absent, rivals=("gravity",))  # along it no joint feels a change
             return replace(absent, restorable=restored > 0)
     accepted = []
@@ -169,8 +169,8 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
         plain &= NEEDED[change.kind] < 0 or (change.kind == "zero" and _carries(fits, change))
         if strong and (plain or confirmed >= NEEDED[change.kind]):
             alike = [c for c in judged if c.kind != change.kind and _same_place(c, change)]
-            tied = max(TIED, RIVALS * change.gain)
-            rivals = tuple(dict.fromkeys(c.kind for c in alike if change.gain - c.gain < tied))
+            within = max(TIED, RIVALS * change.gain)
+            rivals = tuple(dict.fromkeys(c.kind for c in alike if change.gain - c.gain < within))
             accepted.append(replace(change, confirmed=confirmed, rivals=rivals))
     # both are likelihoods of the same torque; turning all of it round changes nothing identified
     if not accepted:

@@ -314,8 +314,9 @@ def train(
 
 def weights_of(module: nn.Module) -> list[Weights]:
     """Weights of each network of a module."""
-    together = isinstance(module, StackedNetwork | Members)
-    return module.arrays() if together else [to_arrays(module)]
+    if isinstance(module, StackedNetwork | Members):
+        return module.arrays()
+    return [to_arrays(module)]
 
 
 def networks_of(module: nn.Module, networks: Sequence[Network]) -> list[nn.Module]:

@@ -348,6 +348,8 @@ def _estimate(runs: Runs, link: str, notes: list[str], com: Array | None = None)
     shares, share_std = _by_joint(designs, runs, body)
     notes = notes + _disagreement(shares, share_std)
     before, after = _loaded_errors(designs, runs, solution, width)
+    robot = runs.problem.robot
+    assert robot is not None
     common: dict[str, Any] = {
         "std": std,
         "link": link,
@@ -357,7 +359,7 @@ def _estimate(runs: Runs, link: str, notes: list[str], com: Array | None = None)
         "first_moment_interval": moments,
         "by_joint": shares,
         "by_joint_std": share_std,
-        "joint_names": tuple(runs.problem.robot.joint_names),
+        "joint_names": tuple(robot.joint_names),
         "units": tuple("N" if slides else "N m" for slides in runs.problem.signals.prismatic),
     }
     if is_open[0]:

@@ -117,7 +117,7 @@ def test_runs_of_the_double_pendulum_become_trajectories(site, tmp_path):
 
     frame = pendulum.frame
     assert pendulum.licence == "BSD-3-Clause"
-    assert list(frame["trajectory"].unique()) == [0, 1]
+    assert list(frame["trajectory"].unique()) == [1, 2]
     for name, source in {"q2": "pos_meas2", "dq1": "vel_meas1", "tau2": "tau_meas2"}.items():
         column = table[:, 1 + names.index(source)]
         np.testing.assert_allclose(frame[name][:300], column)
