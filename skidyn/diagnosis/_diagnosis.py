@@ -222,7 +222,8 @@ def _limits(
     correlated = correlation_time(problem, fit.residual, everywhere)
     _, n_blocks = time_blocks(problem, max(SHORTEST_BLOCK, CORRELATION_TIMES * correlated))
     gain = sum((h.gain for h in result.findings), np.zeros(problem.n_joints))
-    earlier = np.asarray(counts * np.expm1(np.maximum(gain, 0.0) / np.maximum(counts, 1)))
+    share = np.expm1(np.maximum(np.asarray(gain, dtype=float), 0.0) / np.maximum(counts, 1))
+    earlier = np.asarray(counts * share, dtype=np.float64)
     gates = Gates(settings, result.n_tests, n_blocks - 1, counts, _whiteness(problem, fit), earlier)
     return find_limits(problem, result.candidates, blocks, fit.noise, result.inflation, gates)
 

@@ -182,7 +182,8 @@ def find_leaps(q: np.ndarray, time: np.ndarray, trajectory: np.ndarray) -> np.nd
     far &= ~(turns & (np.abs(moved) > np.pi))
     kept = []
     for row in np.flatnonzero(far.any(axis=1) & together):
-        if trajectory[max(0, row - 4)] != trajectory[min(n - 1, row + 5)]:
+        ends = np.array([max(0, row - 4), min(n - 1, row + 5)], dtype=np.intp)
+        if np.ptp(np.unique(trajectory[ends], return_inverse=True)[1]):
             continue  # too close to the end of a trajectory for two parts
         stay, held = [], []
         for k in np.flatnonzero(far[row]):

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from skidyn._signals import Array
-from skidyn.measurement._fits import _PLAIN, Fits, Outcome, Reading, friction
+from skidyn.measurement._fits import Fits, Outcome, Reading, friction
 
 #: Log-likelihood, after the likeness of neighbouring rows is taken off, that a change must gain.
 LEAST = 15.0
@@ -32,9 +32,6 @@ NEEDED = {
 }
 #: What a change must gain beside the one that gains most, as a share.
 BESIDE = 0.3
-#: Multiples of the torque of stated bodies, and their least share of it, where no identified bodies
-#: can confirm a zero.
-USUAL, HEAVY = (0.6, 1.7), 0.4
 #: Share of gravity that a compensated torque may still hold: bodies are known to so much.
 LEFT_OVER = 0.4
 #: Least share of a joint's spread that the new reading must take away.
@@ -166,7 +163,8 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
             continue  # something else explains far more
         plain = change.gain >= OVERWHELMING and change.drop >= HALF
         # any zero of a last joint is that of another body, which identified bodies are free to be
-        plain &= NEEDED[change.kind] < 0 or (change.kind == "zero" and _carries(fits, change))
+        zero = change.kind == "zero" and _is_all(fits, change, before)
+        plain &= NEEDED[change.kind] < 0 or zero
         if strong and (plain or confirmed >= NEEDED[change.kind]):
             alike = [c for c in judged if c.kind != change.kind and _same_place(c, change)]
             within = max(TIED, RIVALS * change.gain)
@@ -224,15 +222,19 @@ def _climbed(change: Change, likelihood: Callable[[Reading], float], degrees: fl
     return replace(change, reading=reading(angle))
 
 
-def _carries(fits: Fits, change: Change) -> bool:
-    """Whether stated bodies, about as they are, make much of the torque of a joint so read."""
+#: Share of a zero's gain that identified bodies may still gain over it on its joint.
+UNEXPLAINED = 0.1
+
+
+def _is_all(fits: Fits, change: Change, identified: Outcome) -> bool:
+    """Whether stated bodies and another zero do what identified bodies do without it.
+
+    Bodies that are not those stated look like another zero of their joint, but leave more.
+    """
     (joint,) = change.joints
-    column, sign = fits.torque_column(change.reading, joint)
-    gain = float(fits.nominal(change.reading).gain[column])
-    use = fits.moving[:, column]
-    own = gain * fits.columns(replace(change.reading, **_PLAIN))[use, 0, joint]
-    whole = sign * fits.average(fits.torque[:, column])[use]
-    return bool(USUAL[0] < gain < USUAL[1] and np.std(own) > HEAVY * np.std(whole))
+    column, _ = fits.torque_column(change.reading, joint)
+    left = float(identified.margin(fits.nominal(change.reading))[column])
+    return left <= UNEXPLAINED * change.gain
 
 
 def _same_place(one: Change, other: Change) -> bool:
