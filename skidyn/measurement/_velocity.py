@@ -82,14 +82,17 @@ class Velocity(Check):
             )
         every = len(joints) == measurement.n_joints
         if cause in ("scale", "other"):
+            what = f"the velocity of {names} is not the derivative of the position"
+            if cause == "other":
+                return self.suspicion(what, evidence, "suspected", joints)
             pairs = {f"dq{k + 1}": float(f"{1 / measurement.velocities[k][0]:.4g}") for k in joints}
             words = ",".join(f"{name}={value:g}" for name, value in pairs.items())
             return self.suspicion(
-                f"the velocity of {names} is not the derivative of the position",
-                evidence + ("; it is at another scale" if cause == "scale" else ""),
+                what,
+                f"{evidence}; it is at another scale",
                 "suspected",
                 joints,
-                (f"--gain {words}", f"gain={pairs}") if cause == "scale" else None,
+                (f"--gain {words}", f"gain={pairs}"),
             )
         quantity, unit = cause.split("=")
         units = {quantity: unit} if every else {f"{quantity}{k + 1}": unit for k in joints}
