@@ -49,6 +49,15 @@ def digits(value: float) -> str:
     return f"{value:.{decimals}f}"
 
 
+def times(ratio: float) -> str:
+    """A ratio in words, such as ``"2.1 times"``; beyond a thousand its digits tell nothing.
+
+    >>> times(2.13), times(325497.0)
+    ('2.1 times', 'more than 1000 times')
+    """
+    return "more than 1000 times" if ratio > 1000 else f"{digits(ratio)} times"
+
+
 def raised(unit: str) -> str:
     """Unit with its powers as they are printed."""
     return unit.replace("^2", "²").replace("^3", "³")

@@ -52,15 +52,15 @@ def run(options: argparse.Namespace) -> None:
     say("4. Added and fitted again; held-out error of the joints that were wrong:")
     for row in story["joints"]:
         if row["speaks"]:
-            say(f"   {row['joint']} {row['name']}: {row['text']}")
-    say("   and while these joints move on the trajectories put aside:")
+            say(f"   {row['name']} (joint {row['joint']}): {row['text']}")
+    say("   On the trajectories put aside, while these joints move:")
     moves = abs(X_new[[f"dq{j + 1}" for j in range(log.robot.n_joints)]].to_numpy()) > MOVING
     before = rmse_per_joint(model.fit(X, y), X_new, y_new, moves)
     after = rmse_per_joint(diagnosis.model, X_new, y_new, moves)
     for row in story["joints"]:
         if row["speaks"]:
             a, b = (digits(errors[row["joint"] - 1]) for errors in (before, after))
-            say(f"   {row['joint']} {row['name']}: {a} → {b} {row['unit']}")
+            say(f"   {row['name']} (joint {row['joint']}): {a} → {b} {row['unit']}")
     write_reports(diagnosis, None, options.html, {"log": "simulated by skidyn demo"})
     page = str(Path(options.html).resolve())
     if options.json:

@@ -8,10 +8,12 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from skidyn._text import digits
+from skidyn._text import digits, joints_told, listed
 
-#: Columns of a bar.
-BAR = 24
+#: Columns of a bar, and of the name of a joint with its number.
+BAR, NAME = 24, 28
+#: Joints for which it is told where their error lies.
+TOLD = 3
 
 
 def story_lines(story: Mapping[str, Any], failures: Sequence[Any] = ()) -> Iterator[str]:
@@ -43,16 +45,30 @@ def story_lines(story: Mapping[str, Any], failures: Sequence[Any] = ()) -> Itera
         yield "What is missing"
     for k, line in enumerate(story["findings"], 1):
         size = f": {line['size']}" if line["size"] else ""
-        yield f"  {k}. {line['what']} on {line['where']}{size}"
         when = f"; it acts {line['when']}" if line.get("when") else ""
-        yield f"     {line['change']}; {line['sure']}{when}"
-    if failures:
-        yield ""
-        yield "Where it fails"
-    for failure in failures[:3]:
-        yield f"  {failure.sentence}"
+        yield f"  {k}. {line['what']} on {line['where']}{size}; {line['sure']}{when}"
+    yield from where_lines(failures)
     yield ""
     yield story["left"]
+
+
+def where_lines(failures: Sequence[Any]) -> Iterator[str]:
+    """In which part of its motion each joint exceeds its noise, a line each."""
+    if failures:
+        yield ""
+        yield "Where the error above the noise lies"
+    apart = [failure for failure in failures if failure.places]
+    for failure in apart[:TOLD]:
+        places = listed(
+            [
+                f"{p.share_of_excess:.0%} {p.where} ({p.share_of_time:.0%} of the time)"
+                for p in failure.places
+            ]
+        )
+        yield f"  joint {failure.joint}: {places}"
+    even = sorted(failure.joint for failure in failures if not failure.places)
+    if even:
+        yield f"  {joints_told(even)}: spread over the whole motion"
 
 
 def joint_lines(story: Mapping[str, Any]) -> Iterator[str]:
@@ -61,8 +77,8 @@ def joint_lines(story: Mapping[str, Any]) -> Iterator[str]:
     rows.sort(key=lambda row: -row["ratios"][0] if row["ratios"][0] == row["ratios"][0] else 0.0)
     known = [ratio for row in rows for ratio in row["ratios"] if ratio == ratio]
     largest = max([1.5, *known])
-    names = [f"{row['joint']} {row['name']}" for row in rows]
-    width = min(max(map(len, names), default=5), 28)
+    names = [_name(row) for row in rows]
+    width = max(map(len, names), default=5)
     added = bool(story["findings"])
     heads = ["before", "after", "noise"] if added else ["error", "noise"]
     wide = shutil.get_terminal_size().columns >= width + 10 * len(heads) + BAR + 10
@@ -73,9 +89,16 @@ def joint_lines(story: Mapping[str, Any]) -> Iterator[str]:
         cells = "".join(f"{digits(value):>9s}" for value in values)
         drawn = f"   {bar(row['ratios'], largest)}" if wide else ""
         worse = "  worse" if row["state"] == "worse" else ""
-        yield f"  {name[:width]:{width}s}{cells} {row['unit']:3s}{drawn}{worse}"
+        yield f"  {name:{width}s}{cells} {row['unit']:3s}{drawn}{worse}"
     if story["quiet"] and rows != list(story["joints"]):
         yield f"  {story['quiet']}"
+
+
+def _name(row: Mapping[str, Any]) -> str:
+    """A joint by its name, shortened where it is long, and its number."""
+    name, number = str(row["name"]), f" ({row['joint']})"
+    room = NAME - len(number)
+    return (name if len(name) <= room else name[: room - 3] + "...") + number
 
 
 def bar(ratios: Sequence[float], largest: float) -> str:

@@ -168,7 +168,10 @@ def _diagnose(
             sample_weight, torque, dtype=np.float64, ensure_non_negative=True
         )
     kinds = list_effects() if effects is None else list(effects)
-    checks = check_measurement(Measurement(signals, torque, robot, robot.joint_names))
+    identified = getattr(model, "parameters", "identified") == "identified"
+    checks = check_measurement(
+        Measurement(signals, torque, robot, robot.joint_names, identified=identified)
+    )
     if not force:
         refuse_certain(checks)
     notes = [str(check) for check in checks]
@@ -186,7 +189,7 @@ def _diagnose(
             signals,
             torque,
             robot=robot,
-            rigid_body=getattr(model, "parameters", "identified") == "identified",
+            rigid_body=identified,
             terms=own_terms(model, robot, X, tau),
             smooth=smooth,
             weight=weight,

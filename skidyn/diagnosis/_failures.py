@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from skidyn._signals import Array
-from skidyn._text import digits, listed
+from skidyn._text import digits, listed, times
 from skidyn.diagnosis._comparison import Comparison, regimes
 
 #: A joint fails where its error on judged rows exceeds the noise by this factor: logs without an
@@ -180,7 +180,7 @@ def find_failures(comparison: Comparison, noise: ArrayLike) -> list[Failure]:
         places = _places(comparison, j, float(levels[j]))
         name, unit = comparison.joint_names[j], comparison.units[j]
         sentence = (
-            f"{name} (joint {j + 1}): error {digits(rmse)} {unit}, {ratio:.2g} times its noise of "
+            f"{name} (joint {j + 1}): error {digits(rmse)} {unit}, {times(ratio)} its noise of "
             f"{digits(levels[j])} {unit}. {_told(places)}"
         )
         found.append(Failure(j + 1, name, float(rmse), float(levels[j]), ratio, places, sentence))

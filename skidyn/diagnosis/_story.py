@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from skidyn._text import digits, fall, inside, joints_told, listed, raised
+from skidyn._text import digits, fall, inside, joints_told, listed, raised, times
 from skidyn.diagnosis._failures import FAILS
 from skidyn.diagnosis._findings import rival_title
 
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 #: An error that changes by less than this share is the same.
 SAME = 0.02
-#: Confidence below which a name is a guess.
-SURE = 0.9
+#: Confidence below which a name is doubtful, and below which it is a guess.
+SURE, GUESS = 0.9, 0.5
 #: Parameters in one line, by the number of joints that have their own.
 TOLD = {1: 3, 2: 2, 3: 1}
 #: Joints whose sizes stand in one line.
@@ -130,11 +130,15 @@ def _verdict(
         open_ends = (
             f"; part of the error on {joints_told(material)} is not explained" if material else ""
         )
+        best = max(lines, key=lambda line: line["fell"])
+        top = f"{_brief(best['what'])} on {best['where']}"
+        if named and not nameless and all(line["guess"] for line in lines):
+            joints = sorted({joint for line in lines for joint in line["joints"]})
+            text = f"Something is missing on {joints_told(joints)}; best guess: {top}{open_ends}"
+            return "?", text, "No name is sure: more or other motion would tell."
         if len(lines) <= SHORT:
             told = [f"{_brief(line['what'])} on {line['where']}" for line in lines]
             return mark, f"Missing: {listed(told)}{open_ends}", text
-        best = max(lines, key=lambda line: line["fell"])
-        top = f"{_brief(best['what'])} on {best['where']}"
         what = [f"{named} known effect{'s' if named > 1 else ''}"] if named else []
         what += ["something without a name"] if nameless else []
         verb = "is" if named + bool(nameless) == 1 else "are"
@@ -179,6 +183,9 @@ def _line(diagnosis: Diagnosis, k: int, rows: Sequence[dict[str, Any]]) -> dict[
         before, after = (step[best["joint"] - 1] for step in steps)
         change = fall(before, after, best["noise"], best["unit"])
         change = change if len(served) == 1 else f"joint {best['joint']}: {change}"
+    shown, weights = _parameters(finding)
+    share = confidence(finding)
+    share = 1.0 if share is None else share
     return {
         "kind": finding.kind,
         "card": k + 1,
@@ -189,9 +196,11 @@ def _line(diagnosis: Diagnosis, k: int, rows: Sequence[dict[str, Any]]) -> dict[
         "where": where(finding.joints, len(rows)) + trajectories_told(finding),
         "only": trajectories_told(finding),
         "when": episodes_told(finding.when),
-        "size": sizes(finding),
+        "size": ", ".join(shown[: _told(finding)]),
+        "main": shown[int(np.argmax(weights))] if shown else "",
         "sure": sure(finding),
-        "doubtful": bool(finding.rivals) or (confidence(finding) or 1.0) < SURE,
+        "doubtful": bool(finding.rivals) or share < SURE,
+        "guess": share < GUESS,
         "change": change,
     }
 
@@ -210,9 +219,9 @@ def _together(group: Sequence[dict[str, Any]]) -> dict[str, Any]:
     joints = sorted({joint for card in group for joint in card["joints"]})
     best = max(group, key=lambda card: card["fell"])
     sizes_told = [
-        f"{card['size'].split(', ')[0]} (joint {card['joints'][0]}{card['only']})"
+        f"{card['main']} (joint {card['joints'][0]}{card['only']})"
         for card in sorted(group, key=lambda card: card["joints"])
-        if card["size"]
+        if card["main"]
     ]
     more = len(sizes_told) - LISTED
     doubtful = next((card for card in group if card["doubtful"]), best)
@@ -246,7 +255,9 @@ def confidence(finding: Finding) -> float | None:
 def sure(finding: Finding) -> str:
     """How sure a finding is, in a few words."""
     share = confidence(finding)
-    text = "" if share is None else f"{min(share, 0.99):.0%} sure of the name"
+    family = finding.title.partition(", best described by ")
+    named = f"that it is {inside(family[0])}" if family[1] else "of the name"
+    text = "" if share is None else f"{min(share, 0.99):.0%} sure {named}"
     if finding.rivals:
         rivals = listed([rival_title(kind) for kind in finding.rivals], "or")
         text += f"{'; ' if text else ''}this data cannot separate it from {rivals}"
@@ -259,7 +270,18 @@ def sure(finding: Finding) -> str:
 
 def sizes(finding: Finding) -> str:
     """The parameters of a finding with half their intervals, ``"k = 3.5 ± 0.4 N m/rad"``."""
-    parts = []
+    return ", ".join(_parameters(finding)[0][: _told(finding)])
+
+
+def _told(finding: Finding) -> int:
+    """How many parameters one line tells."""
+    apart = any(isinstance(row["value"], list) for row in finding.parameters.values())
+    return TOLD[min(len(finding.joints), 3) if apart else 1]
+
+
+def _parameters(finding: Finding) -> tuple[list[str], list[float]]:
+    """Parameters in words, and how many halves of its interval each is away from zero."""
+    parts, weights = [], []
     for name, row in finding.parameters.items():
         if name in ("trajectories", "trajectory"):
             continue
@@ -268,9 +290,10 @@ def sizes(finding: Finding) -> str:
             row[key] if isinstance(row[key], list) else [row[key]] * len(values)
             for key in ("low", "high")
         )
+        bounds = list(zip(values, lows, highs, strict=True))
         numbers = [
             v if low is None or low == high else f"{digits(v)} ± {digits((high - low) / 2)}"
-            for v, low, high in zip(values, lows, highs, strict=True)
+            for v, low, high in bounds
         ]
         told = [digits(v) if isinstance(v, float) else str(v) for v in numbers]
         unit = "" if row["unit"] in ("1", "") else f" {raised(row['unit'])}"
@@ -281,8 +304,9 @@ def sizes(finding: Finding) -> str:
             else ", ".join(told)
         )
         parts.append(f"{name} = {shown.replace('-', '−')}{unit}")
-    apart = any(isinstance(row["value"], list) for row in finding.parameters.values())
-    return ", ".join(parts[: TOLD[min(len(finding.joints), 3) if apart else 1]])
+        known = [2 * abs(v) / (h - low) for v, low, h in bounds if low is not None and h > low]
+        weights.append(max(known, default=0.0))
+    return parts, weights
 
 
 def where(joints: Sequence[int], n_joints: int) -> str:
@@ -324,7 +348,7 @@ def _left(diagnosis: Diagnosis, rows: Sequence[dict[str, Any]]) -> str:
         return "What is left is like the noise on every joint."
     parts = [
         f"{digits(row['after'])} {row['unit']} on joint {row['joint']} "
-        f"({row['ratios'][1]:.1f} times the noise)"
+        f"({times(row['ratios'][1])} the noise)"
         for row in left[:3]
     ]
     others = [row["joint"] for row in left[3:]]

@@ -254,7 +254,8 @@ def of_one_length(arrays: Mapping[str, np.ndarray], source: str) -> dict[str, np
                 "cannot be known; store signals of one length."
             )
     if left := [f"{name} ({length})" for name, length in others.items() if length > 1]:
-        warn_about_log(f"{source}: of other lengths than {n} rows and left out: {', '.join(left)}")
+        names = ", ".join(left)
+        warn_about_log(f"{source}: left out, since their length is not that of {n} rows: {names}")
     return {name: a for name, a in numeric.items() if len(a) == n}
 
 

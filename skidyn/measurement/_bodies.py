@@ -211,8 +211,10 @@ class Bodies(Check):
     stage = 2
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        if measurement.identified or measurement.scaled:
+            return
         seen = explained(measurement)
-        if seen is None or measurement.scaled:
+        if seen is None:
             return
         stated, identified = seen.errors
         wrong = (stated > WRONG) & (stated > TIMES * identified)
@@ -223,16 +225,16 @@ class Bodies(Check):
             return
         joints = [k for k, bad in zip(seen.joints, wrong | odd, strict=True) if bad]
         ratios = ", ".join(
-            f"{measurement.joint_names[k]} {seen.stated.scale[k] / seen.identified.scale[k]:.2g}"
+            f"{seen.stated.scale[k] / seen.identified.scale[k]:.2g} on {measurement.joint(k)}"
             for k in joints
         )
         gains = ", ".join(f"{seen.stated.gain[k]:.2g}" for k in joints)
         yield self.suspicion(
             "masses or inertias of the robot's description are not those of the robot",
-            "errors with the stated bodies, each torque at the scale that fits it best "
-            f"({gains}), and with any friction, are those of identified bodies times {ratios}; "
-            "identify them (skidyn identify) before effects are read from the stated ones "
-            "(--nominal)",
+            f"the error with the stated bodies is that with identified ones times {ratios}, "
+            f"although friction and the scale of each torque ({gains}) were fitted to them. A "
+            "model that keeps the stated bodies (--nominal) would show effects that are not there; "
+            "one that identifies them is not affected",
             "suspected",
             joints,
         )
@@ -307,6 +309,7 @@ class ComputedTorque(Check):
             and rubs.max() < FRICTIONLESS
             and seen.scatter.max() < SILENT
         ):
+            measurement.computed = True
             yield self.suspicion(
                 "the torque is that of the robot's description: it was commanded or computed, not "
                 "measured",
@@ -315,6 +318,7 @@ class ComputedTorque(Check):
                 "suspected",
             )
         elif identified.max() < 1e-4 and seen.fits.n_rows > 200:
+            measurement.computed = True
             yield self.suspicion(
                 "the torque has no noise: it was commanded or computed, not measured",
                 f"a rigid body with friction explains all of it but {identified.max():.1g}",

@@ -18,6 +18,9 @@ from skidyn.measurement._torque import cut_columns
 CLIPPED = 0.002
 #: Step of a position from which it is coarse, rad: a turn in 13 bits.
 COARSE = 0.9 * 2 * np.pi / 2**13
+#: Fourth differences of a torque over its spread from which it has noise, and those of which they
+#: are fewest: of recordings with a noise of their own no joint is below 4e-4.
+NOISELESS, ENOUGH = 1e-5, 200
 #: Share of rows that hold the torque of the row before, while it is not coarse, to be told.
 HELD = 0.3
 
@@ -117,6 +120,32 @@ class ClippedTorque(Check):
                     "noted",
                     [k],
                 )
+
+
+class SmoothTorque(Check):
+    """Torque without any noise: filtered before it was recorded, or computed."""
+
+    name = "smooth_torque"
+    suspects = "torque that was filtered before it was recorded, so that its noise is not known"
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        number, ratios = measurement.signals.trajectory, []
+        within = number[4:] == number[:-4]
+        if within.sum() < ENOUGH or measurement.computed:
+            return
+        for torque in measurement.torque.T:
+            spread = float(np.median(np.abs(torque - np.median(torque))))
+            bend = np.abs(np.diff(torque, n=4))[within]
+            if spread > 0 and np.median(bend) > 0:
+                ratios.append(float(np.median(bend)) / spread / np.sqrt(70))
+        if ratios and max(ratios) < NOISELESS:
+            yield self.suspicion(
+                "the torque has no noise",
+                f"from sample to sample it scatters by at most {max(ratios):.1g} of its spread: it "
+                "was filtered before it was recorded, or computed, so that an error says little "
+                "when it is compared with this noise",
+                "noted",
+            )
 
 
 class HeldTorque(Check):

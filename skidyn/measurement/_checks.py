@@ -17,6 +17,7 @@ from skidyn.measurement._channels import (
     CoarsePosition,
     ConstantTorque,
     HeldTorque,
+    SmoothTorque,
     StillJoint,
 )
 from skidyn.measurement._check import Check
@@ -56,6 +57,7 @@ CHECKS: tuple[Check, ...] = (
     ConstantTorque(),
     ClippedTorque(),
     ComputedTorque(),
+    SmoothTorque(),
     NoFriction(),
     CoarsePosition(),
     SlowSampling(),

@@ -184,9 +184,10 @@ class ClockJitter(Check):
         elif found.margin > TOLD:
             measurement.stale = True
             yield self.suspicion(
-                "the stamps of the clock jitter, not the samples",
-                f"they lie {size} around even steps of {1e3 * step:.4g} ms, and with even steps "
-                f"positions follow their neighbours up to {found.ratio:.3g} times as closely",
+                "the time stamps jitter, but the samples were taken at even steps",
+                f"the stamps lie {size} around even steps of {1e3 * step:.4g} ms, and with even "
+                f"steps a position follows from its neighbours up to {found.ratio:.3g} times as "
+                "closely",
                 "certain" if found.margin > CERTAIN and found.ratio > 1.2 else "suspected",
                 remedy=("--clock regular", "clock='regular'"),
             )

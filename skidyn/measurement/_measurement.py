@@ -44,7 +44,9 @@ class Measurement:
         Robot as its description says; checks that need it are left out without it.
     joint_names : sequence of str
         Names for sentences and remedies.
-    unsigned, delay, readable, stale, scaled : optional
+    identified : bool, default=False
+        Whether bodies are going to be identified: those of the description may then be wrong.
+    unsigned, delay, readable, stale, scaled, computed : optional
         What checks found that others want to know; filled in by them.
 
     Examples
@@ -61,11 +63,13 @@ class Measurement:
     torque: Array
     robot: Robot | None
     joint_names: Sequence[str]
+    identified: bool = False
     unsigned: tuple[list[int], dict[int, float]] | None = field(default=None, repr=False)
     delay: Delay | None = field(default=None, repr=False)
     readable: bool = field(default=True, repr=False)
     stale: bool = field(default=False, repr=False)
     scaled: bool = field(default=False, repr=False)
+    computed: bool = field(default=False, repr=False)
     #: Rows to which positions leap; trajectories are taken to end there.
     leaps: Array = field(init=False, repr=False)
 

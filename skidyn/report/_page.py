@@ -76,6 +76,7 @@ def _environment() -> Any:
         chance=chance,
         words=words,
         raised=raised,
+        breakable=breakable,
         capital=capital,
         short=short,
         mathml=mathml,
@@ -125,6 +126,12 @@ def short(value: float | None) -> str:
 def capital(text: str) -> str:
     """Text with a capital first letter."""
     return text[:1].upper() + text[1:]
+
+
+def breakable(name: str) -> Any:
+    """A name that a narrow place breaks behind its underscores rather than inside a word."""
+    markup = import_optional("markupsafe", extra="report").Markup
+    return markup("_<wbr>").join(name.split("_"))
 
 
 def mathml(formula: str) -> Any:

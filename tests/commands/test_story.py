@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a terminal shows of a diagnosis."""
 
+from types import SimpleNamespace
+
 import pytest
 
 from skidyn._commands._story import bar, story_lines
+from skidyn._commands._terminal import fit
 
 
 def joint(number, before, after, noise, speaks=True, state="better"):
@@ -29,7 +32,7 @@ def story():
 def test_the_verdict_comes_first_and_each_thing_once(story):
     text = "\n".join(story_lines(story))
     assert text.startswith("Missing: spring on joint 2.")
-    for part in ("23 repeated rows", "k = 3.5", "Joint 1 is at its noise.", "2 axis2"):
+    for part in ("23 repeated rows", "k = 3.5", "Joint 1 is at its noise.", "axis2 (2)"):
         assert text.count(part) == 1
     assert "axis1" not in text
 
@@ -41,6 +44,28 @@ def test_a_doubt_about_the_log_comes_before_any_name(story):
 
 def test_a_screen_holds_it(story):
     assert len(list(story_lines(story))) < 20
+
+
+def test_a_screen_holds_several_findings_on_many_joints(story):
+    line = {
+        "what": "Load-dependent friction", "where": "joints 2 and 3",
+        "size": "mu = 0.064 ± 0.0052 (joint 2), mu = 0.072 ± 0.0064 (joint 3)",
+        "sure": "88% sure of the name; this data cannot separate it from LuGre friction",
+        "change": "joint 3: 2.5 → 2.1 N m (noise 1.2)",
+    }  # fmt: skip
+    place = SimpleNamespace(share_of_excess=0.55, where="at high speed", share_of_time=0.3)
+    failures = [SimpleNamespace(joint=j, places=[place] if j < 3 else []) for j in range(1, 7)]
+    story |= {"findings": [line] * 4, "joints": [joint(j, 0.6, 0.2, 0.1) for j in range(1, 7)]}
+    lines = [part for text in story_lines(story, failures) for part in fit(text, 100).split("\n")]
+    assert len(lines) < 34
+    assert "  joint 1: 55% at high speed (30% of the time)" in lines
+    assert "  joints 3, 4, 5 and 6: spread over the whole motion" in lines
+
+
+def test_a_long_name_keeps_its_number(story):
+    story["joints"][1]["name"] = "the_joint_" * 8
+    (row,) = [text for text in story_lines(story) if "the_joint" in text]
+    assert "... (2)" in row
 
 
 def test_joints_of_a_complete_model_are_all_listed(story):

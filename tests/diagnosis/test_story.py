@@ -110,3 +110,10 @@ def test_confidence_is_said_where_it_is_known(missing):
     finding = dataclasses.replace(missing.findings[0], confidence=0.62)
     line = dataclasses.replace(missing, findings=[finding]).story()["findings"][0]
     assert "62% sure of the name" in line["sure"] and line["doubtful"]
+
+
+def test_a_name_that_is_hardly_sure_is_called_a_guess(missing):
+    finding = dataclasses.replace(missing.findings[0], confidence=0.2)
+    story = dataclasses.replace(missing, findings=[finding]).story()
+    assert story["headline"] == "Something is missing on joint 2; best guess: spring on joint 2"
+    assert story["mark"] == "?"

@@ -266,3 +266,20 @@ def test_torque_of_something_else():
     wave = np.convolve(wave, np.hanning(80), "same")
     other = LOG.frame.assign(tau2=LOG.frame["tau2"].std() * wave / wave.std())
     assert told_of(other)["unexplained"].joints == (2,)
+
+
+def test_stated_bodies_concern_only_those_who_keep_them(signals, torque):
+    torque = torque.copy()
+    torque[:, 1] += 9 * np.cos(signals.q.sum(1))  # a weight that the description lacks
+    told = found(signals, torque)
+    assert "bodies" in [s.check for s in told], told
+    names = ("shoulder", "elbow")
+    identified = check_measurement(Measurement(signals, torque, ROBOT, names, identified=True))
+    assert "bodies" not in [s.check for s in identified]
+
+
+def test_torque_without_noise(signals):
+    smooth = ROBOT.inverse_dynamics(signals.q, signals.dq, signals.ddq) + 0.8 * signals.dq
+    assert "smooth_torque" in [s.check for s in found(signals, smooth, None)]
+    noisy = smooth + np.random.default_rng(0).normal(0, 1e-3, smooth.shape)
+    assert found(signals, noisy, None) == []

@@ -46,6 +46,15 @@ def test_opens_and_draws(open_page, fakes, verdict):
     assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
 
 
+def test_names_of_joints_break_between_their_words(open_page, fakes):
+    names = ("shoulder_lift_joint", "panda_joint4", "lwr_6_joint")
+    page = open_page(fakes.make_diagnosis("missing", names))
+    cells = page.locator("#errors th[scope=row]").all()
+    assert {cell.inner_text().split(" (")[0].replace("\n", "") for cell in cells} == set(names)
+    for cell in cells:  # at most two lines for the name and one for the number
+        assert cell.bounding_box()["height"] < 80
+
+
 def over(page, number=0):
     """Place of the curves of a plot: x, y, width, height."""
     place = page.locator("#panels .u-over").nth(number)
