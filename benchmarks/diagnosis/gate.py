@@ -41,7 +41,7 @@ def ratios(robot, change: str | None, seed: int) -> np.ndarray:
     """Ratio of errors of every joint: later trajectories against the first of the healthy robot."""
     X0, y0 = recordings(robot, None, seed)
     X1, y1 = recordings(robot, change, seed) if change else (X0, y0)
-    usual, new = (X0["trajectory"] < N).to_numpy(), (X1["trajectory"] >= N).to_numpy()
+    usual, new = (X0["trajectory"] <= N).to_numpy(), (X1["trajectory"] > N).to_numpy()
     speed = np.abs(X0[[f"dq{j + 1}" for j in range(robot.n_joints)]].to_numpy())
     least = 0.05 * np.quantile(speed[usual], 0.95, axis=0)
     own = np.abs(X1[[f"dq{j + 1}" for j in range(robot.n_joints)]].to_numpy())

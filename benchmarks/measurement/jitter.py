@@ -38,7 +38,7 @@ def clocks(time: np.ndarray, rng: np.random.Generator) -> dict[str, np.ndarray]:
 def held_out(frame: pd.DataFrame, robot: Robot) -> float:
     """Error on motion the fit did not see, over the spread of the torque."""
     names = [f"tau{k + 1}" for k in range(robot.n_joints)]
-    train = (frame["trajectory"] % 2 == 0).to_numpy()
+    train = (frame["trajectory"] % 2 == 1).to_numpy()
     tau = frame[names].to_numpy()
     model = RBDRegressor(robot, ("viscous", "coulomb")).fit(frame[train], tau[train])
     rest = tau[~train] - model.predict(frame[~train])

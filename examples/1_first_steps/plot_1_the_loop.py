@@ -21,7 +21,7 @@ from skidyn.inspection import ErrorBudgetDisplay, ErrorMapDisplay, ResidualDispl
 
 hidden = {"dahl": {"joints": [3]}, "spring": {"joints": [2], "magnitude": 0.6}}
 log = make_hidden_effect_log(load_ur5(), hidden, n_trajectories=8, duration=6.0, random_state=1)
-aside = (log.X["trajectory"] >= 6).to_numpy()
+aside = (log.X["trajectory"] > 6).to_numpy()
 X, y = log.X[~aside], log.y[~aside]
 
 # %%

@@ -24,7 +24,7 @@ from skidyn.identification import RBDRegressor
 from skidyn.inspection import ErrorMapDisplay
 
 log = make_hidden_effect_log(load_planar_arm(), "spring", joints=[1], n_trajectories=16)
-first = (log.X["trajectory"] < 8).to_numpy()
+first = (log.X["trajectory"] <= 8).to_numpy()
 
 
 def columns(X):

@@ -265,7 +265,7 @@ def fetch_xl330(
 
     address = url or XL330_URL
     paths, tables = [], []
-    for number, run in enumerate(runs or XL330_RUNS):
+    for number, run in enumerate(runs or XL330_RUNS, 1):
         path = _retrieve(f"{address.rstrip('/')}/{run}", f"xl330_{run}", data_home, None)
         paths.append(str(path))
         tables.append(_servo_run(path).assign(trajectory=number))
@@ -329,7 +329,7 @@ def fetch_panda_gaz(*, data_home: str | os.PathLike[str] | None = None, url: str
         if values.shape != (len(time), 7):
             raise LogError(f"{signal} has shape {values.shape}; ({len(time)}, 7) is expected")
     columns = {f"{s}{j + 1}": v[:, j] for s, v in parts.items() for j in range(7)}
-    frame = pandas.DataFrame({"time": time, "trajectory": 0} | columns)
+    frame = pandas.DataFrame({"time": time, "trajectory": 1} | columns)
     return _bunch(frame=frame, licence="GPL-3.0", paths=paths)
 
 
@@ -378,7 +378,7 @@ def fetch_screw_drive(
 
     address = url or SCREW_URL
     paths, tables = [], []
-    for number, run in enumerate(runs or SCREW_RUNS):
+    for number, run in enumerate(runs or SCREW_RUNS, 1):
         name = "screw_drive_" + run.replace("/", "_")
         path = _retrieve(f"{address.rstrip('/')}/{run}", name, data_home, None)
         paths.append(str(path))

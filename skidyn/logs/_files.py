@@ -255,7 +255,7 @@ def of_one_length(arrays: Mapping[str, np.ndarray], source: str) -> dict[str, np
             )
     if left := [f"{name} ({length})" for name, length in others.items() if length > 1]:
         names = ", ".join(left)
-        warn_about_log(f"{source}: left out, since their length is not that of {n} rows: {names}")
+        warn_about_log(f"{source}: of another length than {n} rows, and so left out: {names}")
     return {name: a for name, a in numeric.items() if len(a) == n}
 
 

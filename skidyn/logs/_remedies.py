@@ -319,7 +319,7 @@ def _split_at_leaps(table: pd.DataFrame, names: Sequence[str], notes: list[str])
         f"split_leaps: {len(rows)} of {len(table)} rows, to which positions leap, begin a "
         "trajectory"
     )
-    return table.assign(trajectory=np.cumsum(cut))
+    return table.assign(trajectory=np.cumsum(cut) + 1)
 
 
 def _without_repeated(table: pd.DataFrame, n: int, notes: list[str]) -> pd.DataFrame:

@@ -363,10 +363,10 @@ def judge_by_simulation(
     >>> from skidyn.identification import RBDRegressor
     >>> from skidyn.simulation import judge_by_simulation
     >>> log = make_hidden_effect_log(load_planar_arm(), "spring", joints=[1], random_state=0)
-    >>> train = log.frame["trajectory"] < 4
+    >>> train = log.frame["trajectory"] <= 4
     >>> plain = RBDRegressor(log.robot).fit(log.X[train], log.y[train])
     >>> with_spring = plain.with_effects([("spring", [1])]).fit(log.X[train], log.y[train])
-    >>> test = log.frame["trajectory"] == 5
+    >>> test = log.frame["trajectory"] == 6
     >>> judge_by_simulation(plain, with_spring, log.X[test], log.y[test]).improves
     True
     """

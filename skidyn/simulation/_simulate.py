@@ -73,7 +73,7 @@ def simulate(
     >>> from skidyn.simulation import simulate
     >>> log = make_hidden_effect_log(load_planar_arm(), None)
     >>> model = RBDRegressor(log.robot).fit(log.X, log.y)
-    >>> run = log.frame["trajectory"] == 0
+    >>> run = log.frame["trajectory"] == 1
     >>> motion = simulate(model, log.X[run], log.y[run], horizon=0.5)
     >>> bool((motion["q1"] - log.X["q1"][run]).abs().max() < 0.1)
     True

@@ -63,7 +63,7 @@ def test_rows_repeated_by_a_logger_that_polls_too_fast(log):
 def test_a_sensor_zeroed_anew_before_each_recording(log):
     shift = 0.6 * np.random.default_rng(1).normal(size=10)
     torque = np.array(log.y)
-    torque[:, 1] += shift[log.X["trajectory"].to_numpy()] * np.std(torque[:, 1])
+    torque[:, 1] += shift[log.X["trajectory"].to_numpy() - 1] * np.std(torque[:, 1])
 
     kinds, _ = found(log, log.X, torque)
 

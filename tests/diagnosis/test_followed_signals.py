@@ -45,7 +45,7 @@ def test_a_form_in_no_catalogue_is_unknown_and_its_signals_are_named(form):
 def test_a_joint_that_rests_in_some_trajectories_is_diagnosed_all_the_same():
     log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=8, duration=8.0)
     X = log.X.copy()
-    rests = X["trajectory"].isin([3, 7])  # every fourth: a quarter of the folds is empty
+    rests = X["trajectory"].isin([4, 8])  # every fourth: a quarter of the folds is empty
     X.loc[rests, ["q2", "dq2", "ddq2"]] = [0.3, 0.0, 0.0]
     signals = [X[[f"{s}{j}" for j in (1, 2)]].to_numpy() for s in ("q", "dq", "ddq")]
     y = log.robot.inverse_dynamics(*signals) + 0.5 * np.sign(signals[1])

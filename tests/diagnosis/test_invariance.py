@@ -94,7 +94,7 @@ def reordered(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def renumbered(frame: pd.DataFrame) -> pd.DataFrame:
-    return frame.assign(trajectory=frame.trajectory.map([30, 4, 8, 1, 7, 9].__getitem__))
+    return frame.assign(trajectory=frame.trajectory.map([0, 30, 4, 8, 1, 7, 9].__getitem__))
 
 
 def duplicated(frame: pd.DataFrame) -> pd.DataFrame:

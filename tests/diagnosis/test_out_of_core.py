@@ -25,7 +25,7 @@ def folder(tmp_path_factory):
         ROBOT, "stribeck", joints=[2], n_trajectories=18, duration=8.0, rate=100.0
     )
     for k in range(3):
-        part = log.frame[log.frame["trajectory"] // 6 == k]
+        part = log.frame[(log.frame["trajectory"] - 1) // 6 == k]
         part.to_parquet(folder / f"{k}.parquet")
     return folder
 

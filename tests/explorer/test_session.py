@@ -57,14 +57,14 @@ def test_a_payload_of_some_recordings_is_offered_with_their_numbers():
 
 
 def test_undo_takes_it_back(session):
-    before = session.ranked(joint=2), session.curves(2, 0)
+    before = session.ranked(joint=2), session.curves(2, 1)
     session.add("spring", joint=2)
 
     session.undo()
     session.undo()  # nothing left to take back
 
     assert len(session.history) == 1
-    assert (session.ranked(joint=2), session.curves(2, 0)) == before
+    assert (session.ranked(joint=2), session.curves(2, 1)) == before
 
 
 def test_errors_are_those_of_a_diagnosis(session, log):
@@ -122,8 +122,8 @@ def test_curves_keep_peaks_and_residuals_follow_what_was_added(session, log):
 
 
 def test_a_stretch_of_time_ranks_by_what_happens_there(session):
-    start, end = session.stretch(joint=2, trajectory=0, time=3.0)
-    ranked = session.ranked(joint=2, trajectory=0, span=(start, end))
+    start, end = session.stretch(joint=2, trajectory=1, time=3.0)
+    ranked = session.ranked(joint=2, trajectory=1, span=(start, end))
 
     assert start <= 2.5 and end >= 3.5
     assert "spring" in [r.kind for r in ranked]

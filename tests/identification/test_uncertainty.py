@@ -26,7 +26,7 @@ def log():
 @pytest.fixture(scope="module")
 def new(log):
     """Which samples belong to the trajectories that no model sees."""
-    return (log.frame["trajectory"] >= 8).to_numpy()
+    return (log.frame["trajectory"] > 8).to_numpy()
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +100,7 @@ def test_bootstrap_agrees_with_the_jackknife(model):
 
 
 def test_bootstrap_wants_trajectories(log, new):
-    few = (log.frame["trajectory"] < 3).to_numpy()
+    few = (log.frame["trajectory"] <= 3).to_numpy()
     model = RBDRegressor(log.robot).fit(log.X[few], log.y[few])
     with pytest.raises(SkidynError, match="fitted to 3 trajectories"):
         bootstrap_coefficients(model)

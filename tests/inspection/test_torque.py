@@ -17,7 +17,7 @@ def test_shows_the_chosen_joint_and_its_error(log, model):
 def test_one_trajectory_can_be_picked(log, model):
     display = TorqueDisplay.from_estimator(model, log.X, log.y, trajectory=1)
     np.testing.assert_array_equal(display.measured, log.y[log.X["trajectory"] == 1, 0])
-    with pytest.raises(ValueError, match="no trajectory 7; it has 0, 1"):
+    with pytest.raises(ValueError, match="no trajectory 7; it has 1, 2"):
         TorqueDisplay.from_estimator(model, log.X, log.y, trajectory=7)
 
 

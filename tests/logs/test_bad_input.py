@@ -131,7 +131,7 @@ def test_stale_rows_are_counted():
 
 
 def test_single_trajectory_is_told():
-    quality = check_log(LOG[LOG["trajectory"] == 0])
+    quality = check_log(LOG[LOG["trajectory"] == 1])
     assert any("single trajectory" in text for text in quality.notes)
     assert not check_log(LOG).notes
 
@@ -282,7 +282,7 @@ def test_broken_containers(tmp_path):
 
 
 def test_suspicions_are_issued_as_warnings(saved):
-    first = LOG[LOG["trajectory"] == 0].reset_index(drop=True)
+    first = LOG[LOG["trajectory"] == 1].reset_index(drop=True)
     with pytest.warns(LogWarning, match="1 gap") as caught:
         read_log(saved(first.drop(index=range(100, 200))), robot=ROBOT)
     assert caught[0].filename == __file__  # at the caller's line, not inside skidyn

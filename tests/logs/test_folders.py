@@ -13,7 +13,7 @@ from skidyn.exceptions import LogError
 from skidyn.logs import read_log
 
 LOG = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=2, duration=3.0).frame
-RUN = LOG[LOG["trajectory"] == 0].reset_index(drop=True)
+RUN = LOG[LOG["trajectory"] == 1].reset_index(drop=True)
 pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
 
 

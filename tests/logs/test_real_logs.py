@@ -16,7 +16,7 @@ KNOWN = {
     "dvrk/dvrk_mtm.npz": "polled faster",
     "dvrk/dvrk_psm.npz": None,
     "emps/emps.npz": "single trajectory",
-    "kuka_lwr4/kuka_lwr4.npz": "stamps of the clock jitter",
+    "kuka_lwr4/kuka_lwr4.npz": "time stamps jitter",
     "lbr_med7/lbr_med7.npz": "polled faster",
     "panda/panda_gaz.npz": "taken at uneven steps",
     "polydoros/kuka_iiwa.npz": None,

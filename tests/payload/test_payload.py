@@ -147,7 +147,7 @@ def pendulum_runs(seed=0):
     log = make_hidden_effect_log(
         Robot.from_urdf(PENDULUM), None, base=FRICTION, n_trajectories=6, random_state=seed
     )
-    loaded = log.frame["trajectory"] < 3
+    loaded = log.frame["trajectory"] <= 3
     q, ddq = log.frame["q1"].to_numpy(), np.gradient(log.frame["dq1"], log.frame["time"])
     moved = log.frame.assign(tau1=log.frame["tau1"] + 0.5 * 0.2 * (9.81 * np.sin(q) + 0.2 * ddq))
     return log.robot, moved[loaded], log.frame[~loaded]

@@ -28,14 +28,14 @@ def log():
 
 @pytest.fixture(scope="module")
 def models(log):
-    train = log.frame["trajectory"] < 3
+    train = log.frame["trajectory"] <= 3
     plain = RBDRegressor(log.robot).fit(log.X[train], log.y[train])
     with_spring = plain.with_effects([("spring", [1])]).fit(log.X[train], log.y[train])
     return plain, with_spring
 
 
 def test_errors_are_small_where_the_model_is_right_and_are_json(log, models):
-    test = log.frame["trajectory"] == 3
+    test = log.frame["trajectory"] == 4
     errors = simulation_errors(models[1], log.X[test], log.y[test])
     assert errors.position.shape == errors.velocity.shape == (2,)
     assert np.all(errors.position < 0.1 * errors.resting)
@@ -45,7 +45,7 @@ def test_errors_are_small_where_the_model_is_right_and_are_json(log, models):
 
 
 def test_verdict_on_an_effect_that_is_there_and_its_contrary(log, models):
-    test = log.frame["trajectory"] == 3
+    test = log.frame["trajectory"] == 4
     better = judge_by_simulation(*models, log.X[test], log.y[test])
     worse = judge_by_simulation(*models[::-1], log.X[test], log.y[test])
     assert better.improves and not better.worsens and better.change < np.log(0.7)
@@ -54,19 +54,19 @@ def test_verdict_on_an_effect_that_is_there_and_its_contrary(log, models):
 
 
 def test_verdict_is_left_open_where_nothing_changes(log, models):
-    test = log.frame["trajectory"] == 3
+    test = log.frame["trajectory"] == 4
     same = judge_by_simulation(models[1], models[1], log.X[test], log.y[test])
     assert not same.improves and not same.worsens and "chance" in same.text
 
 
 def test_one_piece_is_no_evidence(log, models):
-    test = log.frame["trajectory"] == 3
+    test = log.frame["trajectory"] == 4
     with pytest.raises(SkidynError, match="one piece"):
         judge_by_simulation(*models, log.X[test], log.y[test], horizon=None)
 
 
 def test_motion_that_explodes_is_infinite_not_silent(log, models):
-    test = log.frame["trajectory"] == 3
+    test = log.frame["trajectory"] == 4
     broken = RBDRegressor(log.robot, [Term("spring", (0,))]).fit(log.X, log.y)
     term = broken.effect_terms_[0]
     broken.effect_coefficients_[term] = np.array([-1e5, 0.0])
@@ -89,7 +89,7 @@ def test_scorer_prefers_the_model_that_moves_like_the_robot(log):
 
 
 def test_controller_is_found_from_a_log_and_closes_the_loop(log, models):
-    frame = log.X[log.frame["trajectory"] == 3].reset_index(drop=True)
+    frame = log.X[log.frame["trajectory"] == 4].reset_index(drop=True)
     late = frame[["q1", "q2"]].shift(3).bfill()
     torque = 80 * (late.to_numpy() - frame[["q1", "q2"]]) - 5 * frame[["dq1", "dq2"]].to_numpy()
     frame = frame.assign(q_ref1=frame["q1"], q_ref2=frame["q2"])

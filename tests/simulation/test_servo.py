@@ -43,7 +43,7 @@ def test_gain_and_delay_show_by_the_weight(servo_log):
 
 def test_friction_from_motion_alone_improves_the_motion_of_a_new_log(servo_log):
     robot, log = servo_log
-    train = log["trajectory"] < 2
+    train = log["trajectory"] <= 2
     servo = fit_servo(robot, log[train])
     torque = servo_torque(servo, log)
     X = log[["time", "trajectory", "q1", "q2", "dq1", "dq2"]]

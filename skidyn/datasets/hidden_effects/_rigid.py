@@ -25,7 +25,7 @@ def payload(world: World, joints: Sequence[int], size: float) -> Outcome:
     loaded = _some_trajectories(world)
     torque = world.zeros()
     torque[loaded] = mass * per_kilogram[loaded]
-    parameters = {"mass": mass, "com": com, "trajectories": loaded}
+    parameters = {"mass": mass, "com": com, "trajectories": [k + 1 for k in loaded]}
     formula = "rigid body on the last link in some trajectories (com in the frame of that link)"
     return Outcome([world.n_joints - 1], parameters, formula, torque, variables=("trajectory",))
 
@@ -61,7 +61,7 @@ def external_wrench(world: World, joints: Sequence[int], size: float) -> Outcome
     pushed = _some_trajectories(world)
     torque = world.zeros()
     torque[pushed] = newtons * per_newton[pushed]
-    parameters = {"force": newtons * direction, "trajectories": pushed}
+    parameters = {"force": newtons * direction, "trajectories": [k + 1 for k in pushed]}
     formula = "-J^T F at the frame of the last link, in some trajectories"
     return Outcome([], parameters, formula, torque, variables=("trajectory",))
 
@@ -110,7 +110,7 @@ def _strongest(world: World, per_unit: Array, size: float) -> float:
 
 
 def _some_trajectories(world: World) -> list[int]:
-    """About a third of the trajectories, at least one and never all."""
+    """About a third of the trajectories, at least one and never all; counted from 0."""
     n = world.n_trajectories
     if n < 2:
         raise SkidynError("the effect acts in some trajectories only; two at least are needed.")

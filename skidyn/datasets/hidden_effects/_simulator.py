@@ -363,7 +363,7 @@ def _bunch(
     n = world.n_joints
     keys = {
         "time": world.time.ravel(),
-        "trajectory": np.repeat(np.arange(world.n_trajectories), world.n_samples),
+        "trajectory": np.repeat(np.arange(1, world.n_trajectories + 1), world.n_samples),
     }
     blocks = {"q": q, "dq": dq, "ddq": filtered_derivative(dq, sample_time), "tau": torque}
     if temperature is not None:

@@ -118,8 +118,8 @@ Adds = Callable[[Moment, Array], None]
 class Hidden:
     """An effect: what changes in the plant or in the log, and the truth about it.
 
-    Torques count as the actuator feels them: ``tau = rigid body + friction + torque``. Joints are
-    numbered from 0 here and from 1 in the truth.
+    Torques count as the actuator feels them: ``tau = rigid body + friction + torque``. Joints
+    and trajectories are numbered from 0 here and from 1 in the truth.
     """
 
     kind: str
@@ -150,11 +150,14 @@ class Hidden:
     missing_from_base: str | None = None
 
     def truth(self) -> dict[str, Any]:
-        """What the answer is compared with; joints counted from 1."""
+        """What the answer is compared with; joints and trajectories counted from 1."""
         out: dict[str, Any] = {
             "kind": self.kind,
             "joints": [j + 1 for j in self.joints],
-            "parameters": {name: plain(value) for name, value in self.parameters.items()},
+            "parameters": {
+                name: plain(_counted_from_one(name, value))
+                for name, value in self.parameters.items()
+            },
             "formula": self.formula,
             "scored_parameters": list(self.scored),
             "variables": list(self.variables),
@@ -162,8 +165,15 @@ class Hidden:
             "anywhere": self.anywhere,
         }
         if self.trajectories is not None:
-            out["trajectories"] = self.trajectories
+            out["trajectories"] = [g + 1 for g in self.trajectories]
         return out
+
+
+def _counted_from_one(name: str, value: Any) -> Any:
+    """A parameter of the truth; trajectories in it are those of the log."""
+    if name == "trajectories":
+        return [g + 1 for g in value]
+    return {g + 1: times for g, times in value.items()} if name == "when" else value
 
 
 #: Draws an effect's parameters.

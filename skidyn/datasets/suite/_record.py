@@ -66,7 +66,7 @@ def sample(
             if value is not None:
                 parts[name].append(value[rows])
         parts["tau"].append(tau)
-        parts["trajectory"].append(np.full(len(rows), g))
+        parts["trajectory"].append(np.full(len(rows), g + 1))
     return {name: np.concatenate(values) for name, values in parts.items()}
 
 

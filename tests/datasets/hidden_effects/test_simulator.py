@@ -169,7 +169,7 @@ def test_delayed_torque_belongs_to_an_earlier_position():
     log = make_hidden_effect_log(PLANAR, "time_delay", noise=0.0, **SHORT)
     prompt = make_hidden_effect_log(PLANAR, None, noise=0.0, **SHORT)
     samples = round(log.parameters["delay"] * 100)
-    one, two = (x.frame.query("trajectory == 0")["q1"].to_numpy() for x in (log, prompt))
+    one, two = (x.frame.query("trajectory == 1")["q1"].to_numpy() for x in (log, prompt))
     np.testing.assert_allclose(one[:-samples], two[samples:], atol=1e-4)
 
 
