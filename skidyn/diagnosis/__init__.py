@@ -46,6 +46,7 @@ from skidyn.diagnosis._comparison import (
     error_map as error_map,
     regimes as regimes,
 )
+from skidyn.diagnosis._confidence import confidence as confidence
 from skidyn.diagnosis._diagnosis import own_terms as own_terms
 from skidyn.diagnosis._intervals import parameter_intervals as parameter_intervals
 from skidyn.diagnosis._profile import refine as refine

@@ -150,7 +150,7 @@ class Explorer:
         return self._changed(joint, trajectory)
 
     def _sizes(self) -> dict[str, Any]:
-        return {"sizes": self.session.sizes()}
+        return {"sizes": self.session.sizes(), "sure": self.session.sure()}
 
     def _changed(self, joint: int, trajectory: int) -> dict[str, Any]:
         return {**self._state(), "curves": self._curves(joint, trajectory)}

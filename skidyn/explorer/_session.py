@@ -28,6 +28,7 @@ from skidyn.explorer._beside import Offer, Ripple, fit_ripple, loads, ripples
 from skidyn.explorer._ranking import FoldedModel, HeldOutRows, Ranking
 from skidyn.explorer._samples import Samples
 from skidyn.explorer._script import script
+from skidyn.explorer._sure import Margin, margin, sure_told
 from skidyn.identification import RBDRegressor
 from skidyn.report import rows_with_peaks
 
@@ -180,6 +181,26 @@ class Session:
                 for name, value in list(intervals[term].items())[:TOLD]
             )
             for terms in self.added
+        ]
+
+    def sure(self) -> list[str]:
+        """How sure the name of every addition is.
+
+        Returns
+        -------
+        list of str
+            Such as ``"90% sure of the name"``: as in a diagnosis, from what the best other effect
+            would have taken instead, and from what is left on its joints now.
+        """
+        ratio = np.array(self.history[-1]["rmse"]) / np.maximum(self.noise, 1e-300)
+        return [
+            sure_told(
+                step.margin,
+                float(max(ratio[j - 1] for j in step.entry["joints"])),
+                self.problem.whole_trajectories,
+                any(term.trajectories is not None for term in step.terms),
+            )
+            for step in self._steps[1:]
         ]
 
     @property
@@ -417,7 +438,7 @@ class Session:
                 "fit is not physical, or it is in the model already"
             )
         candidate = max(pool, key=lambda item: item[0])[1]
-        self._push(candidate, joint)
+        self._push(candidate, joint, margin(kind, self.ranked(joint)))
         return self.refine() if refined else self.history[-1]
 
     def refine(self) -> dict[str, Any]:
@@ -434,7 +455,7 @@ class Session:
             blocks = [self.problem.term_rows(t) for t in self.terms if not _is_fine(t)]
             noise = self._steps[-1].noise
             better = refine(self.problem, blocks, [last.coarse], noise, self._target)[0]
-            self._push(better, last.entry["joint"])
+            self._push(better, last.entry["joint"], last.margin)
             self._steps[-1].coarse = None
         return self.history[-1]
 
@@ -477,7 +498,7 @@ class Session:
             self._steps.append(
                 self._step(old.terms, (*self.terms, *old.terms), noise, old.entry["joint"])
             )
-            self._steps[-1].coarse = old.coarse
+            self._steps[-1].coarse, self._steps[-1].margin = old.coarse, old.margin
         return self.history[-1]
 
     def fitted_model(self) -> RBDRegressor:
@@ -564,11 +585,12 @@ class Session:
             step.rows[joint] = self._ranking.held_out(step.model, joint)
         return step.rows[joint]
 
-    def _push(self, candidate: Candidate, joint: int) -> None:
+    def _push(self, candidate: Candidate, joint: int, over: Margin) -> None:
         new = (candidate.term,)
         noise = self._steps[-1].noise
         self._steps.append(self._step(new, (*self.terms, *new), noise, joint))
         self._steps[-1].coarse = candidate if candidate.n_shapes else None
+        self._steps[-1].margin = over
 
     def _step(
         self, new: tuple[Term, ...], terms: tuple[Term, ...], sigma: Array, joint: int | None
@@ -624,6 +646,7 @@ class _Step:
     residual: Array  # held out, at every sample, N m or N
     entry: dict[str, Any]
     coarse: Candidate | None = None
+    margin: Margin = field(default_factory=Margin)
     rows: dict[int, HeldOutRows] = field(default_factory=dict)
     offers: list[Offer] | None = None
     ripples: dict[Term, Ripple] = field(default_factory=dict)

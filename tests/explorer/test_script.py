@@ -72,10 +72,10 @@ def test_the_script_gives_the_numbers_of_the_page(write, arm, log, tmp_path, mon
     assert cli.main(words) == cli.DONE
     explorer = served["explorer"]
     plain = next(e for e in explorer.session.ranked(2) if not get_effect(e.kind).shapes).kind
-    explorer.answer("add", {"kind": plain, "joint": 2, "trajectory": 0})
+    explorer.answer("add", {"kind": plain, "joint": 2, "trajectory": 1})
     shaped = next(e for e in explorer.session.ranked(2) if get_effect(e.kind).shapes).kind
-    explorer.answer("add", {"kind": shaped, "joint": 2, "trajectory": 0})
-    shown = explorer.answer("refine", {"joint": 2, "trajectory": 0})["history"]
+    explorer.answer("add", {"kind": shaped, "joint": 2, "trajectory": 1})
+    shown = explorer.answer("refine", {"joint": 2, "trajectory": 1})["history"]
     text = explorer.session.script(
         explorer.logs, explorer.urdf, joints=explorer.joints, reading=explorer.reading
     )

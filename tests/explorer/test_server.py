@@ -103,7 +103,7 @@ def test_only_who_has_the_token_gets_an_answer(port, explorer):
 
 
 def test_bad_questions_get_an_error_and_change_nothing(port, explorer):
-    ask(port, "/api/add", {"kind": "spring", "joint": 2, "trajectory": 0}, explorer.token)
+    ask(port, "/api/add", {"kind": "spring", "joint": 2, "trajectory": 1}, explorer.token)
     before = explorer.session.history
     for question, words in (
         ("unknown", {}),
@@ -115,11 +115,11 @@ def test_bad_questions_get_an_error_and_change_nothing(port, explorer):
         ("state", [1]),
         ("add", {"kind": "spring", "joint": 2, "trajectory": 99}),
         ("remove", {"step": 1, "joint": 2, "trajectory": 99}),
-        ("remove", {"step": 1, "joint": 77, "trajectory": 0}),
+        ("remove", {"step": 1, "joint": 77, "trajectory": 1}),
         ("ranked", {"joint": 1, "trajectory": [], "time": 1.0}),
         ("ranked", {"joint": 1, "trajectory": {"a": 1}, "time": 1.0}),
-        ("ranked", {"joint": 1, "trajectory": 0, "time": float("inf")}),
-        ("ranked", {"joint": 1, "trajectory": 0, "time": float("nan")}),
+        ("ranked", {"joint": 1, "trajectory": 1, "time": float("inf")}),
+        ("ranked", {"joint": 1, "trajectory": 1, "time": float("nan")}),
     ):
         status, content = ask(port, f"/api/{question}", words, explorer.token)
         assert status == 400, question
@@ -131,11 +131,11 @@ def test_bad_questions_get_an_error_and_change_nothing(port, explorer):
     ("body", "expected"),
     [
         (b"[" * 50_000, 400),
-        (b'{"joint": 1e999, "trajectory": 0}', 400),
-        (b'{"joint": 1, "trajectory": 0, "time": 1e308}', 400),
+        (b'{"joint": 1e999, "trajectory": 1}', 400),
+        (b'{"joint": 1, "trajectory": 1, "time": 1e308}', 400),
         (b'{"joint": "\xff"}', 400),
         (b'{"\\ud800": 1}', 400),
-        (b'{"joint": "\\ud800", "trajectory": 0}', 400),
+        (b'{"joint": "\\ud800", "trajectory": 1}', 400),
         (b'{"joint": 1, "trajectory": 1e400}', 400),
         (b" " * 300_000, 413),
     ],
@@ -187,7 +187,7 @@ def test_the_page_holds_all_it_needs():
 
 def test_an_error_is_told_as_it_is(port, explorer):
     """The page shows it as text, so nothing is escaped on the way."""
-    _, content = ask(port, "/api/add", {"kind": "<b> & 'c'", "joint": 1, "trajectory": 0},
+    _, content = ask(port, "/api/add", {"kind": "<b> & 'c'", "joint": 1, "trajectory": 1},
                      explorer.token)  # fmt: skip
 
     assert "<b> & 'c' cannot be added to joint 1" in content["error"]
@@ -224,13 +224,13 @@ def test_the_loop_click_by_click(explorer, tmp_path):
         tab.reload()  # the address holds all that the page needs
         # it opens on the joint whose error is largest over its noise; look at another trajectory
         tab.wait_for_selector("body[data-ranked='2 all 1']")
-        tab.select_option("#trajectory", "1")
-        tab.wait_for_selector("body[data-drawn='2 1 1']")
+        tab.select_option("#trajectory", "2")
+        tab.wait_for_selector("body[data-drawn='2 2 1']")
         # click where it fails, and elsewhere: the second click is what counts
         for x in (200, 400):
             tab.click("#residual .u-over", position={"x": x, "y": 60})
             tab.wait_for_selector("body[data-ranked='2 span 1']")
-        assert "trajectory 1" in tab.text_content("#where")
+        assert "trajectory 2" in tab.text_content("#where")
         # tick the spring: the error falls
         tab.click("#effects button[data-kind=spring]")
         tab.wait_for_selector("body[data-ranked='2 span 2']")
@@ -238,7 +238,8 @@ def test_the_loop_click_by_click(explorer, tmp_path):
         assert now < 0.2 * given
         assert tab.text_content("#added li span") == "spring on joint 2"
         tab.wait_for_selector("#added small:not(:empty)")
-        assert "±" in tab.text_content("#added small")
+        assert "±" in tab.text_content("#added small.size")
+        assert "sure of the name" in tab.text_content("#added small.sure")
         assert now == pytest.approx(explorer.session.history[-1]["rmse"][1], rel=0.05)
         # undo, and again
         tab.click("#undo")

@@ -165,6 +165,13 @@ def test_what_was_added_is_told_with_its_interval(session):
     session.add("spring", joint=2)
     (told,) = session.sizes()
     assert told.startswith("k = ") and "±" in told and "N m/rad" in told
+    (sure,) = session.sure()
+    assert "sure of the name" in sure and "not sure" not in sure
+
+
+def test_a_name_that_another_effect_beats_is_not_sure(session):
+    session.add("offset", joint=2)
+    assert session.sure() == ["not sure of the name: spring takes more of the error"]
 
 
 def test_an_addition_is_removed_whatever_came_after_it(session):

@@ -130,7 +130,7 @@
       const item = node("li"), off = node("button", "Remove");
       off.setAttribute("aria-label", `Remove ${words(h.added)}`);
       off.addEventListener("click", () => remove(k + 1));
-      item.append(node("span", `${words(h.added)} on ${on(h.joints)}`), off, node("small", ""));
+      item.append(node("span", `${words(h.added)} on ${on(h.joints)}`), off, node("small", "", "size"), node("small", "", "sure"));
       return item;
     }));
     if (state.history.length < 2) el("added").append(node("li", "nothing yet"));
@@ -200,7 +200,9 @@
   }
   async function sizes() {  // what was added in numbers, once the fit is settled
     const mine = asked, answer = await ask("sizes");
-    if (mine === asked) el("added").querySelectorAll("small").forEach((place, k) => { place.textContent = answer.sizes[k] || ""; });
+    if (mine !== asked) return;
+    for (const [name, texts] of [["size", answer.sizes], ["sure", answer.sure]])
+      el("added").querySelectorAll(`small.${name}`).forEach((place, k) => { place.textContent = texts[k] || ""; });
   }
   async function remove(step) {
     if (await change("remove", { step })) { say("removed, the rest fitted again"); await rank(); await sizes(); }

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How sure the name of an added effect is, from what else was offered for the same joint."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from skidyn._text import inside
+from skidyn.diagnosis import confidence
+
+#: A rival takes nearly as much where it falls short of the gain by less than this share.
+NEAR = 0.1
+
+
+class Ranked(Protocol):
+    """An effect with the share of the squared residual that it takes."""
+
+    @property
+    def kind(self) -> str: ...
+    @property
+    def title(self) -> str: ...
+    @property
+    def drop(self) -> float: ...
+
+
+@dataclass(frozen=True)
+class Margin:
+    """By how much the best other effect falls short of an added one.
+
+    Parameters
+    ----------
+    share : float
+        Share of the gain; below zero where the other one takes more.
+    rival : str, default=""
+        Title of the other one.
+    """
+
+    share: float = 1.0
+    rival: str = ""
+
+
+def margin(kind: str, ranked: Sequence[Ranked]) -> Margin:
+    """Margin of an effect among those that were ranked beside it.
+
+    Parameters
+    ----------
+    kind : str
+        Effect that is added.
+    ranked : sequence of RankedEffect
+        Effects that would have helped the same joint, before it was added.
+
+    Returns
+    -------
+    Margin
+    """
+    gains = {e.kind: -np.log1p(-min(e.drop, 1 - 1e-12)) for e in ranked}
+    titles = {e.kind: e.title for e in ranked}
+    others = [other for other in gains if other != kind]
+    if not others:
+        return Margin()
+    rival = max(others, key=gains.__getitem__)
+    own = gains.get(kind, 0.0)
+    return Margin(float(1 - gains[rival] / own) if own > 0 else -1.0, titles[rival])
+
+
+def sure_told(
+    margin: Margin, left_over_noise: float, whole_recordings: bool, some_recordings: bool
+) -> str:
+    """How sure a name is in a few words.
+
+    Parameters
+    ----------
+    margin : Margin
+        Over the best other effect.
+    left_over_noise, whole_recordings, some_recordings
+        As :func:`skidyn.diagnosis.confidence` takes them.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> sure_told(Margin(0.8, "Offset"), 1.0, True, False)
+    '97% sure of the name'
+    >>> sure_told(Margin(-0.3, "Spring"), 1.0, True, False)
+    'not sure of the name: spring takes more of the error'
+    """
+    if margin.share < 0:
+        return f"not sure of the name: {inside(margin.rival)} takes more of the error"
+    share = confidence(margin.share, left_over_noise, whole_recordings, some_recordings)
+    near = margin.share < NEAR and margin.rival
+    also = f"; {inside(margin.rival)} takes nearly as much of the error" if near else ""
+    return f"{share:.0%} sure of the name{also}"
