@@ -83,6 +83,11 @@ def answer(case: Path, keep: Path | None = None) -> dict:
         for effect in report["effects"]
     ]
     effects = merged(effects)
+    left = report["unexplained"]
+    if left is not None and all(e["kind"] != "unknown" for e in effects):
+        # What is left, and nothing that was logged predicts, is no finding; but it is told.
+        nameless = {"kind": "unknown", "joints": left["joints"], "variables": left["variables"]}
+        effects.append(nameless | {"parameters": {}})
     said = ", ".join(f"{e['kind']} {e['joints']}" for e in effects) or report["verdict"]
     print(f"{case.name} {time.perf_counter() - start:5.1f} s  {said}", flush=True)
     kept = ("verdict", "rmse_before", "rmse_after")

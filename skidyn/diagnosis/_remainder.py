@@ -8,6 +8,7 @@ tell of the residual. The remainder is neither.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,9 +17,13 @@ from numpy.typing import NDArray
 from skidyn._signals import Array
 from skidyn.diagnosis._noise import MEDIAN, sensor_noise
 from skidyn.diagnosis._rule import (
+    REMAINDER_CORRELATED,
     REMAINDER_PREDICTABLE_SHARE,
     REMAINDER_SHARE_OF_RANGE,
+    REMAINDER_SLOW_SHARE_OF_RANGE,
+    REMAINDER_SLOW_TIMES_NOISE,
     REMAINDER_TIMES_NOISE,
+    variance_inflation,
 )
 from skidyn.evidence import Problem, smooth_motion
 
@@ -44,7 +49,8 @@ class Remainder:
         What is none of these.
     material : ndarray of shape (n_joints,) of bool
         Whether the error is more than noise, and more than what a healthy robot leaves; or what
-        is predictable exceeds the noise.
+        is slow is correlated, which noise is not, and stands out of averaged noise; or what is
+        predictable exceeds the noise.
 
     Examples
     --------
@@ -77,7 +83,12 @@ def torque_range(torque: Array) -> Array:
 
 
 def find_remainder(
-    problem: Problem, residual: Array, torque: Array, rmse: Array, share: Array
+    problem: Problem,
+    residual: Array,
+    averaged: Sequence[Array],
+    torque: Array,
+    rmse: Array,
+    share: Array,
 ) -> Remainder:
     """Take the error of the completed model apart.
 
@@ -87,6 +98,8 @@ def find_remainder(
         Motion and rows.
     residual : ndarray of shape (n_samples, n_joints), N m or N
         Held-out residual of the completed model.
+    averaged : sequence of ndarray of shape (n_rows_j,)
+        Residual rows of every joint, over which noise is averaged.
     torque : ndarray of shape (n_samples, n_joints), N m or N
         Measured torque.
     rmse : ndarray of shape (n_joints,), N m or N
@@ -106,6 +119,10 @@ def find_remainder(
     left = np.sqrt(np.maximum(excess - predictable**2, 0.0))
     span = torque_range(torque)
     material = (rmse > REMAINDER_TIMES_NOISE * noise) & (left > REMAINDER_SHARE_OF_RANGE * span)
+    rows = np.array([np.sqrt(np.mean(e**2)) if len(e) else 0.0 for e in averaged])
+    correlated = variance_inflation(problem, averaged, range(len(averaged))) > REMAINDER_CORRELATED
+    slow = correlated & (rows > REMAINDER_SLOW_TIMES_NOISE * noise)
+    material |= slow & (left > REMAINDER_SLOW_SHARE_OF_RANGE * span)
     material |= (predictable > noise) & (predictable > REMAINDER_PREDICTABLE_SHARE * span)
     return Remainder(sensor, position, predictable, left, material)
 

@@ -76,6 +76,11 @@ EPISODE_FORCE_SHARE = 0.8
 #: and coloured noise leave up to half as much again as the fast noise, and robots that move well
 #: leave some hundredths of the range.
 REMAINDER_TIMES_NOISE, REMAINDER_SHARE_OF_RANGE = 2.0, 0.02
+#: Smaller remainders are told where they are slow: averaged over time they exceed so many times what
+#: noise leaves there, coloured noise included; the variance of a slow torque is inflated by their
+#: autocorrelation to more than coloured noise does; and they reach this share of the range.
+REMAINDER_SLOW_TIMES_NOISE, REMAINDER_CORRELATED = 3.0, 2.2
+REMAINDER_SLOW_SHARE_OF_RANGE = 0.01
 #: Share of the torque's range above which something predictable is material if it exceeds noise.
 REMAINDER_PREDICTABLE_SHARE = 0.01
 
