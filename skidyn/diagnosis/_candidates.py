@@ -7,6 +7,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+from numpy.typing import NDArray
+
 from skidyn._progress import track
 from skidyn._signals import Array
 from skidyn.effects import Term, get_effect
@@ -46,6 +49,11 @@ class Candidate:
     def signs(self) -> Array:
         """1 for every coefficient that physics forbids to be negative, else 0."""
         return self.term.signs
+
+    @cached_property
+    def zeros(self) -> NDArray[np.bool_]:
+        """Which coefficients only say where the effect is zero."""
+        return self.term.zeros
 
     @cached_property
     def limits(self) -> Array:

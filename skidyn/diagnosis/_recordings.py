@@ -102,7 +102,9 @@ def choose(
     while left and len(chosen) < MOST_TERMS:
         tester = tester_beside(chosen)
         drops = np.array([_drop_alone(tester, c) for c in left])
-        tests = [(left[i], tester.test(left[i].rows)) for i in np.argsort(-drops)[:TESTED]]
+        tests = [
+            (left[i], tester.test(left[i].rows, left[i].zeros)) for i in np.argsort(-drops)[:TESTED]
+        ]
         found = [(t.drop, c) for c, t in tests if significant(t.chance)]
         if not found:
             break

@@ -31,7 +31,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,9 +76,9 @@ EPISODE_FORCE_SHARE = 0.8
 #: and coloured noise leave up to half as much again as the fast noise, and robots that move well
 #: leave some hundredths of the range.
 REMAINDER_TIMES_NOISE, REMAINDER_SHARE_OF_RANGE = 2.0, 0.02
-#: Smaller remainders are told where they are slow: averaged over time they exceed so many times what
-#: noise leaves there, coloured noise included; the variance of a slow torque is inflated by their
-#: autocorrelation to more than coloured noise does; and they reach this share of the range.
+#: Smaller remainders are told where they are slow: averaged over time they exceed so many times
+#: what noise leaves there, coloured noise included; their autocorrelation inflates the variance of
+#: a slow torque to more than coloured noise does; and they reach this share of the range.
 REMAINDER_SLOW_TIMES_NOISE, REMAINDER_CORRELATED = 3.0, 2.2
 REMAINDER_SLOW_SHARE_OF_RANGE = 0.01
 #: Share of the torque's range above which something predictable is material if it exceeds noise.
@@ -232,20 +232,37 @@ class Tester:
         self._duration = _duration(problem)
         self._free = max(1, int(problem.rows.counts.sum()) - len(scale))
 
-    def test(self, rows: dict[int, Array]) -> Test:
+    def test(self, rows: dict[int, Array], zeros: NDArray[np.bool_] | None = None) -> Test:
         """Test the coefficients of some columns together.
 
         Parameters
         ----------
         rows : dict of int to ndarray of shape (n_rows_j, n_coefficients)
             Averaged columns, per joint they reach.
+        zeros : ndarray of shape (n_coefficients,) of bool, optional
+            Coefficients that only say where the effect is zero. The others must be more than
+            chance beside them, too: the constant beside a spring is no spring.
 
         Returns
         -------
         Test
         """
-        k = next(iter(rows.values())).shape[1]
         new = self._swept(rows)
+        test = self._test(rows, new, self.residual)
+        if zeros is None or not zeros.any() or test.chance == 1.0:
+            return test
+        own = {j: block[:, ~zeros] for j, block in rows.items()}
+        aside = np.concatenate([z[:, zeros] for z in new])
+        both = np.column_stack([np.concatenate(self.residual), *np.concatenate(new)[:, ~zeros].T])
+        both -= aside @ np.linalg.lstsq(aside, both, rcond=NEW_SHARE)[0]
+        ends = np.cumsum([len(e) for e in self.residual])[:-1]
+        parts = np.split(both, ends)
+        alone = self._test(own, [part[:, 1:] for part in parts], [part[:, 0] for part in parts])
+        return replace(test, chance=max(test.chance, alone.chance))
+
+    def _test(self, rows: dict[int, Array], new: list[Array], residual: Sequence[Array]) -> Test:
+        """Test columns from which what the model can do has been taken."""
+        k = next(iter(rows.values())).shape[1]
         own = np.asarray(sum(np.sum((b / self.sigma[j]) ** 2, axis=0) for j, b in rows.items()))
         gram = np.asarray(sum(z.T @ z for z in new))
         # Columns that the model can do by itself say nothing.
@@ -255,9 +272,9 @@ class Tester:
         new, gram, k = [z[:, told] for z in new], gram[np.ix_(told, told)], int(told.sum())
         size = np.sqrt(np.diag(gram))
         new, gram = [z / size for z in new], gram / size[:, None] / size
-        score = np.asarray(sum(z.T @ e for z, e in zip(new, self.residual, strict=True)))
+        score = np.asarray(sum(z.T @ e for z, e in zip(new, residual, strict=True)))
         b = np.linalg.solve(gram + RIDGE * np.eye(k), score)
-        left = [e - z @ b for e, z in zip(self.residual, new, strict=True)]
+        left = [e - z @ b for e, z in zip(residual, new, strict=True)]
         drop = float(score @ b)
         chance = max(self._stationary(new, left, drop, k), self._by_blocks(rows, new, left, score))
         coefficients = np.zeros(len(told))

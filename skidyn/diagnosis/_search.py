@@ -240,7 +240,7 @@ class _Search:
 
     def chance(self, candidate: Candidate, others: Sequence[Candidate]) -> float:
         """Chance of a candidate's coefficients beside the model and other candidates."""
-        return self.tester(others).test(candidate.rows).chance
+        return self.tester(others).test(candidate.rows, candidate.zeros).chance
 
     def tester(self, others: Sequence[Candidate]) -> Tester:
         """Tests beside the model and some candidates; the last one is kept for the next call."""
@@ -495,7 +495,9 @@ class _Search:
             n_rows = int(self.problem.rows.counts[list(candidate.joints)].sum())
             if not drops[i] > self.settings.least_share * n_rows:
                 continue
-            if self.significant(tester.test(candidate.rows).chance, candidate.kind):
+            if self.significant(
+                tester.test(candidate.rows, candidate.zeros).chance, candidate.kind
+            ):
                 return int(i)
         return None
 

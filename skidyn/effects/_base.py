@@ -35,6 +35,9 @@ class Coefficient:
         Largest magnitude at which the formula still describes the effect.
     is_share : bool
         Whether it is a share of a shape parameter, so that its own size says nothing.
+    is_zero : bool
+        Whether it only says where the effect is zero, as the constant beside a spring: a finding
+        must be more than chance without it.
 
     Examples
     --------
@@ -47,6 +50,7 @@ class Coefficient:
     sign: int = 0
     limit: float = np.inf
     is_share: bool = False
+    is_zero: bool = False
 
 
 @dataclass(frozen=True)

@@ -85,7 +85,7 @@ class CouplingSpring(_PairEffect):
     kind = "coupling_spring"
     title = "Coupling spring"
     formula = r"k\,(q_i + r\,q_j - x_0)"
-    coefficients = (Coefficient("k", "N m/rad"), Coefficient("tau0", "N m"))
+    coefficients = (Coefficient("k", "N m/rad"), Coefficient("tau0", "N m", is_zero=True))
     simplicity = 16
     rivals = ("spring",)
     separating_motion = "slow motion of the two joints together, then against each other"

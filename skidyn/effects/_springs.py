@@ -36,7 +36,7 @@ class Spring(Effect):
     by_recording = True
     title = "Spring"
     formula = r"k\,(q - q_0)"
-    coefficients = (Coefficient("k", "N m/rad", sign=1), Coefficient("tau0", "N m"))
+    coefficients = (Coefficient("k", "N m/rad", sign=1), Coefficient("tau0", "N m", is_zero=True))
     simplicity = 4
     rivals = ("nonlinear_spring", "gravity_compensator", "offset", "end_stop")
     separating_motion = "slow motion over the whole travel"
@@ -65,7 +65,7 @@ class NonlinearSpring(Effect):
         Coefficient("k1", "N m/rad"),
         Coefficient("k2", "N m/rad^2"),
         Coefficient("k3", "N m/rad^3"),
-        Coefficient("tau0", "N m"),
+        Coefficient("tau0", "N m", is_zero=True),
     )
     simplicity = 29
     rivals = ("spring", "gravity_compensator", "end_stop")
@@ -93,7 +93,7 @@ class GravityCompensator(Effect):
         Coefficient("b1", "N m"),
         Coefficient("a2", "N m"),
         Coefficient("b2", "N m"),
-        Coefficient("tau0", "N m"),
+        Coefficient("tau0", "N m", is_zero=True),
     )
     simplicity = 30
     rivals = ("nonlinear_spring", "spring")

@@ -102,6 +102,11 @@ class Term:
         return np.array([c.sign for c in self.coefficients], dtype=float)
 
     @property
+    def zeros(self) -> NDArray[np.bool_]:
+        """Which coefficients only say where the effect is zero, (width,)."""
+        return np.array([c.is_zero for c in self.coefficients], dtype=bool)
+
+    @property
     def limits(self) -> Array:
         """Largest magnitude of every coefficient at which the formula holds, (width,)."""
         return np.array([c.limit for c in self.coefficients])

@@ -61,7 +61,7 @@ class TemperatureOffset(Effect):
     drawn_against = "temperature"
     title = "Temperature-dependent offset"
     formula = r"\tfrac{d\tau}{dT}\,(T - T_0) + \tau_0"
-    coefficients = (Coefficient("dtau_dT", "N m/K"), Coefficient("tau0", "N m"))
+    coefficients = (Coefficient("dtau_dT", "N m/K"), Coefficient("tau0", "N m", is_zero=True))
     needs = ("temperature",)
     simplicity = 13
     rivals = ("offset", "temperature_friction")
