@@ -285,8 +285,7 @@ class Effect:
         if self.scope == "robot":
             return [tuple(range(n))]
         if self.scope == "pair":
-            alike = [j for j in range(n) if not signals.prismatic[j]]
-            return list(itertools.combinations(alike, 2))
+            return list(itertools.combinations(range(n), 2))
         return [(j,) for j in range(n)]
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:

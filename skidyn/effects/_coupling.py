@@ -12,8 +12,11 @@ from skidyn._signals import SIGN_BLUR, Signals
 from skidyn.effects._base import Array, Coefficient, Effect, Shape
 
 _RATIO = Shape(
-    "ratio", "1", (1.0, -1.0), -10.0, 10.0, spacing="linear", scales=False, has_interval=False
+    "ratio", "1", (1.0, -1.0), -np.inf, np.inf, spacing="linear", scales=False, has_interval=False
 )
+#: Largest ratio, in units of the two joints: beyond it an effect of the second joint alone fits.
+#: Between a slider and a rotary joint, a screw for example, the unit itself is only a guess.
+LARGEST_RATIO, GUESSED = 10.0, (0.1, 1.0, 10.0)
 _GAUTIER = "Janot, Vandanjon, Gautier (2014), IEEE TCST 22(1), 132-145 (TX40 wrist)."
 
 
@@ -35,13 +38,24 @@ class _PairEffect(Effect):
         block = self.coupled_columns(signals, i, j, ratio)
         return {i: block, j: ratio * block}
 
-    def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
-        return 1.0
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        unit = self.travel(signals, joints, {})
+        scales = GUESSED if _differ(signals, joints) else (1.0,)
+        return [{"ratio": sign * scale * unit} for scale in scales for sign in _RATIO.grid]
 
-    def not_shown(self, signals: Signals, joint: int) -> str | None:
-        if signals.prismatic[joint]:
-            return f"joint {joint + 1} slides"
-        return super().not_shown(signals, joint)
+    def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
+        largest = LARGEST_RATIO * (GUESSED[-1] if _differ(signals, joints) else 1.0)
+        return abs(shape["ratio"]) <= largest * self.travel(signals, joints, shape)
+
+    def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
+        i, j = joints
+        return float(signals.unit[i] / signals.unit[j])
+
+
+def _differ(signals: Signals, joints: Sequence[int]) -> bool:
+    """Whether one of two joints slides and the other one turns."""
+    i, j = joints
+    return bool(signals.prismatic[i] != signals.prismatic[j])
 
 
 class CoupledFriction(_PairEffect):
@@ -59,7 +73,7 @@ class CoupledFriction(_PairEffect):
 
     def coupled_columns(self, signals: Signals, i: int, j: int, ratio: float) -> Array:
         speed = signals.dq[:, i] + ratio * signals.dq[:, j]
-        return np.column_stack([np.tanh(speed / SIGN_BLUR), speed])
+        return np.column_stack([np.tanh(speed / (SIGN_BLUR * signals.unit[i])), speed])
 
 
 class CoupledInertia(_PairEffect):

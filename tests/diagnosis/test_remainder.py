@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is left and nothing that was logged predicts: told where it is slow, not where it is noise."""
+"""What is left and nothing that was logged predicts is told where it is slow, as noise is not."""
 
 import numpy as np
 import pytest

@@ -224,7 +224,17 @@ def test_units_of_sliders():
     assert dahl.grid(scara, (2,))[0]["presliding"] == pytest.approx(
         dahl.grid(scara, (0,))[0]["presliding"] / 10
     )
-    assert all(2 not in pair for pair in get_effect("coupling_spring").sites(scara))
+
+
+def test_a_slider_and_a_rotary_joint_can_be_coupled():
+    slides = np.array([kind == "prismatic" for kind in load_scara().joint_types])
+    zero = np.zeros((3, 4))
+    scara = Signals(zero, zero, zero, trajectory=np.zeros(3), prismatic=slides)
+    spring = get_effect("coupling_spring")
+    assert (2, 3) in spring.sites(scara)
+    for pair, expected in (((2, 3), (0.01, 0.1, 1.0)), ((0, 1), (1.0,))):
+        ratios = sorted({abs(shape["ratio"]) for shape in spring.grid(scara, pair)})
+        assert ratios == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("kind", list_effects())
