@@ -84,7 +84,7 @@ def answer(case: Path, keep: Path | None = None) -> dict:
     ]
     effects = merged(effects)
     left = report["unexplained"]
-    if left is not None and all(e["kind"] != "unknown" for e in effects):
+    if left is not None and not effects:
         # What is left, and nothing that was logged predicts, is no finding; but it is told.
         nameless = {"kind": "unknown", "joints": left["joints"], "variables": left["variables"]}
         effects.append(nameless | {"parameters": {}})

@@ -15,7 +15,7 @@ from skidyn._progress import tell
 from skidyn._signals import Array, Signals
 from skidyn.effects import Term, TermSum
 from skidyn.evidence._broken import without_broken
-from skidyn.evidence._folds import Normal, nearest_folds
+from skidyn.evidence._folds import RIDGE, Normal, nearest_folds
 from skidyn.evidence._kinematics import SmoothedMotion, as_given, smooth_motion
 from skidyn.evidence._rows import (
     FEWEST_SAMPLES,
@@ -560,7 +560,11 @@ def _weighted(terms: TermSum, design: list[Array], target: list[Array], sigma: A
     size = np.linalg.norm(a, axis=0)
     size[size == 0] = 1.0
     unit = a / size
-    normal = Normal(unit.T @ unit, unit.T @ y, np.ones(len(size)))
+    # No column alone carries more than there is to explain. What the data leaves open, such as the
+    # share of a rotor in an inertia, is shared out as the smallest corrections that do it, and the
+    # loads of the joints, which depend on that, stay those of a robot.
+    ridge = max(RIDGE, 1 / max(float(y @ y), 1.0))
+    normal = Normal(unit.T @ unit, unit.T @ y, np.ones(len(size)), ridge)
     # One refinement step recovers the accuracy that forming the Gram matrix costs.
     scaled = normal.solution + normal.solve(unit.T @ (y - a @ (normal.solution / size)))
     coefficients = scaled / size
