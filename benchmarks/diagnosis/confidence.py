@@ -17,6 +17,8 @@ import numpy as np
 from sklearn.linear_model import LogisticRegression
 
 BINS = (0.0, 0.6, 0.75, 0.85, 0.9, 0.95, 1.0)
+#: As in the confidence that is judged.
+COLOURED, LEAST, ENOUGH = 1.7, 0.003, 0.3
 #: These act on the tool or the base: any joint is right.
 ANYWHERE = {"payload", "external_wrench", "base_tilt", "environment_contact"}
 
@@ -42,14 +44,24 @@ def names(truth: Path, reports: Path) -> list[tuple[float, bool, list[float]]]:
         if file.stem not in table:
             continue
         report, seen = json.loads(file.read_text()), set()
-        ratio = np.array(report["rmse_after"]) / np.maximum(report["noise_floor"], 1e-300)
+        inflation = np.array(report["remainder_inflation"])
+        nameless = {j for e in report["effects"] if e["kind"] == "unknown" for j in e["joints"]}
+        nameless |= set((report["unexplained"] or {"joints": []})["joints"])
         for effect in report["effects"]:
             if effect["confidence"] is None or effect["kind"] in seen:
                 continue
             seen.add(effect["kind"])
-            left = max(1.0, float(ratio[[j - 1 for j in effect["joints"]]].max()))
-            tells = [min(max(effect["margin"], 0.0), 1.0), np.log(left)]
-            tells.append(float(effect["trajectories"] is not None))
+            alike = [e for e in report["effects"] if e["kind"] == effect["kind"]]
+            joints = {j for e in alike for j in e["joints"]}
+            slow = inflation[[j - 1 for j in joints]].max()
+            drop = max(e["error_drop"] for e in alike)
+            tells = [
+                min(max(effect["margin"], 0.0), 1.0),
+                np.log(max(slow / COLOURED, 1.0)),
+                np.log10(min(max(drop, LEAST), ENOUGH) / ENOUGH),
+                float(bool(nameless & joints)),
+                float(effect["trajectories"] is not None),
+            ]
             rows.append((effect["confidence"], right(effect, table[file.stem]), tells))
     return rows
 
@@ -73,7 +85,10 @@ def main() -> None:
     if 0 < good.sum() < len(good):
         fit = LogisticRegression(C=3.0).fit(np.array([t for _, _, t in rows]), good)
         weights = ", ".join(f"{w:.2f}" for w in (*fit.intercept_, *fit.coef_[0]))
-        print(f"weights (constant, margin, left, some recordings) of these: {weights}")
+        print(
+            "weights (constant, margin, correlated, removed, nameless beside it, "
+            f"some recordings) of these: {weights}"
+        )
 
 
 if __name__ == "__main__":

@@ -127,8 +127,7 @@ def conclude(
     episodes, inside = find_episodes(problem, smooth, least, share_held)
     if episodes:
         findings.append(_episodic(episodes, inside, result.fit.residual))
-    ratio = rmse / np.maximum(parts.noise, 1e-300)
-    findings = [_sure(f, ratio, problem.whole_trajectories) for f in findings]
+    findings = [_sure(f, findings, parts, problem.whole_trajectories) for f in findings]
     return Diagnosis(
         _verdict(findings, parts),
         robot.joint_names,
@@ -350,13 +349,22 @@ def _drop(before: Sequence[float], after: Sequence[float], joints: Sequence[int]
     return float(np.mean([1 - (a / b) ** 2 for b, a in pairs]))
 
 
-def _sure(finding: Finding, ratio: Array, whole: bool) -> Finding:
+def _sure(finding: Finding, findings: Sequence[Finding], parts: Remainder, whole: bool) -> Finding:
     """The finding with the probability that its name is right."""
     if not finding.terms:
         return finding
     joints = [j - 1 for j in finding.joints]
-    left, some = float(ratio[joints].max()), finding.trajectories is not None
-    return replace(finding, confidence=confidence(finding.margin, left, whole, some))
+    others = [f for f in findings if f is not finding and f.kind == UNKNOWN]
+    beside = any(set(f.joints) & set(finding.joints) for f in others)
+    probability = confidence(
+        finding.margin,
+        float(parts.inflation[joints].max()),
+        max(f.error_drop for f in findings if f.kind == finding.kind),
+        nameless=finding.kind != UNKNOWN and (beside or bool(parts.material[joints].any())),
+        whole_recordings=whole,
+        some_recordings=finding.trajectories is not None,
+    )
+    return replace(finding, confidence=probability)
 
 
 def _episodic(

@@ -1,28 +1,36 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How sure a name is: the probability that it is right, set once with generated logs.
 
-Four things tell: by how much of its gain the best other explanation falls short, what is left on
-its joints once it is added, in units of the noise, whether whole recordings could be left out to
-judge it, and whether it acts in some recordings only. The weights are those of a logistic
-regression on names found in logs of other seeds (``benchmarks/diagnosis/confidence.py``), whole
-and cut down to one to five of their recordings, held near round values; the same benchmark
-prints the reliability on other logs.
+What tells is by how much of its gain the best other explanation falls short; whether what is left
+on its joints is white, as noise is, or slow, as the rest of a torque that was given a wrong name;
+how much of the error it removes; and whether something without a name stays beside it. The weights
+are those of a logistic regression on names found in logs of other seeds
+(``benchmarks/diagnosis/confidence.py``), held near round values; the same benchmark prints the
+reliability on other logs.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-#: Weights of the constant, of the margin, of the logarithm of what is left over the noise, of
-#: folds that are blocks of time and not recordings, and of an effect of some recordings only.
-CONSTANT, MARGIN, LEFT, BLOCKS, SOME = 2.2, 1.5, -1.5, -1.0, -1.0
+#: Weights of the constant, of the margin, of the logarithm of the inflation of the variance by
+#: autocorrelation, of the decimal logarithm of the share of the error that is removed.
+CONSTANT, MARGIN, CORRELATED, REMOVED = 2.4, 1.2, -1.5, 2.2
+#: Weights of something without a name on the same joints, of folds that are blocks of time and not
+#: recordings, and of an effect of some recordings only.
+NAMELESS, BLOCKS, SOME = -1.5, -0.5, -1.0
+#: Coloured noise inflates the variance so much; shares of the error between these count.
+COLOURED, LEAST, ENOUGH = 1.7, 0.003, 0.3
 #: No name is surer than the number of logs on which the weights were found allows.
 MOST = 0.98
 
 
 def confidence(
     margin: float,
-    left_over_noise: float,
+    inflation: float,
+    removed: float,
+    *,
+    nameless: bool = False,
     whole_recordings: bool = True,
     some_recordings: bool = False,
 ) -> float:
@@ -32,8 +40,12 @@ def confidence(
     ----------
     margin : float
         Share of its gain that the best other explanation of the same joints falls short of.
-    left_over_noise : float
-        Held-out error of its joints with all findings, over their noise.
+    inflation : float
+        Inflation of the variance by the autocorrelation of what is left on its joints; 1 if white.
+    removed : float
+        Largest share of the squared error of a joint that the effect removes.
+    nameless : bool, default=False
+        Whether something without a name is left, or was found, on its joints.
     whole_recordings : bool, default=True
         Whether it was judged on whole recordings left out.
     some_recordings : bool, default=False
@@ -45,6 +57,7 @@ def confidence(
         Between 0 and 0.98.
     """
     logit = CONSTANT + MARGIN * min(max(margin, 0.0), 1.0)
-    logit += LEFT * float(np.log(max(left_over_noise, 1.0)))
-    logit += BLOCKS * (not whole_recordings) + SOME * some_recordings
+    logit += CORRELATED * float(np.log(max(inflation / COLOURED, 1.0)))
+    logit += REMOVED * float(np.log10(min(max(removed, LEAST), ENOUGH) / ENOUGH))
+    logit += NAMELESS * nameless + BLOCKS * (not whole_recordings) + SOME * some_recordings
     return min(MOST, float(1 / (1 + np.exp(-logit))))

@@ -47,6 +47,9 @@ class Remainder:
         What a function of the logged signals would still take away.
     left : ndarray of shape (n_joints,), N m or N
         What is none of these.
+    inflation : ndarray of shape (n_joints,)
+        Inflation of the variance of slow torques by the autocorrelation of the error: about 1 for
+        white noise, up to 2 for coloured noise, more for a torque that is missing.
     material : ndarray of shape (n_joints,) of bool
         Whether the error is more than noise, and more than what a healthy robot leaves; or what
         is slow is correlated, which noise is not, and stands out of averaged noise; or what is
@@ -62,6 +65,7 @@ class Remainder:
     position_noise: Array
     predictable: Array
     left: Array
+    inflation: Array
     material: NDArray[np.bool_]
 
     @property
@@ -120,11 +124,11 @@ def find_remainder(
     span = torque_range(torque)
     material = (rmse > REMAINDER_TIMES_NOISE * noise) & (left > REMAINDER_SHARE_OF_RANGE * span)
     rows = np.array([np.sqrt(np.mean(e**2)) if len(e) else 0.0 for e in averaged])
-    correlated = variance_inflation(problem, averaged, range(len(averaged))) > REMAINDER_CORRELATED
-    slow = correlated & (rows > REMAINDER_SLOW_TIMES_NOISE * noise)
+    inflation = variance_inflation(problem, averaged, range(len(averaged)))
+    slow = (inflation > REMAINDER_CORRELATED) & (rows > REMAINDER_SLOW_TIMES_NOISE * noise)
     material |= slow & (left > REMAINDER_SLOW_SHARE_OF_RANGE * span)
     material |= (predictable > noise) & (predictable > REMAINDER_PREDICTABLE_SHARE * span)
-    return Remainder(sensor, position, predictable, left, material)
+    return Remainder(sensor, position, predictable, left, inflation, material)
 
 
 def noise_level(problem: Problem, residual: Array) -> Array:

@@ -150,6 +150,11 @@ class Diagnosis:
         return np.zeros(len(self.joint_names)) if self.parts is None else self.parts.left
 
     @property
+    def remainder_inflation(self) -> Array:
+        """How slow what is left is: 1 if it is white, up to 2 as coloured noise; (n_joints,)."""
+        return np.ones(len(self.joint_names)) if self.parts is None else self.parts.inflation
+
+    @property
     def regimes(self) -> tuple[str, ...]:
         """Names of the columns of :meth:`error_map`."""
         return REGIMES
@@ -287,6 +292,7 @@ class Diagnosis:
             "noise_floor": [float(x) for x in self.noise_floor],
             "sensor_noise": [float(x) for x in self.sensor_noise],
             "remainder": [float(x) for x in self.remainder],
+            "remainder_inflation": [float(x) for x in self.remainder_inflation],
             "effects": [finding.to_dict() for finding in self.findings],
             "unexplained": self.unexplained,
             "limits": [limit.to_dict() for limit in self.limits],

@@ -105,7 +105,7 @@ def make_diagnosis(verdict="missing", joint_names=("shoulder", "elbow", "slider"
         rmse_before=np.array(history[0]["rmse"]), rmse_after=np.array(history[-1]["rmse"]),
         budget=[dict(share) for _ in range(n)], warnings=["one trajectory has 3 repeated rows"],
         regimes=REGIMES, base_model=None, data=(), checks=[], parts=None,
-        sensor_noise=np.full(n, 0.2), remainder=np.zeros(n),
+        sensor_noise=np.full(n, 0.2), remainder=np.zeros(n), remainder_inflation=np.ones(n),
     )  # fmt: skip
     result.error_map = lambda after=False: error_map(
         result.comparison_after if after else result.comparison
