@@ -45,7 +45,7 @@ def digits(value: float) -> str:
         return "–"
     if value == 0 or not 1e-4 <= abs(value) < 1e4:
         return f"{value:.2g}"
-    decimals = max(0, 1 - math.floor(math.log10(abs(value))))
+    decimals = max(0, 1 - math.floor(math.log10(abs(float(f"{value:.1e}")))))
     return f"{value:.{decimals}f}"
 
 

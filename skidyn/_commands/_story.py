@@ -72,7 +72,7 @@ def where_lines(failures: Sequence[Any]) -> Iterator[str]:
 
 
 def joint_lines(story: Mapping[str, Any]) -> Iterator[str]:
-    """A row per joint that has something to say, the worst first; the others in one line."""
+    """A row per joint that is not at its noise, the worst first; the others in one line."""
     rows = [row for row in story["joints"] if row["speaks"]] or list(story["joints"])
     rows.sort(key=lambda row: -row["ratios"][0] if row["ratios"][0] == row["ratios"][0] else 0.0)
     known = [ratio for row in rows for ratio in row["ratios"] if ratio == ratio]

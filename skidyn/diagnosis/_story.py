@@ -42,7 +42,7 @@ def story(diagnosis: Diagnosis) -> dict[str, Any]:
         ``mark`` and ``headline`` of the verdict, ``text`` below it, ``findings`` in one line per
         kind (``what``, ``where``, ``size``, ``sure``, ``change``, ``when``), ``cards`` with the
         same for every finding, ``joints`` (a row each, with
-        ``speaks`` where there is something to say), ``quiet`` (a sentence on the others) and
+        ``speaks`` where it is not at its noise), ``quiet`` (a sentence on the others) and
         ``left`` (a sentence on what stays), ``doubts`` (what is suspected of the log, to be
         looked at before a name is believed) and other ``warnings``.
     """
@@ -197,7 +197,7 @@ def _line(diagnosis: Diagnosis, k: int, rows: Sequence[dict[str, Any]]) -> dict[
         "only": trajectories_told(finding),
         "when": episodes_told(finding.when),
         "size": ", ".join(shown[: _told(finding)]),
-        "main": shown[int(np.argmax(weights))] if shown else "",
+        "clear": dict(zip(shown, weights, strict=True)),
         "sure": sure(finding),
         "doubtful": bool(finding.rivals) or share < SURE,
         "guess": share < GUESS,
@@ -218,10 +218,11 @@ def _together(group: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """A line for several findings: the first parameter of each, what helped most, how sure."""
     joints = sorted({joint for card in group for joint in card["joints"]})
     best = max(group, key=lambda card: card["fell"])
+    at = _first_clear([list(card["clear"].values()) for card in group])
     sizes_told = [
-        f"{card['main']} (joint {card['joints'][0]}{card['only']})"
+        f"{list(card['clear'])[at]} (joint {card['joints'][0]}{card['only']})"
         for card in sorted(group, key=lambda card: card["joints"])
-        if card["main"]
+        if len(card["clear"]) > at
     ]
     more = len(sizes_told) - LISTED
     doubtful = next((card for card in group if card["doubtful"]), best)
@@ -236,6 +237,12 @@ def _together(group: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "doubtful": doubtful["doubtful"],
         "change": change if change.startswith("joint") else f"joint {best['joints'][0]}: {change}",
     }
+
+
+def _first_clear(weights: Sequence[Sequence[float]]) -> int:
+    """The first parameter whose interval leaves zero out on every joint; else the first."""
+    fewest = min(map(len, weights), default=0)
+    return next((k for k in range(fewest) if all(own[k] > 1 for own in weights)), 0)
 
 
 def _step(history: Sequence[dict[str, Any]], finding: Finding) -> int | None:
@@ -329,14 +336,13 @@ def episodes_told(episodes: Sequence[Any]) -> str:
 
 
 def _quiet(rows: Sequence[dict[str, Any]]) -> str:
-    """One sentence on the joints that have nothing to say."""
+    """One sentence on the joints that are at their noise."""
     quiet = [row["joint"] for row in rows if not row["speaks"]]
     if not quiet:
         return ""
     if len(quiet) == len(rows):
-        return "All joints are at their noise."
-    verb = "is at its" if len(quiet) == 1 else "are at their"
-    return f"{joints_told(quiet).capitalize()} {verb} noise."
+        return "On every joint the error is like the noise."
+    return f"On {joints_told(quiet)} the error is like the noise."
 
 
 def _left(diagnosis: Diagnosis, rows: Sequence[dict[str, Any]]) -> str:

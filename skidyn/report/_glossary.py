@@ -4,14 +4,15 @@
 from __future__ import annotations
 
 MEANINGS = {
-    "held-out error": "Root mean square of measured less modelled torque on judged samples, each "
-    "predicted by a model that was fitted without the trajectory or the block of time it is from.",
-    "noise": "What no model could remove: the scatter of the torque and position sensors. A joint "
-    "whose error is like its noise is explained.",
-    "residual": "Measured less modelled torque.",
-    "judged": "A sample counts while its joint slides: away from rest and from reversals, where "
-    "dry friction can take any value up to its limit and no model of sliding can know it. Where "
-    "hysteresis was found, samples at reversals count too.",
+    "held-out error": "Root mean square of measured minus modelled torque on judged samples. "
+    "Each sample is predicted by a model that was fitted without its trajectory, or without its "
+    "block of time where there are few trajectories.",
+    "noise": "What no model could remove: the scatter of the torque and position sensors. A "
+    "joint whose error is like its noise is explained.",
+    "residual": "Measured minus modelled torque.",
+    "judged": "A sample is judged while its joint slides, away from rest and from reversals: "
+    "there dry friction can take any value up to its limit, and no model of sliding can predict "
+    "it. Where hysteresis was found, samples at reversals are judged too.",
     "reversal": "A change of the joint's direction, and the moments before and after it.",
     "rest": "The joint does not move: dry friction holds it and can take any value up to its "
     "limit.",
@@ -19,24 +20,27 @@ MEANINGS = {
     "medium": "Speeds between slow and fast.",
     "fast": "Speeds above 70 % of the speed that the joint exceeds in 5 % of its motion.",
     "loaded": "The fifth of the motion with the largest torque.",
-    "warm": "The fifth with the highest temperature, or the latest where none is logged.",
-    "largest hidden": "An effect of this size or more would have been found; a smaller one may be "
-    "there without being seen.",
-    "regime": "A part of the motion: rest, reversal, slow, medium, fast; across them, loaded (the "
-    "fifth of the motion with the largest torque) and warm (the warmest, or the latest fifth).",
-    "95% interval": "Estimated anew with parts of the log left out, the parameter lies in it in "
-    "95 of 100 recordings.",
-    "rival": "Another effect that explains this recording nearly as well. The motion that is named "
-    "with it would tell them apart.",
-    "q-value": "Share of false findings to be expected among those reported at this level.",
-    "trajectory": "One piece of motion of the log, by the number that the log gives it, or counted "
-    "from 1. Errors are held out by whole trajectories where there are enough of them.",
+    "warm": "The fifth of the motion with the highest temperature, or the last fifth where no "
+    "temperature is logged.",
+    "largest hidden": "An effect of this size or more would have been found; a smaller one may "
+    "be there unseen.",
+    "regime": "A part of the motion: rest, reversal, slow, medium or fast; and, independent of "
+    "these, loaded (the fifth of the motion with the largest torque) and warm (the warmest "
+    "fifth, or the last one).",
+    "95% interval": "An interval that holds the true value in 95 of 100 recordings. It comes "
+    "from estimates with parts of the log left out.",
+    "rival": "Another effect that explains this recording nearly as well. The motion that is "
+    "named beside it would tell them apart.",
+    "q-value": "Share of false findings that is to be expected among all findings reported at "
+    "this level.",
+    "trajectory": "One piece of motion of the log, with the number that the log gives it, or "
+    "counted from 1. Errors are held out by whole trajectories where there are enough of them.",
 }
 
 #: Words of the page of a fleet alone.
 FLEET_MEANINGS = {
-    "distance": "A robot's coefficient less that of the others, over the scatter between the "
-    "robots.",
+    "distance": "A robot's coefficient minus that of the others, divided by the scatter between "
+    "the robots.",
     "scatter": "The standard deviation of a coefficient between normal robots, from the median of "
     "the fleet, so that few worn robots do not count.",
     "q-value": MEANINGS["q-value"],

@@ -43,7 +43,9 @@ def test_numbers_are_those_of_the_diagnosis(missing):
 def test_a_complete_model_has_nothing_to_say(complete):
     story = complete.story()
     assert story["headline"] == "Nothing significant is missing"
-    assert story["findings"] == [] and story["quiet"] == "All joints are at their noise."
+    assert (
+        story["findings"] == [] and story["quiet"] == "On every joint the error is like the noise."
+    )
     assert complete.failures == []
 
 
@@ -117,3 +119,14 @@ def test_a_name_that_is_hardly_sure_is_called_a_guess(missing):
     story = dataclasses.replace(missing, findings=[finding]).story()
     assert story["headline"] == "Something is missing on joint 2; best guess: spring on joint 2"
     assert story["mark"] == "?"
+
+
+def test_sizes_of_several_joints_are_those_of_a_parameter_that_is_not_zero(missing):
+    k = {"value": 0.1, "low": -0.4, "high": 0.6, "unit": "N m/rad"}
+    c = {"value": 2.0, "low": 1.6, "high": 2.4, "unit": "N m/rad^3"}
+    finding = dataclasses.replace(missing.findings[0], parameters={"k1": k, "k3": c})
+    other = dataclasses.replace(finding, joints=(1,))
+    history = [missing.history[0], {**missing.history[1], "joints": [1, 2]}]
+    story = dataclasses.replace(missing, findings=[finding, other], history=history).story()
+    (line,) = story["findings"]
+    assert line["size"].startswith("k3 = 2.0 ± 0.40") and "k1" not in line["size"]

@@ -22,7 +22,7 @@ class Adding(Picture):
         return subject.budget
 
     def show(self, summary: Summary, canvas: Canvas) -> dict[str, Any] | None:
-        """Bars of the joints that have something to say; nothing without findings."""
+        """Bars of the joints that are not at their noise; nothing without findings."""
         if not summary["what"]:
             return None
         history, units, falls = summary["report"]["history"], summary["units"], []
