@@ -48,8 +48,9 @@ def story_lines(story: Mapping[str, Any], failures: Sequence[Any] = ()) -> Itera
         when = f"; it acts {line['when']}" if line.get("when") else ""
         yield f"  {k}. {line['what']} on {line['where']}{size}; {line['sure']}{when}"
     yield from where_lines(failures)
-    yield ""
-    yield story["left"]
+    if any(row["speaks"] for row in story["joints"]):
+        yield ""
+        yield story["left"]
 
 
 def where_lines(failures: Sequence[Any]) -> Iterator[str]:
@@ -90,7 +91,7 @@ def joint_lines(story: Mapping[str, Any]) -> Iterator[str]:
         drawn = f"   {bar(row['ratios'], largest)}" if wide else ""
         worse = "  worse" if row["state"] == "worse" else ""
         yield f"  {name:{width}s}{cells} {row['unit']:3s}{drawn}{worse}"
-    if story["quiet"] and rows != list(story["joints"]):
+    if story["quiet"]:
         yield f"  {story['quiet']}"
 
 

@@ -52,7 +52,7 @@ def story(diagnosis: Diagnosis) -> dict[str, Any]:
     doubts = [str(check) for check in diagnosis.checks if check.certainty == "suspected"]
     return {
         "verdict": diagnosis.verdict,
-        "mark": mark,
+        "mark": "?" if doubts else mark,
         "headline": headline,
         "text": text,
         "findings": _grouped(cards),
@@ -341,7 +341,7 @@ def _quiet(rows: Sequence[dict[str, Any]]) -> str:
     if not quiet:
         return ""
     if len(quiet) == len(rows):
-        return "On every joint the error is like the noise."
+        return ""  # the verdict says so
     return f"On {joints_told(quiet)} the error is like the noise."
 
 

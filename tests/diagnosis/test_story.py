@@ -43,9 +43,7 @@ def test_numbers_are_those_of_the_diagnosis(missing):
 def test_a_complete_model_has_nothing_to_say(complete):
     story = complete.story()
     assert story["headline"] == "Nothing significant is missing"
-    assert (
-        story["findings"] == [] and story["quiet"] == "On every joint the error is like the noise."
-    )
+    assert story["findings"] == [] and "like the noise" in story["text"]
     assert complete.failures == []
 
 
