@@ -125,19 +125,17 @@ def bring(page: Page, selector: str) -> None:
 
 def of_the_comparison(browser: Browser, path: Path) -> None:
     """Verdict, and the residuals of both."""
-    page = opened(browser, path.as_uri(), 640)
+    page = opened(browser, path.as_uri(), 740)
     page.wait_for_selector("#plots[data-view]")
     save(page, "comparison.png")
     page = opened(browser, path.as_uri(), 460)
-    others = "document.querySelectorAll('#residuals figure').forEach((f, k) => k < 4 && f.remove())"
-    page.evaluate(others)
     bring(page, "#residuals")
     save(page, "comparison-residuals.png")
 
 
 def of_the_explorer(browser: Browser, address: str) -> None:
     """After a first effect has been added."""
-    page = opened(browser, address, 800)
+    page = opened(browser, address, 840)
     page.wait_for_selector("body[data-ranked]")
     page.select_option("#joint", "4")
     page.wait_for_selector("body[data-ranked^='4 ']")
@@ -145,7 +143,7 @@ def of_the_explorer(browser: Browser, address: str) -> None:
     page.wait_for_selector("body[data-ranked$=' 2']")
     page.wait_for_timeout(3000)  # shapes are refined after the first answer
     page.evaluate("document.querySelector('#status').textContent = ''")  # a time of this machine
-    page.add_style_tag(content=".hint + .hint, #effects li:nth-child(n + 6) { display: none }")
+    page.add_style_tag(content=".hint + .hint, #effects li:nth-child(n + 3) { display: none }")
     save(page, "explorer.png")
 
 

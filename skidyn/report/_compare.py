@@ -321,7 +321,7 @@ def _sentence(report: dict[str, Any]) -> str:
         less = sum(row["ratio"] < 1 for row in report["ratios"])
         text += (
             f"As given, {second} has {_change(mean, first)} in the mean over joints; its error is "
-            f"the smaller one on {less or 'none'} of {len(report['ratios'])} joints. "
+            f"smaller on {less or 'none'} of {len(report['ratios'])} joints. "
         )
     shared = [row for row in report["findings"] if len(row["in"]) == 2]
     return text + (f"Missing in both: {_brief(shared)}." if shared else "")
