@@ -12,6 +12,7 @@ import os
 import sys
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 from skidyn.diagnosis import Settings, diagnose
@@ -59,3 +60,17 @@ log = load_recording(DATA / "panda" / "panda_gaz.npz").frame
 model = RBDRegressor(wrong, ("viscous", "coulomb", "offset"), parameters="nominal")
 ABSENT = diagnose(model, log, log[[f"tau{j + 1}" for j in range(7)]], settings=once).findings[0]
 print(ABSENT.sentence)
+
+# %%
+# Both masses with their 95 % intervals, beside what is known of them.
+found = [finding.parameters["mass"] for finding in (PAYLOAD, ABSENT)]
+names = ["UR10e, carried", "Panda, only described"]
+fig, ax = plt.subplots(figsize=(6, 3.4), layout="constrained")
+value = np.array([row["value"] for row in found])
+ends = np.array([[row["low"], row["high"]] for row in found]).T
+ax.errorbar(names, value, np.abs(ends - value), fmt="o", capsize=6, label="found, 95 %")
+ax.plot(names, [2.805, -0.73], "_", ms=40, label="true difference from the description")
+ax.axhline(0, color="0.8", lw=1)
+ax.set(ylabel="mass (kg)", xlim=(-0.5, 1.5))
+ax.legend(loc="center left")
+plt.show()

@@ -14,6 +14,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
@@ -54,3 +55,11 @@ print("same prediction:", np.array_equal(loaded.predict(log.X), diagnosis.model.
 history = mlflow.tracking.MlflowClient().get_metric_history(run.info.run_id, "held_out_rmse")
 for point in history:
     print(f"step {point.step}: held-out RMSE {point.value:.4f} N m")
+
+# %%
+# The same as a picture: the error falls with every effect that is added.
+steps = ["as given", *(f"+ {entry['added']}" for entry in diagnosis.history[1:])]
+fig, ax = plt.subplots(figsize=(6, 3.4), layout="constrained")
+ax.bar(steps, [point.value for point in history])
+ax.set(ylabel="held_out_rmse of the run (N m)")
+plt.show()

@@ -11,6 +11,7 @@ position. All three give the same model.
 # %%
 import sys
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
@@ -49,4 +50,16 @@ for name, model, X in (
 # Transformers answer in the kind of table that is asked for.
 positions = table.select("time", "trajectory", "q1", "q2")
 smooth = SmoothDerivatives().set_output(transform="polars")
-print(smooth.fit_transform(positions).head(3))
+smoothed = smooth.fit_transform(positions)
+print(smoothed.head(3))
+
+# %%
+# What it derives from positions alone, beside the velocity that was recorded.
+part = slice(100, 300)
+time = log.X["time"].to_numpy()[part]
+fig, ax = plt.subplots(figsize=(6, 3.4), layout="constrained")
+ax.plot(time, log.X["dq1"].to_numpy()[part], color="0.6", lw=3, label="recorded, pandas")
+ax.plot(time, smoothed["dq1"].to_numpy()[part], label="from positions, polars")
+ax.set(xlabel="time (s)", ylabel="velocity of joint 1 (rad/s)")
+ax.legend()
+plt.show()

@@ -12,6 +12,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
@@ -35,3 +36,15 @@ types = sio.get_untrusted_types(file=file)
 print("\n".join(types))
 loaded = sio.load(file, trusted=types)
 print("same prediction:", np.array_equal(loaded.predict(log.X), model.predict(log.X)))
+
+# %%
+# One second of it, around a reversal of the second joint.
+part = slice(100, 200)
+time = log.X["time"].to_numpy()[part]
+fig, ax = plt.subplots(figsize=(6, 3.4), layout="constrained")
+ax.plot(time, log.y[part, 1], color="0.7", lw=4, label="measured")
+ax.plot(time, model.predict(log.X)[part, 1], label="model before it is saved")
+ax.plot(time, loaded.predict(log.X)[part, 1], "--", label="model from the file")
+ax.set(xlabel="time (s)", ylabel="torque of joint 2 (N m)")
+ax.legend()
+plt.show()

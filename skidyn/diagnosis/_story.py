@@ -128,7 +128,9 @@ def _verdict(
             f"{'it' if len(lines) == 1 else 'them'} changes the error as shown below."
         )
         open_ends = (
-            f"; part of the error on {joints_told(material)} is not explained" if material else ""
+            f"; part of the error on {where(material, len(rows))} is not explained"
+            if material
+            else ""
         )
         best = max(lines, key=lambda line: line["fell"])
         top = f"{_brief(best['what'])} on {best['where']}"
