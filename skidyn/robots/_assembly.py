@@ -3,15 +3,16 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from skidyn._exceptions import RobotDescriptionError
+from skidyn._exceptions import RobotDescriptionError, RobotDescriptionWarning
 from skidyn._text import suggest
-from skidyn.dynamics import KinematicTree, transform_inertial
-from skidyn.robots._description import Description, Joint, Mimic
+from skidyn.dynamics import KinematicTree, inertial_parts, skew, transform_inertial
+from skidyn.robots._description import Description, Joint, Mimic, is_positive
 
 
 @dataclass(frozen=True)
@@ -98,7 +99,26 @@ def assemble(description: Description, selected: Sequence[str] | None) -> Assemb
         raise RobotDescriptionError(
             f"The robot {description.name!r} has no moving joint; all its joints are fixed."
         )
+    for name, placement in assembly.links.items():
+        if description.links[name].fault:
+            _check_body(assembly, placement.body, description.links[name].fault)
     return assembly
+
+
+def _check_body(assembly: Assembly, body: int, fault: str) -> None:
+    """Refuse a faulty link if the moving body that it is part of has no positive inertia."""
+    if body >= 0:
+        mass, moment, inertia = inertial_parts(assembly.parameters[body])
+        center = moment / mass if mass > 0 else np.zeros(3)
+        arm = skew(center)
+        if not is_positive(inertia + mass * arm @ arm):
+            raise RobotDescriptionError(fault)
+    where = "a body that does not move" if body < 0 else "a body whose inertia is positive"
+    warnings.warn(
+        f"{fault} It is part of {where}, so it is used as given.",
+        RobotDescriptionWarning,
+        stacklevel=2,
+    )
 
 
 def _attach(

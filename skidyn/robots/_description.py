@@ -19,10 +19,14 @@ _MOMENT_TOLERANCE = 1e-6
 
 @dataclass(frozen=True)
 class Link:
-    """A link with its inertial parameters about its own frame, shape (10,)."""
+    """A link with its inertial parameters about its own frame, shape (10,).
+
+    ``fault`` says what is wrong with its inertia; that counts only for the body it belongs to.
+    """
 
     name: str
     parameters: np.ndarray
+    fault: str = ""
 
 
 @dataclass(frozen=True)
@@ -139,7 +143,7 @@ def link_of(
     Raises
     ------
     RobotDescriptionError
-        The mass is negative, the inertia is not positive definite, or one of them is no number.
+        The mass is negative, or mass or inertia is no number.
     """
     what = f"link {name!r}"
     if mass < 0:
@@ -151,8 +155,13 @@ def link_of(
         raise RobotDescriptionError(
             f"The mass or inertia of {what} is too large to be a number; check its size and units."
         )
-    _check_inertia(inertia, what)
-    return Link(name, parameters)
+    return Link(name, parameters, _fault(inertia, what))
+
+
+def is_positive(inertia: np.ndarray) -> bool:
+    """Whether no principal moment is negative beyond rounding."""
+    moments = np.linalg.eigvalsh(inertia)
+    return bool(moments[0] >= -_MOMENT_TOLERANCE * abs(moments[-1]))
 
 
 def symmetric(xx: float, xy: float, xz: float, yy: float, yz: float, zz: float) -> np.ndarray:
@@ -192,20 +201,21 @@ def check_limits(lower: float, upper: float, what: str) -> tuple[float, float]:
     return lower, upper
 
 
-def _check_inertia(matrix: np.ndarray, what: str) -> None:
+def _fault(matrix: np.ndarray, what: str) -> str:
+    """Why no body has such an inertia, or ``""``; a warning where no distribution of mass has."""
     moments = np.linalg.eigvalsh(matrix)
-    tolerance = _MOMENT_TOLERANCE * abs(moments[-1])
     listed = ", ".join(f"{m:g}" for m in moments)
-    if moments[0] < -tolerance:
-        raise RobotDescriptionError(
+    if not is_positive(matrix):
+        return (
             f"The inertia of {what} is not positive definite: its principal moments are {listed} "
             "kg m^2. Check the signs and the units of ixx .. izz; they are taken about the center "
             "of mass."
         )
-    if moments[0] + moments[1] < moments[2] - tolerance:
+    if moments[0] + moments[1] < moments[2] - _MOMENT_TOLERANCE * abs(moments[-1]):
         warnings.warn(
             f"The principal moments {listed} kg m^2 of {what} break the triangle inequality: no "
             "distribution of positive mass has them. They are used as given.",
             RobotDescriptionWarning,
-            stacklevel=2,
+            stacklevel=3,
         )
+    return ""

@@ -6,7 +6,7 @@ import warnings
 import numpy as np
 import pytest
 
-from skidyn.exceptions import RobotDescriptionError
+from skidyn.exceptions import RobotDescriptionError, RobotDescriptionWarning
 from skidyn.robots import Robot
 
 GOOD_INERTIA = '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>'
@@ -268,3 +268,12 @@ def test_a_body_whose_inertia_is_no_number_is_named(mass):
     text = robot(link("a"), f'<link name="b">{far}</link>', joint("j", "a", "b"))
     with pytest.raises(RobotDescriptionError, match="inertia of link 'b' is too large"):
         Robot.from_urdf(text)
+
+
+def test_faulty_inertia_of_a_part_that_is_fixed_is_a_warning():
+    """As in published descriptions: an antenna with a slightly negative moment on a heavy base."""
+    inertia = GOOD_INERTIA.replace('ixy="0"', 'ixy="5"')
+    antenna = link("antenna", 1e-3, inertia), joint("k", "a", "antenna", "fixed")
+    text = robot(TWO, *antenna, joint("j", "a", "b"))
+    with pytest.warns(RobotDescriptionWarning, match="link 'antenna' is not positive definite"):
+        assert Robot.from_urdf(text).n_joints == 1
