@@ -36,6 +36,7 @@ from skidyn.measurement import (
     check_measurement,
     copied_rows,
     refuse_certain,
+    units_in_doubt,
 )
 from skidyn.robots import Robot
 
@@ -175,6 +176,13 @@ def _diagnose(
     if not force:
         refuse_certain(checks)
     notes = [str(check) for check in checks]
+    if not force and units_in_doubt(checks):
+        kinds = []
+        notes.append(
+            "A unit is in doubt, so that no physical effect is named: what is missing is given as "
+            "a function of the signals. Settle the unit, or go on regardless with --force (in "
+            "Python: force=True)."
+        )
     for note in notes:
         warnings.warn(note, LogWarning, stacklevel=4)
     own = _is_rigid_body_regressor(model)

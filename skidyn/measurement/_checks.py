@@ -136,6 +136,25 @@ def check_measurement(measurement: Measurement) -> list[Suspicion]:
 _UNITS, _SCALES = CHECKS[:4], CHECKS[:2]
 
 
+def units_in_doubt(found: list[Suspicion]) -> bool:
+    """Whether the unit of the clock or of a position is suspected to be another one.
+
+    Then a name of physics would be that of a scale.
+
+    Parameters
+    ----------
+    found : list of Suspicion
+        From :func:`check_measurement`.
+
+    Returns
+    -------
+    bool
+
+    """
+    names = {check.name for check in _SCALES}
+    return any(s.check in names and s.certainty != "noted" for s in found)
+
+
 def refuse_certain(found: list[Suspicion]) -> None:
     """Raise if a measurement is certainly not what it claims.
 
