@@ -89,7 +89,7 @@ def test_compare_knows_joints_trajectories_and_regimes(work, capsys):
     code, content = run_json(capsys, "compare", *arguments(work))
     assert code == cli.DONE
     assert {(row["joint"], row["trajectory"]) for row in content["table"]} == {
-        (j, t) for j in (1, 2) for t in range(6)
+        (j, t) for j in (1, 2) for t in range(1, 7)
     }
     assert cli.main(["compare", *arguments(work)]) == cli.DONE
     assert "reversal" in capsys.readouterr().out

@@ -12,8 +12,8 @@ from skidyn._commands._output import parameters, print_json, run_diagnosis, writ
 from skidyn._text import digits
 
 DESCRIPTION = """\
-Add an effect to a model that skidyn diagnose has looked at, and print the held-out error before and
-after. The report remembers the log and the model.
+Add an effect to a model that skidyn diagnose has judged, and print the held-out error before and
+after. The report holds where the log is, and which model it was.
 
   skidyn diagnose run*.csv --urdf robot.urdf --out report.json
   skidyn add --from report.json --effect dahl --joints 1,4 --out better.json

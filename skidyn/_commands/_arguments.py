@@ -130,15 +130,17 @@ def with_remedies(parser: Any) -> None:
     mend.add_argument(
         "--flip",
         metavar="JOINT,..",
-        help="other sign: a joint (its torque), q3 (its motion), or a column such as dq3",
+        help="change the sign of a joint (its torque), q3 (its motion), or a column such as dq3",
     )
     mend.add_argument(
         "--order", metavar="2,1,3", help="for each joint the column that holds it, or tau=2,1,3"
     )
-    mend.add_argument("--gain", metavar="tau3=0.02", help="factors of columns or quantities")
+    mend.add_argument(
+        "--gain", metavar="tau3=0.02", help="multiply columns or quantities by factors"
+    )
     mend.add_argument("--zero", metavar="q2=1.57", help="what positions read at the robot's zero")
-    mend.add_argument("--late", metavar="tau=0.008", help="delays in s, which are taken out")
-    mend.add_argument("--unwrap", action="store_true", help="take leaps by a turn out")
+    mend.add_argument("--late", metavar="tau=0.008", help="delays in s, to be taken out")
+    mend.add_argument("--unwrap", action="store_true", help="take jumps by a whole turn out")
     mend.add_argument(
         "--torque-sign",
         choices=("recorded", "command"),
@@ -155,12 +157,14 @@ def with_remedies(parser: Any) -> None:
         "--drop-repeated", action="store_true", help="leave out rows that repeat the one before"
     )
     mend.add_argument(
-        "--split-leaps", action="store_true", help="a new trajectory where positions leap"
+        "--split-leaps", action="store_true", help="begin a new trajectory where positions jump"
     )
     mend.add_argument(
         "--restore-gravity", action="store_true", help="add gravity that was taken off the torque"
     )
-    mend.add_argument("--resample", type=float, metavar="HZ", help="rate of an even clock")
+    mend.add_argument(
+        "--resample", type=float, metavar="HZ", help="average over even steps at this rate"
+    )
 
 
 def with_log(parser: Any, urdf_required: bool = True) -> None:

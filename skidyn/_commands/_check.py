@@ -11,16 +11,17 @@ from skidyn._commands._input import read_frame, read_robot
 from skidyn._commands._output import print_json, working
 
 DESCRIPTION = """\
-Is a log what its owner thinks it is? Said first is what would change an answer most, with its
-evidence and the option that mends it: units, clock, repeated rows, and with the robot also signs
-and order of joints, gravity, torque without sign, currents taken for torques, delay. Then rate,
-resolution, and how far and how often each joint was moved.
+Check whether a log is what it claims to be. What would change the results most comes first, with
+its evidence and the option that mends it: units, clock, repeated rows, and with the robot also
+signs and order of joints, gravity, torque without sign, currents taken for torques, and delay. Then
+follow the rate, the resolution, and how far and how often each joint was moved.
 
   skidyn check run1.csv run2.csv
   skidyn check run1.csv --urdf robot.urdf
 
-at rest: share of rows in which the joint stands; at limit: share of rows at the extreme torque;
-dq/q': recorded velocity over differentiated position, 1 in a consistent log; delay: of the torque.
+at rest: share of rows in which the joint stands still; at limit: share of rows at the extreme
+torque; dq/q': recorded velocity over differentiated position, 1 in a consistent log; delay: of
+the torque.
 """
 
 

@@ -33,15 +33,16 @@ and by regime (at rest, around reversals, slow, fast, loaded). Nothing is search
   skidyn compare run*.csv --urdf robot.urdf --model rigid_body,viscous,coulomb,stribeck
 
 Compare two models, or two recordings, or two reports of skidyn diagnose, with each other: both are
-diagnosed, and their curves, errors, findings and coefficients come side by side, as a page and as
-JSON beside it.
+diagnosed, and their curves, errors, findings and coefficients are shown side by side, as a page and
+as JSON beside it.
 
   skidyn compare run*.csv --urdf robot.urdf --against-model better.skops --html models.html
   skidyn compare new*.csv --urdf robot.urdf --against worn*.csv --html wear.html
   skidyn compare new.json worn.json --html wear.html
 
-A gate for tests: the model is fitted to a healthy recording, and its error on the new one must not
-be larger than so many times the usual; joints that fail are named, and the exit code is 1.
+A gate for tests: the model is fitted to a healthy recording, and the error of a joint on the new
+one must not exceed the given multiple of its usual error. Joints that fail are named, and the exit
+code is 1.
 
   skidyn compare new*.csv --urdf robot.urdf --against healthy*.csv --fail-above 1.5
 """

@@ -13,16 +13,16 @@ from skidyn._commands._output import print_json, working
 from skidyn._exceptions import SkidynError
 
 DESCRIPTION = """\
-Design a motion from which the parameters of a robot can be told, within its limits.
+Design a motion from which the parameters of a robot can be identified, within its limits.
 
   skidyn excite --urdf robot.urdf --out motion.csv --duration 20
   skidyn excite --urdf robot.urdf --recorded run1.csv --out next.csv
   skidyn excite --urdf robot.urdf --limits '{"workspace": [[-1, 1], [-1, 1], [0.1, 2]]}' ...
 
-Every joint starts and ends at rest. Positions, velocities and torques keep the limits of the URDF,
-or those of --limits. With --recorded, the motion adds to what these logs tell, and the torque
-limits hold for the model that is fitted to them, friction included. Collisions are not looked at:
-try the motion slowly. Play it on the robot, log it, then: skidyn diagnose.
+Every joint starts and ends at rest. Positions, velocities and torques stay within the limits of the
+URDF, or those of --limits. With --recorded, the motion shows what these logs do not, and the torque
+limits hold for the model that is fitted to them, friction included. Collisions are not checked: try
+the motion slowly at first. Then play it on the robot, log it, and run skidyn diagnose.
 """
 
 
@@ -52,14 +52,14 @@ def add_parser(commands: Any) -> None:
         "--criterion",
         choices=("determinant", "condition"),
         default="determinant",
-        help="what is made best (default: %(default)s)",
+        help="what is optimized (default: %(default)s)",
     )
     parser.add_argument(
         "--limits",
         metavar="JSON",
         help="position, velocity, acceleration, torque by joint; workspace, a box in m",
     )
-    parser.add_argument("--seed", type=int, default=0, help="of the random starts")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the random starting points")
     parser.add_argument(
         "--recorded",
         nargs="+",

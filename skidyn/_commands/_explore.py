@@ -13,8 +13,8 @@ from skidyn._commands._input import covered_joints, read_model_and_log, reading
 from skidyn._commands._output import working
 
 DESCRIPTION = """\
-Do the loop by hand on a local page: see measurement against model, click where it fails, see what
-would help there, tick it and watch error and curves fall; undo; save.
+Do the loop by hand on a local page: see the measurement against the model, click where the model
+fails, see which effects would help there, add one and watch the error fall; undo; save.
 
   skidyn explore run*.csv --urdf robot.urdf --folder results
 

@@ -14,8 +14,8 @@ from skidyn._commands._output import parameters, print_json, working, write_json
 ESTIMATORS = ("weighted", "ordinary", "robust", "ridge", "entropic")
 DESCRIPTION = """\
 Identify inertial parameters and effects together and print them with standard errors that survive
-autocorrelation. Masses themselves are rarely visible; printed are the combinations that are, how
-well the motion excites them, and what the data leaves open.
+autocorrelation. Single masses can rarely be identified: what is printed are the combinations
+that can, how well the motion excites them, and which ones the data leaves open.
 
   skidyn identify run*.csv --urdf robot.urdf --out parameters.json
   skidyn identify run*.csv --urdf robot.urdf --consistent     only bodies that can exist

@@ -36,13 +36,18 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--noise", default="low", choices=("low", "high"), help="of torques (default: %(default)s)"
     )
-    parser.add_argument("--seed", type=int, default=0, help="of what is random (default: 0)")
+    parser.add_argument(
+        "--seed", type=int, default=0, help="seed of all that is random (default: 0)"
+    )
     parser.add_argument(
         "--out", type=Output, metavar="LOG", help="file.csv or file.parquet to write"
     )
     along = parser.add_argument_group("along a log")
     along.add_argument(
-        "--model", type=Input, metavar="SKOPS", help="fitted model, as skidyn identify saves it"
+        "--model",
+        type=Input,
+        metavar="SKOPS",
+        help="fitted model, stored by skidyn.save_model or skidyn explore",
     )
     along.add_argument(
         "--log",

@@ -209,7 +209,10 @@ def read_log(
     for note in notes:
         warn_about_log(note)
     if check:
-        for message in check_log(frame, robot).warnings:
+        quality = check_log(frame, robot)
+        # wrong bodies of the description are no fault of the log: diagnose tells who keeps them
+        told = [str(check) for check in quality.checks if check.check != "bodies"]
+        for message in (*quality.faults, *told):
             warn_about_log(message)
     return frame
 

@@ -235,7 +235,7 @@ class Bodies(Check):
             f"although friction and the scale of each torque ({gains}) were fitted to them. A "
             "model that keeps the stated bodies (--nominal) would show effects that are not there; "
             "one that identifies them is not affected",
-            "suspected",
+            "noted" if measurement.identified is None else "suspected",
             joints,
         )
 

@@ -44,8 +44,9 @@ class Measurement:
         Robot as its description says; checks that need it are left out without it.
     joint_names : sequence of str
         Names for sentences and remedies.
-    identified : bool, default=False
-        Whether bodies are going to be identified: those of the description may then be wrong.
+    identified : bool, optional
+        Whether bodies are going to be identified, so that those of the description may be wrong; by
+        default it is not known.
     unsigned, delay, readable, stale, scaled, computed : optional
         What checks found that others want to know; filled in by them.
 
@@ -63,7 +64,7 @@ class Measurement:
     torque: Array
     robot: Robot | None
     joint_names: Sequence[str]
-    identified: bool = False
+    identified: bool | None = None
     unsigned: tuple[list[int], dict[int, float]] | None = field(default=None, repr=False)
     delay: Delay | None = field(default=None, repr=False)
     readable: bool = field(default=True, repr=False)

@@ -271,11 +271,15 @@ def test_torque_of_something_else():
 def test_stated_bodies_concern_only_those_who_keep_them(signals, torque):
     torque = torque.copy()
     torque[:, 1] += 9 * np.cos(signals.q.sum(1))  # a weight that the description lacks
-    told = found(signals, torque)
-    assert "bodies" in [s.check for s in told], told
-    names = ("shoulder", "elbow")
-    identified = check_measurement(Measurement(signals, torque, ROBOT, names, identified=True))
-    assert "bodies" not in [s.check for s in identified]
+
+    def certainty(identified):
+        names = ("shoulder", "elbow")
+        told = check_measurement(Measurement(signals, torque, ROBOT, names, identified))
+        return next((s.certainty for s in told if s.check == "bodies"), None)
+
+    assert certainty(False) == "suspected"
+    assert certainty(None) == "noted"
+    assert certainty(True) is None
 
 
 def test_torque_without_noise(signals):
