@@ -45,7 +45,7 @@ class _PairEffect(Effect):
 
     def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
         largest = LARGEST_RATIO * (GUESSED[-1] if _differ(signals, joints) else 1.0)
-        return abs(shape["ratio"]) <= largest * self.travel(signals, joints, shape)
+        return bool(abs(shape["ratio"]) <= largest * self.travel(signals, joints, shape))
 
     def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
         i, j = joints

@@ -21,6 +21,7 @@ from skidyn.diagnosis import (
     own_terms,
     parameter_intervals,
     refine,
+    variance_inflation,
 )
 from skidyn.effects import Term, TermSum, get_effect, list_effects
 from skidyn.evidence import jackknife, make_problem
@@ -192,16 +193,25 @@ class Session:
             Such as ``"90% sure of the name"``: as in a diagnosis, from what the best other effect
             would have taken instead, and from what is left on its joints now.
         """
-        ratio = np.array(self.history[-1]["rmse"]) / np.maximum(self.noise, 1e-300)
-        return [
-            sure_told(
-                step.margin,
-                float(max(ratio[j - 1] for j in step.entry["joints"])),
-                self.problem.whole_trajectories,
-                any(term.trajectories is not None for term in step.terms),
+        residual, rows = self._steps[-1].residual, self.problem.rows
+        everywhere = range(self.problem.n_joints)
+        averaged = [rows.average(residual[:, j], j) for j in everywhere]
+        inflation = variance_inflation(self.problem, averaged, everywhere)
+        errors = np.maximum([entry["rmse"] for entry in self.history], 1e-300)
+        removed = 1 - (errors[1:] / errors[:-1]) ** 2
+        told = []
+        for step, drop in zip(self._steps[1:], removed, strict=True):
+            joints = [j - 1 for j in step.entry["joints"]]
+            told.append(
+                sure_told(
+                    step.margin,
+                    float(inflation[joints].max()),
+                    float(drop[joints].max()),
+                    self.problem.whole_trajectories,
+                    any(term.trajectories is not None for term in step.terms),
+                )
             )
-            for step in self._steps[1:]
-        ]
+        return told
 
     @property
     def refinable(self) -> bool:

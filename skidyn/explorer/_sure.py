@@ -68,7 +68,11 @@ def margin(kind: str, ranked: Sequence[Ranked]) -> Margin:
 
 
 def sure_told(
-    margin: Margin, left_over_noise: float, whole_recordings: bool, some_recordings: bool
+    margin: Margin,
+    inflation: float,
+    removed: float,
+    whole_recordings: bool,
+    some_recordings: bool,
 ) -> str:
     """How sure a name is in a few words.
 
@@ -76,7 +80,7 @@ def sure_told(
     ----------
     margin : Margin
         Over the best other effect.
-    left_over_noise, whole_recordings, some_recordings
+    inflation, removed, whole_recordings, some_recordings
         As :func:`skidyn.diagnosis.confidence` takes them.
 
     Returns
@@ -85,14 +89,20 @@ def sure_told(
 
     Examples
     --------
-    >>> sure_told(Margin(0.8, "Offset"), 1.0, True, False)
+    >>> sure_told(Margin(0.8, "Offset"), 1.0, 0.5, True, False)
     '97% sure of the name'
-    >>> sure_told(Margin(-0.3, "Spring"), 1.0, True, False)
+    >>> sure_told(Margin(-0.3, "Spring"), 1.0, 0.5, True, False)
     'not sure of the name: spring takes more of the error'
     """
     if margin.share < 0:
         return f"not sure of the name: {inside(margin.rival)} takes more of the error"
-    share = confidence(margin.share, left_over_noise, whole_recordings, some_recordings)
+    share = confidence(
+        margin.share,
+        inflation,
+        removed,
+        whole_recordings=whole_recordings,
+        some_recordings=some_recordings,
+    )
     near = margin.share < NEAR and margin.rival
     also = f"; {inside(margin.rival)} takes nearly as much of the error" if near else ""
     return f"{share:.0%} sure of the name{also}"
