@@ -110,6 +110,7 @@ def evidence_of_rows(
     terms: Sequence[Term],
     group: NDArray[np.int64],
     method: Method = "auto",
+    weight: Array | None = None,
 ) -> Evidence:
     """Evidence with every sample as a row.
 
@@ -127,6 +128,8 @@ def evidence_of_rows(
         Number under which the factors of a sample are kept, in the place of its trajectory.
     method : {"auto", "gram", "qr"}, default="auto"
         Gram matrices or triangular factors.
+    weight : ndarray of shape (n_samples,), optional
+        Weight of every sample, 0 or more: that of 2 counts like two samples.
 
     Returns
     -------
@@ -136,12 +139,13 @@ def evidence_of_rows(
     base = find_base_parameters(robot)
     layout = _Layout.of(robot, base, terms, signals)
     factors: dict[Key, Array] = {}
+    root = None if weight is None else np.sqrt(weight)
     if method != "qr":
-        grams = _accumulate(robot, layout, signals, torque, group, _add_gram)
+        grams = _accumulate(robot, layout, signals, torque, group, _add_gram, root)
         if method == "gram" or _condition(grams, layout) <= LARGEST_CONDITION:
             factors = {key: _root(gram) for key, gram in grams.items()}
     if not factors:
-        factors = _accumulate(robot, layout, signals, torque, group, _add_triangle)
+        factors = _accumulate(robot, layout, signals, torque, group, _add_triangle, root)
     widened = {key: layout.widen(factor, key[1]) for key, factor in factors.items()}
     # The torque of the URDF's rigid body is a combination of the columns: it is taken off here.
     nominal = np.zeros(len(layout.names) + 1)
@@ -149,7 +153,7 @@ def evidence_of_rows(
     nominal[-1] = 1.0
     for factor in widened.values():
         factor[:, -1] = factor @ nominal
-    return Evidence(tuple(layout.names), widened, _counts(group, robot.n_joints))
+    return Evidence(tuple(layout.names), widened, _counts(group, robot.n_joints, weight))
 
 
 def sample_blocks(
@@ -227,10 +231,12 @@ def _checked(
     return Signals(**arrays, trajectory=number, prismatic=prismatic, robot=robot), torque
 
 
-def _counts(group: NDArray[np.int64], n_joints: int) -> dict[Key, int]:
-    names, counts = np.unique(group, return_counts=True)
-    pairs = zip(names, counts, strict=True)
-    return {(int(name), j): int(count) for name, count in pairs for j in range(n_joints)}
+def _counts(
+    group: NDArray[np.int64], n_joints: int, weight: Array | None = None
+) -> dict[Key, float]:
+    names, place = np.unique(group, return_inverse=True)
+    pairs = zip(names, np.bincount(place, weight).tolist(), strict=True)
+    return {(int(name), j): count for name, count in pairs for j in range(n_joints)}
 
 
 @dataclass
@@ -302,6 +308,7 @@ def _accumulate(
     torque: Array,
     group: NDArray[np.int64],
     update: Update,
+    root: Array | None,
 ) -> dict[Key, Array]:
     """What ``update`` makes of the rows of every group and joint, part after part."""
     found: dict[Key, Array] = {}
@@ -316,8 +323,10 @@ def _accumulate(
                 slab[n_rigid + k] = values[rows]
             end = n_rigid + len(own) + 1
             slab[end - 1] = torque[rows, j]
+            # Not in place: what is constant in the block is written only once.
+            own_rows = slab[first:end] if root is None else slab[first:end] * root[rows]
             for name, part in parts:
-                found[name, j] = update(found.get((name, j)), slab[first:end, part])
+                found[name, j] = update(found.get((name, j)), own_rows[:, part])
     return found
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
+from copy import copy
 from numbers import Real
 from typing import Any, Literal
 
@@ -37,6 +38,7 @@ from skidyn.evidence import (
 )
 from skidyn.identification._constraints import BodyConstraints
 from skidyn.identification._estimators import ESTIMATORS, Estimator, find_estimator
+from skidyn.identification._every_sample import may_take_samples, predicts_better
 from skidyn.identification._identifiability import condition_number
 from skidyn.identification._instrumental import instrument_rows
 from skidyn.identification._output_error import refine_by_simulation
@@ -130,7 +132,9 @@ class RBDRegressor(Results, RegressorMixin, BaseEstimator):
         how well the motion excites the model. Below 100 is good, beyond 1,000 a part of the
         coefficients is chance.
     noise_std_ : ndarray of shape (n_joints,)
-        Standard deviation of one averaged residual row, N m or N.
+        Standard deviation of one residual row, N m or N.
+    rows_ : {"averaged", "samples"}
+        Whether the rows of the fit are averages over short windows of motion, or all samples.
     recordings_ : list of (int, ndarray of uint64)
         By what the recordings are known again to which effects of single recordings belong.
     robot_ : Robot
@@ -156,8 +160,9 @@ class RBDRegressor(Results, RegressorMixin, BaseEstimator):
     way.
 
     With a time column, torque and all regressor columns are averaged over the same short windows
-    (parallel filtering), without samples at rest and around reversals. Joints are weighted by their
-    noise, iterated.
+    (parallel filtering), without samples at rest and around reversals. Where X holds accelerations
+    and left-out folds are predicted better that way, every sample is a row instead, unless noise in
+    the accelerations would bias the coefficients. Joints are weighted by their noise, iterated.
 
     References
     ----------
@@ -277,10 +282,9 @@ class RBDRegressor(Results, RegressorMixin, BaseEstimator):
                 )
         terms = make_terms(self.effects, self.robot_.n_joints)
         self.recordings_ = remember(signals, terms)
-        identified = self.parameters == "identified"
-        plain = identified and instruments is None and weight is None and not method.rows
+        plain = self.parameters == "identified" and instruments is None and not method.rows
         needs_fit = any(t.effect.needs_fit or t.is_open for t in terms)
-        if signals.time is None and plain and not needs_fit:
+        if signals.time is None and plain and weight is None and not needs_fit:
             return self._fit_samples(signals, torque, terms, method)
         problem = self._problem(signals, torque, terms, weight)
         fit = find_terms(problem)
@@ -290,6 +294,7 @@ class RBDRegressor(Results, RegressorMixin, BaseEstimator):
             Z = validate_data(self, instruments, reset=False, dtype=np.float64)
             Z = Z[order] if len(Z) == len(order) else Z
             others = instrument_rows(problem, fit, self._read(Z), self._smooths())
+        self.rows_ = "averaged"
         self.evidence_ = Evidence.from_problem(whole, fit.terms)
         self.n_parts_ = 0
         every = Regression.from_problem(whole, fit, others if whole is problem else None)
@@ -314,7 +319,13 @@ class RBDRegressor(Results, RegressorMixin, BaseEstimator):
             every,
             solution,
             lambda rows: np.column_stack([problem.sample_folds(j, rows) for j in joints]),
+            weight,
         )
+        as_given = problem.signals.time is not None and not (self._smooths() or self._broken)
+        if as_given and plain and not needs_fit and may_take_samples(terms):
+            other = copy(self)._fit_samples(signals, torque, terms, method, weight)
+            if predicts_better(other.bands_, self.bands_):
+                self.__dict__.update(other.__dict__)
         return self
 
     def _problem(
@@ -360,12 +371,18 @@ class RBDRegressor(Results, RegressorMixin, BaseEstimator):
         return keep_weak_directions(solution, kept, every)
 
     def _fit_samples(
-        self, signals: Signals, torque: Array, terms: Sequence[Term], method: Estimator
+        self,
+        signals: Signals,
+        torque: Array,
+        terms: Sequence[Term],
+        method: Estimator,
+        weight: Array | None = None,
     ) -> RBDRegressor:
-        """Without a clock every sample is a row: their evidence says all that the rows do."""
+        """Every sample is a row: their evidence says all that the rows do."""
         block, owner, fold = sample_blocks(signals.trajectory)
-        parts = evidence_of_rows(signals, torque, self.robot_, terms, block)
+        parts = evidence_of_rows(signals, torque, self.robot_, terms, block, weight=weight)
         folds = renumbered(parts, fold)
+        self.rows_ = "samples"
         self.evidence_ = renumbered(parts, owner)
         self.n_parts_ = 0
         regression, solution = self._solve_evidence(method, folds, terms)
@@ -377,6 +394,7 @@ class RBDRegressor(Results, RegressorMixin, BaseEstimator):
             regression,
             solution,
             lambda rows: np.repeat(fold[block[rows], None], self.robot_.n_joints, axis=1),
+            weight,
         )
         return self
 
@@ -387,7 +405,8 @@ class RBDRegressor(Results, RegressorMixin, BaseEstimator):
         Only the evidence is kept, not the data: memory does not grow. The order of the parts does
         not matter, and the result is that of ``fit`` on all of them, where these are trajectories
         that are whole in one part and more than six, or data without time (``fit`` leaves out rows
-        at the borders of the blocks of time into which it cuts few trajectories).
+        at the borders of the blocks of time into which it cuts few trajectories, and may take every
+        sample as a row, which parts after it then do as well).
 
         Parameters
         ----------
@@ -418,6 +437,10 @@ class RBDRegressor(Results, RegressorMixin, BaseEstimator):
         signals, torque, _ = self._begin(X, y, first=first)
         given = self.effects if first else self.effect_terms_
         terms = linear_terms(given, self.robot_.n_joints)
+        if first:
+            self.rows_ = "averaged" if signals.time is not None else "samples"
+        if self.rows_ == "samples":
+            signals = signals.with_(time=None)
         part = evidence_of_signals(
             signals,
             torque,
@@ -638,7 +661,9 @@ class RBDRegressor(Results, RegressorMixin, BaseEstimator):
                 signals = self._without_clock(signals)
         if not first and named_recordings(self.effect_terms_):
             signals = recognise(signals, self.recordings_)
-        for note in broken_notes(signals, torque, self.robot_.joint_names):
+        notes = broken_notes(signals, torque, self.robot_.joint_names)
+        self._broken = bool(notes)
+        for note in notes:
             warn_about_log(note)
         return signals, torque, order
 

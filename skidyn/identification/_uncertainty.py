@@ -15,7 +15,7 @@ from sklearn.utils.validation import check_is_fitted
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Array, Signals
 from skidyn.effects import Term, TermSum
-from skidyn.evidence import REST, RIDGE
+from skidyn.evidence import REST, RIDGE, window_rows
 from skidyn.robots import Robot
 
 if TYPE_CHECKING:
@@ -149,6 +149,8 @@ class PredictionBands:
         Root mean square left-out error at rest and moving, N m or N.
     ratios : ndarray of shape (2, n_joints, n_levels)
         Quantiles of error over scale at rest and moving.
+    rmse : ndarray of shape (2, n_joints)
+        Root mean square left-out error of samples, and of averages over short windows, N m or N.
 
     References
     ----------
@@ -161,6 +163,7 @@ class PredictionBands:
     spread: Array
     scale: Array
     ratios: Array
+    rmse: Array
 
     @classmethod
     def calibrate(
@@ -171,6 +174,7 @@ class PredictionBands:
         regression: Regression,
         solution: Solution,
         folds: Callable[[NDArray[np.int64]], NDArray[np.int64]],
+        weight: Array | None = None,
     ) -> PredictionBands:
         """Bands from the errors of every fold under the coefficients fitted without it.
 
@@ -188,10 +192,13 @@ class PredictionBands:
             Coefficients, also those without one fold each.
         folds : callable
             Fold of samples, by joint: from (k,) to (k, n_joints).
+        weight : ndarray of shape (n_samples,), optional
+            Weight of every sample in ``rmse``.
         """
         terms = regression.terms
         rows = np.arange(0, signals.n_samples, -(-signals.n_samples // MOST_SAMPLES))
         fold = folds(rows)
+        weight = None if weight is None else weight[rows]
         if all(term.is_pointwise for term in terms):
             signals, torque, rows = signals.take(rows), torque[rows], np.arange(len(rows))
         signals = _with_load(model, terms, signals.with_(robot=model.robot_))
@@ -208,7 +215,8 @@ class PredictionBands:
                 error[here, j] -= _own(block, change[fold[here, j]])
             place += part[0].shape[1]
         scale, ratios = _distribution(error, width, _moving(signals)[rows])
-        return cls(regression.rigid_index, tuple(terms), spread, scale, ratios)
+        rmse = _root_mean_squares(error, signals.take(rows), weight)
+        return cls(regression.rigid_index, tuple(terms), spread, scale, ratios, rmse)
 
     def std(self, model: RBDRegressor, signals: Signals) -> Array:
         """Scale of the error of a prediction, shape (n_samples, n_joints), N m or N."""
@@ -304,6 +312,19 @@ def _columns(
             for j, block in blocks.items():
                 found[j, own] = block[where].T
         yield list(found)
+
+
+def _root_mean_squares(error: Array, signals: Signals, weight: Array | None) -> Array:
+    """Root mean square error of samples, and of averages over short windows."""
+    weight = np.ones(len(error)) if weight is None else weight
+    windows = window_rows(signals, np.repeat(weight[:, None] > 0, signals.n_joints, axis=1))
+    windows = windows.weighted(weight)
+    averaged = [windows.average(e, j) for j, e in enumerate(error.T)]
+    squares = [
+        np.average(error**2, axis=0, weights=weight),
+        [np.mean(a**2) if len(a) else 0.0 for a in averaged],
+    ]
+    return np.asarray(np.sqrt(squares)) + 1e-100
 
 
 def _distribution(error: Array, width: Array, moving: NDArray[np.bool_]) -> tuple[Array, Array]:
