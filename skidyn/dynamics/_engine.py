@@ -7,9 +7,8 @@ import threading
 from collections import OrderedDict
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -27,9 +26,6 @@ from skidyn.dynamics._recursion import (
 from skidyn.dynamics._scalar import ScalarFunction
 from skidyn.dynamics._tape import Scalar
 from skidyn.dynamics._tree import KinematicTree
-
-if TYPE_CHECKING:
-    import torch
 
 #: Samples per chunk. Below about a thousand the cost of a ufunc call shows; far above, the rows of
 #: a chunk no longer fit into the second-level cache.
@@ -275,38 +271,6 @@ class Engine:
     def gravity_key(self, gravity: Any = None) -> tuple[float, ...]:
         """Gravity as a key of the program cache."""
         return self._gravity_key if gravity is None else tuple(float(g) for g in gravity)
-
-    def inverse_dynamics_torch(
-        self, signals: dict[str, torch.Tensor], parameters: Any = None
-    ) -> torch.Tensor:
-        """Joint torques of a batch of tensors, differentiable in signals and parameters."""
-        import torch
-
-        from skidyn.dynamics._torch import evaluate_torch
-
-        like = signals["q"]
-        if parameters is None:
-            own = torch.tensor(self._own_parameters, dtype=like.dtype, device=like.device)
-        else:
-            own = torch.stack(self._canonical_torch(like).parameters(parameters))
-        program = self.program("inverse_dynamics", self.gravity_key(), True, True, False)
-        return evaluate_torch(program, {**signals, "parameter": own.reshape(-1)})
-
-    def _canonical_torch(self, like: torch.Tensor) -> CanonicalModel:
-        """The canonical model with its parameter maps as tensors."""
-        import torch
-
-        maps: dict[str, Any] = {
-            name: torch.tensor(getattr(self.canonical, name), dtype=like.dtype, device=like.device)
-            for name in ("kept", "moved", "reframed")
-        }
-        return replace(self.canonical, **maps)
-
-    def torque_regressor_torch(self, signals: dict[str, torch.Tensor]) -> torch.Tensor:
-        """Regressor of a batch of tensors, differentiable."""
-        from skidyn.dynamics._torch import evaluate_torch
-
-        return evaluate_torch(self.program("torque_regressor", self.gravity_key()), signals)
 
 
 def _without_dust(parameters: np.ndarray) -> np.ndarray:

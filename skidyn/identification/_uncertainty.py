@@ -320,11 +320,9 @@ def _root_mean_squares(error: Array, signals: Signals, weight: Array | None) -> 
     windows = window_rows(signals, np.repeat(weight[:, None] > 0, signals.n_joints, axis=1))
     windows = windows.weighted(weight)
     averaged = [windows.average(e, j) for j, e in enumerate(error.T)]
-    squares = [
-        np.average(error**2, axis=0, weights=weight),
-        [np.mean(a**2) if len(a) else 0.0 for a in averaged],
-    ]
-    return np.asarray(np.sqrt(squares)) + 1e-100
+    of_samples = np.average(error**2, axis=0, weights=weight)
+    of_averages = np.array([np.mean(a**2) if len(a) else 0.0 for a in averaged])
+    return np.sqrt(np.stack([of_samples, of_averages])) + 1e-100
 
 
 def _distribution(error: Array, width: Array, moving: NDArray[np.bool_]) -> tuple[Array, Array]:

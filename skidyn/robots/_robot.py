@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     import torch
     from pytorch_kinematics.chain import Chain
 
+    from skidyn.robots._torch import TorchDynamics
+
 _PARAMETER_SYMBOLS = ("m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 
 
@@ -378,6 +380,12 @@ class Robot:
     def _engine(self) -> Engine:
         return Engine(self.tree, self.inertial_parameters, self.gravity)
 
+    @cached_property
+    def _torch(self) -> TorchDynamics:
+        from skidyn.robots._torch import TorchDynamics
+
+        return TorchDynamics(self)
+
     def __getstate__(self) -> dict[str, Any]:
         # Without the cached engine: the pickle (and so its hash) does not depend on past calls.
         return {name: self.__dict__[name] for name in self.__dataclass_fields__}
@@ -658,6 +666,8 @@ class Robot:
     ) -> torch.Tensor:
         """Differentiable :meth:`inverse_dynamics`, in the precision and on the device of ``q``.
 
+        Its transforms are those of :attr:`chain`.
+
         Parameters
         ----------
         q, dq, ddq : Tensor of shape (n_samples, n_joints)
@@ -670,13 +680,14 @@ class Robot:
         Tensor of shape (n_samples, n_joints)
             N m; N for prismatic joints.
         """
-        signals = {"q": q, "dq": dq, "ddq": ddq}
-        return self._engine.inverse_dynamics_torch(signals, parameters)
+        return self._torch.inverse_dynamics(q, dq, ddq, parameters)
 
     def torque_regressor_torch(
         self, q: torch.Tensor, dq: torch.Tensor, ddq: torch.Tensor
     ) -> torch.Tensor:
         """Differentiable :meth:`torque_regressor`, in the precision and on the device of ``q``.
+
+        Its transforms are those of :attr:`chain`.
 
         Parameters
         ----------
@@ -688,7 +699,7 @@ class Robot:
         Tensor of shape (n_samples, n_joints, 10 * n_bodies)
             Joint torque per unit of every inertial parameter.
         """
-        return self._engine.torque_regressor_torch({"q": q, "dq": dq, "ddq": ddq})
+        return self._torch.torque_regressor(q, dq, ddq)
 
     def _signals(self, **signals: Any) -> dict[str, np.ndarray]:
         """Signals as float64 arrays of one shape (n_samples, n_joints)."""

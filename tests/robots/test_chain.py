@@ -80,3 +80,39 @@ def test_a_chain_that_was_moved_leaves_the_robot_alone():
     robot = load_scara()
     robot.chain.to(dtype=torch.float32)
     assert robot.chain.dtype == torch.float64
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_dynamics_on_the_chain_equal_those_of_numpy(name):
+    robot = ROBOTS[name]()
+    motion = np.random.default_rng(0).uniform(-1.5, 1.5, (3, 20, robot.n_joints))
+    # Any number of batch dimensions.
+    tensors = torch.tensor(motion.reshape(3, 4, 5, -1), requires_grad=True)
+    torque, regressor = (
+        robot.inverse_dynamics_torch(*tensors),
+        robot.torque_regressor_torch(*tensors),
+    )
+    assert torque.shape == (4, 5, robot.n_joints) and torque.dtype == torch.float64
+    np.testing.assert_allclose(
+        torque.detach().reshape(20, -1), robot.inverse_dynamics(*motion), atol=1e-11
+    )
+    np.testing.assert_allclose(
+        regressor.detach().reshape(20, robot.n_joints, -1),
+        robot.torque_regressor(*motion),
+        atol=1e-11,
+    )
+    few = [torch.tensor(x[:2], requires_grad=True) for x in motion]
+    # Stiffness and inertia are derivatives of the torque; training on them needs second ones.
+    loss = robot.torque_regressor_torch(*few).square().sum()
+    first = torch.autograd.grad(loss, few, create_graph=True)
+    second = torch.autograd.grad(sum(g.square().sum() for g in first), few)
+    assert all(torch.isfinite(g).all() for g in second)
+
+
+def test_dynamics_on_the_chain_follow_the_precision_of_the_motion():
+    robot = load_panda()
+    motion = torch.rand(3, 5, 7, dtype=torch.float32)
+    torque = robot.inverse_dynamics_torch(*motion)
+    assert torque.dtype == torch.float32
+    exact = robot.inverse_dynamics(*motion.numpy())
+    np.testing.assert_allclose(torque, exact, atol=1e-5 * np.abs(exact).max())
