@@ -6,7 +6,7 @@
 Printed is the error on held-out parts: RMSE over the standard deviation of the torque, mean over
 the joints. Physics is ``RBDRegressor`` with plain friction; "Ridge" is ten lines of
 scikit-learn on the columns of rigid body and friction. ``--unseen`` takes the logs that had no part
-in settling defaults; ``--only`` names logs, ``--models`` estimators.
+in settling defaults; ``--only`` names logs, ``--models`` estimators; ``--joints`` prints every joint.
 """
 
 from __future__ import annotations
@@ -96,14 +96,14 @@ def models(log: Log) -> dict[str, Callable[[], Any]]:
     }
 
 
-def held_out_error(log: Log, make: Callable[[], Any]) -> float:
-    """Mean over the joints of RMSE over standard deviation, on rows that were held out."""
+def held_out_errors(log: Log, make: Callable[[], Any]) -> Array:
+    """RMSE over standard deviation of every joint, on rows that were held out."""
     squares = np.zeros(log.y.shape)
     for train, test in log.splits():
         model = make().fit(log.X.iloc[train], log.y[train])
         predicted = np.reshape(model.predict(log.X.iloc[test]), (len(test), -1))
         squares[test] = (log.y[test] - predicted) ** 2
-    return float(np.mean(np.sqrt(squares.mean(axis=0)) / log.y.std(axis=0)))
+    return np.asarray(np.sqrt(squares.mean(axis=0)) / log.y.std(axis=0))
 
 
 def main() -> None:
@@ -111,17 +111,22 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", choices=[*LOGS, *UNSEEN])
     parser.add_argument("--unseen", action="store_true")
     parser.add_argument("--models", nargs="+")
+    parser.add_argument("--joints", action="store_true", help="print every joint as well")
     options = parser.parse_args()
     warnings.filterwarnings("ignore")  # remarks on the data
     for name in options.only or (UNSEEN if options.unseen else LOGS):
         log = {**LOGS, **UNSEEN}[name]()
         print(f"\n**{log.title}**: {len(log.X)} rows, {log.y.shape[1]} joints\n")
-        print("| model | error | s |\n|---|---|---|", flush=True)
+        joints = "joints | ", "---|"
+        head, line = joints if options.joints else ("", "")
+        print(f"| model | error | {head}s |\n|---|---|{line}---|", flush=True)
         for title, make in models(log).items():
             if options.models is None or title in options.models:
                 start = time.process_time()
-                error = held_out_error(log, make)
-                print(f"| {title} | {error:.3f} | {time.process_time() - start:.0f} |", flush=True)
+                errors = held_out_errors(log, make)
+                spent = time.process_time() - start
+                own = " ".join(f"{e:.3f}" for e in errors) + " | " if options.joints else ""
+                print(f"| {title} | {errors.mean():.3f} | {own}{spent:.0f} |", flush=True)
 
 
 if __name__ == "__main__":
