@@ -12,7 +12,7 @@ from sklearn.base import BaseEstimator, MetaEstimatorMixin, RegressorMixin, clon
 from sklearn.metrics import check_scoring
 from sklearn.model_selection import check_cv, cross_val_score
 from sklearn.utils.metaestimators import available_if
-from sklearn.utils.validation import check_is_fitted
+from sklearn.utils.validation import _check_sample_weight, check_is_fitted, validate_data
 
 from skidyn._columns import column_names
 from skidyn._exceptions import SkidynError
@@ -146,6 +146,12 @@ class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         EffectSearchCV
             The search itself.
         """
+        array, torque = validate_data(
+            self, X, y, multi_output=True, y_numeric=True, dtype=np.float64
+        )
+        if sample_weight is not None:
+            sample_weight = _check_sample_weight(sample_weight, array, dtype=np.float64)
+        X, y, sample_weight = self._log(self._table(X, array), torque, sample_weight)
         model = clone(self.estimator)
         opened = open_model(model, X, y)
         if not hasattr(opened.model, "with_effects"):
@@ -164,10 +170,6 @@ class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         )
         findings = self.diagnosis_.findings
         self.best_effects_ = [t for f in findings for t in f.terms]
-        self.n_features_in_ = int(np.shape(X)[1])
-        names = column_names(X)
-        if names is not None:
-            self.feature_names_in_ = np.asarray(names, dtype=object)
         prefix = "".join(f"{pipeline.steps[-1][0]}__" for pipeline in opened.outer)
         weights = {} if sample_weight is None else {f"{prefix}sample_weight": sample_weight}
         self._score_steps(X, y, groups, weights, f"{prefix}effects", list(opened.model.effects))
@@ -242,4 +244,15 @@ class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             Predicted torque.
         """
         check_is_fitted(self)
-        return np.asarray(self.best_estimator_.predict(X))
+        array = validate_data(self, X, reset=False, dtype=np.float64)
+        return np.asarray(self.best_estimator_.predict(self._table(X, array)))
+
+    # The two hooks that the common tests replace: their rows are of any width, and no motion.
+
+    def _table(self, X: Any, array: Array) -> Any:
+        """X as it was given where its columns have names, else as an array."""
+        return array if column_names(X) is None else X
+
+    def _log(self, X: Any, torque: Array, weight: Array | None) -> tuple[Any, Array, Array | None]:
+        """The log that is searched."""
+        return X, torque, weight

@@ -1,10 +1,57 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import numpy as np
 from sklearn.base import clone
+from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import EffectSearchCV
 from skidyn.identification import RBDRegressor
+from skidyn.robots import Robot
+
+PENDULUM = Robot.from_urdf(
+    '<robot name="pendulum"><link name="base"/><link name="rod"><inertial>'
+    '<origin xyz="0.2 0 0"/><mass value="1.5"/>'
+    '<inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+    '<joint name="j1" type="revolute"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/>'
+    '<limit lower="-3" upper="3" effort="50" velocity="3"/></joint></robot>'
+)
+
+
+def pendulum_log():
+    """Two swings of two seconds: trajectory, time, q, dq, ddq; and the torque."""
+    t, swings = np.arange(50) * 0.04, []
+    for k, w in enumerate((2.0, 2.7)):
+        q = np.sin(w * t)
+        swings.append(np.c_[np.full(50, k), t, q, w * np.cos(w * t), -(w**2) * q])
+    X = np.concatenate(swings)
+    torque = PENDULUM.inverse_dynamics(X[:, [2]], X[:, [3]], X[:, [4]])[:, 0]
+    return X, torque + 0.5 * np.sign(X[:, 3]) + 0.05 * np.random.default_rng(0).normal(size=100)
+
+
+class SearchOfPendulum(EffectSearchCV):
+    """Searches a log of its own, since the checks bring random rows and no motion; tests only."""
+
+    def _log(self, X, torque, weight):
+        return *pendulum_log(), None
+
+    def _table(self, X, array):
+        motion = array[:, [k % array.shape[1] for k in range(3)]]
+        return np.c_[np.zeros(len(array)), np.arange(len(array)), motion]
+
+    def __sklearn_tags__(self):
+        tags = super().__sklearn_tags__()
+        tags.regressor_tags.poor_score = True
+        return tags
+
+
+@parametrize_with_checks(
+    [SearchOfPendulum(RBDRegressor(PENDULUM, trajectory=0, time=1), effects=(), cv=2)],
+    expected_failed_checks=lambda estimator: {
+        "check_regressor_multioutput": "the robot and not y says how many outputs there are"
+    },
+)
+def test_scikit_learn_contract(estimator, check):
+    check(estimator)
 
 
 def test_finds_adds_and_predicts_better():
