@@ -16,6 +16,7 @@ import json
 import os
 import zipfile
 from collections.abc import Iterable, Iterator
+from copy import copy
 from pathlib import Path
 from typing import Any
 
@@ -111,9 +112,12 @@ def save_model(path: Any, model: Any) -> Path:
     Raises
     ------
     SkidynError
-        The model holds a function, or something else that :func:`load_model` never creates. A
-        fitted :class:`skidyn.diagnosis.EffectSearchCV` holds its diagnosis: store its
-        ``best_estimator_``.
+        The model holds a function, or something else that :func:`load_model` never creates.
+
+    Notes
+    -----
+    A :class:`skidyn.diagnosis.EffectSearchCV` is stored without its ``diagnosis_``, which holds the
+    log, and its ``scorer_``; fitted inside another estimator it cannot be stored.
 
     Examples
     --------
@@ -128,6 +132,9 @@ def save_model(path: Any, model: Any) -> Path:
         path, model = model, path
     skops = import_optional("skops.io", extra="share")
     target = Path(path)
+    if hasattr(model, "diagnosis_"):
+        model = copy(model)
+        del model.diagnosis_, model.scorer_
     try:
         data = skops.dumps(model)
     except Exception as error:  # whatever an object answers that cannot tell its state

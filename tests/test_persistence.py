@@ -222,16 +222,18 @@ def test_a_model_with_a_function_inside_is_refused_when_it_is_stored(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_a_search_says_what_of_it_can_be_stored(tmp_path):
+def test_a_search_is_stored_without_its_diagnosis(tmp_path):
     log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=4, duration=3.0)
     search = EffectSearchCV(RBDRegressor(log.robot), effects=("spring",), cv=2)
     skidyn.load_model(skidyn.save_model(tmp_path / "before.skops", search))
     search.fit(log.X, log.y)
-    with pytest.raises(SkidynError, match="EffectSearchCV cannot be .* best_estimator_, which"):
-        skidyn.save_model(tmp_path / "m.skops", search)
-    assert not (tmp_path / "m.skops").exists()
-    again = skidyn.load_model(skidyn.save_model(tmp_path / "m.skops", search.best_estimator_))
+    again = skidyn.load_model(skidyn.save_model(tmp_path / "m.skops", search))
     np.testing.assert_array_equal(again.predict(log.X), search.predict(log.X))
+    assert again.best_score_ == search.best_score_
+    assert hasattr(search, "diagnosis_") and not hasattr(again, "diagnosis_")
+    with pytest.raises(SkidynError, match="Pipeline cannot be stored"):
+        skidyn.save_model(tmp_path / "pipeline.skops", make_pipeline(search))
+    assert not (tmp_path / "pipeline.skops").exists()
 
 
 def test_one_large_array_named_again_and_again_is_not_unpacked(tmp_path, monkeypatch):
