@@ -10,10 +10,10 @@ from typing import Any
 
 from skidyn._text import digits, joints_told, listed
 
-#: Columns of a bar, and of the name of a joint with its number.
-BAR, NAME = 24, 28
-#: Joints for which it is told where their error lies.
-TOLD = 3
+#: Columns of a bar at most and at least, and of the name of a joint with its number.
+BAR, LEAST, NAME = 24, 12, 28
+#: Joints for which it is told where their error lies, and parts of the motion of each.
+TOLD, PLACES = 3, 2
 
 
 def story_lines(story: Mapping[str, Any], failures: Sequence[Any] = ()) -> Iterator[str]:
@@ -63,7 +63,7 @@ def where_lines(failures: Sequence[Any]) -> Iterator[str]:
         places = listed(
             [
                 f"{p.share_of_excess:.0%} {p.where} ({p.share_of_time:.0%} of the time)"
-                for p in failure.places
+                for p in failure.places[:PLACES]
             ]
         )
         yield f"  joint {failure.joint}: {places}"
@@ -82,13 +82,14 @@ def joint_lines(story: Mapping[str, Any]) -> Iterator[str]:
     width = max(map(len, names), default=5)
     added = bool(story["findings"])
     heads = ["before", "after", "noise"] if added else ["error", "noise"]
-    wide = shutil.get_terminal_size().columns >= width + 10 * len(heads) + BAR + 10
+    room = min(BAR, shutil.get_terminal_size().columns - width - 9 * len(heads) - 9)
+    wide = room >= LEAST
     picture = "   error over noise" if wide else ""
     yield f"  {'joint':{width}s}{''.join(f'{head:>9s}' for head in heads)}{picture}"
     for name, row in zip(names, rows, strict=True):
         values = [row["before"], *([row["after"]] if added else []), row["noise"]]
         cells = "".join(f"{digits(value):>9s}" for value in values)
-        drawn = f"   {bar(row['ratios'], largest)}" if wide else ""
+        drawn = f"   {bar(row['ratios'], largest, room)}" if wide else ""
         worse = "  worse" if row["state"] == "worse" else ""
         yield f"  {name:{width}s}{cells} {row['unit']:3s}{drawn}{worse}"
     if story["quiet"]:
@@ -102,7 +103,7 @@ def _name(row: Mapping[str, Any]) -> str:
     return (name if len(name) <= room else name[: room - 3] + "...") + number
 
 
-def bar(ratios: Sequence[float], largest: float) -> str:
+def bar(ratios: Sequence[float], largest: float, width: int = BAR) -> str:
     """Error over noise as a bar: full after, light before, and a mark at the noise.
 
     Parameters
@@ -111,6 +112,8 @@ def bar(ratios: Sequence[float], largest: float) -> str:
         Error before and after over the noise.
     largest : float
         Ratio at the end of the bar.
+    width : int, default=24
+        Columns.
 
     Returns
     -------
@@ -127,8 +130,8 @@ def bar(ratios: Sequence[float], largest: float) -> str:
     except (UnicodeEncodeError, LookupError):
         full, light, mark = "#-|"
     before, after, noise = (
-        round(BAR * min(r, largest) / largest) if r == r else 0 for r in (*ratios, 1.0)
+        round(width * min(r, largest) / largest) if r == r else 0 for r in (*ratios, 1.0)
     )
-    cells = [full if k < after else light if k < before else " " for k in range(BAR)]
-    cells[min(noise, BAR - 1)] = mark
+    cells = [full if k < after else light if k < before else " " for k in range(width)]
+    cells[min(noise, width - 1)] = mark
     return "".join(cells).rstrip()

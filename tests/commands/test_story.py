@@ -82,3 +82,12 @@ def test_a_bar_shows_before_after_and_noise():
 
 def test_a_bar_without_numbers_is_empty():
     assert bar([float("nan"), float("nan")], 4.0).strip() in ("│", "|")
+
+
+def test_a_usual_terminal_has_room_for_bars(story, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    story["joints"][1]["name"] = "shoulder_lift_joint"
+    lines = list(story_lines(story))
+    (row,) = [line for line in lines if "shoulder_lift_joint (2)" in line]
+    assert "│" in row or "|" in row
+    assert max(map(len, lines[2:5])) <= 80
