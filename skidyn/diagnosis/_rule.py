@@ -168,7 +168,7 @@ class Settings:
     white: float = 2.0
     nameless_price: int = 6
     nameless_tried: int = 20
-    shapes_tested: int = 4
+    shapes_tested: int = 12
     max_findings: int = 4
     finalists: int = 8
     refined: int = 4
