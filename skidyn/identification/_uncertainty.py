@@ -322,7 +322,8 @@ def _root_mean_squares(error: Array, signals: Signals, weight: Array | None) -> 
     averaged = [windows.average(e, j) for j, e in enumerate(error.T)]
     of_samples = np.average(error**2, axis=0, weights=weight)
     of_averages = np.array([np.mean(a**2) if len(a) else 0.0 for a in averaged])
-    return np.sqrt(np.stack([of_samples, of_averages])) + 1e-100
+    rmse: Array = np.sqrt(np.stack([of_samples, of_averages])) + 1e-100
+    return rmse
 
 
 def _distribution(error: Array, width: Array, moving: NDArray[np.bool_]) -> tuple[Array, Array]:
