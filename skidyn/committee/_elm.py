@@ -36,6 +36,10 @@ class ELMCommittee(RegressorMixin, BaseEstimator):
     ``fit`` on the whole log gives, with the same scaling of the inputs (up to rounding: sums are in
     single precision up to p = 0.99).
 
+    Without physics it has its place only where no model of the robot exists: with a URDF, a rigid
+    body with friction predicts far better, and boosted trees may do so too
+    (:doc:`/user_guide/learners`).
+
     Parameters
     ----------
     n_estimators : int, default=10

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, MetaEstimatorMixin, RegressorMixin, clone
 from sklearn.compose import TransformedTargetRegressor
 from sklearn.ensemble import BaggingRegressor
-from sklearn.linear_model import RidgeCV
+from sklearn.linear_model import Ridge
 from sklearn.model_selection import check_cv
 from sklearn.multioutput import MultiOutputRegressor
 from sklearn.neural_network import MLPRegressor
@@ -43,6 +43,8 @@ Array = NDArray[np.float64]
 FOLDS = 20
 #: Folds of the stacking where members are trained again for it.
 BLOCKS = 3
+#: Folds and strengths among which that of the default meta-regressor is chosen.
+FOLDS_OF_HEAD, ALPHAS = 5, (1.0, 1e2, 1e4, 1e6)
 
 
 class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
@@ -55,6 +57,10 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     To learn what a physical model leaves over, put it into :class:`skidyn.hybrid.HybridRegressor`:
     ``HybridRegressor(physics, BLLRegressor())``.
 
+    By itself it has its place only where no model of the robot exists: with a URDF, a rigid
+    body with friction predicts far better, and boosted trees may do so too
+    (:doc:`/user_guide/learners`).
+
     Parameters
     ----------
     estimator : estimator, default=None
@@ -63,8 +69,9 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         columns are set from those given here; one that has no parameters for them does not see
         them. With ``per_joint=True`` of the member each output has networks of its own.
     final_estimator : estimator, default=None
-        Meta-regressor; a linear one (ridge) if None. One of a single output is fitted once for each
-        output.
+        Meta-regressor. If None, a ridge that shrinks towards the members' mean, as strongly as
+        predicts left-out trajectories best; the mean itself where that is better. One of a single
+        output is fitted once for each output.
     n_estimators : int, default=10
         Members.
     resample : {"window", "trajectory"}, default="window"
@@ -260,10 +267,14 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         if not honest.any():  # too few rows to hold any out: stack what there is
             inputs, honest = _member_mean(self.bagging_, X), np.ones(len(X), dtype=bool)
         self.n_stacked_ = int(honest.sum())
-        head = RidgeCV() if self.final_estimator is None else clone(self.final_estimator)
+        weight = None if sample_weight is None else sample_weight[honest]
+        if self.final_estimator is None:
+            own = inputs[honest], y[honest], weight, trajectories[honest]
+            self.final_estimator_ = _ridge_towards_mean(*own)
+            return self
+        head = clone(self.final_estimator)
         if "random_state" in head.get_params():
             head.set_params(random_state=int(rng.randint(2**31 - 1)))
-        weight = None if sample_weight is None else sample_weight[honest]
         self.final_estimator_ = _fit_head(head, inputs[honest], y[honest], weight)
         return self
 
@@ -378,6 +389,36 @@ def _fit_head(head: Any, X: Array, y: Array, weight: Array | None) -> Any:
         if y.ndim == 1:
             raise
         return _fit(MultiOutputRegressor(clone(head)), X, y, weight)
+
+
+def _ridge_towards_mean(
+    X: Array, y: Array, weight: Array | None, trajectories: NDArray[Any]
+) -> Ridge:
+    """What the members' mean misses, by a ridge, if left-out trajectories are better for it.
+
+    Rows of a trajectory are alike, and the means of the few members that have not seen a row are
+    poorer than that of all: leaving out single rows would trust such a correction far too much.
+    """
+    missing = y.reshape(len(y), -1) - X
+    size, spread = X.std(axis=0), y.reshape(len(y), -1).std(axis=0)
+    size[size == 0], spread[spread == 0] = 1.0, 1.0
+    scaled, folds = X / size, list(held_out_folds(trajectories, FOLDS_OF_HEAD))
+    best, least = Ridge(), np.average((missing / spread) ** 2, axis=0, weights=weight).mean()
+    correction, offset = np.zeros((X.shape[1], X.shape[1])), np.zeros(X.shape[1])
+    for alpha in ALPHAS:
+        left = missing.copy()
+        for train, test in folds:
+            own = None if weight is None else weight[train]
+            head = Ridge(alpha=alpha).fit(scaled[train], missing[train], own)
+            left[test] -= head.predict(scaled[test]).reshape(len(test), -1)
+        error = np.average((left / spread) ** 2, axis=0, weights=weight).mean()
+        if error < least:
+            best, least = Ridge(alpha=alpha), error
+            found = clone(best).fit(scaled, missing, weight)
+            correction, offset = np.atleast_2d(found.coef_) / size, found.intercept_
+    best.fit(X, X)  # for what a fitted estimator has beside its coefficients
+    best.coef_, best.intercept_ = np.eye(X.shape[1]) + correction, offset
+    return best
 
 
 def _with_skorch_members(member: Any) -> Any:

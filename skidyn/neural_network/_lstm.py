@@ -18,6 +18,10 @@ class LSTMRegressor(SequenceRegressor):
 
     Training is that of skorch: its callbacks, optimisers and nets are those of this regressor.
 
+    Without physics it has its place only where no model of the robot exists: with a URDF, a rigid
+    body with friction predicts far better, and boosted trees may do so too
+    (:doc:`/user_guide/learners`).
+
     Parameters
     ----------
     per_joint : bool, default=False
@@ -72,6 +76,10 @@ class NDLRegressor(LSTMRegressor):
     ``scaling="minmax"``. It learns the torque from positions, velocities and
     accelerations without any physics. Windows, training and prediction are those of
     :class:`LSTMRegressor`.
+
+    Without physics it has its place only where no model of the robot exists: with a URDF, a rigid
+    body with friction predicts far better, and boosted trees may do so too
+    (:doc:`/user_guide/learners`).
 
     Parameters
     ----------

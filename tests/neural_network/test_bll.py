@@ -186,3 +186,18 @@ def test_groups_and_lists_of_splits(log):
     bll = BLLRegressor(Ridge(), n_estimators=2, cv=cv, random_state=0).fit(X, y, groups=groups)
     given = BLLRegressor(Ridge(), n_estimators=2, cv=list(cv.split(X, y, groups)), random_state=0)
     np.testing.assert_allclose(given.fit(X, y).predict(X), bll.predict(X))
+
+
+def test_default_meta_regressor_does_not_spoil_the_mean_of_the_members():
+    # A path in few trajectories: what single members miss on one says nothing about another.
+    t = np.linspace(0, 12, 360)
+    q = np.c_[np.sin(t), np.cos(1.7 * t), np.sin(2.3 * t + 1)]
+    X, y = np.c_[np.arange(360) // 60, q], np.c_[q[:, 0] * q[:, 1], q[:, 2] ** 2, q[:, 0]]
+    train, test = X[:, 0] != 3, X[:, 0] == 3
+    member = LSTMRegressor(window=2, hidden_size=6, max_epochs=15)
+    bll = BLLRegressor(member, n_estimators=4, trajectory=0, random_state=0)
+    bll.fit(X[train], y[train])
+    members = [each.predict(X[test]) for each in bll.bagging_.estimators_]
+    alone = np.sqrt(np.mean((y[test] - np.mean(members, axis=0)) ** 2))
+    stacked = np.sqrt(np.mean((y[test] - bll.predict(X[test])) ** 2))
+    assert stacked < 1.1 * alone
