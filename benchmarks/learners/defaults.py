@@ -6,7 +6,7 @@
 Printed is the error on held-out parts: RMSE over the standard deviation of the torque, mean over
 the joints. Physics is ``RBDRegressor`` with plain friction; "Ridge" is ten lines of
 scikit-learn on the columns of rigid body and friction. ``--unseen`` takes the logs that had no part
-in settling defaults; ``--only`` names logs, ``--models`` estimators, ``--joints`` prints joints.
+in settling learners; ``--only`` names logs, ``--models`` estimators, ``--joints`` prints joints.
 """
 
 from __future__ import annotations
