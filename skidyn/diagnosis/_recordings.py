@@ -20,6 +20,8 @@ from skidyn.evidence import Problem
 TESTED = 8
 #: Terms of one kind at most.
 MOST_TERMS = 24
+#: One recording that does this share of what all of them do stands out by itself.
+MOSTLY = 0.8
 
 
 def groups_of_recordings(problem: Problem) -> list[tuple[int, ...]]:
@@ -127,7 +129,11 @@ def _zeroed_anew(
         if not 1 < len(own) <= MOST_TERMS or own[0].width > 1:
             continue
         rows = {j: np.hstack([c.rows[j] for c in own]) for j in own[0].rows}
-        if significant(tester.test(rows).chance):
+        together = tester.test(rows)
+        # One that does nearly all of it stands out by itself.
+        alone = [tester.test(c.rows) for c in own]
+        strongest = max((t.drop for t in alone if significant(t.chance)), default=0.0)
+        if significant(together.chance) and strongest < MOSTLY * together.drop:
             chosen += own
     return chosen
 
