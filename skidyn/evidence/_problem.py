@@ -31,6 +31,8 @@ from skidyn.robots import Robot, base_parameter_index
 RANK_TOLERANCE = 2e-6
 #: Folds: whole trajectories where there are more than this many, else blocks of them.
 FEW_TRAJECTORIES, FEWEST_BLOCKS, MOST_FOLDS = 6, 8, 20
+#: Combinations of columns that are smaller than the root of this, of their parts, may be open.
+LARGEST_RIDGE = 1e-6
 #: Samples of a window from which a smooth function can be told: more are passed over at first.
 ENOUGH_SAMPLES = 16
 #: Share of the smoother's half width that is left out around rest and reversals, and the samples
@@ -563,7 +565,7 @@ def _weighted(terms: TermSum, design: list[Array], target: list[Array], sigma: A
     # No column alone carries more than there is to explain. What the data leaves open, such as the
     # share of a rotor in an inertia, is shared out as the smallest corrections that do it, and the
     # loads of the joints, which depend on that, stay those of a robot.
-    ridge = max(RIDGE, 1 / max(float(y @ y), 1.0))
+    ridge = max(RIDGE, 1 / max(float(y @ y), 1 / LARGEST_RIDGE))
     normal = Normal(unit.T @ unit, unit.T @ y, np.ones(len(size)), ridge)
     # One refinement step recovers the accuracy that forming the Gram matrix costs.
     scaled = normal.solution + normal.solve(unit.T @ (y - a @ (normal.solution / size)))
