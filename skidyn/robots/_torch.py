@@ -103,12 +103,12 @@ class TorchDynamics:
         factor = torch.tensor(tree.multipliers, **like)
         position = q[:, place] * factor + torch.tensor(tree.offsets, **like)
         speed, rate = dq[:, place] * factor, ddq[:, place] * factor
-        poses = chain.forward_kinematics_tensor(position, analytical_grad=False)
+        poses = _poses(chain, position)
         zero = q.new_zeros(len(q), 3)
         base = _Body(zero, zero, zero, zero, zero, zero - torch.tensor(robot.gravity, **like))
         bodies: list[_Body] = []
         for k, name in enumerate(robot.body_names):
-            pose = poses[chain.frame_to_idx[name]]
+            pose = poses[name]
             rotation, origin = pose[:, :3, :3], pose[:, :3, 3]
             axis = rotation @ torch.tensor(tree.axes[k], **like)
             above = bodies[tree.parents[k]] if tree.parents[k] >= 0 else base
@@ -164,3 +164,13 @@ def _inertia_columns(vector: Tensor) -> Tensor:
     zero = torch.zeros_like(x)
     rows = [[x, y, z, zero, zero, zero], [zero, x, zero, y, z, zero], [zero, zero, x, zero, y, z]]
     return torch.stack([torch.stack(row, dim=-1) for row in rows], dim=-2)
+
+
+def _poses(chain: Any, position: Tensor) -> dict[str, Tensor]:
+    """Pose of every frame of a chain, (n, 4, 4), with derivatives of any order."""
+    if hasattr(chain, "forward_kinematics_tensor"):
+        # since pytorch-kinematics 0.8; the gradient of its own cannot be differentiated again
+        table = chain.forward_kinematics_tensor(position, analytical_grad=False)
+        return {name: table[index] for name, index in chain.frame_to_idx.items()}
+    frames = chain.forward_kinematics(position)
+    return {name: pose.get_matrix() for name, pose in frames.items()}
