@@ -109,6 +109,27 @@ def resolve_keys(
     return Keys(found[0], found[1], features)
 
 
+def fitted_keys(estimator: Any) -> Keys:
+    """Key columns of the table that an estimator was fitted to, by its ``trajectory`` and ``time``.
+
+    Parameters
+    ----------
+    estimator : estimator
+        Fitted, at least as far as ``n_features_in_``.
+
+    Returns
+    -------
+    Keys
+    """
+    names = getattr(estimator, "feature_names_in_", None)
+    return resolve_keys(
+        None if names is None else [str(name) for name in names],
+        estimator.n_features_in_,
+        trajectory=estimator.trajectory,
+        time=estimator.time,
+    )
+
+
 def keys_of(X: Any, *, trajectory: ColumnSpec = "auto", time: ColumnSpec = "auto") -> Keys:
     """Key columns of a table or array as the user gave it."""
     return resolve_keys(column_names(X), X.shape[1], trajectory=trajectory, time=time)

@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 from sklearn.linear_model import LogisticRegression
 
+from skidyn.diagnosis._confidence import COLOURED, ENOUGH, LEAST
+
 BINS = (0.0, 0.6, 0.75, 0.85, 0.9, 0.95, 1.0)
-#: As in the confidence that is judged.
-COLOURED, LEAST, ENOUGH = 1.7, 0.003, 0.3
 #: These act on the tool or the base: any joint is right.
 ANYWHERE = {"payload", "external_wrench", "base_tilt", "environment_contact"}
 

@@ -16,7 +16,7 @@ from sklearn.utils.validation import _check_sample_weight, check_is_fitted, vali
 
 from skidyn._columns import ColumnSpec
 from skidyn._compat import Interval, StrOptions, fit_context
-from skidyn._keys import Keys, resolve_keys
+from skidyn._keys import Keys, fitted_keys
 from skidyn.preprocessing import scaling_of
 
 Array = NDArray[Any]
@@ -319,10 +319,4 @@ class ELMCommittee(RegressorMixin, BaseEstimator):
         return with_constant
 
     def _keys(self) -> Keys:
-        names = getattr(self, "feature_names_in_", None)
-        return resolve_keys(
-            None if names is None else list(names),
-            self.n_features_in_,
-            trajectory=self.trajectory,
-            time=self.time,
-        )
+        return fitted_keys(self)

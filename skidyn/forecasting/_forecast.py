@@ -15,7 +15,7 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 
 from skidyn._columns import ColumnSpec
 from skidyn._compat import Interval, fit_context
-from skidyn._keys import Keys, resolve_keys
+from skidyn._keys import Keys, fitted_keys
 from skidyn._signals import find_segments
 
 Array = NDArray[np.float64]
@@ -71,13 +71,7 @@ class _Forecaster(RegressorMixin, BaseEstimator):
         return tags
 
     def _keys(self) -> Keys:
-        names = getattr(self, "feature_names_in_", None)
-        return resolve_keys(
-            None if names is None else list(names),
-            self.n_features_in_,
-            trajectory=self.trajectory,
-            time=self.time,
-        )
+        return fitted_keys(self)
 
     def _past(self, X: Array) -> Array:
         """Sample before each row, one column per output."""

@@ -29,7 +29,7 @@ from skidyn._compat import (
     fit_context,
     fit_progress,
 )
-from skidyn._keys import Keys, resolve_keys
+from skidyn._keys import Keys, fitted_keys
 from skidyn.hybrid._gate import learned_weights
 from skidyn.hybrid._own_joint import OwnJointRegressor
 from skidyn.hybrid._range import TrainingRange, distances, fade
@@ -250,13 +250,7 @@ class HybridRegressor(CallbackSupportMixin, MetaEstimatorMixin, RegressorMixin, 
         return OwnJointRegressor(joint_names=names, trajectory=self.trajectory, time=self.time)
 
     def _keys(self) -> Keys:
-        names = getattr(self, "feature_names_in_", None)
-        return resolve_keys(
-            None if names is None else list(names),
-            self.n_features_in_,
-            trajectory=self.trajectory,
-            time=self.time,
-        )
+        return fitted_keys(self)
 
     def predict(self, X: Any) -> Array:
         """Predict the torque: physics, plus the learned part where it was kept.

@@ -23,7 +23,7 @@ from sklearn.utils.validation import (
 from skidyn._columns import Columns, ColumnSpec, resolve_columns
 from skidyn._compat import HasMethods, fit_context
 from skidyn._exceptions import ColumnError
-from skidyn._keys import Keys, resolve_keys
+from skidyn._keys import Keys, fitted_keys
 from skidyn._order import taken, time_order
 from skidyn.effects import dahl_state
 from skidyn.model_selection import order_of_log
@@ -191,13 +191,7 @@ class OwnJointRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         return own if order is None else [table[np.argsort(order)] for table in own]
 
     def _keys(self) -> Keys:
-        names = getattr(self, "feature_names_in_", None)
-        return resolve_keys(
-            None if names is None else list(names),
-            self.n_features_in_,
-            trajectory=self.trajectory,
-            time=self.time,
-        )
+        return fitted_keys(self)
 
     def predict(self, X: Any) -> Array:
         """Predict the torque of every row.

@@ -26,7 +26,7 @@ from skidyn._compat import (
     fit_context,
     fit_progress,
 )
-from skidyn._keys import Keys, resolve_keys
+from skidyn._keys import Keys, fitted_keys
 from skidyn._order import taken, time_order
 from skidyn.model_selection import order_of_log
 from skidyn.neural_network._engine import (
@@ -264,13 +264,7 @@ class SequenceRegressor(SkorchParameters, CallbackSupportMixin, RegressorMixin, 
         return Plan(self.window, self.stride, settings | own)
 
     def _keys(self) -> Keys:
-        names = getattr(self, "feature_names_in_", None)
-        return resolve_keys(
-            None if names is None else list(names),
-            self.n_features_in_,
-            trajectory=self.trajectory,
-            time=self.time,
-        )
+        return fitted_keys(self)
 
     # ---- predict ----
 

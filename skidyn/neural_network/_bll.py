@@ -30,7 +30,7 @@ from skorch import NeuralNet
 
 from skidyn._columns import ColumnSpec
 from skidyn._compat import HasMethods, Interval, StrOptions, fit_context
-from skidyn._keys import Keys, resolve_keys
+from skidyn._keys import Keys, fitted_keys
 from skidyn._order import taken, time_order
 from skidyn.model_selection import held_out_folds, order_of_log
 from skidyn.neural_network._base import SequenceRegressor, deferred_training, train_together
@@ -340,13 +340,7 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         return held_out_folds(trajectories, int(self.cv or BLOCKS), guard=guard)
 
     def _keys(self) -> Keys:
-        names = getattr(self, "feature_names_in_", None)
-        return resolve_keys(
-            None if names is None else list(names),
-            self.n_features_in_,
-            trajectory=self.trajectory,
-            time=self.time,
-        )
+        return fitted_keys(self)
 
     def predict(self, X: Any, return_std: bool = False) -> Any:
         """Predict the torque of every row.

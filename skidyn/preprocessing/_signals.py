@@ -15,7 +15,7 @@ from sklearn.utils.validation import _check_feature_names_in, check_is_fitted, v
 from skidyn._columns import ColumnSpec, _key_column
 from skidyn._compat import Interval, fit_context
 from skidyn._exceptions import ColumnError
-from skidyn._keys import Keys, resolve_keys
+from skidyn._keys import Keys, fitted_keys
 from skidyn.preprocessing._affine import scaling_of
 
 Array = NDArray[np.float64]
@@ -32,9 +32,7 @@ class _SignalTransformer(TransformerMixin, BaseEstimator):
         return None if names is None else [str(name) for name in names]
 
     def _keys(self) -> Keys:
-        return resolve_keys(
-            self._names(), self.n_features_in_, trajectory=self.trajectory, time=self.time
-        )
+        return fitted_keys(self)
 
     def _checked(self, X: Any) -> Array:
         check_is_fitted(self)
