@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from skidyn._exceptions import LogError
 from skidyn._signals import Array
 
 if TYPE_CHECKING:
@@ -44,6 +45,27 @@ def order_in_time(trajectory: NDArray[Any], time: Array | None) -> NDArray[np.in
     if surplus <= SHUFFLED * len(time):
         return None
     return np.lexsort((time, trajectory))
+
+
+def refuse_shuffled(what: str, trajectory: NDArray[Any], time: Array | None) -> None:
+    """Raise a LogError where rows are shuffled and ``what`` needs to know which follow each other.
+
+    Parameters
+    ----------
+    what : str
+        What needs it, as the subject of the message.
+    trajectory : ndarray of shape (n_samples,)
+        Trajectory number of every row.
+    time : ndarray of shape (n_samples,), s, or None
+        Time; without it no order can be known.
+    """
+    if order_in_time(trajectory, time) is not None:
+        raise LogError(
+            f"{what} follows the motion from row to row, but the rows of X are not in the order of "
+            "time, as after train_test_split, KFold(shuffle=True), BaggingRegressor or "
+            "HalvingGridSearchCV over samples. Give whole trajectories in the order of time: split "
+            "by TrajectoryKFold, GroupKFold or GroupShuffleSplit, or apply it before the split"
+        )
 
 
 def has_one_motion(trajectory: NDArray[Any], time: Array) -> bool:

@@ -40,7 +40,8 @@ from sklearn.preprocessing import FunctionTransformer, StandardScaler
 import skidyn
 from skidyn.committee import ELMCommittee
 from skidyn.diagnosis import EffectSearchCV
-from skidyn.effects import FrictionTransformer
+from skidyn.effects import FrictionTransformer, Term
+from skidyn.exceptions import LogError
 from skidyn.hybrid import HybridRegressor, OwnJointRegressor
 from skidyn.identification import RBDRegressor
 from skidyn.model_selection import LeakageWarning, TrajectoryKFold
@@ -167,7 +168,7 @@ def test_searches(model, grid):
     resource = "max_epochs" if epochs else "n_samples"
     halving = HalvingGridSearchCV(model, grid, resource=resource, factor=2, **limits, **every)
     if isinstance(model, EffectSearchCV):  # it draws single rows, in which no motion is left
-        with pytest.raises(ValueError, match="no joint slides long enough for a diagnosis"):
+        with pytest.raises(LogError, match=r"not in the order of time.*HalvingGridSearchCV"):
             halving.fit(X, Y)
         return
     found = halving.fit(X, Y).cv_results_
@@ -225,10 +226,29 @@ def test_inspection(model):
 def test_shuffled_rows(model):
     train, test, y_train, _ = train_test_split(X, Y, random_state=0)
     if isinstance(model, EffectSearchCV):
-        with pytest.raises(skidyn.exceptions.LogError, match="no joint slides long enough"):
+        with pytest.raises(LogError, match="not in the order of time, as after train_test_split"):
             model.fit(train, y_train)
         return
     assert np.isfinite(clone(model).fit(train, y_train).predict(test)).all()
+    assert np.isfinite(clone(model).fit(train[:40], y_train[:40]).predict(test)).all()
+
+
+@pytest.mark.parametrize(
+    "transformer",
+    [
+        ButterworthFilter(5.0),
+        TimeDerivative(["q1"]),
+        SmoothDerivatives(["q1"], derivatives=1),
+        FrictionTransformer([Term("dahl", (0,), {"presliding": 0.01})]),
+    ],
+    ids=lambda t: type(t).__name__,
+)
+def test_steps_that_need_a_sequence_refuse_shuffled_rows(transformer):
+    table = X.drop(columns="dq1") if isinstance(transformer, SmoothDerivatives) else X
+    train, _ = train_test_split(table, random_state=0)
+    with pytest.raises(LogError, match=r"not in the order of time.*TrajectoryKFold"):
+        clone(transformer).fit_transform(train)
+    assert np.isfinite(clone(transformer).fit_transform(table)).all()
 
 
 def test_copies_files_and_single_precision(model, tmp_path):

@@ -14,6 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from skidyn._columns import ColumnSpec
 from skidyn._exceptions import ColumnError, LogError, LogWarning
+from skidyn._order import refuse_shuffled
 from skidyn._signals import Array, Signals, read_signals
 from skidyn.diagnosis._conclusion import conclude
 from skidyn.diagnosis._correction import open_model
@@ -163,6 +164,7 @@ def _diagnose(
         rate=rate,
         to_derive=smooth,
     )
+    refuse_shuffled("A diagnosis", signals.trajectory, signals.time)
     weight = None
     if sample_weight is not None:
         weight = _check_sample_weight(
@@ -257,7 +259,8 @@ def _check_rows(problem: Problem) -> None:
     empty = [j + 1 for j, n in enumerate(problem.rows.counts) if n < 8]
     if len(empty) == problem.n_joints:
         raise LogError(
-            "no joint slides long enough for a diagnosis: the log is too short, or all joints rest"
+            "no joint slides long enough for a diagnosis: the log is too short, scattered in "
+            "time, or all joints rest"
         )
 
 

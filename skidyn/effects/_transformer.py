@@ -15,6 +15,7 @@ from sklearn.utils.validation import _check_feature_names_in, check_is_fitted, v
 from skidyn._columns import Columns, ColumnSpec, _key_column, resolve_columns
 from skidyn._exceptions import ColumnError, EffectError
 from skidyn._keys import Keys, resolve_keys
+from skidyn._order import refuse_shuffled
 from skidyn._signals import Array, signals_from
 from skidyn.effects._catalogue import make_terms
 from skidyn.effects._term import Term
@@ -114,6 +115,8 @@ class FrictionTransformer(TransformerMixin, BaseEstimator):
         check_is_fitted(self)
         X = validate_data(self, X, reset=False, dtype=np.float64)
         signals = signals_from(X, self.columns_, to_derive=self.columns_.ddq is None)
+        if not all(term.is_pointwise for term in self.terms_):
+            refuse_shuffled("An effect with a memory", signals.trajectory, signals.time)
         blocks = [t.torque_columns(signals)[t.joints[0]] for t in self.terms_]
         return np.hstack([X, *blocks])
 

@@ -80,7 +80,9 @@ def smooth_motion(signals: Signals, cutoff: float | None = None) -> SmoothedMoti
         own = sampling_rate(signals.take(rows))
         own = own if abs(own - rate) > EVEN_STEPS * rate else rate  # recordings of several rates
         width, _ = _half_width(own, cutoff)
-        if rows.stop - rows.start <= 2 * width + 1:
+        # Scattered samples are many for their median step, or few for the time they span.
+        steps = round(float(np.ptp(signals.clock[rows])) * own)
+        if min(rows.stop - rows.start, steps + 1) <= 2 * width + 1:
             valid[rows] = False  # too short to smooth; kept as logged, and not used
             continue
         q[rows], dq[rows], ddq[rows] = _local_polynomial(

@@ -153,7 +153,7 @@ class SmoothDerivatives(_SignalTransformer):
         of_velocities = self.columns is None and bool(velocities)
         self.derivatives_ = self.derivatives or (1 if of_velocities else 2)
         refuse_columns_there(names, self.columns_, self.derivatives_)
-        self.rate_ = _sampling_rate(X, keys, self.rate)
+        self.rate_ = _sampling_rate(X, keys, self._segments(X), self.rate)
         if self.cutoff is not None and not self.cutoff < self.rate_ / 2:
             raise ValueError(
                 f"cutoff={self.cutoff} Hz is not below half the sampling rate "
@@ -235,7 +235,7 @@ class SmoothDerivatives(_SignalTransformer):
         smoothed = X.copy()
         first = np.empty((len(X), len(self.columns_)))
         second = np.empty_like(first)
-        for segment in self._keys().segments(X):
+        for segment in self._segments(X):
             if segment.stop - segment.start < 6:
                 raise ValueError(
                     f"the segment at row {segment.start} has {segment.stop - segment.start} "

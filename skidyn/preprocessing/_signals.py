@@ -16,6 +16,7 @@ from skidyn._columns import ColumnSpec, _key_column
 from skidyn._compat import Interval, fit_context
 from skidyn._exceptions import ColumnError
 from skidyn._keys import Keys, fitted_keys
+from skidyn._order import refuse_shuffled
 from skidyn.preprocessing._affine import scaling_of
 
 Array = NDArray[np.float64]
@@ -39,14 +40,21 @@ class _SignalTransformer(TransformerMixin, BaseEstimator):
         checked: Array = validate_data(self, X, reset=False, dtype=np.float64)
         return checked
 
+    def _segments(self, X: Array) -> list[slice]:
+        """Runs of rows that follow each other."""
+        keys = self._keys()
+        time = None if keys.time is None else X[:, keys.time]
+        refuse_shuffled(type(self).__name__, keys.trajectories(X), time)
+        return keys.segments(X)
 
-def _sampling_rate(X: Array, keys: Keys, rate: float | None) -> float:
+
+def _sampling_rate(X: Array, keys: Keys, segments: list[slice], rate: float | None) -> float:
     """Samples per second: as given, or from the median step of the time column."""
     if rate is not None:
         return float(rate)
     if keys.time is None:
         raise ValueError("X has no time column; declare it, or give rate in Hz.")
-    steps = np.concatenate([np.diff(X[segment, keys.time]) for segment in keys.segments(X)])
+    steps = np.concatenate([np.diff(X[segment, keys.time]) for segment in segments])
     steps = steps[steps > 0]
     if len(steps) == 0:
         raise ValueError("the time column never advances; n_samples = 1 is too few for a rate.")
@@ -141,7 +149,7 @@ class ButterworthFilter(OneToOneFeatureMixin, _SignalTransformer):
             The transformer.
         """
         X = validate_data(self, X, dtype=np.float64)
-        self.rate_ = _sampling_rate(X, self._keys(), self.rate)
+        self.rate_ = _sampling_rate(X, self._keys(), self._segments(X), self.rate)
         return self
 
     def transform(self, X: Any) -> Array:
@@ -161,7 +169,7 @@ class ButterworthFilter(OneToOneFeatureMixin, _SignalTransformer):
         keys = self._keys()
         filtered: Array = X.copy()
         features = list(keys.features)
-        for segment in keys.segments(X):
+        for segment in self._segments(X):
             filtered[segment, features] = _low_pass(
                 X[segment, features], self.cutoff, self.order, self.rate_
             )
@@ -256,7 +264,7 @@ class TimeDerivative(_SignalTransformer):
             found = [*keys.features[len(keys.features) // 2 :]]
         self.columns_ = np.array(found, dtype=int)
         refuse_columns_there(names, self.columns_, 1)
-        self.rate_ = _sampling_rate(X, keys, self.rate)
+        self.rate_ = _sampling_rate(X, keys, self._segments(X), self.rate)
         return self
 
     def transform(self, X: Any) -> Array:
@@ -275,7 +283,7 @@ class TimeDerivative(_SignalTransformer):
         X = self._checked(X)
         keys = self._keys()
         derivative = np.empty((len(X), len(self.columns_)))
-        for segment in keys.segments(X):
+        for segment in self._segments(X):
             values = X[segment, self.columns_]
             if len(values) < 2:
                 raise ValueError(
