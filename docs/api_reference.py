@@ -284,6 +284,7 @@ PAGES: tuple[Page, ...] = (
                     "ButterworthFilter",
                     "CurrentToTorque",
                     "DelayEstimate",
+                    "DropKeys",
                     "SignalScaler",
                     "SmoothDerivatives",
                     "TimeDerivative",

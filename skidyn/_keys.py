@@ -58,14 +58,19 @@ class Keys:
         DataFrame or array
             ``X`` itself, or its features.
         """
-        parameters = learner.get_params() if hasattr(learner, "get_params") else {}
-        if any(name.rpartition("__")[2] == "trajectory" for name in parameters):
+        if knows_keys(learner):
             return X
         if self.trajectory is None and self.time is None:
             return X
         from sklearn.utils import _safe_indexing
 
         return _safe_indexing(X, list(self.features), axis=1)
+
+
+def knows_keys(learner: Any) -> bool:
+    """Whether an estimator, or a part of it, has parameters for key columns."""
+    parameters = learner.get_params() if hasattr(learner, "get_params") else {}
+    return any(name.rpartition("__")[2] == "trajectory" for name in parameters)
 
 
 def resolve_keys(

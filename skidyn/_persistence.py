@@ -57,6 +57,7 @@ CLASSES = frozenset(
         "preprocessing._current.CurrentToTorque",
         "preprocessing._derivatives.SmoothDerivatives",
         "preprocessing._signals.ButterworthFilter",
+        "preprocessing._drop_keys.DropKeys",
         "preprocessing._signals.SignalScaler",
         "preprocessing._signals.TimeDerivative",
         "robots._assembly.LinkPlacement",
@@ -112,7 +113,8 @@ def save_model(path: Any, model: Any) -> Path:
     Raises
     ------
     SkidynError
-        The model holds a function, or something else that :func:`load_model` never creates.
+        There is no path or no model; or the model holds a function, or something else that
+        :func:`load_model` never creates.
 
     Notes
     -----
@@ -130,6 +132,11 @@ def save_model(path: Any, model: Any) -> Path:
     """
     if isinstance(model, str | os.PathLike) and not isinstance(path, str | os.PathLike):
         path, model = model, path
+    if not isinstance(path, str | os.PathLike) or isinstance(model, str | os.PathLike):
+        raise SkidynError(
+            f"save_model takes a path and a model; got a {type(path).__name__} and a "
+            f"{type(model).__name__}"
+        )
     skops = import_optional("skops.io", extra="share")
     target = Path(path)
     if hasattr(model, "diagnosis_"):

@@ -15,6 +15,7 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 from sklearn.base import BaseEstimator
+from sklearn.linear_model import Ridge
 from sklearn.neighbors import KNeighborsRegressor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer
@@ -70,6 +71,15 @@ def test_every_learner_comes_back(tmp_path, number):
     with zipfile.ZipFile(tmp_path / "m.skops") as archive:  # arrays and a description, no pickles
         kinds = {name.rpartition(".")[2] for name in archive.namelist()}
     assert kinds <= {"npy", "json"}
+
+
+def test_path_and_model_in_either_order(tmp_path):
+    path = tmp_path / "m.skops"
+    assert skidyn.save_model(Ridge(alpha=2.0), path) == skidyn.save_model(path, Ridge(alpha=2.0))
+    assert skidyn.load_model(path).alpha == 2.0
+    for pair in ((Ridge(), Ridge()), (path, path)):
+        with pytest.raises(SkidynError, match="takes a path and a model"):
+            skidyn.save_model(*pair)
 
 
 def test_pickles_are_refused_and_never_run(tmp_path):

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import sklearn
-from sklearn.base import clone
+from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.compose import TransformedTargetRegressor
 from sklearn.ensemble import BaggingRegressor, StackingRegressor, VotingRegressor
 from sklearn.experimental import enable_halving_search_cv  # noqa: F401
@@ -34,7 +34,7 @@ from sklearn.model_selection import (
     train_test_split,
 )
 from sklearn.multioutput import MultiOutputRegressor
-from sklearn.pipeline import make_pipeline
+from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import FunctionTransformer, StandardScaler
 
 import skidyn
@@ -49,6 +49,7 @@ from skidyn.neural_network import BLLRegressor, LSTMRegressor, NDLRegressor, SDL
 from skidyn.preprocessing import (
     ButterworthFilter,
     CurrentToTorque,
+    DropKeys,
     SignalScaler,
     SmoothDerivatives,
     TimeDerivative,
@@ -168,7 +169,7 @@ def test_searches(model, grid):
     resource = "max_epochs" if epochs else "n_samples"
     halving = HalvingGridSearchCV(model, grid, resource=resource, factor=2, **limits, **every)
     if isinstance(model, EffectSearchCV):  # it draws single rows, in which no motion is left
-        with pytest.raises(LogError, match=r"not in the order of time.*HalvingGridSearchCV"):
+        with pytest.raises(ValueError, match=r"(?s)not in the order of time.*HalvingGridSearchCV"):
             halving.fit(X, Y)
         return
     found = halving.fit(X, Y).cv_results_
@@ -237,14 +238,15 @@ def test_shuffled_rows(model):
     "transformer",
     [
         ButterworthFilter(5.0),
-        TimeDerivative(["q1"]),
-        SmoothDerivatives(["q1"], derivatives=1),
-        FrictionTransformer([Term("dahl", (0,), {"presliding": 0.01})]),
+        TimeDerivative(),
+        SmoothDerivatives(),
+        FrictionTransformer([Term("dahl", (1,), {"presliding": 0.01})]),
     ],
     ids=lambda t: type(t).__name__,
 )
 def test_steps_that_need_a_sequence_refuse_shuffled_rows(transformer):
-    table = X.drop(columns="dq1") if isinstance(transformer, SmoothDerivatives) else X
+    derives = isinstance(transformer, TimeDerivative | SmoothDerivatives)
+    table = X.drop(columns="ddq1") if derives else X
     train, _ = train_test_split(table, random_state=0)
     with pytest.raises(LogError, match=r"not in the order of time.*TrajectoryKFold"):
         clone(transformer).fit_transform(train)
@@ -291,9 +293,53 @@ def test_metadata_routing():
         np.testing.assert_allclose(scores, expected, **SAME)
 
 
+class Spy(RegressorMixin, BaseEstimator):
+    """Says which columns it was given."""
+
+    def fit(self, X, y):
+        self.columns_ = X.shape[1]
+        self.mean_ = np.mean(y)
+        return self
+
+    def predict(self, X):
+        assert X.shape[1] == self.columns_
+        return np.full(len(X), self.mean_)
+
+
+@pytest.mark.parametrize(
+    ("learner", "columns"),
+    [
+        (Spy(), 3),
+        (make_pipeline(StandardScaler(), Spy()), 3),
+        (make_pipeline(FrictionTransformer(), Spy()), 5),
+        (make_pipeline(SignalScaler(), StandardScaler(), Spy()), 3),
+        (VotingRegressor([("own", OwnJointRegressor(Ridge())), ("spy", Spy())]), 3),
+    ],
+)
+@pytest.mark.parametrize("table", [X, X.to_numpy()], ids=["names", "positions"])
+def test_key_columns_never_reach_learners(learner, columns, table):
+    keys = {} if table is X else {"trajectory": 0, "time": 1}
+    own = {
+        n: keys[n.rpartition("__")[2]] for n in learner.get_params() if n.split("__")[-1] in keys
+    }
+    learner = clone(learner).set_params(**own)
+    inside = {"cv": 2, "alpha": 1.0, **keys}
+    physics = RBDRegressor(PENDULUM, **keys)
+    fitted = [
+        HybridRegressor(learner, Ridge(), **inside).fit(table, Y).physics_,
+        BLLRegressor(learner, n_estimators=1, **keys).fit(table, Y).bagging_.estimators_[0],
+    ]
+    kept = HybridRegressor(physics, learner, **inside).fit(table, Y).learner_
+    for model in fitted + [kept] * (kept is not None):
+        while not isinstance(model, Spy):
+            model = model[-1] if isinstance(model, Pipeline) else model.estimators_[-1]
+        assert model.columns_ == columns
+
+
 @pytest.mark.parametrize(
     "transformer",
     [
+        DropKeys(),
         FrictionTransformer(),
         ButterworthFilter(5.0),
         TimeDerivative(),

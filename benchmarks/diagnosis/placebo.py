@@ -63,7 +63,7 @@ def main() -> None:
                 r = fit.residual[joint] / fit.residual[joint].std()
                 for kind in KINDS:
                     for shape in get_effect(kind).grid(other.signals, (joint,))[:3]:
-                        x = other.term_rows(Term(kind, (joint,), shape))[joint][:, 0]
+                        x = other.term_rows(Term.at(kind, (joint,), shape))[joint][:, 0]
                         n = min(len(r), len(x))
                         if n < 100 or x[:n].std() == 0:
                             continue

@@ -27,13 +27,14 @@ from sklearn.ensemble import HistGradientBoostingRegressor
 from sklearn.linear_model import RidgeCV
 from sklearn.multioutput import MultiOutputRegressor
 from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import FunctionTransformer, StandardScaler
+from sklearn.preprocessing import StandardScaler
 
 from skidyn.committee import ELMCommittee
 from skidyn.diagnosis import EffectSearchCV
 from skidyn.hybrid import HybridRegressor
 from skidyn.identification import RBDRegressor
 from skidyn.neural_network import BLLRegressor, LSTMRegressor, NDLRegressor, SDLRegressor
+from skidyn.preprocessing import DropKeys
 
 
 class RidgeOnColumns:
@@ -62,8 +63,9 @@ class RidgeOnColumns:
 
 def boosting() -> Any:
     """Boosted trees with their defaults, one for each joint, without the key columns."""
-    drop = FunctionTransformer(lambda X: X.drop(columns=["trajectory", "time"], errors="ignore"))
-    return make_pipeline(drop, MultiOutputRegressor(HistGradientBoostingRegressor(random_state=0)))
+    return make_pipeline(
+        DropKeys(), MultiOutputRegressor(HistGradientBoostingRegressor(random_state=0))
+    )
 
 
 def models(log: Log) -> dict[str, Callable[[], Any]]:

@@ -27,7 +27,6 @@ import numpy as np
 from _common import REST, Array, LinearPhysics, print_table
 from _logs import LOGS, RecordedLog
 from sklearn.base import clone
-from sklearn.compose import make_column_transformer
 from sklearn.ensemble import HistGradientBoostingRegressor
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
@@ -57,13 +56,10 @@ def learners(epochs: int) -> dict[str, Any]:
     network = LSTMRegressor(hidden_size=16, max_epochs=epochs, random_state=0)
     boosting = HistGradientBoostingRegressor(max_iter=60, max_leaf_nodes=15, random_state=0)
 
-    def no_keys() -> Any:
-        return make_column_transformer(("drop", ["trajectory", "time"]), remainder="passthrough")
-
     return {
         "own joints": None,
-        "boosting": make_pipeline(no_keys(), MultiOutputRegressor(boosting)),
-        "Gaussian process": make_pipeline(no_keys(), StandardScaler(), process),
+        "boosting": MultiOutputRegressor(boosting),
+        "Gaussian process": make_pipeline(StandardScaler(), process),
         "ELM": ELMCommittee(p=0.9, random_state=0),
         "LSTM": network,
         "BLL": BLLRegressor(network, n_estimators=4, random_state=0),

@@ -22,6 +22,7 @@ from sklearn.preprocessing import FunctionTransformer
 from skidyn.datasets import make_hidden_effect_log
 from skidyn.effects import FrictionTransformer
 from skidyn.model_selection import TrajectoryKFold
+from skidyn.preprocessing import DropKeys
 from skidyn.robots import Robot
 
 URDF = """
@@ -35,19 +36,19 @@ log = make_hidden_effect_log(Robot.from_urdf(URDF), None, n_trajectories=6, dura
 X, y = log.X, log.y.ravel()
 
 # %%
-# The pipeline: sine and cosine of the position for gravity, friction columns, a linear model.
+# The pipeline: sine and cosine of the position for gravity, friction columns, a linear model. The
+# number of the trajectory and the time are no features; ``DropKeys`` takes them out.
+features = DropKeys().set_output(transform="pandas")
+friction = FrictionTransformer().set_output(transform="pandas")
+trees = HistGradientBoostingRegressor(max_iter=100, random_state=0)
 gravity = make_column_transformer(
     (FunctionTransformer(lambda q: np.c_[np.sin(q), np.cos(q)]), ["q1"]), remainder="passthrough"
 )
 models = {
-    "linear": make_pipeline(gravity, LinearRegression()),
-    "linear + friction": make_pipeline(
-        FrictionTransformer().set_output(transform="pandas"), gravity, LinearRegression()
-    ),
-    "trees": HistGradientBoostingRegressor(max_iter=100, random_state=0),
-    "trees + friction": make_pipeline(
-        FrictionTransformer(), HistGradientBoostingRegressor(max_iter=100, random_state=0)
-    ),
+    "linear": make_pipeline(features, gravity, LinearRegression()),
+    "linear + friction": make_pipeline(friction, features, gravity, LinearRegression()),
+    "trees": make_pipeline(features, trees),
+    "trees + friction": make_pipeline(friction, features, trees),
 }
 errors = {}
 for name, model in models.items():

@@ -149,7 +149,7 @@ def parameters(model: RBDRegressor) -> dict[str, Any]:
         "effects": [
             {
                 "kind": term.kind,
-                "joints": [j + 1 for j in term.joints],
+                "joints": list(term.joints),
                 "shape": dict(term.shape),
                 "coefficients": model.effect_coefficients_[term].tolist(),
             }

@@ -63,12 +63,12 @@ class Candidate:
     @property
     def joints(self) -> tuple[int, ...]:
         """Joints of the term, from 0."""
-        return self.term.joints
+        return self.term.places
 
     @cached_property
     def site(self) -> tuple[str, tuple[int, ...]]:
         """Kind and joints: what can be added once."""
-        return self.kind, self.term.joints
+        return self.kind, self.term.places
 
 
 def catalogue_candidates(problem: Problem, kinds: Iterable[str]) -> list[Candidate]:
@@ -85,13 +85,13 @@ def catalogue_candidates(problem: Problem, kinds: Iterable[str]) -> list[Candida
     -------
     list of Candidate
     """
-    present = {(term.kind, term.joints) for term in problem.terms}
+    present = {(term.kind, term.places) for term in problem.terms}
     candidates = []
     for kind in track(list(kinds), "Preparing effects"):
         effect = get_effect(kind)
         if effect.search == "trajectories" and not problem.rigid_body and problem.robot is not None:
             # With the URDF's own bodies even a load carried all the time shows.
-            term = Term(kind, tuple(range(problem.n_joints)))
+            term = Term.at(kind, tuple(range(problem.n_joints)))
             candidates.append(Candidate(kind, term, problem.term_rows(term)))
             continue
         if effect.search != "grid" or ("robot" in effect.needs and problem.robot is None):
@@ -104,7 +104,7 @@ def catalogue_candidates(problem: Problem, kinds: Iterable[str]) -> list[Candida
             if (kind, joints) in present or all(hidden) or (len(joints) < 3 and any(hidden)):
                 continue
             for shape in effect.grid(problem.signals, joints):
-                term = Term(kind, joints, shape)
+                term = Term.at(kind, joints, shape)
                 rows = problem.term_rows(term)
                 candidates.append(Candidate(kind, term, rows, n_shapes=len(effect.shapes)))
     return candidates

@@ -307,7 +307,7 @@ def _held_out(
             continue
         for t in (c.term for c in hypothesis.candidates if c.term in waves):
             own = np.zeros_like(torque)
-            own[:, t.joints[0]] = hypothesis.torque[:, t.joints[0]]
+            own[:, t.places[0]] = hypothesis.torque[:, t.places[0]]
             held.torque[t] = own
     return held
 

@@ -13,7 +13,7 @@ from sklearn.utils.validation import _check_sample_weight
 from threadpoolctl import threadpool_limits
 
 from skidyn._columns import ColumnSpec
-from skidyn._exceptions import ColumnError, LogError, LogWarning
+from skidyn._exceptions import ColumnError, EffectError, LogError, LogWarning
 from skidyn._order import refuse_shuffled
 from skidyn._signals import Array, Signals, read_signals
 from skidyn.diagnosis._conclusion import conclude
@@ -104,6 +104,10 @@ def diagnose(
     LogError
         X or the torque hold values that are not finite, or too few samples; or the log is not what
         it claims, and ``force`` is False.
+    EffectError
+        The catalogue has no such effect.
+    ValueError
+        ``settings`` or ``smooth`` has no meaning.
 
     Examples
     --------
@@ -150,6 +154,12 @@ def _diagnose(
     force: bool,
     sample_weight: Any,
 ) -> Diagnosis:
+    if isinstance(effects, str):
+        raise EffectError(f"effects={effects!r} is one word; write a list, effects=[{effects!r}]")
+    if not isinstance(settings, Settings):
+        raise ValueError(f"settings={settings!r}; expected Settings(...) or None")
+    if not isinstance(smooth, bool | np.bool_):
+        raise ValueError(f"smooth={smooth!r}; expected True or False")
     robot = robot if robot is not None else getattr(model, "robot", None)
     if robot is None:
         raise ColumnError("this regressor has no robot; pass robot=Robot.from_urdf(...)")

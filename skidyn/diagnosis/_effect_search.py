@@ -146,6 +146,8 @@ class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         EffectSearchCV
             The search itself.
         """
+        if not isinstance(self.refit, bool | np.bool_):
+            raise ValueError(f"refit={self.refit!r}; expected True or False")
         array, torque = validate_data(
             self, X, y, multi_output=True, y_numeric=True, dtype=np.float64
         )

@@ -68,9 +68,9 @@ def recording_candidates(problem: Problem, kinds: Iterable[str]) -> list[Candida
                 continue
             if not all(_mostly_both_ways(problem, j) for j in joints):
                 continue
-            whole = problem.term_rows(Term(kind, joints))
+            whole = problem.term_rows(Term.at(kind, joints))
             for group in groups_of_recordings(problem):
-                term = Term(kind, joints, {"trajectories": group})
+                term = Term.at(kind, joints, {"trajectories": group})
                 rows = {
                     j: np.where(np.isin(problem.rows.trajectory[j], group)[:, None], block, 0.0)
                     for j, block in whole.items()

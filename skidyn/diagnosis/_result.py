@@ -235,7 +235,7 @@ class Diagnosis:
         """
         if kind == "formula":
             return self._refitted(self._formulas(joints))
-        wanted = None if joints is None else {int(j) - 1 for j in joints}
+        wanted = None if joints is None else set(map(int, joints))
         for finding in self.findings:
             if finding.kind != kind:
                 continue

@@ -785,7 +785,7 @@ def _nameless_candidates(problem: Problem, residual: Array) -> list[Candidate]:
                 )
                 shapes = [] if line is None else [{"frequency": line.frequency}]
             for shape in shapes:
-                term = Term(kind, joints, shape)
+                term = Term.at(kind, joints, shape)
                 names = effect.variables(joint, shape)
                 candidates.append(Candidate(UNKNOWN, term, problem.screening_rows(term), names))
     return candidates

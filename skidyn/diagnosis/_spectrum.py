@@ -78,7 +78,7 @@ def find_lines(problem: Problem, residual: Array) -> list[Line]:
                 continue
             # Power over its level is exponentially distributed; any wave of a joint may be highest.
             chance = min(1.0, 2 * HIGHEST * float(np.exp(-height)))
-            term = Term("torque_ripple", (joint,), {"N": waves})
+            term = Term.at("torque_ripple", (joint,), {"N": waves})
             line = _test_line(problem, term, chance, 2 * HIGHEST, use, r, fold)
             weak = _explained_share(r[use], line.torque[use]) <= 0.2
             lines.append(_capped(line, height) if weak else line)
@@ -107,7 +107,7 @@ def find_vibrations(problem: Problem, residual: Array) -> list[Line]:
         use, r = problem.rows.sliding[:, joint], residual[:, joint]
         found = clock_line(signals, r, use, problem.motion.rate, (SLOWEST, np.inf))
         if found is not None:
-            term = Term("vibration", (joint,), {"frequency": found.frequency})
+            term = Term.at("vibration", (joint,), {"frequency": found.frequency})
             line = _test_line(problem, term, found.chance, 1.0, use, r, fold)
             lines.append(_capped(line, found.height))
     return lines
@@ -177,7 +177,7 @@ def _test_line(
     r: Array,
     fold: NDArray[np.int64],
 ) -> Line:
-    (joint,) = term.joints
+    (joint,) = term.places
     block = term.torque_columns(problem.signals)[joint]
     grams, cross = [], []
     for f in np.unique(fold[use]):

@@ -76,7 +76,7 @@ def split_effects(
         effect = get_effect(kind)
         if effect.search != "trajectories":
             continue
-        term = Term(kind, tuple(range(problem.n_joints)))
+        term = Term.at(kind, tuple(range(problem.n_joints)))
         rows = {j: b / sigma[j] for j, b in problem.term_rows(term).items()}
         own = _own_estimates(problem, design, y, rows, names, effect.leading or term.width)
         best: tuple[Array, list[Any]] | None = None

@@ -117,14 +117,14 @@ def describe_unknowns(
         span = place[term]
         effect = term.effect
         assert isinstance(effect, NamelessEffect)
-        guessed = effect.variables(term.joints[0], dict(term.shape))
-        if len(term.joints) > 1:  # on the whole robot, as a force at the tool
-            for joint in term.joints:
+        guessed = effect.variables(term.places[0], dict(term.shape))
+        if len(term.places) > 1:  # on the whole robot, as a force at the tool
+            for joint in term.places:
                 own = (f"q{joint + 1}",)
                 shape = _shape(problem, term, joint, whole[span], left[:, span], own)
                 found.append(UnknownTorque(joint + 1, guessed, (), shape, None))
             continue
-        (joint,) = term.joints
+        (joint,) = term.places
         known = np.ones(len(whole), dtype=bool)
         known[span] = False
         without = _Remainder([d[:, known] for d in design], sigma, joint)

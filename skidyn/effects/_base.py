@@ -212,7 +212,7 @@ class Effect:
         signals : Signals
             Motion.
         joint : int
-            Joint, counted from 0.
+            Place of the joint in arrays.
         **shape : float
             Values of the shape parameters.
 
@@ -233,14 +233,14 @@ class Effect:
         signals : Signals
             Motion.
         joints : sequence of int
-            Joints of the term.
+            Places of the term's joints in arrays.
         **shape : float
             Values of the shape parameters.
 
         Returns
         -------
         dict of int to ndarray of shape (n_samples, n_coefficients)
-            By joint, from 0.
+            By the joint's place in arrays.
         """
         (joint,) = joints
         return {joint: self.columns(signals, joint, **shape)}
@@ -253,7 +253,7 @@ class Effect:
         signals : Signals
             Motion.
         joint : int
-            Joint, counted from 0.
+            Place of the joint in arrays.
 
         Returns
         -------
@@ -279,7 +279,7 @@ class Effect:
         Returns
         -------
         list of tuple of int
-            Joints from 0.
+            Places of the joints in arrays.
         """
         n = signals.n_joints
         if self.scope == "robot":
@@ -296,7 +296,7 @@ class Effect:
         signals : Signals
             Motion.
         joints : sequence of int
-            Joints of the term.
+            Places of the term's joints in arrays.
 
         Returns
         -------
@@ -318,7 +318,7 @@ class Effect:
         signals : Signals
             Motion.
         joints : sequence of int
-            Joints of the term.
+            Places of the term's joints in arrays.
         shape : mapping
             Shape parameters.
 
@@ -337,7 +337,7 @@ class Effect:
         signals : Signals
             Motion.
         joints : sequence of int
-            Joints of the term.
+            Places of the term's joints in arrays.
         shape : mapping
             Shape parameters.
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from operator import index
 from typing import Any
 
 from skidyn._exceptions import EffectError
@@ -80,7 +81,7 @@ def make_terms(specs: Iterable[TermSpec], n_joints: int) -> list[Term]:
     ----------
     specs : iterable of str, (str, joints) or Term
         ``"viscous"`` is viscous friction on every joint; ``("dahl", [1, 4])`` Dahl friction on
-        joints 1 and 4, counted from 1; a :class:`Term` stands for itself (joints from 0).
+        joints 1 and 4, counted from 1; a :class:`Term` stands for itself.
     n_joints : int
         Number of joints of the robot.
 
@@ -101,27 +102,43 @@ def make_terms(specs: Iterable[TermSpec], n_joints: int) -> list[Term]:
     """
     if isinstance(specs, str):
         raise EffectError(f"effects={specs!r} is one word; write a list, effects=[{specs!r}]")
+    if not isinstance(specs, Iterable):
+        raise EffectError(f"effects={specs!r}; expected a list, such as ['viscous', 'coulomb']")
     terms: list[Term] = []
     for spec in specs:
         if isinstance(spec, Term):
             get_effect(spec.kind)  # refuses an unknown kind
-            _check_joints(spec.kind, spec.joints, n_joints)
+            _check_joints(spec.kind, spec.places, n_joints)
             terms.append(spec)
             continue
-        kind, joints = (spec, None) if isinstance(spec, str) else spec
+        kind, joints = (spec, None) if isinstance(spec, str) else _kind_and_joints(spec)
         terms += _expand(kind, joints, n_joints)
     return terms
 
 
+def _kind_and_joints(spec: Any) -> tuple[str, list[int]]:
+    """Kind and joints of a pair that a user wrote."""
+    try:
+        kind, joints = spec
+        if isinstance(kind, str) and not isinstance(joints, str):
+            return kind, [index(joint) for joint in joints]
+    except (TypeError, ValueError):  # no pair, or no list of whole numbers
+        pass
+    raise EffectError(
+        f"{spec!r} is no effect; write 'viscous', or ('dahl', [1, 4]) with joints counted from 1, "
+        "or a Term"
+    )
+
+
 def _expand(kind: str, joints: Sequence[int] | None, n_joints: int) -> list[Term]:
     scope = get_effect(kind).scope
-    chosen = tuple(range(n_joints)) if joints is None else tuple(int(j) - 1 for j in joints)
+    chosen = tuple(range(n_joints)) if joints is None else tuple(j - 1 for j in joints)
     _check_joints(kind, chosen, n_joints)
     if scope == "joint":
-        return [Term(kind, (j,)) for j in chosen]
+        return [Term.at(kind, (j,)) for j in chosen]
     if scope == "pair" and len(chosen) != 2:
         raise EffectError(f"{kind} couples two joints; write ({kind!r}, [5, 6])")
-    return [Term(kind, chosen)]
+    return [Term.at(kind, chosen)]
 
 
 def _check_joints(kind: str, joints: Sequence[int], n_joints: int) -> None:

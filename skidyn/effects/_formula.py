@@ -70,7 +70,7 @@ def formula(expression: str, joint: int) -> Term:
     formula(joint 3, expression=sin(q1 - q3))
     """
     _parse(expression)
-    return Term("formula", (joint - 1,), {"expression": expression})
+    return Term("formula", (joint,), {"expression": expression})
 
 
 class Formula(Effect):

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from skidyn._exceptions import EffectError
 from skidyn._signals import Array, Signals
 from skidyn.effects._base import Coefficient, Effect
 from skidyn.effects._registry import get_effect
@@ -23,7 +24,7 @@ _JOINTS = 32
 class Term:
     """An effect on certain joints with certain shape parameters: one block of regressor columns.
 
-    Terms add up: ``Term("viscous", (0,)) + Term("coulomb", (0,))`` is a :class:`TermSum`, a part of
+    Terms add up: ``Term("viscous", (1,)) + Term("coulomb", (1,))`` is a :class:`TermSum`, a part of
     a model.
 
     Parameters
@@ -31,13 +32,13 @@ class Term:
     kind : str
         Kind of the effect, a name of the catalogue.
     joints : tuple of int
-        Joints, counted from 0; all joints for an effect of the whole robot.
+        Joints, counted from 1; all joints for an effect of the whole robot.
     shape : mapping of str to object
         Values of the shape parameters; empty where the effect has none.
 
     Examples
     --------
-    >>> term = Term("dahl", (0,), {"presliding": 0.02})
+    >>> term = Term("dahl", (1,), {"presliding": 0.02})
     >>> print(term)
     dahl(joint 1, presliding=0.02)
     >>> term.names, term.effect.title
@@ -47,6 +48,34 @@ class Term:
     kind: str
     joints: tuple[int, ...]
     shape: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if any(joint < 1 for joint in self.joints):
+            raise EffectError(f"{self.kind}: joints={self.joints}; joints are counted from 1")
+
+    @classmethod
+    def at(cls, kind: str, places: Iterable[int], shape: Mapping[str, Any] | None = None) -> Term:
+        """Term of the joints at these places in arrays, which Python counts from 0.
+
+        Parameters
+        ----------
+        kind : str
+            Kind of the effect.
+        places : iterable of int
+            Columns of the joints in arrays of all joints.
+        shape : mapping of str to object, optional
+            Values of the shape parameters.
+
+        Returns
+        -------
+        Term
+        """
+        return cls(kind, tuple(place + 1 for place in places), {} if shape is None else shape)
+
+    @property
+    def places(self) -> tuple[int, ...]:
+        """Columns of the joints in arrays of all joints, which Python counts from 0."""
+        return tuple(joint - 1 for joint in self.joints)
 
     def __hash__(self) -> int:
         return hash((self.kind, self.joints, tuple(sorted(map(str, self.shape.items())))))
@@ -59,7 +88,7 @@ class Term:
         return TermSum((self,)) + other
 
     def _numbers(self, between: str) -> str:
-        return between.join(str(j + 1) for j in self.joints)
+        return between.join(map(str, self.joints))
 
     @property
     def trajectories(self) -> tuple[int, ...] | None:
@@ -160,9 +189,9 @@ class Term:
         Returns
         -------
         dict of int to ndarray of shape (n_samples, width)
-            By joint, from 0.
+            By the joint's place in arrays.
         """
-        columns = self.effect.torque_columns(signals, self.joints, **self._own_shape)
+        columns = self.effect.torque_columns(signals, self.places, **self._own_shape)
         if self.trajectories is None:
             return columns
         here = np.isin(signals.trajectory, self.trajectories)[:, None]
@@ -197,7 +226,7 @@ class TermSum(tuple[Term, ...]):
     Examples
     --------
     >>> from skidyn.effects import Term
-    >>> friction = Term("viscous", (0,)) + Term("coulomb", (0,))
+    >>> friction = Term("viscous", (1,)) + Term("coulomb", (1,))
     >>> friction.names
     ('viscous.Fv[1]', 'coulomb.Fc[1]')
     >>> [(term.kind, own) for term, own in friction.slices()]
@@ -249,7 +278,7 @@ def _short(value: Any) -> str:
 def _trial(term: Term, dq: Array, trajectory: NDArray[np.int64]) -> Signals:
     """Motion on which a term is tried without robot and clock: all other signals are drawn."""
     rng = np.random.default_rng(0)
-    shape = (len(dq), max(_JOINTS, 1 + max(term.joints)))
+    shape = (len(dq), max(_JOINTS, *term.joints))
     q, ddq, load, torque, temperature = rng.normal(size=(5, *shape))
     return Signals(
         q=q,

@@ -117,7 +117,7 @@ class FrictionTransformer(TransformerMixin, BaseEstimator):
         signals = signals_from(X, self.columns_, to_derive=self.columns_.ddq is None)
         if not all(term.is_pointwise for term in self.terms_):
             refuse_shuffled("An effect with a memory", signals.trajectory, signals.time)
-        blocks = [t.torque_columns(signals)[t.joints[0]] for t in self.terms_]
+        blocks = [t.torque_columns(signals)[t.places[0]] for t in self.terms_]
         return np.hstack([X, *blocks])
 
     def get_feature_names_out(self, input_features: Any = None) -> NDArray[Any]:
@@ -136,7 +136,7 @@ class FrictionTransformer(TransformerMixin, BaseEstimator):
         check_is_fitted(self)
         names = list(_check_feature_names_in(self, input_features))
         for i, term in enumerate(self.terms_):
-            own = [f"{term.kind}_{c.name}_{term.joints[0] + 1}" for c in term.coefficients]
+            own = [f"{term.kind}_{c.name}_{term.joints[0]}" for c in term.coefficients]
             # The same kind twice on a joint differs in its shape parameters alone.
             names += [f"{name}_{i}" if name in names else name for name in own]
         return np.asarray(names, dtype=object)

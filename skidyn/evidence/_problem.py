@@ -304,7 +304,7 @@ class Problem:
 
 def hysteresis_joints(terms: Iterable[Term]) -> list[int]:
     """Joints, from 0, whose friction at reversals some of the terms describe."""
-    joints = {j for t in terms if t.effect.family == "hysteresis" for j in t.joints}
+    joints = {j for t in terms if t.effect.family == "hysteresis" for j in t.places}
     return sorted(joints)
 
 

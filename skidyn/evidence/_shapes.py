@@ -65,9 +65,9 @@ class Gain:
 def best_on_grid(problem: Problem, kind: str, joints: tuple[int, ...], gain: Gain) -> Term:
     """The term of a kind whose grid shape explains most."""
     grid = get_effect(kind).grid(problem.signals, joints)
-    terms = [Term(kind, joints, shape) for shape in grid]
+    terms = [Term.at(kind, joints, shape) for shape in grid]
     gains = [gain(problem.term_rows(t), t.signs) for t in terms]
-    return terms[int(np.argmax(gains))] if terms else Term(kind, joints)
+    return terms[int(np.argmax(gains))] if terms else Term.at(kind, joints)
 
 
 def refine_term(problem: Problem, term: Term, gain: Gain) -> Term:
@@ -104,7 +104,7 @@ def refine_term(problem: Problem, term: Term, gain: Gain) -> Term:
                 if not low <= there <= high:
                     continue
                 trial = {**values, shape.name: float(there)}
-                if not effect.admissible(problem.signals, term.joints, trial):
+                if not effect.admissible(problem.signals, term.places, trial):
                     continue
                 rows = problem.term_rows(term.with_shape(**trial))
                 value = gain(rows, signs)
@@ -117,8 +117,8 @@ def refine_term(problem: Problem, term: Term, gain: Gain) -> Term:
 
 def _range(problem: Problem, term: Term, shape: Shape) -> tuple[float, float, float]:
     """Lowest and highest value of a shape parameter and the first step."""
-    unit = float(problem.signals.unit[term.joints[0]]) if shape.scales else 1.0
+    unit = float(problem.signals.unit[term.places[0]]) if shape.scales else 1.0
     step = FIRST_STEP
     if shape.spacing == "linear":
-        step = FIRST_SHARE * term.effect.travel(problem.signals, term.joints, term.shape)
+        step = FIRST_SHARE * term.effect.travel(problem.signals, term.places, term.shape)
     return shape.low * unit, shape.high * unit, step

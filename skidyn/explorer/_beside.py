@@ -79,7 +79,7 @@ def fit_ripple(problem: Problem, term: Term, residual: Array, fold: NDArray[np.i
     -------
     Ripple
     """
-    (joint,) = term.joints
+    (joint,) = term.places
     columns = term.torque_columns(problem.signals)[joint]
     use = problem.rows.sliding[:, joint]
     a, y, of = columns[use], residual[use, joint], fold[use]

@@ -177,7 +177,7 @@ class Session:
         slides = self.problem.signals.prismatic
         return [
             ", ".join(
-                measure(name, value, term.effect.units(bool(slides[term.joints[0]])).get(name, ""))
+                measure(name, value, term.effect.units(bool(slides[term.places[0]])).get(name, ""))
                 for term in terms
                 for name, value in list(intervals[term].items())[:TOLD]
             )
@@ -581,7 +581,7 @@ class Session:
             raise EffectError(f"no trajectory {trajectory}; there are {self.trajectories}")
 
     def _has(self, candidate: Candidate) -> bool:
-        return any((t.kind, t.joints) == candidate.site for t in self.terms)
+        return any((t.kind, t.places) == candidate.site for t in self.terms)
 
     def _of_samples(self, joint: int, found: HeldOutRows) -> float:
         """What the whole residual of averaged rows makes up of the squared error of samples."""
@@ -614,14 +614,14 @@ class Session:
         fitted: dict[Term, Ripple] = {}
         for term in filter(_is_fine, terms):
             fitted[term] = fit_ripple(self.problem, term, residual, self._samples.fold)
-            residual[:, term.joints[0]] -= fitted[term].torque
+            residual[:, term.places[0]] -= fitted[term].torque
         sliding = self.problem.rows.sliding
         squares = np.sum(residual**2 * sliding, axis=0)
         rmse = np.sqrt(squares / np.maximum(sliding.sum(axis=0), 1))
         entry = {
             "added": new[0].kind if new else None,
             "joint": joint,
-            "joints": [j + 1 for j in new[0].joints] if new else [],
+            "joints": list(new[0].joints) if new else [],
             "rmse": [float(x) for x in rmse],
         }
         return _Step(new, model, self._ranking.noise(model), residual, entry, ripples=fitted)

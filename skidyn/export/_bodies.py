@@ -94,7 +94,7 @@ def described(model: RBDRegressor | Robot, kinds: tuple[str, ...]) -> Descriptio
         if is_carried(term):
             parameters[-1] += values
         elif term.kind in kinds and values[0] >= 0.0:  # no format has negative friction or springs
-            joints[term.kind][term.joints[0]] += values
+            joints[term.kind][term.places[0]] += values
         else:
             left.append(term)
     return Description(robot, parameters, joints, left)

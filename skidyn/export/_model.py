@@ -163,7 +163,7 @@ def describe_term(model: RBDRegressor, term: Term) -> dict[str, Any]:
     """An effect as plain data, complete: coefficients by name, with units."""
     effect = term.effect
     robot = model.robot_
-    prismatic = bool(_sliding(robot)[list(term.joints)].all())
+    prismatic = bool(_sliding(robot)[list(term.places)].all())
     turns = {c.name: c.unit for c in effect.coefficients}
     units = {
         name: unit.replace("N m", "N").replace("rad", "m") if prismatic else unit
@@ -172,7 +172,7 @@ def describe_term(model: RBDRegressor, term: Term) -> dict[str, Any]:
     values = model.effect_coefficients_[term]
     return {
         "kind": term.kind,
-        "joints": [robot.joint_names[j] for j in term.joints],
+        "joints": [robot.joint_names[j] for j in term.places],
         "coefficients": dict(zip(turns, map(float, values), strict=True)),
         "units": units,
         "shape": dict(term.shape),
@@ -181,6 +181,6 @@ def describe_term(model: RBDRegressor, term: Term) -> dict[str, Any]:
 
 def name_term(robot: Robot, term: Term) -> str:
     """An effect in words, such as ``"dahl of joint2"``."""
-    joints = [robot.joint_names[j] for j in term.joints]
+    joints = [robot.joint_names[j] for j in term.places]
     where = "all joints" if len(joints) == robot.n_joints > 1 else ", ".join(joints)
     return f"{term.kind} of {where}"

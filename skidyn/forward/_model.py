@@ -193,7 +193,7 @@ class ForwardModel:
             if isinstance(effect, PathMemory):
                 laws = effect.laws(**term.shape)
                 first = len(memories)
-                memories += [Memory(term.joints[0], law) for law in laws]
+                memories += [Memory(term.places[0], law) for law in laws]
                 states[term] = [
                     filled([tape.input("state", first + k)], (1,)) for k in range(len(laws))
                 ]
@@ -309,7 +309,7 @@ class ForwardModel:
         for term in self.inside:
             effect = term.effect
             if isinstance(effect, PathMemory):
-                columns += effect.path_states(signals, term.joints[0], **term.shape)
+                columns += effect.path_states(signals, term.places[0], **term.shape)
         return np.column_stack(columns) if columns else np.zeros((signals.n_samples, 0))
 
     # ------------------------------------------------------------------ many models at once
@@ -362,10 +362,10 @@ def _model_torque(model: Any, moment: _Moment) -> Any:
     # Hysteresis is friction: it comes before what a sensor makes of the torque, so the model's
     # own order is kept by adding it to the columns of the terms that are left.
     torque = plain._torque(moment)
-    gain = {t.joints[0]: plain.effect_coefficients_[t][0] for t in kept if t.kind == "torque_gain"}
+    gain = {t.places[0]: plain.effect_coefficients_[t][0] for t in kept if t.kind == "torque_gain"}
     for term, states in moment.states.items():
         effect = term.effect
-        (j,) = term.joints
+        (j,) = term.places
         assert isinstance(effect, PathMemory)
         block = effect.columns_at(moment, j, states, **term.shape)
         own = block @ model.effect_coefficients_[term]
@@ -374,7 +374,7 @@ def _model_torque(model: Any, moment: _Moment) -> Any:
 
 
 def _elastic(forward: ForwardModel, term: Term) -> None:
-    (joint,) = term.joints
+    (joint,) = term.places
     compliance = float(forward.model.effect_coefficients_[term][0])
     if compliance <= 0:
         raise SkidynError(
@@ -387,7 +387,7 @@ def _elastic(forward: ForwardModel, term: Term) -> None:
 
 
 def _loose(forward: ForwardModel, term: Term) -> None:
-    (joint,) = term.joints
+    (joint,) = term.places
     gap = float(forward.model.effect_coefficients_[term][0]) * term.shape["gap"]
     if gap <= 0:
         raise SkidynError(
@@ -405,7 +405,7 @@ def _loose(forward: ForwardModel, term: Term) -> None:
 
 def _late(forward: ForwardModel, term: Term) -> None:
     delay = float(forward.model.effect_coefficients_[term][0])
-    forward.delay[list(term.joints)] += delay
+    forward.delay[list(term.places)] += delay
 
 
 #: Effects that act on the motion itself or on the clock, not on the torque of an instant.

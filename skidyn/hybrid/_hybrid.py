@@ -34,6 +34,7 @@ from skidyn.hybrid._gate import learned_weights
 from skidyn.hybrid._own_joint import OwnJointRegressor
 from skidyn.hybrid._range import TrainingRange, distances, fade
 from skidyn.model_selection import held_out_folds
+from skidyn.preprocessing import without_keys_inside
 
 Array = NDArray[np.float64]
 
@@ -197,10 +198,10 @@ class HybridRegressor(CallbackSupportMixin, MetaEstimatorMixin, RegressorMixin, 
     ) -> None:
         keys = self._keys()
         learner = self._own_joints() if self.learner is None else self.learner
-        seen_by_physics = keys.for_learner(table, self.physics)
-        residuals = _honest_residuals(
-            self.physics, seen_by_physics, torque, weight, folds, progress
-        )
+        learner = without_keys_inside(learner, keys)
+        physics = without_keys_inside(self.physics, keys)
+        seen_by_physics = keys.for_learner(table, physics)
+        residuals = _honest_residuals(physics, seen_by_physics, torque, weight, folds, progress)
         table = keys.for_learner(table, learner)
         residual, learned = np.zeros(torque.shape), np.zeros(torque.shape)
         for (train, test), seen in zip(folds, residuals, strict=True):
@@ -228,7 +229,7 @@ class HybridRegressor(CallbackSupportMixin, MetaEstimatorMixin, RegressorMixin, 
             self.p_value_[:] = 1.0
             if self.alpha < 1:
                 warnings.warn(NOT_TESTED, UserWarning, stacklevel=4)
-        self.physics_ = _fit(clone(self.physics), seen_by_physics, torque, weight, progress)
+        self.physics_ = _fit(clone(physics), seen_by_physics, torque, weight, progress)
         self.learner_ = None
         if self.learned_weight_.any():
             self.learner_ = _fit(clone(learner), table, residual, weight, progress)

@@ -115,6 +115,6 @@ def find_estimator(name: str) -> Estimator:
     ValueError
         There is none.
     """
-    if name not in ESTIMATORS:
+    if not isinstance(name, str) or name not in ESTIMATORS:
         raise ValueError(f"estimator={name!r}; expected one of {', '.join(map(repr, ESTIMATORS))}")
     return ESTIMATORS[name]

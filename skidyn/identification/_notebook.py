@@ -41,7 +41,7 @@ def model_table(
         slides = robot.joint_types[j] == "prismatic"
         told = []
         for term in terms:
-            if j not in term.joints:
+            if j not in term.places:
                 continue
             units = term.effect.units(slides)
             for coefficient, column in zip(term.coefficients, term.names, strict=True):

@@ -630,10 +630,11 @@ class RBDRegressor(Results, RegressorMixin, BaseEstimator):
             )
         if not (self.smooth is None or isinstance(self.smooth, bool | np.bool_)):
             raise ValueError(f"smooth={self.smooth!r}; expected True, False or None")
-        for name in ("forgetting", "prior_std"):
+        for name, none in (("forgetting", False), ("prior_std", True), ("horizon", True)):
             value = getattr(self, name)
-            if not (isinstance(value, Real) or (value is None and name == "prior_std")):
-                raise ValueError(f"{name}={value!r}; expected a number")
+            number = isinstance(value, Real) and not isinstance(value, bool | np.bool_)
+            if not (number or (none and value is None)):
+                raise ValueError(f"{name}={value!r}; expected a number{' or None' if none else ''}")
         if not 0 < self.forgetting <= 1:
             raise ValueError(f"forgetting={self.forgetting!r}; expected a weight above 0, up to 1")
         if self.prior_std is not None and not self.prior_std > 0:

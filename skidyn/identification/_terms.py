@@ -36,7 +36,7 @@ def _shaped(problem: Problem, terms: Sequence[Term], fit: Fit) -> list[Term]:
             continue
         others = [problem.term_rows(shaped[k]) for k in open_ if k != i]
         gain = Gain(problem, others, fit.noise, problem.target)
-        start = best_on_grid(problem, term.kind, term.joints, gain)
+        start = best_on_grid(problem, term.kind, term.places, gain)
         shaped[i] = refine_term(problem, start, gain)
         open_.append(i)
     return shaped

@@ -36,6 +36,7 @@ from skidyn.model_selection import held_out_folds, order_of_log
 from skidyn.neural_network._base import SequenceRegressor, deferred_training, train_together
 from skidyn.neural_network._lstm import LSTMRegressor
 from skidyn.neural_network._skorch_member import SkorchMember
+from skidyn.preprocessing import without_keys_inside
 
 Array = NDArray[np.float64]
 
@@ -312,6 +313,7 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         position = {"trajectory": keys.trajectory, "time": keys.time}
         wanted = {name: name.rpartition("__")[2] for name in names}
         member.set_params(**{n: position[key] for n, key in wanted.items() if key in position})
+        member = without_keys_inside(member, keys)
         if self.resample == "trajectory":
             if "resample" not in names:
                 raise ValueError(

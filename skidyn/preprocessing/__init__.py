@@ -4,6 +4,7 @@
 from skidyn.preprocessing._current import CurrentToTorque
 from skidyn.preprocessing._delay import DelayEstimate, advance_channels, estimate_delay
 from skidyn.preprocessing._derivatives import SmoothDerivatives
+from skidyn.preprocessing._drop_keys import DropKeys
 from skidyn.preprocessing._logs import average_repetitions, cross_fitted_residual
 from skidyn.preprocessing._signals import ButterworthFilter, SignalScaler, TimeDerivative
 
@@ -11,6 +12,7 @@ __all__ = [
     "ButterworthFilter",
     "CurrentToTorque",
     "DelayEstimate",
+    "DropKeys",
     "SignalScaler",
     "SmoothDerivatives",
     "TimeDerivative",
@@ -22,3 +24,4 @@ __all__ = [
 
 # For other packages of skidyn; no part of the public interface.
 from skidyn.preprocessing._affine import scaling_of as scaling_of
+from skidyn.preprocessing._drop_keys import without_keys_inside as without_keys_inside

@@ -35,6 +35,10 @@ def read_description(source: str | bytes | os.PathLike[str]) -> bytes:
         data = source
     elif isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<"):
         data = source.lstrip("\ufeff").encode("utf-8", errors="surrogatepass")
+    elif not isinstance(source, str | os.PathLike):
+        raise RobotDescriptionError(
+            f"{source!r} describes no robot; give the path of a URDF, its text, or a Robot"
+        )
     else:
         path = Path(source)
         if path.stat().st_size > MAX_BYTES:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import numpy as np
+import pytest
 from sklearn.base import clone
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
@@ -60,8 +61,23 @@ def test_finds_adds_and_predicts_better():
     )
     start = RBDRegressor(log.robot)
     search = clone(EffectSearchCV(start, effects=("spring", "dahl"))).fit(log.X, log.y)
-    assert [(t.kind, t.joints) for t in search.best_effects_] == [("spring", (1,))]
+    assert [(t.kind, t.joints) for t in search.best_effects_] == [("spring", (2,))]
     assert search.cv_results_["added"].tolist() == [None, "spring"]
     assert np.all(np.diff(search.cv_results_["mean_rmse"]) < 0)
     assert search.score(log.X, log.y) > start.fit(log.X, log.y).score(log.X, log.y)
     assert not hasattr(search.estimator, "coef_")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"effects": "viscous"}, r"effects=\['viscous'\]"),
+        ({"smooth": "x"}, "expected True or False"),
+        ({"refit": "x"}, "expected True or False"),
+        ({"settings": "x"}, r"expected Settings\(\.\.\.\)"),
+    ],
+)
+def test_parameters_of_another_kind_are_refused(wrong, message):
+    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=2, duration=2.0)
+    with pytest.raises(ValueError, match=message):
+        EffectSearchCV(RBDRegressor(log.robot), **wrong).fit(log.X, log.y)

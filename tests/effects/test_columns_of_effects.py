@@ -122,7 +122,7 @@ def test_springs(signals):
     cubic = columns("nonlinear_spring", signals, q_middle=0.1) @ [1.0, 2.0, 3.0, 4.0]
     x = q - 0.1
     np.testing.assert_allclose(cubic, x + 2 * x**2 + 3 * x**3 + 4)
-    one = Term("offset", (0,), {"trajectories": (1,)}).torque_columns(signals)[0][:, 0]
+    one = Term("offset", (1,), {"trajectories": (1,)}).torque_columns(signals)[0][:, 0]
     np.testing.assert_array_equal(one, signals.trajectory == 1)
 
 
@@ -167,7 +167,7 @@ def test_payload_is_a_heavier_last_link(signals):
     heavier[-1] += body
     state = signals.q, signals.dq, signals.ddq
     change = ROBOT.inverse_dynamics(*state, parameters=heavier) - ROBOT.inverse_dynamics(*state)
-    blocks = Term("payload", (0, 1), {"trajectories": (1,)}).torque_columns(signals)
+    blocks = Term("payload", (1, 2), {"trajectories": (1,)}).torque_columns(signals)
     for j in range(2):
         np.testing.assert_allclose(blocks[j][300:] @ body, change[300:, j], atol=1e-10)
         assert not blocks[j][:300].any()
@@ -282,6 +282,6 @@ def test_diagnosis_finds_a_users_effect():
         effects = ["magnet", "spring", "dahl"]
         found = diagnose(RBDRegressor(log.robot), log.X, y, effects=effects).findings
         assert [f.kind for f in found] == ["magnet"]
-        assert found[0].terms[0].joints == (1,)
+        assert found[0].terms[0].joints == (2,)
     finally:
         unregister_effect("magnet")

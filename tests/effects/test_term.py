@@ -11,9 +11,11 @@ from skidyn.effects import (
     Term,
     TermSum,
     formula,
+    make_terms,
     register_effect,
     unregister_effect,
 )
+from skidyn.exceptions import EffectError
 from skidyn.identification import RBDRegressor
 
 
@@ -54,43 +56,51 @@ def own_effects():
     unregister_effect("warming")
 
 
+def test_joints_are_counted_from_1():
+    assert Term("dahl", (2,)).places == (1,)
+    assert Term.at("dahl", [1]) == Term("dahl", (2,))
+    assert make_terms([("dahl", [2])], 2) == [Term("dahl", (2,))]
+    with pytest.raises(EffectError, match="counted from 1"):
+        Term("dahl", (0,))
+
+
 def test_a_term_knows_its_columns():
-    term = Term("coupled_friction", (4, 5), {"ratio": 1.0})
+    term = Term("coupled_friction", (5, 6), {"ratio": 1.0})
     assert term.names == ("coupled_friction.Fc[5,6]", "coupled_friction.Fv[5,6]")
     assert term.width == 2
     assert term.signs.tolist() == [1.0, 1.0]
-    assert Term("time_delay", (0,)).limits.tolist() == [0.1]
+    assert Term("time_delay", (1,)).limits.tolist() == [0.1]
 
 
 def test_a_sum_of_terms_has_one_block_of_coefficients():
-    whole = Term("viscous", (0,)) + Term("asymmetric_friction", (0,)) + [Term("offset", (1,))]
+    whole = Term("viscous", (1,)) + Term("asymmetric_friction", (1,)) + [Term("offset", (2,))]
     assert isinstance(whole, TermSum)
     assert whole.width == 4
     assert whole.names[-1] == "offset.tau0[2]"
     assert whole.signs.tolist() == [1.0, 0.0, 0.0, 0.0]
     places = dict(whole.slices(10))
-    assert places[Term("asymmetric_friction", (0,))] == slice(11, 13)
+    assert places[Term("asymmetric_friction", (1,))] == slice(11, 13)
 
 
 def test_a_changed_shape_is_another_term():
-    term = Term("stribeck", (0,), {"vs": 0.1, "delta": 2.0})
-    assert term.with_shape(vs=0.2) == Term("stribeck", (0,), {"vs": 0.2, "delta": 2.0})
-    assert Term("stribeck", (0,)).is_open
+    term = Term("stribeck", (1,), {"vs": 0.1, "delta": 2.0})
+    assert term.with_shape(vs=0.2) == Term("stribeck", (1,), {"vs": 0.2, "delta": 2.0})
+    assert Term("stribeck", (1,)).is_open
     assert not term.is_open
-    assert not Term("viscous", (0,)).is_open
+    assert not Term("viscous", (1,)).is_open
 
 
 @pytest.mark.parametrize(
     ("term", "dry"),
     [
-        (Term("viscous", (0,)), False),
-        (Term("coulomb", (3,)), True),
-        (Term("offset", (0,)), False),
-        (Term("stribeck", (0,), {"vs": 0.1, "delta": 2.0}), True),
-        (Term("load_dependent_friction", (0,)), True),
-        (Term("coupled_friction", (4, 5), {"ratio": -1.0}), True),
-        (Term("dahl", (0,), {"presliding": 0.02}), False),
-        (Term("time_delay", (0,)), False),
+        (Term("viscous", (1,)), False),
+        (Term("coulomb", (4,)), True),
+        (Term("offset", (1,)), False),
+        (Term("stribeck", (1,), {"vs": 0.1, "delta": 2.0}), True),
+        (Term("load_dependent_friction", (1,)), True),
+        (Term("coupled_friction", (5, 6), {"ratio": -1.0}), True),
+        (Term("dahl", (1,), {"presliding": 0.02}), False),
+        (Term("time_delay", (1,)), False),
         (formula("sign(dq2) * cos(q1)", joint=2), True),
         (formula("dq2 * cos(q1)", joint=2), False),
     ],
@@ -102,11 +112,11 @@ def test_dry_friction_is_known_by_its_columns(term, dry):
 @pytest.mark.parametrize(
     ("term", "pointwise"),
     [
-        (Term("viscous", (0,)), True),
-        (Term("nonlinear_viscous", (0,), {"power": 2.0}), True),
-        (Term("dahl", (0,), {"presliding": 0.02}), False),
-        (Term("time_delay", (0,)), False),
-        (Term("payload", (0, 1)), False),
+        (Term("viscous", (1,)), True),
+        (Term("nonlinear_viscous", (1,), {"power": 2.0}), True),
+        (Term("dahl", (1,), {"presliding": 0.02}), False),
+        (Term("time_delay", (1,)), False),
+        (Term("payload", (1, 2)), False),
         (formula("t * dq1", joint=1), False),
     ],
 )
@@ -115,23 +125,23 @@ def test_a_memory_is_known_by_the_columns(term, pointwise):
 
 
 def test_a_users_own_effect_needs_no_list(own_effects):
-    assert Term("sticky_grease", (0,)).is_dry
-    assert Term("sticky_grease", (0,)).is_pointwise
-    assert not Term("warming", (0,)).is_dry
-    assert not Term("warming", (0,)).is_pointwise
+    assert Term("sticky_grease", (1,)).is_dry
+    assert Term("sticky_grease", (1,)).is_pointwise
+    assert not Term("warming", (1,)).is_dry
+    assert not Term("warming", (1,)).is_pointwise
 
 
 def test_a_users_own_dry_friction_does_not_spike_in_a_delay(own_effects):
     """What lags is the smooth part of the torque, whichever effect is the dry one."""
     log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=3, duration=4.0)
-    delay = Term("time_delay", (0,))
+    delay = Term("time_delay", (1,))
     plain = RBDRegressor(log.robot, ["viscous", delay]).fit(log.X, log.y)
     own = RBDRegressor(log.robot, ["viscous", ("sticky_grease", [1]), delay]).fit(log.X, log.y)
     own.effect_coefficients_[delay][:] = 1.0
     seen = own.predict(log.X)
     own.effect_coefficients_[delay][:] = 0.0
     late = (seen - own.predict(log.X))[:, 0]
-    own.effect_coefficients_[Term("sticky_grease", (0,))][:] = 1e6
+    own.effect_coefficients_[Term("sticky_grease", (1,))][:] = 1e6
     assert plain.coef_.shape == (len(own.coef_) - 1,)
     without = own.predict(log.X)
     own.effect_coefficients_[delay][:] = 1.0

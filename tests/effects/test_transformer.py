@@ -40,7 +40,7 @@ def test_recovers_friction(frame):
 
 
 def test_hysteresis_starts_anew_with_each_trajectory(frame):
-    transformer = FrictionTransformer([Term("dahl", (0,), {"presliding": 0.5})]).fit(frame)
+    transformer = FrictionTransformer([Term("dahl", (1,), {"presliding": 0.5})]).fit(frame)
     state = transformer.transform(frame)[:, -1]
     assert state[0] == state[100] == 0
     np.testing.assert_allclose(transformer.transform(frame[100:])[:, -1], state[100:])

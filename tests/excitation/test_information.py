@@ -80,6 +80,6 @@ def test_what_is_no_recording_is_refused():
     with pytest.raises(SkidynError, match="recorded holds ndarray"):
         recorded_information(model, [np.zeros((5, 6))])
     with pytest.raises(SkidynError, match="cannot be designed for dahl: .* the motion before"):
-        make_model(ROBOT, [Term("dahl", (0,), {"presliding": 0.02})])
+        make_model(ROBOT, [Term("dahl", (1,), {"presliding": 0.02})])
     with pytest.raises(SkidynError, match="stribeck has the shape parameter 'vs': give a Term"):
         make_model(ROBOT, ["stribeck"])

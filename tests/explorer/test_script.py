@@ -95,13 +95,13 @@ def test_the_script_gives_the_numbers_of_the_page(write, arm, log, tmp_path, mon
 
 
 def test_the_model_is_written_as_it_was_given():
-    term = Term("stribeck", (1,), {"vs": np.float64(0.1)})
+    term = Term("stribeck", (2,), {"vs": np.float64(0.1)})
     model = RBDRegressor(load_planar_arm(), ["viscous", term], consistent=True)
 
     text = script(model, [("spring", 2)], ["a.csv"], "r.urdf", None, {"rate": None})
 
     compile(text, "explored.py", "exec")
-    assert "['viscous', Term('stribeck', (1,), {'vs': 0.1})], consistent=True)" in text
+    assert "['viscous', Term('stribeck', (2,), {'vs': 0.1})], consistent=True)" in text
     assert "from skidyn.effects import Term" in text
     assert "read_log(['a.csv'], robot=robot)" in text
     assert "session.add('spring', joint=2)" in text

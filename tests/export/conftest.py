@@ -38,17 +38,17 @@ TREE = f"""
 STATIC = (
     *("viscous", "coulomb", "offset", "asymmetric_friction", "rotor_inertia", "spring"),
     *("load_dependent_friction", "torque_gain", "external_wrench"),
-    Term("stribeck", (0,), {"vs": 0.1, "delta": 2.0}),
-    Term("nonlinear_viscous", (1,), {"power": 1.7}),
-    Term("position_dependent_friction", (1,), {"n": 2.0}),
-    Term("torque_ripple", (1,), {"N": 30.0}),
-    Term("coupled_friction", (0, 1), {"ratio": -0.5}),
-    Term("coupled_inertia", (0, 1), {"ratio": 0.5}),
-    Term("coupling_spring", (0, 1), {"ratio": 1.0}),
-    Term("nonlinear_spring", (0,), {"q_middle": 0.2}),
+    Term("stribeck", (1,), {"vs": 0.1, "delta": 2.0}),
+    Term("nonlinear_viscous", (2,), {"power": 1.7}),
+    Term("position_dependent_friction", (2,), {"n": 2.0}),
+    Term("torque_ripple", (2,), {"N": 30.0}),
+    Term("coupled_friction", (1, 2), {"ratio": -0.5}),
+    Term("coupled_inertia", (1, 2), {"ratio": 0.5}),
+    Term("coupling_spring", (1, 2), {"ratio": 1.0}),
+    Term("nonlinear_spring", (1,), {"q_middle": 0.2}),
     ("gravity_compensator", [2]),
-    Term("end_stop", (1,), {"q_lim": 0.3, "side": 1.0}),
-    Term("saturation", (0,), {"limit": 0.5}),
+    Term("end_stop", (2,), {"q_lim": 0.3, "side": 1.0}),
+    Term("saturation", (1,), {"limit": 0.5}),
 )
 
 LOADERS = {

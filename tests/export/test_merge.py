@@ -150,7 +150,7 @@ def test_merged_urdf_gives_the_torque_and_keeps_pictures_and_comments(model, own
     np.testing.assert_allclose(
         read.inverse_dynamics(*motion), model.rigid_body_torque(*motion), rtol=1e-6, atol=1e-6
     )
-    sizes = {t.kind: t for t in model.effect_terms_ if t.joints == (0,)}
+    sizes = {t.kind: t for t in model.effect_terms_ if t.joints == (1,)}
     np.testing.assert_allclose(
         read.joint_dynamics["damping"][0], model.effect_coefficients_[sizes["viscous"]]
     )

@@ -45,7 +45,7 @@ def test_mujoco_gives_the_torque_of_the_model(consistent, name, states, tmp_path
 
 def test_springs_have_a_field_and_negative_friction_has_none(fit, states, tmp_path):
     model = fit(load_scara(), ["spring", "viscous"], consistent=True)
-    slack = next(t for t in model.effect_terms_ if t.kind == "viscous" and t.joints == (2,))
+    slack = next(t for t in model.effect_terms_ if t.kind == "viscous" and t.joints == (3,))
     model.effect_coefficients_[slack] = np.array([-0.1])
     assert write_mjcf(model, tmp_path / "robot.xml") == ("viscous of joint3",)
     q, dq, ddq = states(model.robot_)

@@ -20,9 +20,9 @@ from skidyn.export import (
 from skidyn.identification import RBDRegressor
 
 MEMORY = [
-    Term("dahl", (0,), {"presliding": 0.02}),
-    Term("maxwell_slip", (1,), {"presliding": 0.02}),
-    Term("offset", (0,), {"trajectory": 0}),
+    Term("dahl", (1,), {"presliding": 0.02}),
+    Term("maxwell_slip", (2,), {"presliding": 0.02}),
+    Term("offset", (1,), {"trajectory": 0}),
 ]
 
 

@@ -209,10 +209,19 @@ def test_intervals_cover_the_truth(exact):
         ({"consistent": "yes"}, "True, False or BodyConstraints"),
         ({"smooth": "x"}, "True, False or None"),
         ({"forgetting": "a"}, "expected a number"),
+        ({"forgetting": True}, "expected a number"),
+        ({"horizon": "x"}, "expected a number or None"),
+        ({"estimator": ["ridge"]}, "expected one of 'weighted'"),
         ({"effects": "viscous"}, r"effects=\['viscous'\]"),
+        ({"effects": None}, "expected a list"),
+        ({"effects": [3]}, "3 is no effect"),
+        ({"effects": [("viscous", 1)]}, "joints counted from 1"),
+        ({"effects": [("viscous", ["a"])]}, "joints counted from 1"),
+        ({"effects": [("viscous", [0])]}, "no joint 0; the robot has joints 1 to"),
+        ({"robot": 5}, "5 describes no robot"),
     ],
 )
 def test_parameters_of_another_kind_are_refused(exact, wrong, message):
     robot, _, X, y = exact
     with pytest.raises(ValueError, match=message):
-        RBDRegressor(robot, **wrong).fit(X, y)
+        RBDRegressor(**({"robot": robot} | wrong)).fit(X, y)

@@ -135,7 +135,7 @@ def test_rows_of_weight_zero_do_not_count_but_are_neighbours():
 @pytest.fixture(scope="module")
 def with_an_offset_in_one_run():
     y = LOG.y + 2.0 * (LOG.X["trajectory"].to_numpy() == 1)[:, None] * np.array([1.0, 0.0])
-    terms = ["viscous", "coulomb", Term("offset", (0,), {"trajectories": (1,)})]
+    terms = ["viscous", "coulomb", Term("offset", (1,), {"trajectories": (1,)})]
     return RBDRegressor(ROBOT, terms).fit(LOG.X, y), y
 
 

@@ -13,6 +13,7 @@ from skidyn.exceptions import ColumnError
 from skidyn.preprocessing import (
     ButterworthFilter,
     CurrentToTorque,
+    DropKeys,
     SignalScaler,
     SmoothDerivatives,
     TimeDerivative,
@@ -27,6 +28,7 @@ ESTIMATORS = [
     TimeDerivative(rate=1.0),
     SmoothDerivatives(rate=1.0, cutoff=0.1),
     SignalScaler(),
+    DropKeys(),
     CurrentToTorque(101, 0.125),
 ]
 

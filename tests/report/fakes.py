@@ -65,7 +65,7 @@ def _finding(joints, kind, title, drop, scale):
         separating_motion="slow sweeps with small reversals, below 0.02 rad",
         sentence=f"{title} on joint {joints[0]}. Adding it removes {drop:.0%} of the error.",
         code=f'model = diagnosis.add("{kind}", joints={list(joints)})',
-        terms=(Term(kind, (joints[0] - 1,)),), curves=[_curve(j, scale) for j in joints],
+        terms=(Term(kind, joints[:1]),), curves=[_curve(j, scale) for j in joints],
     )  # fmt: skip
 
 

@@ -67,7 +67,7 @@ def test_one_piece_is_no_evidence(log, models):
 
 def test_motion_that_explodes_is_infinite_not_silent(log, models):
     test = log.frame["trajectory"] == 4
-    broken = RBDRegressor(log.robot, [Term("spring", (0,))]).fit(log.X, log.y)
+    broken = RBDRegressor(log.robot, [Term("spring", (1,))]).fit(log.X, log.y)
     term = broken.effect_terms_[0]
     broken.effect_coefficients_[term] = np.array([-1e5, 0.0])
     errors = simulation_errors(broken, log.X[test], log.y[test])

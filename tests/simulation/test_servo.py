@@ -21,7 +21,7 @@ def servo_log():
     log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=3, duration=10.0)
     truth = RBDRegressor(log.robot, EFFECTS, "nominal").fit(log.X, log.y)
     for term in truth.effect_terms_:
-        size = {"viscous": 4.0, "coulomb": 1.5}[term.kind] * (1.0, 0.1)[term.joints[0]]
+        size = {"viscous": 4.0, "coulomb": 1.5}[term.kind] * (1.0, 0.1)[term.places[0]]
         truth.effect_coefficients_[term] = np.array([size])
     wanted = log.X.iloc[::2].reset_index(drop=True)
     wanted = wanted.assign(q_ref1=wanted["q1"], q_ref2=wanted["q2"])
@@ -50,8 +50,8 @@ def test_friction_from_motion_alone_improves_the_motion_of_a_new_log(servo_log):
     plain = RBDRegressor(robot, (), "nominal").fit(X[train], torque[train])
     whole = RBDRegressor(robot, EFFECTS, "nominal").fit(X[train], torque[train])
     sizes = {t: float(c[0]) for t, c in whole.effect_coefficients_.items()}
-    assert sizes[Term("viscous", (0,))] == pytest.approx(4.0, rel=0.2)
-    assert sizes[Term("coulomb", (0,))] == pytest.approx(1.5, rel=0.3)
+    assert sizes[Term("viscous", (1,))] == pytest.approx(4.0, rel=0.2)
+    assert sizes[Term("coulomb", (1,))] == pytest.approx(1.5, rel=0.3)
     before, after = (
         simulation_errors(m, log[~train], controller=servo, step=1e-2).position
         for m in (plain, whole)

@@ -117,7 +117,7 @@ def test_stiff_controller_is_stable_at_the_rate_of_a_slow_log():
 def test_presliding_springs_back():
     """Dahl friction lets go what it held: a push within the presliding range leaves no trace."""
     sizes = {"dahl": [3.0], "viscous": [100.0]}
-    model = slider([Term("dahl", (0,), {"presliding": 0.01}), "viscous"], sizes)
+    model = slider([Term("dahl", (1,), {"presliding": 0.01}), "viscous"], sizes)
     time = np.linspace(0, 3, 301)
     X, y = log_of(model.robot_, [0.0], [0.0], lambda t, j: 0.3 * (t < 1.5), time)
     q, _ = moved(model, X, y)
@@ -127,7 +127,7 @@ def test_presliding_springs_back():
 
 def test_elastic_link_swings_at_its_resonance():
     """Motor held by a stiff controller: the link of 2 kg swings at sqrt(k / m)."""
-    term = Term("joint_elasticity", (0,), {"resonance": 5.0, "damping": 0.01})
+    term = Term("joint_elasticity", (1,), {"resonance": 5.0, "damping": 0.01})
     stiffness = 2.0 * (2 * np.pi * 5.0) ** 2
     sizes = {"joint_elasticity": [1 / stiffness], "rotor_inertia": [1.0]}
     model = slider([term, "rotor_inertia"], sizes)

@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Features without key columns, which a learner that does not know them learns by heart."""
+
+from __future__ import annotations
+
+from numbers import Integral
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.base import clone
+from sklearn.pipeline import Pipeline, make_pipeline
+from sklearn.utils.validation import _check_feature_names_in, check_is_fitted, validate_data
+
+from skidyn._columns import ColumnSpec
+from skidyn._compat import fit_context
+from skidyn._keys import Keys, knows_keys
+from skidyn.preprocessing._signals import _SignalTransformer
+
+Array = NDArray[np.float64]
+
+
+class DropKeys(_SignalTransformer):
+    """Take the key columns out of a table, before a learner that does not know them.
+
+    A learner takes the number of a trajectory and the time for features, and learns the log by
+    heart. ``HybridRegressor`` and ``BLLRegressor`` keep them from learners by themselves.
+
+    Parameters
+    ----------
+    trajectory, time : int, str or None, default="auto"
+        Key columns, which are dropped.
+
+    Attributes
+    ----------
+    n_features_in_ : int
+        Columns of X.
+    feature_names_in_ : ndarray of str
+        Their names, where X has names.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> from sklearn.linear_model import Ridge
+    >>> from sklearn.pipeline import make_pipeline
+    >>> from skidyn.preprocessing import DropKeys
+    >>> X = pd.DataFrame({"trajectory": [1, 1, 2], "time": [0.0, 0.1, 0.0], "q1": [0.2, 0.3, 0.4]})
+    >>> make_pipeline(DropKeys(), Ridge()).fit(X, [2.0, 3.0, 4.0])[-1].n_features_in_
+    1
+    """
+
+    _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
+        "trajectory": [str, Integral, None],
+        "time": [str, Integral, None],
+    }
+
+    def __init__(self, *, trajectory: ColumnSpec = "auto", time: ColumnSpec = "auto") -> None:
+        self.trajectory = trajectory
+        self.time = time
+
+    @fit_context(prefer_skip_nested_validation=True)
+    def fit(self, X: Any, y: Any = None) -> DropKeys:
+        """Find the key columns.
+
+        Parameters
+        ----------
+        X : DataFrame or array-like of shape (n_samples, n_features)
+            Log.
+        y : None
+            Ignored.
+
+        Returns
+        -------
+        self : object
+            The transformer.
+        """
+        validate_data(self, X, dtype=np.float64)
+        self._keys()
+        return self
+
+    def transform(self, X: Any) -> Array:
+        """Drop the key columns.
+
+        Parameters
+        ----------
+        X : DataFrame or array-like of shape (n_samples, n_features)
+            Log.
+
+        Returns
+        -------
+        X_features : ndarray of shape (n_samples, n_features_out)
+            All other columns, in their order.
+        """
+        return self._checked(X)[:, list(self._keys().features)]
+
+    def get_feature_names_out(self, input_features: Any = None) -> NDArray[Any]:
+        """Names of the columns that are left.
+
+        Parameters
+        ----------
+        input_features : array-like of str, default=None
+            Names of the columns of X; those seen in ``fit`` if None.
+
+        Returns
+        -------
+        ndarray of str
+            Names of the output's columns.
+        """
+        check_is_fitted(self)
+        names: NDArray[Any] = _check_feature_names_in(self, input_features)
+        return names[list(self._keys().features)]
+
+
+def without_keys_inside(learner: Any, keys: Keys) -> Any:
+    """A learner whose parts that do not know key columns do not see them either.
+
+    Steps of a ``Pipeline`` after the last that knows key columns, and members of stackings and
+    votings that do not know them, get a :class:`DropKeys`. (A learner without any part that knows
+    key columns never sees them: ``Keys.for_learner``.)
+
+    Parameters
+    ----------
+    learner : estimator
+        Not fitted.
+    keys : Keys
+        Key columns of the table that the learner is fitted to.
+
+    Returns
+    -------
+    estimator
+        The learner itself, or a copy.
+    """
+    if (keys.trajectory is None and keys.time is None) or not knows_keys(learner):
+        return learner
+    drop = DropKeys(trajectory=keys.trajectory, time=keys.time)
+    if isinstance(learner, Pipeline):
+        knowing = [k for k, (_, step) in enumerate(learner.steps) if knows_keys(step)]
+        last = knowing[-1]
+        steps = list(clone(learner).steps)
+        if last == len(steps) - 1:
+            steps[-1] = (steps[-1][0], without_keys_inside(steps[-1][1], keys))
+        else:
+            # transformers of signals hand key columns on in their place
+            steps.insert(last + 1, ("drop_keys", drop))
+        return learner.__class__(**{**learner.get_params(deep=False), "steps": steps})
+    if isinstance(getattr(learner, "estimators", None), list):
+        members = [
+            (name, without_keys_inside(m, keys) if knows_keys(m) else make_pipeline(drop, m))
+            for name, m in learner.estimators
+        ]
+        return clone(learner).set_params(estimators=members)
+    return learner
