@@ -1,23 +1,31 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Models out of skidyn: functions in C, Python and ONNX, and descriptions in URDF and MJCF."""
 
+from skidyn.export._bam import BamModel, read_bam, write_bam
+from skidyn.export._bam_fit import fit_bam
 from skidyn.export._c import c_source, write_c
 from skidyn.export._merge import merge_mjcf, merge_urdf
 from skidyn.export._mjcf import write_mjcf
 from skidyn.export._onnx import to_onnx, write_onnx
 from skidyn.export._python import python_source, write_python
+from skidyn.export._ros2 import write_ros2
 from skidyn.export._urdf import write_urdf
 
 __all__ = [
+    "BamModel",
     "c_source",
+    "fit_bam",
     "merge_mjcf",
     "merge_urdf",
     "python_source",
+    "read_bam",
     "to_onnx",
+    "write_bam",
     "write_c",
     "write_mjcf",
     "write_onnx",
     "write_python",
+    "write_ros2",
     "write_urdf",
 ]
 

@@ -57,7 +57,7 @@ def c_source(model: RBDRegressor | Robot, *, name: str = "skidyn_inverse_dynamic
     >>> print(c_source(load_planar_arm()).splitlines()[8])
     void skidyn_inverse_dynamics(const double q[2], const double dq[2], const double ddq[2], double tau[2])
     """  # noqa: E501
-    return _text(static_model(model), name)
+    return function_text(static_model(model), name)
 
 
 def write_c(
@@ -89,10 +89,11 @@ def write_c(
     ()
     """
     static = static_model(model)
-    return write_files(path, _text(static, name), model, static.left)
+    return write_files(path, function_text(static, name), model, static.left)
 
 
-def _text(static: StaticModel, name: str) -> str:
+def function_text(static: StaticModel, name: str) -> str:
+    """A C function of part of a model."""
     if not re.fullmatch(r"[A-Za-z_]\w*", name, flags=re.ASCII):
         raise SkidynError(f"name is {name!r}; expected a C identifier such as 'robot_torque'.")
     robot = static.robot

@@ -58,12 +58,12 @@ def static_model(model: RBDRegressor | Robot) -> StaticModel:
     if isinstance(model, Robot):
         return StaticModel(model, _fixed(model, model.inertial_parameters), [], [])
     check_model(model)
-    held = [term for term in model.effect_terms_ if _is_static(model, term)]
-    if not _agrees(model, held, _traced(model, held)):
+    held = [term for term in model.effect_terms_ if is_static(model, term)]
+    if not _agrees(model, held, traced(model, held)):
         # Another effect sees the torque of the bodies without the payload.
         held = [term for term in held if not is_carried(term)]
     left = [term for term in model.effect_terms_ if term not in held]
-    return StaticModel(model.robot_, _traced(model, held), held, left)
+    return StaticModel(model.robot_, traced(model, held), held, left)
 
 
 def check_model(model: Any) -> None:
@@ -100,7 +100,7 @@ def is_carried(term: Term) -> bool:
     return term.kind == "payload" and term.shape.get("trajectories") is None
 
 
-def _traced(model: RBDRegressor, terms: Sequence[Term]) -> Program:
+def traced(model: RBDRegressor, terms: Sequence[Term]) -> Program:
     tape, n = Tape(), model.robot_.n_joints
     robot: Any = SymbolicRobot(model.robot_, tape)
     part = _with_terms(model, terms)
@@ -116,12 +116,12 @@ def _traced(model: RBDRegressor, terms: Sequence[Term]) -> Program:
     return Program(tape, outputs, (n,))
 
 
-def _is_static(model: RBDRegressor, term: Term) -> bool:
+def is_static(model: RBDRegressor, term: Term) -> bool:
     """Whether an effect can be written down, and then gives the torque that it gives."""
     if {"trajectory", "trajectories"} & {k for k, v in term.shape.items() if v is not None}:
         return False  # belongs to some of the recordings
     try:
-        program = _traced(model, [term])
+        program = traced(model, [term])
     except Exception:  # whatever an effect says to symbols: it cannot be written down
         return False
     return _agrees(model, [term], program)
@@ -129,7 +129,7 @@ def _is_static(model: RBDRegressor, term: Term) -> bool:
 
 def _agrees(model: RBDRegressor, terms: Sequence[Term], program: Program) -> bool:
     """Whether a program gives the torque of the model with these effects, on random numbers."""
-    signals = _random_signals(model.robot_)
+    signals = random_signals(model.robot_)
     part = copy.copy(model)
     part.effect_terms_ = list(terms)
     expected = part._torque(signals)
@@ -139,7 +139,7 @@ def _agrees(model: RBDRegressor, terms: Sequence[Term], program: Program) -> boo
     return bool(np.abs(written - expected).max() <= _ROUNDING * (1 + np.abs(expected).max()))
 
 
-def _random_signals(robot: Robot) -> Signals:
+def random_signals(robot: Robot) -> Signals:
     rng = np.random.default_rng(0)
     q, dq, ddq = rng.normal(size=(3, _SAMPLES, robot.n_joints))
     dq[::8] *= 1e-3  # where the direction of motion is blurred

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""BAM's models of friction, fitted to a log."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from skidyn._columns import column_names, resolve_columns
+from skidyn._exceptions import SkidynError
+from skidyn._signals import signals_from
+from skidyn.evidence import smooth_motion
+from skidyn.export._bam import ALWAYS, BAM_MODELS, BamModel, budget, joint_number
+from skidyn.robots import Robot
+
+#: Velocity (rad/s) below which friction may be anything up to its size.
+_RESTS = 0.03
+#: Rows that moving samples are thinned to: far more than there are parameters.
+_ROWS = 20_000
+#: Where the velocity of Stribeck's friction is searched from, and its limits, rad/s.
+_SPEEDS, _SLOWEST, _FASTEST = (0.1, 0.5, 2.0), 0.01, 20.0
+#: Limits of the exponent.
+_EXPONENT = (0.4, 10.0)
+
+
+def fit_bam(
+    robot: Robot,
+    X: Any,
+    y: Any,
+    *,
+    joint: str | int | None = None,
+    name: str = "m6",
+    actuator: str,
+    motor: Mapping[str, float] | None = None,
+) -> BamModel:
+    """Fit one of BAM's models of friction, and the armature, to torque of a motor.
+
+    The bodies of the robot are taken as known, as on BAM's pendulum: what the motor's torque holds
+    beside theirs is armature and friction. Least squares over the samples that move, from several
+    starts; friction is not negative.
+
+    Parameters
+    ----------
+    robot : Robot
+        Robot whose inertial parameters are true; identified ones by
+        ``dataclasses.replace(robot, inertial_parameters=model.inertial_parameters_)``.
+    X : DataFrame
+        Motion, with ``time`` (s), ``q1..``, ``dq1..`` (rad, rad/s); it is smoothed.
+    y : array-like of shape (n_samples, n_joints), N m
+        Torque of the motors.
+    joint : str or int, optional
+        Joint, by name or counted from 0; not needed if there is one.
+    name : {"m1", "m2", "m3", "m4", "m5", "m6"}, default="m6"
+        Model of friction.
+    actuator : str
+        Type of servo as BAM calls it, such as ``"xl330"``.
+    motor : mapping of str to float, optional
+        Constants of the motor, which no torque shows: ``kt``, ``R`` and others.
+
+    Returns
+    -------
+    BamModel
+        To be written by :func:`write_bam`.
+
+    Raises
+    ------
+    SkidynError
+        The joint is unknown or slides, a column is missing, or too few samples move.
+
+    Examples
+    --------
+    >>> from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+    >>> from skidyn.export import fit_bam
+    >>> log = make_hidden_effect_log(load_planar_arm(), None)
+    >>> servo = fit_bam(log.robot, log.X, log.y, joint="joint2", name="m1", actuator="mx64")
+    >>> bool(servo.parameters["friction_base"] > 0)
+    True
+    """
+    if name not in BAM_MODELS:
+        raise SkidynError(f"name is {name!r}; BAM has the models {', '.join(BAM_MODELS)}")
+    j = joint_number(robot, joint)
+    q, dq, ddq = _motion(robot, X)
+    torque = np.asarray(y, dtype=float).reshape(len(q), -1)
+    if torque.shape[1] != robot.n_joints:
+        raise SkidynError(
+            f"y has {torque.shape[1]} column(s); the robot has {robot.n_joints} joints"
+        )
+    whole = np.isfinite(torque[:, j]) & np.isfinite(np.hstack([q, dq, ddq])).all(axis=1)
+    rows = np.flatnonzero(whole & (np.abs(dq[:, j]) > _RESTS))
+    keys = ["armature", *ALWAYS, *BAM_MODELS[name]]
+    if len(rows) < 10 * len(keys):
+        raise SkidynError(
+            f"{len(rows)} samples of {robot.joint_names[j]} move faster than {_RESTS} rad/s; its "
+            f"model {name} has {len(keys)} parameters"
+        )
+    rows = rows[:: len(rows) // _ROWS + 1]
+    bodies = robot.inverse_dynamics(q[rows], dq[rows], ddq[rows])[:, j]
+    outside = -robot.inverse_dynamics(q[rows], dq[rows], 0.0 * ddq[rows])[:, j]
+    given, speed, own = torque[rows, j], dq[rows, j], ddq[rows, j]
+    size = float(np.std(given)) + 1e-12
+
+    def residual(x: Any) -> Any:
+        values = dict(zip(keys, x, strict=True))
+        friction = np.sign(speed) * budget(name, values, given, outside, speed)
+        return (bodies + values["armature"] * own + friction - given) / size
+
+    low = np.array([{"dtheta_stribeck": _SLOWEST, "alpha": _EXPONENT[0]}.get(k, 0.0) for k in keys])
+    high = np.array(
+        [{"dtheta_stribeck": _FASTEST, "alpha": _EXPONENT[1]}.get(k, np.inf) for k in keys]
+    )
+    fits = []
+    for start in _SPEEDS if "alpha" in keys else _SPEEDS[:1]:
+        typical = {"dtheta_stribeck": start, "alpha": 1.5, "armature": 1e-3}
+        first = np.array([typical.get(k, 0.05 if "load" in k else 0.05 * size) for k in keys])
+        fits.append(
+            least_squares(residual, first, bounds=(low, high), x_scale=np.maximum(first, 1e-4))
+        )
+    best = min(fits, key=lambda fit: float(fit.cost))
+    found = dict(zip(keys, map(float, best.x), strict=True))
+    return BamModel(name, actuator, {**found, **(motor or {})})
+
+
+def _motion(robot: Robot, X: Any) -> tuple[Any, Any, Any]:
+    """Smoothed motion of a table."""
+    names = column_names(X)
+    if names is None:
+        raise SkidynError("X is no table; give a DataFrame with the columns time, q1.., dq1..")
+    columns = resolve_columns(names, len(names), robot.joint_names, require_acceleration=False)
+    if columns.time is None:
+        raise SkidynError("the log has no column 'time' (s)")
+    table = np.asarray(X, dtype=float)
+    plain = replace(columns, ddq=columns.ddq or columns.dq, temperature=None)
+    signals = smooth_motion(signals_from(table, plain, robot)).signals
+    return signals.q, signals.dq, signals.ddq
