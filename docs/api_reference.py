@@ -403,13 +403,14 @@ PAGES: tuple[Page, ...] = (
     ),
     Page(
         "skidyn.export",
-        "An identified model as a function in C, Python or ONNX, as URDF or as MJCF.",
+        "An identified model as a function in C, Python or ONNX, as a description, for ROS 2 and BAM.",
         (
             Section(
                 "Files",
-                ("write_c", "write_mjcf", "write_onnx", "write_python", "write_urdf"),
+                ("write_c", "write_mjcf", "write_onnx", "write_python", "write_ros2", "write_urdf"),
             ),
-            Section("Your own files", ("merge_mjcf", "merge_urdf")),
+            Section("Your own files", ("merge_mjcf", "merge_urdf", "merge_usd")),
+            Section("Servos", ("BamModel", "fit_bam", "read_bam", "write_bam")),
             Section("In memory", ("c_source", "python_source", "to_onnx")),
         ),
     ),

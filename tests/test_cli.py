@@ -253,7 +253,7 @@ def test_every_option_with_choices_is_completed(tmp_path):
     wanted = {
         "check --clock": {"recorded", "regular"},
         "diagnose --torque-sign": {"recorded", "command"},
-        "export --format": {"c", "python", "onnx", "urdf", "mjcf"},
+        "export --format": {"c", "python", "onnx", "urdf", "mjcf", "usd", "bam", "ros2"},
         "simulate --robot": {"panda", "scara", "ur5"},
         "simulate --engine": {"own", "mujoco"},
         "add --effect": {"dahl", "spring"},

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``skidyn export``: a fitted model as C, Python, ONNX, URDF or MJCF."""
+"""``skidyn export``: a fitted model as code, or as a description for other tools."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from skidyn._commands._arguments import Input, Output, command, with_log
-from skidyn._commands._input import read_model_and_log
+from skidyn._commands._input import json_option, read_model_and_log
 from skidyn._commands._output import print_json, working
 from skidyn._exceptions import SkidynError
 from skidyn._writing import writable
@@ -19,9 +19,16 @@ Fit a model to a log and write it for other tools.
   skidyn export run1.csv --urdf robot.urdf --format c --out model.c
   skidyn export run1.csv --urdf robot.urdf --format urdf,mjcf --consistent --out identified
 
-With --into, the numbers go into your own MJCF or URDF, whose other bytes stay as they are:
+With --into, the numbers go into your own MJCF or URDF, whose other bytes stay as they are, or into
+a layer of text over your own USD stage:
 
   skidyn export run1.csv --urdf robot.urdf --format mjcf --into own.xml --consistent --out new.xml
+
+A ROS 2 package with a plugin of inverse_dynamics_solver is a new folder with the package's name; the
+friction of one joint goes to a file of BAM's for the servo that you name:
+
+  skidyn export run1.csv --urdf robot.urdf --format ros2 --out robot_dynamics
+  skidyn export run1.csv --urdf robot.urdf --format bam --servo elbow --actuator xl330 --out m1.json
 
 C, Python and ONNX get a function of q, dq, ddq for feedforward, which needs nothing of skidyn.
 Several formats at once get the name of --out with their own suffix. What a format cannot hold (a
@@ -29,7 +36,18 @@ URDF knows viscous and Coulomb friction only) is listed, and written to FILE.ski
 """
 
 #: Suffix of the files of every format.
-SUFFIXES = {"c": ".c", "python": ".py", "onnx": ".onnx", "urdf": ".urdf", "mjcf": ".xml"}
+SUFFIXES = {
+    "c": ".c",
+    "python": ".py",
+    "onnx": ".onnx",
+    "urdf": ".urdf",
+    "mjcf": ".xml",
+    "usd": ".usda",
+    "bam": ".json",
+    "ros2": "",
+}
+#: Formats that go into a file of the user's own.
+INTO = ("urdf", "mjcf", "usd")
 
 
 def add_parser(commands: Any) -> None:
@@ -47,7 +65,13 @@ def add_parser(commands: Any) -> None:
         "--into",
         type=Input,
         metavar="FILE",
-        help="your own MJCF or URDF, of which --out becomes a copy",
+        help="your own MJCF or URDF, of which --out becomes a copy; your own USD stage, over which "
+        "--out becomes a layer",
+    )
+    parser.add_argument("--servo", metavar="JOINT", help="joint of the servo, for bam")
+    parser.add_argument("--actuator", help="servo as BAM calls it, such as xl330, for bam")
+    parser.add_argument(
+        "--motor", metavar="JSON", help='constants of the servo, for bam: \'{"kt": 0.4, "R": 3}\''
     )
     parser.add_argument("--consistent", action="store_true", help="only bodies that can exist")
 
@@ -57,10 +81,14 @@ def run(options: argparse.Namespace) -> None:
     from skidyn import export
 
     files = _files(options.format, options.out)
-    if options.into is not None and (len(files) > 1 or not set(files) <= {"urdf", "mjcf"}):
-        raise SkidynError(f"--into takes --format urdf or mjcf, not {options.format}")
-    for path in files.values():
-        writable(path)
+    if options.into is not None and (len(files) > 1 or not set(files) <= set(INTO)):
+        raise SkidynError(f"--into takes --format {' or '.join(INTO)}, not {options.format}")
+    if options.into is None and "usd" in files:
+        raise SkidynError("--into is missing: the USD stage over which --format usd writes a layer")
+    motor = json_option("motor", options.motor)
+    for form, path in files.items():
+        if form != "ros2":
+            writable(path)
     model, frame, tau = read_model_and_log(options)
     model.set_params(consistent=options.consistent)
     with working("Identifying", options):
@@ -70,6 +98,11 @@ def run(options: argparse.Namespace) -> None:
         try:
             if options.into is not None:
                 effects = getattr(export, f"merge_{form}")(model, options.into, path)
+            elif form == "bam":
+                words = {"joint": options.servo, "actuator": options.actuator, "motor": motor}
+                effects = export.write_bam(model, path, **words)
+            elif form == "ros2":
+                effects = export.write_ros2(model, path, package=path.name)
             else:
                 effects = getattr(export, f"write_{form}")(model, path)
         except (SkidynError, OSError, ImportError) as error:

@@ -10,6 +10,7 @@ from skidyn.export._onnx import to_onnx, write_onnx
 from skidyn.export._python import python_source, write_python
 from skidyn.export._ros2 import write_ros2
 from skidyn.export._urdf import write_urdf
+from skidyn.export._usd import merge_usd
 
 __all__ = [
     "BamModel",
@@ -17,6 +18,7 @@ __all__ = [
     "fit_bam",
     "merge_mjcf",
     "merge_urdf",
+    "merge_usd",
     "python_source",
     "read_bam",
     "to_onnx",

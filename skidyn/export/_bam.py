@@ -285,6 +285,8 @@ def _of_joint(
 ) -> tuple[BamModel, tuple[str, ...]]:
     """What BAM's m1 or m2 holds of a joint, and names of the joint's other effects."""
     check_model(model)
+    if not isinstance(motor, Mapping):
+        raise SkidynError(f"motor is {motor!r}; expected numbers by name, such as kt and R")
     if not isinstance(model, RBDRegressor):
         raise SkidynError("BAM's format holds friction; give a fitted RBDRegressor or a BamModel")
     if actuator is None:
@@ -309,5 +311,7 @@ def _of_joint(
             values["alpha"] = float(term.shape["delta"])
         else:
             left.append(name_term(model.robot_, term))
+    if not all(isinstance(value, int | float) for value in motor.values()):
+        raise SkidynError(f"motor is {dict(motor)!r}; expected numbers by name, such as kt and R")
     name = "m2" if "alpha" in values else "m1"
     return BamModel(name, actuator, {**values, **motor}), tuple(left)

@@ -56,6 +56,12 @@ def central_inertia(parameters: np.ndarray, body: str) -> CentralInertia | None:
     return CentralInertia(mass, center, (central + central.T) / 2)
 
 
+def about_origin(mass: float, center: np.ndarray, central: np.ndarray) -> np.ndarray:
+    """The ten parameters from mass, centre of mass and the inertia about it."""
+    inertia = central + mass * (center @ center * np.eye(3) - np.outer(center, center))
+    return np.asarray(np.r_[mass, mass * center, inertia[np.triu_indices(3)]])
+
+
 @dataclass(frozen=True)
 class Description:
     """What of a model a description of bodies and joints holds.

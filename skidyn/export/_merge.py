@@ -14,7 +14,13 @@ from scipy.spatial.transform import Rotation
 from skidyn._exceptions import SkidynError
 from skidyn._optional import import_optional
 from skidyn.dynamics import transform_inertial
-from skidyn.export._bodies import CentralInertia, central_inertia, described, numbers
+from skidyn.export._bodies import (
+    CentralInertia,
+    about_origin,
+    central_inertia,
+    described,
+    numbers,
+)
 from skidyn.export._edits import Edits, Element
 from skidyn.export._files import PathLike, write_files
 from skidyn.identification import RBDRegressor
@@ -126,13 +132,7 @@ def _urdf_inertial(element: Element | None) -> np.ndarray:
     )
     turn = Rotation.from_euler("xyz", angles).as_matrix()
     inertia = turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.T
-    return _about_origin(mass, center, inertia)
-
-
-def _about_origin(mass: float, center: np.ndarray, central: np.ndarray) -> np.ndarray:
-    """The ten parameters from mass, centre of mass and the inertia about it."""
-    inertia = central + mass * (center @ center * np.eye(3) - np.outer(center, center))
-    return np.asarray(np.r_[mass, mass * center, inertia[np.triu_indices(3)]])
+    return about_origin(mass, center, inertia)
 
 
 def _urdf_text(central: CentralInertia) -> str:
@@ -339,7 +339,7 @@ def _welded(mujoco: Any, world: Any, carrier: int) -> np.ndarray:
         here = data.xmat[other].reshape(3, 3) @ world.body_ipos[other] + data.xpos[other]
         center = turn.T @ (here - origin)
         inertia = axes @ np.diag(world.body_inertia[other]) @ axes.T
-        total += _about_origin(float(world.body_mass[other]), center, inertia)
+        total += about_origin(float(world.body_mass[other]), center, inertia)
     return total
 
 

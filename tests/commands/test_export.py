@@ -53,4 +53,32 @@ def test_an_unknown_format_is_refused_before_anything_is_read(tmp_path, capsys):
     words = ["export", "log.csv", "--urdf", "arm.urdf", "--format", "c,matlab", "--out", "m"]
 
     assert cli.main(words) == cli.BAD_INPUT
-    assert "'matlab'; expected some of c, python, onnx, urdf, mjcf" in capsys.readouterr().err
+    assert (
+        "'matlab'; expected some of c, python, onnx, urdf, mjcf, usd, bam, ros2"
+        in capsys.readouterr().err
+    )
+
+
+def test_a_servo_and_a_ros_package_are_written(work, run, tmp_path):
+    log = ("export", work / "log.csv", "--urdf", work / "arm.urdf", "--consistent")
+    servo = ("--servo", "joint2", "--actuator", "mx64", "--motor", '{"kt": 1.6}')
+
+    code, written = run(*log, "--format", "bam", *servo, "--out", tmp_path / "m1.json")
+
+    assert code == cli.DONE and list(written) == [str(tmp_path / "m1.json")]
+    bam = json.loads((tmp_path / "m1.json").read_text())
+    assert (bam["model"], bam["actuator"], bam["kt"]) == ("m1", "mx64", 1.6)
+
+    code, written = run(*log, "--format", "ros2", "--out", tmp_path / "arm_dynamics")
+
+    assert code == cli.DONE
+    assert (tmp_path / "arm_dynamics" / "arm_dynamics.xml").exists()
+    code, _ = run(*log, "--format", "ros2", "--out", tmp_path / "arm_dynamics")
+    assert code == cli.BAD_INPUT, "a command replaces no folder"
+
+
+def test_a_usd_layer_needs_a_stage(work, capsys):
+    words = ["export", str(work / "log.csv"), "--urdf", str(work / "arm.urdf"), "--format", "usd"]
+
+    assert cli.main([*words, "--out", "new.usda"]) == cli.BAD_INPUT
+    assert "--into is missing" in capsys.readouterr().err
