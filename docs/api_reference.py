@@ -154,6 +154,7 @@ PAGES: tuple[Page, ...] = (
                 (
                     "fit_controller",
                     "fit_servo",
+                    "judge_additions",
                     "judge_by_simulation",
                     "neg_simulation_error",
                     "servo_torque",
@@ -403,7 +404,7 @@ PAGES: tuple[Page, ...] = (
     ),
     Page(
         "skidyn.export",
-        "An identified model as a function in C, Python or ONNX, as a description, for ROS 2 and BAM.",
+        "An identified model as a function, as a description of the robot, for ROS 2 and for BAM.",
         (
             Section(
                 "Files",

@@ -20,7 +20,7 @@ from scipy.io import loadmat
 
 from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
-from skidyn.simulation import simulate
+from skidyn.simulation import judge_by_simulation, simulate
 
 URDF = """<robot name="emps"><link name="base"/><link name="carriage"><inertial><mass value="90"/>
 <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
@@ -50,9 +50,21 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--models", nargs="*", default=list(MODELS), choices=list(MODELS))
+    parser.add_argument(
+        "--judge",
+        action="store_true",
+        help="only: direction-dependent friction judged over pieces of a second and of five",
+    )
     options = parser.parse_args()
     X, y = read(options.folder / "DATA_EMPS.mat")
     X_test, y_test = read(options.folder / "DATA_EMPS_PULSES.mat")
+    if options.judge:
+        plain = RBDRegressor(Robot.from_urdf(URDF), SYMMETRIC)
+        models = [plain.fit(X, y), plain.with_effects(["asymmetric_friction"]).fit(X, y)]
+        for horizon in (1.0, 5.0):
+            verdict = judge_by_simulation(*models, X_test, y_test, horizon=horizon)
+            print(f"pieces of {horizon:g} s: {verdict}", flush=True)
+        return
     print(f"{'model':30s} {'estimator':14s} {'free run, mm':>12s} {'seconds':>8s}")
     for name in options.models:
         for estimator in ("weighted", "output_error"):

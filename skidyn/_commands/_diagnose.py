@@ -15,6 +15,7 @@ from skidyn._commands._output import (
     print_json,
     provenance,
     run_diagnosis,
+    working,
     write_reports,
 )
 
@@ -40,12 +41,20 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--force", action="store_true", help="go on although the log is not what it claims"
     )
+    parser.add_argument(
+        "--simulate",
+        action="store_true",
+        help="judge findings by the simulated motion too; those that worsen it are told",
+    )
     parser.add_argument("--effects", help="kinds to try, separated by commas (default: all)")
 
 
 def run(options: argparse.Namespace) -> None:
     model, frame, tau = read_model_and_log(options, check=False)
     diagnosis = run_diagnosis(model, frame, tau, options)
+    if options.simulate:
+        with working("Simulating", options):
+            diagnosis.judge_by_simulation()
     write_reports(diagnosis, options.out, options.html, provenance(options))
     if options.json:
         print_json(diagnosis.to_dict())

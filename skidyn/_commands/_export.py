@@ -24,7 +24,7 @@ a layer of text over your own USD stage:
 
   skidyn export run1.csv --urdf robot.urdf --format mjcf --into own.xml --consistent --out new.xml
 
-A ROS 2 package with a plugin of inverse_dynamics_solver is a new folder with the package's name; the
+A ROS 2 package with a plugin of inverse_dynamics_solver is a new folder of the package's name; the
 friction of one joint goes to a file of BAM's for the servo that you name:
 
   skidyn export run1.csv --urdf robot.urdf --format ros2 --out robot_dynamics

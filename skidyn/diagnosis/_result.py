@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from skidyn._exceptions import EffectError
+from skidyn._exceptions import EffectError, SkidynError
 from skidyn._signals import Array
 from skidyn.diagnosis._comparison import REGIMES, Comparison, error_map
 from skidyn.diagnosis._correction import CorrectedRegressor, Opened
@@ -24,7 +24,12 @@ from skidyn.diagnosis._story import story
 from skidyn.diagnosis._unknown import UnknownTorque
 from skidyn.effects import Term, make_terms
 from skidyn.evidence import Problem
+from skidyn.identification import RBDRegressor
 from skidyn.measurement import Suspicion
+from skidyn.simulation import HORIZON, SimulationVerdict, judge_additions
+
+#: How the sentence on a finding begins that the model for simulation is without.
+_VETO = "Not in the completed model, because it worsens the simulated motion:"
 
 Verdict = Literal["complete", "missing", "unknown"]
 
@@ -76,6 +81,9 @@ class Diagnosis:
         What the completed model leaves, by what it is made of.
     opened : Opened or None
         What the model was taken out of (a pipeline, a search), if anything.
+    vetoed : list of Finding
+        Findings that worsen the simulated motion, which :attr:`model` leaves out; empty before
+        :meth:`judge_by_simulation`.
 
     Examples
     --------
@@ -106,6 +114,7 @@ class Diagnosis:
     checks: list[Suspicion] = field(default_factory=list)
     parts: Remainder | None = None
     opened: Opened | None = field(repr=False, default=None)
+    vetoed: list[Finding] = field(repr=False, default_factory=list)
 
     def __repr__(self) -> str:
         units = ["N" if slides else "N m" for slides in self.problem.signals.prismatic]
@@ -209,8 +218,55 @@ class Diagnosis:
 
     @cached_property
     def model(self) -> Any:
-        """The given model with every finding added, fitted to all data."""
-        return self._refitted([t for f in self.findings for t in f.terms])
+        """The given model with every finding added that is not vetoed, fitted to all data."""
+        kept = [f for f in self.findings if not any(f is other for other in self.vetoed)]
+        return self._refitted([t for f in kept for t in f.terms])
+
+    def judge_by_simulation(
+        self, horizon: float | None = HORIZON
+    ) -> list[SimulationVerdict | None]:
+        """Judge every finding by the motion of the model along recordings left out of its fit.
+
+        An effect that lowers the error of the torque may worsen the motion. One that does so beyond
+        chance goes to :attr:`vetoed`, a sentence on it to :attr:`warnings`, and :attr:`model` comes
+        without it; :meth:`add` adds it all the same.
+
+        Parameters
+        ----------
+        horizon : float, s, or None, default=1.0
+            Time after which the simulated model is put back on the log; None for whole recordings.
+
+        Returns
+        -------
+        list of SimulationVerdict or None
+            For every finding; None where simulation says nothing.
+
+        Raises
+        ------
+        SkidynError
+            The model is no RBDRegressor, it cannot be simulated, or the log has no time.
+
+        See Also
+        --------
+        skidyn.simulation.judge_additions : How recordings are left out.
+        """
+        if not isinstance(self.base_model, RBDRegressor):
+            raise SkidynError(
+                f"the model is {type(self.base_model).__name__}; a simulation needs the inertia of "
+                "an RBDRegressor"
+            )
+        additions = [finding.terms for finding in self.findings]
+        verdicts = judge_additions(self.base_model, additions, *self.data[:2], horizon=horizon)
+        self.vetoed = [
+            f for f, v in zip(self.findings, verdicts, strict=True) if v is not None and v.worsens
+        ]
+        self.warnings = [note for note in self.warnings if not note.startswith(_VETO)]
+        for finding, verdict in zip(self.findings, verdicts, strict=True):
+            if verdict is not None and verdict.worsens:
+                where = ", ".join(self.joint_names[j - 1] for j in finding.joints)
+                self.warnings.append(f"{_VETO} {finding.title} of {where}. {verdict.text}")
+        self.__dict__.pop("model", None)
+        return verdicts
 
     def add(self, kind: str, joints: Sequence[int] | None = None) -> Any:
         """Add an effect to the model and fit it again.

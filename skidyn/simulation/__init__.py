@@ -2,6 +2,7 @@
 """Forward simulation of fitted models: their motion, how far it is from a log, in a loop or not."""
 
 from skidyn.forward import Controller, fit_controller
+from skidyn.simulation._additions import judge_additions
 from skidyn.simulation._closed_loop import simulate_closed_loop
 from skidyn.simulation._score import (
     SimulationErrors,
@@ -19,6 +20,7 @@ __all__ = [
     "SimulationVerdict",
     "fit_controller",
     "fit_servo",
+    "judge_additions",
     "judge_by_simulation",
     "neg_simulation_error",
     "servo_torque",
@@ -26,3 +28,6 @@ __all__ = [
     "simulate_closed_loop",
     "simulation_errors",
 ]
+
+# For other packages of skidyn; no part of the public interface.
+from skidyn.simulation._score import HORIZON as HORIZON

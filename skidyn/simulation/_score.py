@@ -16,6 +16,8 @@ from skidyn.identification import RBDRegressor
 
 #: Seconds over which a model is simulated before it is put back on the log.
 HORIZON = 1.0
+#: Error, relative to that of a model without forces, beyond which a piece is lost.
+FAR = 10.0
 
 
 @dataclass(frozen=True)
@@ -223,6 +225,28 @@ def errors_of(
     )
 
 
+def pooled_errors(parts: list[SimulationErrors]) -> SimulationErrors:
+    """Errors of several folds as those of one log."""
+    share = np.array([len(part.pieces) for part in parts], dtype=float)
+    share /= share.sum()
+
+    def mean(name: str) -> Array:
+        squares = [w * getattr(part, name) ** 2 for w, part in zip(share, parts, strict=True)]
+        return np.asarray(np.sqrt(np.sum(squares, axis=0)))
+
+    return SimulationErrors(
+        parts[0].joint_names,
+        parts[0].units,
+        parts[0].horizon,
+        mean("position"),
+        mean("velocity"),
+        mean("final"),
+        mean("resting"),
+        np.concatenate([part.pieces for part in parts]),
+        np.concatenate([part.trajectory for part in parts]),
+    )
+
+
 def neg_simulation_error(estimator: RBDRegressor, X: Any, y: Any) -> float:
     """Scorer for scikit-learn: minus the simulation error over 1 s, relative to no forces.
 
@@ -269,7 +293,7 @@ class SimulationVerdict:
         Without and with the change.
     change : float
         Mean over the pieces of the logarithm of the error after over that before; negative is
-        better.
+        better. Errors count up to ten times that of a model without forces.
     low, high : float
         95 % interval of the change, over trajectories where there are enough of them.
     joints : ndarray of shape (n_joints,)
@@ -301,14 +325,14 @@ class SimulationVerdict:
     def text(self) -> str:
         """The verdict in a sentence."""
         low, high = (f"{100 * np.expm1(x):+.0f} %" for x in (self.low, self.high))
-        if not np.isfinite(self.change):
-            return "With the change the simulated motion grows without bound."
+        lost = self.after.n_lost - self.before.n_lost
+        more = f" With the change {lost} piece(s) grow without bound." if lost > 0 else ""
         said = "changes by an amount that may be chance"
         if self.worsens or self.improves:
             said = "grows" if self.worsens else "falls"
         return (
             f"The error of the simulated motion {said}: {100 * np.expm1(self.change):+.0f} % "
-            f"(95 %: {low} to {high}; {len(self.before.pieces)} pieces)."
+            f"(95 %: {low} to {high}; {len(self.before.pieces)} pieces).{more}"
         )
 
     def __str__(self) -> str:
@@ -378,20 +402,24 @@ def judge_by_simulation(
                 "one piece cannot tell a change from chance; give a longer log or a shorter horizon"
             )
         errors.append(errors_of(model, task, *run(ForwardModel(model), task, step), horizon))
+    return compare_errors(*errors)
+
+
+def compare_errors(before: SimulationErrors, after: SimulationErrors) -> SimulationVerdict:
+    """Verdict on the errors of the same pieces, without and with a change."""
+    errors = before, after
     scale = np.maximum(errors[0].resting, 1e-12)
-    sizes = [np.sqrt(np.mean((e.pieces / scale) ** 2, axis=1)) for e in errors]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        ratio = np.log(sizes[1] + 1e-12) - np.log(sizes[0] + 1e-12)
-        joints = np.log(errors[1].pieces + 1e-12) - np.log(errors[0].pieces + 1e-12)
-    ratio, joints = (np.where(np.isnan(x), 0.0, x) for x in (ratio, joints))  # both are lost
+    # Beyond FAR a motion is lost, however far it gets: one such piece is no more than one piece.
+    joint_sizes = [np.minimum(e.pieces / scale, FAR) for e in errors]
+    sizes = [np.sqrt(np.mean(size**2, axis=1)) for size in joint_sizes]
+    ratio = np.log(sizes[1] + 1e-12) - np.log(sizes[0] + 1e-12)
+    joints = np.log(joint_sizes[1] + 1e-12) - np.log(joint_sizes[0] + 1e-12)
     names = np.unique(errors[0].trajectory)
     if len(names) >= 6:
         ratio = np.array([ratio[errors[0].trajectory == k].mean() for k in names])
     change = float(ratio.mean())
-    half = 0.0
-    if np.isfinite(change):
-        spread = float(ratio.std(ddof=1) / np.sqrt(len(ratio)))
-        half = float(student_t.ppf(0.975, len(ratio) - 1)) * spread
+    spread = float(ratio.std(ddof=1) / np.sqrt(len(ratio)))
+    half = float(student_t.ppf(0.975, len(ratio) - 1)) * spread
     return SimulationVerdict(
         errors[0], errors[1], change, change - half, change + half, joints.mean(axis=0)
     )

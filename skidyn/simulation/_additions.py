@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which of several additions to a model make it move more like the robot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.base import clone
+
+from skidyn._columns import column_names
+from skidyn._exceptions import SkidynError
+from skidyn.forward import Controller
+from skidyn.identification import RBDRegressor
+from skidyn.model_selection import held_out_folds
+from skidyn.simulation._score import (
+    HORIZON,
+    SimulationErrors,
+    SimulationVerdict,
+    compare_errors,
+    pooled_errors,
+    simulation_errors,
+)
+
+Rows = NDArray[np.intp]
+
+#: Folds at most; a single recording is cut into as many pieces of time.
+_FOLDS = 5
+
+
+def judge_additions(
+    model: RBDRegressor,
+    additions: Sequence[Iterable[Any]],
+    X: Any,
+    y: Any,
+    *,
+    controller: Controller | None = None,
+    horizon: float | None = HORIZON,
+) -> list[SimulationVerdict | None]:
+    """Judge additions to a model by simulation of recordings that were left out of its fit.
+
+    Recordings are left out fold by fold, one recording in pieces of time; the model is fitted to
+    the others without and with an addition, and simulated along those left out. Each addition is
+    judged on top of those before it that did not worsen the motion. All are fitted with
+    ``consistent=True``: other bodies may have an inertia with which nothing can move.
+
+    Parameters
+    ----------
+    model : RBDRegressor
+        Model without the additions; need not be fitted.
+    additions : sequence of iterables of str, (str, joints) or Term
+        Effects that are added together, as for :meth:`RBDRegressor.with_effects`.
+    X : DataFrame
+        Motion with ``time`` (s), as in :func:`simulate`; with a controller also its reference.
+    y : array-like of shape (n_samples, n_joints), N m or N
+        Torque, to which models are fitted; it drives them too unless there is a controller.
+    controller : Controller, optional
+        Drives the models toward ``q_ref1..`` in place of y.
+    horizon : float, s, or None, default=1.0
+        Length of the pieces that are simulated; None for whole trajectories.
+
+    Returns
+    -------
+    list of SimulationVerdict or None
+        For every addition; None where simulation says nothing: it cannot be simulated, or the
+        simulated motion is further from the logged one than that of a model without forces, with
+        the addition and without.
+
+    Raises
+    ------
+    SkidynError
+        The log has no time, or is too short to leave a part of it out.
+
+    Examples
+    --------
+    >>> from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+    >>> from skidyn.identification import RBDRegressor
+    >>> from skidyn.simulation import judge_additions
+    >>> log = make_hidden_effect_log(load_planar_arm(), "spring", joints=[1], random_state=0)
+    >>> model = RBDRegressor(log.robot, ("viscous", "coulomb"))
+    >>> verdicts = judge_additions(model, [[("spring", [1])]], log.X, log.y)
+    >>> verdicts[0].improves
+    True
+    """
+    folds = _folds(X, model.trajectory)
+    torque = np.asarray(y, dtype=float)
+    if model.consistent is False:
+        model = clone(model).set_params(consistent=True)
+    used: list[Any] = []
+    errors = _held_out(model, used, X, torque, folds, controller, horizon)
+    verdicts: list[SimulationVerdict | None] = []
+    for addition in additions:
+        terms = [*used, *addition]
+        try:
+            after = _held_out(model, terms, X, torque, folds, controller, horizon)
+        except SkidynError:
+            verdicts.append(None)
+            continue
+        verdict = compare_errors(errors, after)
+        verdicts.append(verdict if min(_typical(errors), _typical(after)) < 1.0 else None)
+        if verdicts[-1] is None or not verdict.worsens:
+            used, errors = terms, after
+    return verdicts
+
+
+def _folds(X: Any, trajectory: Any) -> list[tuple[Rows, Rows]]:
+    """Rows to fit and rows to simulate."""
+    names = column_names(X)
+    if names is None:
+        raise SkidynError("X is no table; give a DataFrame with the columns time, q1.., dq1..")
+    column = names[trajectory] if isinstance(trajectory, int) else trajectory or "trajectory"
+    number = np.asarray(X[column]) if column in names else np.zeros(len(X))
+    return held_out_folds(number, _FOLDS)
+
+
+def _held_out(
+    model: RBDRegressor,
+    terms: Sequence[Any],
+    X: Any,
+    y: Any,
+    folds: Sequence[tuple[Rows, Rows]],
+    controller: Controller | None,
+    horizon: float | None,
+) -> SimulationErrors:
+    """Errors of the simulated motion of every fold, by a model that has not seen it."""
+    found = []
+    for others, rows in folds:
+        fitted = model.with_effects(terms).fit(_rows(X, others), y[others])
+        drive = None if controller is not None else y[rows]
+        found.append(
+            simulation_errors(fitted, _rows(X, rows), drive, controller=controller, horizon=horizon)
+        )
+    return pooled_errors(found)
+
+
+def _typical(errors: SimulationErrors) -> float:
+    """Error of the median piece, relative to that of a model without forces."""
+    sizes = errors.pieces / np.maximum(errors.resting, 1e-12)
+    return float(np.median(np.sqrt(np.mean(sizes**2, axis=1))))
+
+
+def _rows(X: Any, rows: Rows) -> Any:
+    return X.iloc[rows] if hasattr(X, "iloc") else X[rows]
