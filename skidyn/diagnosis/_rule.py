@@ -127,6 +127,9 @@ class Settings:
         one's score is named.
     ripple_share : float
         Torque ripple must do this share of what a function of the signals does on averaged rows.
+    resolved : float
+        Times the lower end of the range of a shape parameter that its refined value must reach;
+        below, the effect is the simpler kind that it becomes there.
     member : float
         Chance at which one of several recordings differs, once all together are more than chance.
     most_recordings : int
@@ -163,6 +166,7 @@ class Settings:
     simpler_share: float = 0.05
     family_share: float = 0.95
     ripple_share: float = 0.8
+    resolved: float = 2.0
     member: float = 0.05
     most_recordings: int = 2
     white: float = 2.0

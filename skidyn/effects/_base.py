@@ -74,6 +74,9 @@ class Shape:
         Whether the value is an angle or angular velocity, so that it scales for sliders.
     has_interval : bool
         Whether a confidence interval of the value is stated.
+    limit_kind : str
+        Simpler kind that the effect becomes where the value is too small to be resolved, as
+        pre-sliding friction becomes Coulomb friction.
 
     Examples
     --------
@@ -89,6 +92,7 @@ class Shape:
     spacing: Literal["log", "linear"] = "log"
     scales: bool = True
     has_interval: bool = True
+    limit_kind: str = ""
 
 
 class Effect:

@@ -233,7 +233,14 @@ class Dahl(PathMemory):
     formula = r"F\,h,\quad \tfrac{dh}{dq} = \tfrac{1}{\delta}\,(1 - h\,\mathrm{sign}\,\dot q)"
     coefficients = (Coefficient("F", "N m", sign=1),)
     shapes = (
-        Shape("presliding", "rad", (0.003, 0.008, 0.014, 0.022, 0.035, 0.055, 0.09), 0.0005, 0.5),
+        Shape(
+            "presliding",
+            "rad",
+            (0.003, 0.008, 0.014, 0.022, 0.035, 0.055, 0.09),
+            0.0005,
+            0.5,
+            limit_kind="coulomb",
+        ),
     )
     family = "hysteresis"
     simplicity = 21
@@ -254,7 +261,14 @@ class LuGre(PathMemory):
     formula = r"\left(F_c + \Delta F\,e^{-(\dot q/v_s)^2}\right) h,\quad h\ \text{as in Dahl}"
     coefficients = (Coefficient("F", "N m", sign=1), Coefficient("dF", "N m"))
     shapes = (
-        Shape("presliding", "rad", (0.003, 0.008, 0.014, 0.022), 0.0005, 0.5),
+        Shape(
+            "presliding",
+            "rad",
+            (0.003, 0.008, 0.014, 0.022),
+            0.0005,
+            0.5,
+            limit_kind="coulomb",
+        ),
         Shape("vs", "rad/s", (0.05, 0.1, 0.16), 0.01, 1.0),
     )
     family = "hysteresis"
@@ -285,7 +299,16 @@ class MaxwellSlip(PathMemory):
         Coefficient("F2", "N m"),
         Coefficient("F3", "N m"),
     )
-    shapes = (Shape("presliding", "rad", (0.005, 0.016, 0.025, 0.04, 0.06, 0.1), 0.001, 0.5),)
+    shapes = (
+        Shape(
+            "presliding",
+            "rad",
+            (0.005, 0.016, 0.025, 0.04, 0.06, 0.1),
+            0.001,
+            0.5,
+            limit_kind="coulomb",
+        ),
+    )
     family = "hysteresis"
     simplicity = 24
     rivals = ("dahl", "lugre", "coulomb")

@@ -10,15 +10,7 @@ import numpy as np
 
 from skidyn._signals import Signals
 from skidyn.effects._base import Array, Coefficient, Effect, Shape
-
-
-def time_derivative(values: Array, signals: Signals) -> Array:
-    """Derivative over time within each segment, by central differences (per second)."""
-    rate = np.zeros_like(values)
-    for rows in signals.segments:
-        if rows.stop - rows.start >= 2:
-            rate[rows] = np.gradient(values[rows], signals.clock[rows], axis=0)
-    return rate
+from skidyn.effects._derivatives import smooth_derivatives
 
 
 class TorqueGain(Effect):
@@ -69,7 +61,8 @@ class TimeDelay(Effect):
         smooth = (
             signals.smooth_torque if signals.smooth_torque is not None else signals.model_torque
         )
-        return {j: -time_derivative(smooth[:, [j]], signals) for j in joints}
+        # Its acceleration is noisy, and a derivative of it would be noise on single samples.
+        return {j: -smooth_derivatives(smooth[:, [j]], signals, order=2)[1] for j in joints}
 
 
 class Saturation(Effect):

@@ -9,29 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from skidyn._local_polynomial import local_polynomial
 from skidyn._signals import Signals
 from skidyn.effects._base import Array, Coefficient, Effect, Shape
-
-#: Width over which the load is smoothed before it is differentiated twice, in s.
-_SMOOTHING = 0.08
-
-
-def _smooth_derivatives(values: Array, signals: Signals) -> tuple[Array, Array, Array]:
-    """A signal smoothed by local quartic polynomials, with its first two time derivatives."""
-    result = tuple(np.zeros_like(values) for _ in range(3))
-    for rows in signals.segments:
-        y = values[rows]
-        if len(y) < 7:
-            continue
-        step = float(np.median(np.diff(signals.clock[rows])))
-        half = max(3, int(_SMOOTHING / 2 / step))
-        width = min(2 * half + 1, (len(y) - 1) // 2 * 2 + 1)
-        for out, part in zip(
-            result, local_polynomial(y, width, min(4, width - 1), step), strict=True
-        ):
-            out[rows] = part
-    return result  # type: ignore[return-value]
+from skidyn.effects._derivatives import smooth_derivatives
 
 
 def _oscillator(load: Array, signals: Signals, resonance: float, damping: float) -> Array:
@@ -136,7 +116,7 @@ class _LinkSideEffect(Effect):
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
         (joint,) = joints
-        moves = _smooth_derivatives(self.displacement(signals, joint, **shape), signals)
+        moves = smooth_derivatives(self.displacement(signals, joint, **shape), signals)
         slopes = _torque_slopes(signals, joint)
         columns = {}
         for j in range(signals.n_joints):
