@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from operator import is_not
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,7 +95,9 @@ class _Search:
             self.pool += _nameless_candidates(problem, problem.torque - problem.explained(base))
         self.by_recording = recording_candidates(problem, self.kinds)
         self.n_tests = max(1, len(self.pool) + len(self.by_recording))
+        self.whole_pool = self.pool
         self.start = self.left = np.zeros(problem.n_joints)
+        self._reconsidering = False
         self._kept_tester: tuple[list[Array], Tester | None] = ([], None)
 
     # ---------------------------------------------------------------- state of the model so far
@@ -141,6 +144,7 @@ class _Search:
             self.add(best)
             self.withdraw(best)
             self.refit()
+            self.reconsider(best, steps)
         self.sigma = self.fit.noise
         self.withdraw()
         everywhere = range(self.problem.n_joints)
@@ -157,12 +161,132 @@ class _Search:
             ranking.remove(best)
             if self._richer_known(best):
                 continue
+            best = self._first_of_two_names(best, offered)
             simpler = self._at_its_limit(best)
             judged = None if simpler is None else self.judged(simpler)
-            if judged is not None and not self.shadow(judged):
+            if judged is not None and self.shadow(judged):
+                judged = self._beside_another_kind(judged)
+            if judged is not None:
                 rivals = _rivals(judged, offered)
                 return replace(judged, margin=_margin(judged, rivals))
         return None
+
+    def _first_of_two_names(self, best: Hypothesis, ranking: list[Hypothesis]) -> Hypothesis:
+        """A nameless function, or the first of two known effects that together do as well."""
+        if best.kind != UNKNOWN or best.errors is None or _within(best) or self._reconsidering:
+            return best
+        joints = list(best.joints)
+        left = best.errors.sum(0)
+        weight = 1 / np.maximum(left[joints], 1e-300)
+        removed = left * np.expm1(np.maximum(best.gain, 0) / self._counts)
+        tolerated = self.settings.form_tolerance * float(weight @ removed[joints])
+        rivals = [
+            h
+            for h in ranking
+            if h.kind != UNKNOWN
+            and h.errors is not None
+            and not _within(h)
+            and set(joints) <= set(h.joints)
+        ]
+        for rival in rivals[: self.settings.refined]:
+            first = self.judged(rival)
+            if first is None:
+                continue
+            kept = self._state()
+            self.add(first)
+            self.refit()
+            self.sigma = self.fit.noise
+            known = [c for c, _ in self._greedy_by_kind(nameless=False)]
+            second = [h for h in self._finals(known) if set(joints) <= set(h.joints)]
+            errors = [h.errors.sum(0) for h in second if h.errors is not None]
+            self._restore(kept)
+            if any(float(weight @ (e - left)[joints]) <= tolerated for e in errors):
+                return rival
+        return best
+
+    # ---------------------------------------------------------------- earlier findings, once more
+    def reconsider(self, newest: Hypothesis, steps: list[Step]) -> None:
+        """Let every kind compete again for what earlier findings explain, beside the newest."""
+        for old in [h for h in self.findings if h is not newest and h.torque is None]:
+            step = self._competed_again(old)
+            if step is not None:
+                steps[:] = [step if s.added is old else s for s in steps]
+                newest = self._refined_anew(newest)
+            elif set(old.joints) & set(newest.joints):
+                self._refined_anew(old)
+
+    def _competed_again(self, old: Hypothesis) -> Step | None:
+        """Put the kind that now wins in the place of an earlier finding, if it is another one."""
+        kept = self._state()
+        place = self.findings.index(old)
+        self.findings.remove(old)
+        self.chosen = [c for c in self.chosen if c not in old.candidates]
+        taken = {c.site for c in self.chosen}
+        self.pool = [c for c in self.whole_pool if c.site not in taken]
+        self.refit()
+        self.sigma, self.left = self.fit.noise, self._left()
+        self._reconsidering = True
+        ranking = self.rank()
+        best = self.accepted(ranking)
+        self._reconsidering = False
+        again = self._finals([list(old.candidates)])
+        known = best is not None and best.kind not in (old.kind, UNKNOWN)
+        if best is None or not known or any(h.score > best.score for h in again):
+            self._restore(kept)
+            return None
+        self.add(best)
+        self.findings.insert(place, self.findings.pop())
+        self.refit()
+        self.sigma, self.left = self.fit.noise, self._left()
+        return Step([best, *(h for h in ranking if h.kind != best.kind)], best)
+
+    def _beside_another_kind(self, shadow: Hypothesis) -> Hypothesis | None:
+        """What looks like the shadow of an earlier finding, if that was the wrong kind.
+
+        Two effects on one joint may first look like a third one, beside which the second of them is
+        small.
+        """
+        if self._reconsidering or shadow.kind == UNKNOWN or _within(shadow):
+            return None
+        own = set(shadow.joints)
+        for old in [h for h in self.findings if h.torque is None and own & set(h.joints)]:
+            kept = self._state()
+            before = self.left
+            self.add(shadow)
+            self.refit()
+            if self._competed_again(old) is not None:
+                counts = self.problem.rows.counts
+                gain = float(log_likelihood_gain(before[None], self.left[None], counts).sum())
+                added = sum(map(self._count, self.findings)) - sum(map(self._count, kept[1]))
+                if gain - 2 * self._price(self.chosen) * added > self.settings.least_gain:
+                    self.findings = [h for h in self.findings if h is not shadow]
+                    self.chosen = [c for c in self.chosen if c not in shadow.candidates]
+                    self.refit()
+                    self.sigma, self.left = self.fit.noise, self._left()
+                    for found in self._finals([list(shadow.candidates)]):
+                        return self.judged(found)
+            self._restore(kept)
+        return None
+
+    def _count(self, hypothesis: Hypothesis) -> int:
+        return hypothesis.n_parameters
+
+    def _state(self) -> tuple[Any, ...]:
+        return (
+            self.chosen,
+            list(self.findings),
+            self.pool,
+            self.ripple,
+            self.sigma,
+            self.left,
+            self.start,
+        )
+
+    def _restore(self, state: tuple[Any, ...]) -> None:
+        self.chosen, self.findings, self.pool, self.ripple, self.sigma, self.left, self.start = (
+            state
+        )
+        self.refit()
 
     def _at_its_limit(self, hypothesis: Hypothesis) -> Hypothesis | None:
         """The hypothesis, or the simpler kind that its unresolved terms are; what has them waits.
@@ -321,7 +445,7 @@ class _Search:
         if best.torque is not None:
             self.ripple = self.ripple + best.torque
         else:
-            self.chosen += best.candidates
+            self.chosen = [*self.chosen, *best.candidates]
         self.findings.append(best)
         taken = {c.site for c in best.candidates}
         self.pool = [c for c in self.pool if c.site not in taken]
@@ -350,7 +474,9 @@ class _Search:
                 self._replace(old, kept, without)
 
     def _refined_anew(self, finding: Hypothesis) -> Hypothesis:
-        """A finding with its shapes found again, now that another one is gone."""
+        """A finding with its shapes found again, now that others have changed."""
+        if finding.torque is not None or not any(c.n_shapes for c in finding.candidates):
+            return finding
         others = [c for c in self.chosen if c not in finding.candidates]
         own = [self.problem.term_rows(term) for term in self.problem.terms]
         blocks = [*own, *(c.rows for c in others)]
@@ -485,7 +611,7 @@ class _Search:
         ]
         return min([best, *near], key=_simplicity)
 
-    def _greedy_by_kind(self) -> list[tuple[list[Candidate], float]]:
+    def _greedy_by_kind(self, nameless: bool = True) -> list[tuple[list[Candidate], float]]:
         """For each kind, terms added joint by joint while each lowers the held-out error."""
         screen = Screen(self.problem, self.sigma, self.pool, self.target)
         kinds = np.array([c.kind for c in self.pool])
@@ -494,7 +620,8 @@ class _Search:
         first = screen.step(base_model)
         tester = self.tester(self.chosen)
         found = []
-        for kind in track(list(dict.fromkeys(kinds)), f"{self._round}: screening effects"):
+        wanted = [kind for kind in dict.fromkeys(kinds) if nameless or kind != UNKNOWN]
+        for kind in track(wanted, f"{self._round}: screening effects"):
             chosen, drop = self._greedy(screen, kinds == kind, base, first, tester)
             if chosen:
                 found.append((chosen, -(drop - 2 * sum(c.width for c in chosen))))
