@@ -196,8 +196,12 @@ class _Search:
             self.add(first)
             self.refit()
             self.sigma = self.fit.noise
-            known = [c for c, _ in self._greedy_by_kind(nameless=False)]
-            second = [h for h in self._finals(known) if set(joints) <= set(h.joints)]
+            known = sorted(self._greedy_by_kind(nameless=False), key=lambda item: item[1])
+            second = [
+                h
+                for h in self._finals([c for c, _ in known[: self.settings.refined]])
+                if set(joints) <= set(h.joints)
+            ]
             errors = [h.errors.sum(0) for h in second if h.errors is not None]
             self._restore(kept)
             if any(float(weight @ (e - left)[joints]) <= tolerated for e in errors):
@@ -417,7 +421,12 @@ class _Search:
         settings = self.settings
         tolerance = settings.nameless_tolerance if nameless else settings.form_tolerance
         own, earlier = self._removed(self.left, hypothesis.gain), self.start - self.left
-        return self._mostly_small(joints, hypothesis.gain, own, tolerance * earlier)
+        if not self._mostly_small(joints, hypothesis.gain, own, tolerance * earlier):
+            return False
+        # What an imperfect formula leaves does not become noise by one known effect.
+        known = hypothesis.kind != UNKNOWN and not _within(hypothesis)
+        most = self._mostly_small(joints, hypothesis.gain, own, 0.5 * self.left)
+        return not known or most or self._price(hypothesis.candidates) > settings.white
 
     def _mostly_small(self, joints: Sequence[int], gain: Array, own: Array, least: Array) -> bool:
         """Whether most of a gain is had on joints of which less is removed than what is least.
