@@ -163,8 +163,10 @@ def find_limits(
         own, swept = _information(candidate, design, sigma, model)
         needed = gates.needed(joint, candidate.width + candidate.n_shapes, float(inflation[joint]))
         size = needed / np.sqrt(swept) if swept > NEW_SHARE * own else np.inf
-        # More than all that the torque holds is no limit.
-        told = size if size**2 * own < power[joint] else np.inf
+        # More than all that the torque holds is no limit, nor a torque beyond its range, of which
+        # the motion shows a vanishing part.
+        beyond = effect.coefficients[0].unit == "N m" and size > np.ptp(problem.torque[:, joint])
+        told = size if size**2 * own < power[joint] and not beyond else np.inf
         largest.setdefault((effect.kind, joint), []).append((candidate, float(told)))
     limits = [_limit(problem, joint, tried) for (_, joint), tried in largest.items()]
     return sorted([*limits, *_not_shown(problem)], key=lambda limit: (limit.joint, limit.kind))

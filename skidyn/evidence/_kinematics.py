@@ -12,8 +12,8 @@ from scipy.interpolate import CubicSpline
 from skidyn._local_polynomial import local_polynomial
 from skidyn._signals import Array, Signals
 
-#: Order of the local polynomial. A quartic of the same noise takes 0.7 % off an acceleration of 6 Hz
-#: at 100 Hz, which looks like an elastic joint where the torque is that precise; this one 0.1 %.
+#: Order of the local polynomial. Of accelerations of 6 Hz sampled at 100 Hz a quartic of the same
+#: noise takes 0.7 %, which looks like an elastic joint where the torque is precise; this one 0.1 %.
 ORDER = 6
 #: Highest cut-off in Hz, and the largest share of the sampling rate.
 HIGHEST_CUTOFF, CUTOFF_SHARE = 27.0, 0.24

@@ -53,7 +53,8 @@ def test_velocity_and_acceleration_are_the_derivatives(motion):
     inner = slice(2, -2)
 
     for x, dx in ((motion.q, motion.dq), (motion.dq, motion.ddq)):
-        numeric = np.gradient(x[:, 1], step)[inner]
+        before, after = x[1:-3, 1] - x[3:-1, 1], x[:-4, 1] - x[4:, 1]
+        numeric = (after - 8 * before) / (12 * step)  # fourth order
         assert np.abs(numeric - dx[inner, 1]).max() < 0.05 * np.abs(dx[:, 1]).max()
 
 
