@@ -152,6 +152,7 @@ PAGES: tuple[Page, ...] = (
             Section(
                 "Functions",
                 (
+                    "fit_bam_servo",
                     "fit_controller",
                     "fit_servo",
                     "judge_additions",
@@ -159,6 +160,7 @@ PAGES: tuple[Page, ...] = (
                     "neg_simulation_error",
                     "servo_torque",
                     "simulate",
+                    "simulate_bam_servo",
                     "simulate_closed_loop",
                     "simulation_errors",
                 ),

@@ -32,6 +32,10 @@ __all__ = [
 ]
 
 # For other packages of skidyn; no part of the public interface.
+from skidyn.export._bam import (
+    BAM_MODELS as BAM_MODELS,
+    friction_budget as friction_budget,
+)
 from skidyn.export._model import (
     check_model as check_model,
     name_term as name_term,

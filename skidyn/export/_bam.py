@@ -123,11 +123,11 @@ class BamModel:
             *(np.asarray(x, dtype=float) for x in (motor_torque, external_torque, dq))
         )
         return np.asarray(
-            np.sign(speed) * budget(self.name, self.parameters, motor, outside, speed)
+            np.sign(speed) * friction_budget(self.name, self.parameters, motor, outside, speed)
         )
 
 
-def budget(
+def friction_budget(
     name: str, values: Mapping[str, Any], motor: Array, outside: Array, speed: Array
 ) -> Array:
     """Largest torque of friction, N m."""
@@ -224,7 +224,7 @@ def write_bam(
     path : path
         File to write.
     joint : str or int, optional
-        Joint of a fitted model, by name or counted from 0; not needed if there is one.
+        Joint of a fitted model, by name or counted from 1; not needed if there is one.
     actuator : str, optional
         Type of servo as BAM calls it; needed for a fitted model.
     motor : mapping of str to float, optional
@@ -265,19 +265,19 @@ def write_bam(
     return left
 
 
-def joint_number(robot: Any, joint: str | int | None) -> int:
-    """A rotary joint by name or number."""
+def joint_place(robot: Any, joint: str | int | None) -> int:
+    """Place of a rotary joint in arrays, by its name or its number from 1."""
     names = list(robot.joint_names)
     if joint is None and len(names) == 1:
-        joint = 0
-    number = names.index(joint) if isinstance(joint, str) and joint in names else joint
-    if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number < len(names):
+        joint = 1
+    number = names.index(joint) + 1 if isinstance(joint, str) and joint in names else joint
+    if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= len(names):
         raise SkidynError(
-            f"joint is {joint!r}; expected one of {', '.join(names)}, or its number from 0"
+            f"joint is {joint!r}; expected one of {', '.join(names)}, or its number from 1"
         )
-    if robot.joint_types[number] == "prismatic":
-        raise SkidynError(f"{names[number]} slides; BAM's servos turn")
-    return number
+    if robot.joint_types[number - 1] == "prismatic":
+        raise SkidynError(f"{names[number - 1]} slides; BAM's servos turn")
+    return number - 1
 
 
 def _of_joint(
@@ -291,7 +291,7 @@ def _of_joint(
         raise SkidynError("BAM's format holds friction; give a fitted RBDRegressor or a BamModel")
     if actuator is None:
         raise SkidynError("actuator is missing: the servo as BAM calls it, such as 'xl330'")
-    number = joint_number(model.robot_, joint)
+    number = joint_place(model.robot_, joint)
     values = {"armature": 0.0, "friction_base": 0.0, "friction_viscous": 0.0}
     places = {
         "rotor_inertia": "armature",
@@ -300,7 +300,7 @@ def _of_joint(
     }
     left = []
     for term in model.effect_terms_:
-        if number not in term.joints:
+        if number not in term.places:
             continue
         size = float(model.effect_coefficients_[term][0])
         whole = not {k for k in ("trajectory", "trajectories") if term.shape.get(k) is not None}

@@ -14,7 +14,7 @@ from skidyn._columns import column_names, resolve_columns
 from skidyn._exceptions import SkidynError
 from skidyn._signals import signals_from
 from skidyn.evidence import smooth_motion
-from skidyn.export._bam import ALWAYS, BAM_MODELS, BamModel, budget, joint_number
+from skidyn.export._bam import ALWAYS, BAM_MODELS, BamModel, friction_budget, joint_place
 from skidyn.robots import Robot
 
 #: Velocity (rad/s) below which friction may be anything up to its size.
@@ -53,7 +53,7 @@ def fit_bam(
     y : array-like of shape (n_samples, n_joints), N m
         Torque of the motors.
     joint : str or int, optional
-        Joint, by name or counted from 0; not needed if there is one.
+        Joint, by name or counted from 1; not needed if there is one.
     name : {"m1", "m2", "m3", "m4", "m5", "m6"}, default="m6"
         Model of friction.
     actuator : str
@@ -82,7 +82,7 @@ def fit_bam(
     """
     if name not in BAM_MODELS:
         raise SkidynError(f"name is {name!r}; BAM has the models {', '.join(BAM_MODELS)}")
-    j = joint_number(robot, joint)
+    j = joint_place(robot, joint)
     q, dq, ddq = _motion(robot, X)
     torque = np.asarray(y, dtype=float).reshape(len(q), -1)
     if torque.shape[1] != robot.n_joints:
@@ -105,7 +105,7 @@ def fit_bam(
 
     def residual(x: Any) -> Any:
         values = dict(zip(keys, x, strict=True))
-        friction = np.sign(speed) * budget(name, values, given, outside, speed)
+        friction = np.sign(speed) * friction_budget(name, values, given, outside, speed)
         return (bodies + values["armature"] * own + friction - given) / size
 
     low = np.array([{"dtheta_stribeck": _SLOWEST, "alpha": _EXPONENT[0]}.get(k, 0.0) for k in keys])

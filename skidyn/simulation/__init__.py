@@ -3,6 +3,7 @@
 
 from skidyn.forward import Controller, fit_controller
 from skidyn.simulation._additions import judge_additions
+from skidyn.simulation._bam_servo import fit_bam_servo, simulate_bam_servo
 from skidyn.simulation._closed_loop import simulate_closed_loop
 from skidyn.simulation._score import (
     SimulationErrors,
@@ -18,6 +19,7 @@ __all__ = [
     "Controller",
     "SimulationErrors",
     "SimulationVerdict",
+    "fit_bam_servo",
     "fit_controller",
     "fit_servo",
     "judge_additions",
@@ -25,6 +27,7 @@ __all__ = [
     "neg_simulation_error",
     "servo_torque",
     "simulate",
+    "simulate_bam_servo",
     "simulate_closed_loop",
     "simulation_errors",
 ]

@@ -101,7 +101,7 @@ def test_a_fitted_model_is_written_as_the_simplest_that_holds_it(fit, load, tmp_
     )
     assert left == ("offset of joint2",)
     found = read_bam(tmp_path / "m1.json")
-    own = {t.kind: c[0] for t, c in model.effect_coefficients_.items() if t.joints == (1,)}
+    own = {t.kind: c[0] for t, c in model.effect_coefficients_.items() if t.joints == (2,)}
     assert found.name == "m1" and found.actuator == "mx64"
     assert found.parameters == {
         "armature": own["rotor_inertia"],
@@ -109,10 +109,10 @@ def test_a_fitted_model_is_written_as_the_simplest_that_holds_it(fit, load, tmp_
         "friction_viscous": own["viscous"],
         "kt": 1.6,
     }
-    stribeck = Term("stribeck", (1,), {"vs": 0.1, "delta": 2.0})
+    stribeck = Term("stribeck", (2,), {"vs": 0.1, "delta": 2.0})
     model = fit(load("scara"), ["coulomb", stribeck], consistent=True)
     model.effect_coefficients_[stribeck] = np.array([0.3])
-    assert write_bam(model, tmp_path / "m2.json", joint=1, actuator="mx64") == ()
+    assert write_bam(model, tmp_path / "m2.json", joint=2, actuator="mx64") == ()
     found = read_bam(tmp_path / "m2.json")
     assert found.name == "m2" and found.parameters["friction_stribeck"] == 0.3
     q, dq, ddq = np.zeros((3, 9, model.robot_.n_joints))
@@ -161,7 +161,8 @@ def test_wrong_files_and_arguments_are_refused_by_name(fit, load, tmp_path):
     model = fit(load("scara"), ["viscous"], consistent=True)
     cases = {
         "expected one of": {"joint": "elbow", "actuator": "x"},
-        "actuator is missing": {"joint": 0},
+        "number from 1": {"joint": 0, "actuator": "x"},
+        "actuator is missing": {"joint": 1},
         "slides": {"joint": "joint3", "actuator": "x"},
     }
     for message, words in cases.items():

@@ -179,7 +179,7 @@ def test_a_robot_alone_has_no_friction(states, tmp_path):
 
 def test_parameters_are_arrays_in_the_order_of_the_joints(fit, load, tmp_path):
     yaml = pytest.importorskip("yaml")
-    stribeck = Term("stribeck", (0,), {"vs": 0.1, "delta": 2.0})
+    stribeck = Term("stribeck", (1,), {"vs": 0.1, "delta": 2.0})
     effects = ["viscous", "coulomb", "rotor_inertia", ("spring", [2]), stribeck]
     model = fit(load("scara"), effects, consistent=True)
     write_ros2(model, tmp_path, package="scara_dynamics")
@@ -194,7 +194,7 @@ def test_parameters_are_arrays_in_the_order_of_the_joints(fit, load, tmp_path):
     for term, values in model.effect_coefficients_.items():
         for c, value in zip(term.effect.coefficients, values, strict=True):
             found = own[term.kind][c.name]
-            assert found[term.joints[0]] == value
+            assert found[term.joints[0] - 1] == value
             assert all(isinstance(x, float) for x in found)
     assert own["stribeck"]["vs"] == [0.1, 0.0, 0.0, 0.0]
 

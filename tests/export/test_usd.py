@@ -121,7 +121,7 @@ def test_friction_and_armature_have_the_units_of_the_stage(model, own):
 
     merge_usd(model, own / "own.usda", own / "new.usda")
     stage = Usd.Stage.Open(str(own / "new.usda"))
-    sizes = {(t.kind, t.joints[0]): c[0] for t, c in model.effect_coefficients_.items()}
+    sizes = {(t.kind, t.joints[0] - 1): c[0] for t, c in model.effect_coefficients_.items()}
     for j, (name, axis) in enumerate((("shoulder", "angular"), ("elbow", "linear"))):
         prim = stage.GetPrimAtPath(f"/arm/{name}")
         assert f"PhysxJointAxisAPI:{axis}" in prim.GetAppliedSchemas() or prim.GetMetadata(
