@@ -89,11 +89,13 @@ def conclude(
     while True:
         steps = _steps(problem, result, torque, sliding)
         terms = [*problem.terms, *_found_terms(problem, result.findings)]
-        intervals = parameter_intervals(problem, terms, result.fit.noise)
-        useless = _useless(result.findings, steps, least_drop) or _vague(result.findings, intervals)
+        useless = _useless(result.findings, steps, least_drop) or _vague(
+            result.findings, parameter_intervals(problem, terms, result.fit.noise, shapes=False)
+        )
         if useless is None:
             break
         result = _without(problem, result, *useless)
+    intervals = parameter_intervals(problem, terms, result.fit.noise)
     held = steps[-1].held
     history = [step.entry for step in steps]
     shown = [entry["rmse"] for entry in history]

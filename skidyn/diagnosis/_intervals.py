@@ -3,7 +3,9 @@
 
 The jackknife over whole trajectories (Efron, Stein 1981, Ann. Stat. 9) holds whatever the
 autocorrelation within a trajectory. Shape parameters take part through the derivative of the
-effect's torque (one Gauss-Newton step from the fitted value in every fold).
+effect's torque (one Gauss-Newton step from the fitted value in every fold), which is held to the
+spacing of the grid on which they were found: along a direction that the data leaves open, a
+linear step would lead anywhere.
 """
 
 from __future__ import annotations
@@ -15,8 +17,14 @@ import numpy as np
 from scipy.stats import t as student_t
 
 from skidyn._signals import Array
-from skidyn.effects import Term, TermSum
-from skidyn.evidence import Problem, jackknife, left_out_coefficients
+from skidyn.effects import Shape, Term, TermSum
+from skidyn.evidence import (
+    Problem,
+    fold_products,
+    jackknife,
+    left_out_coefficients,
+    solve_left_out,
+)
 
 CONFIDENCE = 0.95
 #: Relative step (or absolute, for linear parameters) of the derivative by a shape parameter.
@@ -26,7 +34,7 @@ Interval = tuple[float, float, float]
 
 
 def parameter_intervals(
-    problem: Problem, terms: Sequence[Term], sigma: Array
+    problem: Problem, terms: Sequence[Term], sigma: Array, shapes: bool = True
 ) -> dict[Term, dict[str, Any]]:
     """Physical parameters of every term with 95 % intervals.
 
@@ -38,6 +46,9 @@ def parameter_intervals(
         Every effect of the model.
     sigma : ndarray of shape (n_joints,)
         Noise of one row.
+    shapes : bool, default=True
+        Whether shape parameters are uncertain, too. Without them an interval says whether an
+        effect of this very shape may be absent.
 
     Returns
     -------
@@ -49,9 +60,12 @@ def parameter_intervals(
     )
     places = list(TermSum(terms).slices(len(problem.rigid_index)))
     at = len(whole)
-    slopes, owners = _slopes(problem, places, whole)
+    slopes, owners, spread = _slopes(problem, places if shapes else [], whole)
     design = problem.design([*blocks, *slopes])
-    full, left = left_out_coefficients(problem, design, sigma, problem.target)
+    grams, cross = fold_products(problem, design, sigma, problem.target)
+    known = np.zeros(len(cross[0]))
+    known[len(known) - len(spread) :] = 1 / np.square(spread)
+    full, left = solve_left_out(grams, cross, (np.diag(known), np.zeros(len(known))))
     result = {}
     for i, (term, own) in enumerate(places):
         value = term.parameters(whole[own], problem.signals)
@@ -78,14 +92,16 @@ def parameter_intervals(
 
 def _slopes(
     problem: Problem, places: Sequence[tuple[Term, slice]], whole: Array
-) -> tuple[list[dict[int, Array]], list[tuple[int, str, bool]]]:
-    """Derivative of each term's torque by each of its continuous shape parameters."""
-    slopes, owners = [], []
+) -> tuple[list[dict[int, Array]], list[tuple[int, str, bool]], list[float]]:
+    """Derivative of each term's torque by each of its shape parameters, and their spread."""
+    slopes, owners, spread = [], [], []
     for i, (term, own) in enumerate(places):
         for shape in term.effect.shapes:
             if shape.name not in term.shape or not shape.has_interval:
                 continue
             here = float(term.shape[shape.name])
+            if np.isclose(here, shape.low, rtol=1e-6):
+                continue  # at the end of its range; what is beyond is no such effect
             log = shape.spacing == "log"
             step = STEP * here if log else STEP * max(abs(here), 1e-3)
             sides = [
@@ -97,7 +113,18 @@ def _slopes(
                 {j: ((sides[0][j] - sides[1][j]) @ whole[own])[:, None] / width for j in sides[0]}
             )
             owners.append((i, shape.name, log))
-    return slopes, owners
+            spread.append(_spacing(shape))
+    return slopes, owners, spread
+
+
+def _spacing(shape: Shape) -> float:
+    """Largest step between neighbours of the grid; of its logarithm where steps are factors."""
+    log = shape.spacing == "log"
+    grid = np.sort(np.log(shape.grid) if log else np.array(shape.grid, dtype=float))
+    if len(grid) < 2:  # known no better than by its range
+        low, high = (np.log(shape.low), np.log(shape.high)) if log else (shape.low, shape.high)
+        return float(high - low) / 2
+    return float(np.diff(grid).max())
 
 
 def _interval(value: Any, replicates: Sequence[Any]) -> Any:
@@ -105,4 +132,6 @@ def _interval(value: Any, replicates: Sequence[Any]) -> Any:
         return value
     values = np.array(replicates, dtype=float)
     half = float(student_t.ppf(0.5 + CONFIDENCE / 2, len(values) - 1) * jackknife(values))
+    if half <= 1e-9 * abs(value):
+        return value  # was not estimated
     return (float(value), float(value) - half, float(value) + half)

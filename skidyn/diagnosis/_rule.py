@@ -118,6 +118,8 @@ class Settings:
         tenth of its size. A nameless function that does better by no more than this does not take
         the place of a name, and a later finding that removes no more on the same joints is the
         shadow of the earlier ones.
+    exact_tolerance : float
+        The same where no effect has shape parameters, whose formulas are exact.
     nameless_tolerance : float
         The same for what a nameless function leaves: its form is only near the true one.
     simpler_share : float
@@ -162,6 +164,7 @@ class Settings:
     least_share: float = 0.006
     least_drop: float = 0.002
     form_tolerance: float = 0.015
+    exact_tolerance: float = 0.0015
     nameless_tolerance: float = 0.15
     simpler_share: float = 0.05
     family_share: float = 0.95

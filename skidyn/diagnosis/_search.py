@@ -414,12 +414,7 @@ class _Search:
     def shadow(self, hypothesis: Hypothesis) -> bool:
         """Whether an explanation is so small that earlier ones' imperfect formulas may leave it."""
         joints = sorted({j for c in hypothesis.candidates for j in c.rows})
-        nameless = any(
-            h.kind == UNKNOWN and h.torque is None and set(h.joints) & set(joints)
-            for h in self.findings
-        )
-        settings = self.settings
-        tolerance = settings.nameless_tolerance if nameless else settings.form_tolerance
+        settings, tolerance = self.settings, self._tolerance
         own, earlier = self._removed(self.left, hypothesis.gain), self.start - self.left
         if not self._mostly_small(joints, hypothesis.gain, own, tolerance * earlier):
             return False
@@ -427,6 +422,26 @@ class _Search:
         known = hypothesis.kind != UNKNOWN and not _within(hypothesis)
         most = self._mostly_small(joints, hypothesis.gain, own, 0.5 * self.left)
         return not known or most or self._price(hypothesis.candidates) > settings.white
+
+    @property
+    def _tolerance(self) -> Array:
+        """Share of the squared error removed so far that formulas may have left, by joint.
+
+        A formula without shape parameters is exact, or it is another kind's.
+        """
+        settings = self.settings
+        shares = np.full(self.problem.n_joints, settings.exact_tolerance)
+        for h in self.findings:
+            if h.kind == UNKNOWN and h.torque is not None:
+                continue
+            nameless = h.kind == UNKNOWN
+            for c in h.candidates:
+                if not nameless and not c.n_shapes:
+                    continue
+                share = settings.nameless_tolerance if nameless else settings.form_tolerance
+                reached = list(c.rows)
+                shares[reached] = np.maximum(shares[reached], share)
+        return shares
 
     def _mostly_small(self, joints: Sequence[int], gain: Array, own: Array, least: Array) -> bool:
         """Whether most of a gain is had on joints of which less is removed than what is least.
@@ -514,7 +529,7 @@ class _Search:
         before, after = (e.sum(0) for e in errors)
         joints = sorted({j for c in old.candidates for j in c.rows})
         gain = self._counts * np.log(np.maximum(before, 1e-300) / np.maximum(after, 1e-300))
-        least = self.settings.form_tolerance * (self.start - after)
+        least = self._tolerance * (self.start - after)
         return self._mostly_small(joints, gain, before - after, least)
 
     def _replace(

@@ -19,7 +19,7 @@ class PositionDependentFriction(Effect):
     title = "Position-dependent friction"
     formula = r"A\cos(n q - \varphi)\,\mathrm{sign}(\dot q)"
     coefficients = (Coefficient("a", "N m"), Coefficient("b", "N m"))
-    shapes = (Shape("n", "1/rad", (1.0, 2.0), 0.3, 100.0, spacing="linear", scales=False),)
+    shapes = (Shape("n", "1/rad", (1.0, 2.0), 1.0, 100.0, spacing="linear", scales=False),)
     simplicity = 22
     rivals = ("load_dependent_friction", "coulomb")
     separating_motion = "slow sweeps over the whole travel in both directions"
