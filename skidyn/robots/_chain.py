@@ -17,7 +17,8 @@ def build_chain(robot: Robot) -> Chain:
     """Chain of all bodies and of the links fixed to them, in float64 on the CPU.
 
     Built from what was read already and not by the parsers of pytorch-kinematics: these carry
-    offsets through float32, take z for an axis that is missing, and know no locked joints.
+    offsets through float32 (frames of the Panda are off by 2e-8 m), take z for an axis that is
+    missing, and know no locked joints.
 
     Parameters
     ----------

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The chain of pytorch-kinematics against the NumPy engine."""
 
+from importlib import resources
+
 import numpy as np
 import pytest
 
@@ -25,11 +27,39 @@ BRANCHED = """
     <origin xyz="0 0.2 0" rpy="1 0 0"/></joint>
 </robot>
 """
+INERTIAL = "<inertial><mass>2</mass><pose>0.1 0 0.2 0 0.4 0</pose></inertial>"
+SDF = f"""
+<sdf version="1.9"><model name="arm"><link name="base"/>
+ <link name="upper"><pose>0.1 0 0.5 0.2 0 0.3</pose>{INERTIAL}</link>
+ <link name="rod"><pose relative_to="slide"/>{INERTIAL}</link>
+ <joint name="turn" type="revolute"><pose>0 0.05 0 0 0 0.7</pose><parent>base</parent>
+  <child>upper</child><axis><xyz>0 1 1</xyz></axis></joint>
+ <joint name="slide" type="prismatic"><pose relative_to="upper">0.3 0 0 0 0 1</pose>
+  <parent>upper</parent><child>rod</child><axis><xyz>0 0 1</xyz></axis></joint>
+</model></sdf>
+"""
+MJCF = """
+<mujoco model="arm"><compiler angle="radian"/><worldbody><body name="base" pos="0 0 0.2">
+ <geom size="0.1" mass="1"/><body name="upper" pos="0.1 0 0.3" euler="0.4 0 0">
+  <joint name="yaw" axis="0 0 1" pos="0.02 0 0.01"/><joint name="pitch" axis="0 1 1"/>
+  <geom type="box" size="0.1 0.2 0.3" mass="2"/><body name="rod" pos="0.3 0.1 0">
+   <joint name="slide" type="slide" axis="1 0 0.5"/><geom size="0.1" mass="1.5"/>
+   <site name="tip" pos="0 0.3 0"/></body></body></body></worldbody></mujoco>
+"""
+
+
+def mjcf_robot():
+    pytest.importorskip("mujoco")
+    return Robot.from_mjcf(MJCF)
+
+
 ROBOTS = {
     "panda": load_panda,
     "ur10e": load_ur10e,
     "scara": load_scara,
     "branched": lambda: Robot.from_urdf(BRANCHED),
+    "sdf": lambda: Robot.from_sdf(SDF),
+    "mjcf": lambda: mjcf_robot(),
     "locked": lambda: Robot.from_urdf(BRANCHED, joints=["j2"]),
 }
 
@@ -56,6 +86,19 @@ def test_frames_agree_with_the_numpy_engine(name):
             position, rotation = robot.links[link].translation, robot.links[link].rotation
         assert np.abs(matrix[:, :3, 3] - position).max() < 1e-9
         assert np.abs(matrix[:, :3, :3] - rotation).max() < 1e-9
+
+
+def test_frames_are_those_of_the_parser_of_pytorch_kinematics():
+    from pytorch_kinematics import build_chain_from_urdf
+
+    robot, q = load_panda(), np.random.default_rng(0).uniform(-2, 2, (20, 7))
+    urdf = (resources.files("skidyn.datasets") / "robots" / "panda.urdf").read_bytes()
+    theirs = build_chain_from_urdf(urdf).to(dtype=torch.float64)
+    expected = theirs.forward_kinematics(torch.tensor(q))
+    for link, pose in robot.chain.forward_kinematics(torch.tensor(q)).items():
+        # Their parser carries offsets through float32.
+        difference = pose.get_matrix() - expected[link].get_matrix()
+        assert difference.abs().max() < 1e-6
 
 
 def test_jacobian_of_the_serial_chain_agrees():
