@@ -42,6 +42,7 @@ from skidyn.committee import ELMCommittee
 from skidyn.diagnosis import EffectSearchCV
 from skidyn.effects import FrictionTransformer, Term
 from skidyn.exceptions import LogError
+from skidyn.forecasting import AutoregressiveRegressor, PersistenceRegressor
 from skidyn.hybrid import HybridRegressor, OwnJointRegressor
 from skidyn.identification import RBDRegressor
 from skidyn.model_selection import LeakageWarning, TrajectoryKFold
@@ -79,6 +80,8 @@ REGRESSORS = {
         EffectSearchCV(RBDRegressor(PENDULUM), effects=(), cv=2),
         {"estimator__parameters": ["identified", "nominal"]},
     ),
+    "AR": (AutoregressiveRegressor(3), {"order": [1, 3]}),
+    "Persistence": (PersistenceRegressor(), {"trajectory": ["trajectory", "auto"]}),
 }
 SCORERS = {
     "r2": r2_score,
@@ -105,6 +108,15 @@ def make_log(n_trajectories=4, n_rows=100):
 X, Y = make_log()
 GROUPS = X["trajectory"].to_numpy()
 SPLITS = list(GroupKFold(2).split(X, Y, GROUPS))
+#: The torque one sample ago, for forecasts.
+BEFORE = np.where(np.diff(GROUPS, prepend=-1) == 0, np.roll(Y, 1), Y)
+PAST = X[["trajectory", "time"]].assign(q1=BEFORE)
+
+
+def table_of(model):
+    """Log of the kind that an estimator reads."""
+    forecasts = isinstance(model, AutoregressiveRegressor | PersistenceRegressor)
+    return PAST if forecasts else X
 
 
 @pytest.fixture(params=REGRESSORS)
@@ -128,6 +140,7 @@ def remarks():
 
 def by_hand(model, splits=SPLITS, score=r2_score):
     """Scores of a plain loop over folds."""
+    X = table_of(model)
     return [
         score(Y[test], clone(model).fit(X.iloc[train], Y[train]).predict(X.iloc[test]))
         for train, test in splits
@@ -135,6 +148,7 @@ def by_hand(model, splits=SPLITS, score=r2_score):
 
 
 def test_cross_validate_with_four_scorers(model):
+    X = table_of(model)
     found = cross_validate(model, X, Y, groups=GROUPS, cv=GroupKFold(2), scoring=list(SCORERS))
     fitted = [clone(model).fit(X.iloc[train], Y[train]) for train, _ in SPLITS]
     for name, score in SCORERS.items():
@@ -146,6 +160,7 @@ def test_cross_validate_with_four_scorers(model):
 
 
 def test_leave_one_group_out_and_learning_curve(model):
+    X = table_of(model)
     cv = LeaveOneGroupOut()
     scores = cross_val_score(model, X, Y, groups=GROUPS, cv=cv)
     np.testing.assert_allclose(scores, by_hand(model, cv.split(X, Y, GROUPS)), **SAME)
@@ -156,6 +171,7 @@ def test_leave_one_group_out_and_learning_curve(model):
 
 
 def test_searches(model, grid):
+    X = table_of(model)
     (name, values), *_ = grid.items()
     expected = [np.mean(by_hand(clone(model).set_params(**{name: value}))) for value in values]
     every = {"cv": TrajectoryKFold(2), "refit": False}
@@ -165,10 +181,12 @@ def test_searches(model, grid):
     order = [values.index(p[name]) for p in search.cv_results_["params"]]
     np.testing.assert_allclose(search.cv_results_["mean_test_score"], np.take(expected, order))
     epochs = isinstance(model, LSTMRegressor | SDLRegressor)
-    limits = {"min_resources": 2, "max_resources": 4} if epochs else {"min_resources": 100}
+    limits = {"min_resources": 2, "max_resources": 4} if epochs else {"min_resources": len(X) // 2}
     resource = "max_epochs" if epochs else "n_samples"
     halving = HalvingGridSearchCV(model, grid, resource=resource, factor=2, **limits, **every)
-    if isinstance(model, EffectSearchCV):  # it draws single rows, in which no motion is left
+    if isinstance(
+        model, EffectSearchCV | AutoregressiveRegressor
+    ):  # it draws single rows, in which no motion is left
         with pytest.raises(ValueError, match=r"(?s)not in the order of time.*HalvingGridSearchCV"):
             halving.fit(X, Y)
         return
@@ -179,9 +197,13 @@ def test_searches(model, grid):
         own = [m.set_params(max_epochs=n) for m, n in zip(own, found["n_resources"], strict=True)]
         expected = [np.mean(by_hand(m)) for m in own]
         np.testing.assert_allclose(found["mean_test_score"], expected, **SAME)
+    else:  # the last round has all rows, in another order
+        last = np.mean(by_hand(clone(model).set_params(**found["params"][-1])))
+        np.testing.assert_allclose(found["mean_test_score"][-1], last, rtol=1e-6)
 
 
 def test_inside_other_estimators(model):
+    X = table_of(model)
     own = clone(model).fit(X, Y).predict(X)
     other = LinearRegression().fit(X, Y)
     for table in ("default", "pandas", "polars"):
@@ -208,15 +230,23 @@ def test_bagging(model):
         if key in at:
             named[name] = at[key]
     bag = BaggingRegressor(clone(model).set_params(**named), 2, random_state=0)
-    table = X.to_numpy()
+    table = table_of(model).to_numpy()
+    if isinstance(model, AutoregressiveRegressor):  # it takes no weights, so that rows are drawn
+        with pytest.raises(LogError, match="not in the order of time.*BaggingRegressor"):
+            bag.fit(table, Y)
+        return
     members = [member.predict(table) for member in bag.fit(table, Y).estimators_]
     np.testing.assert_allclose(bag.predict(table), np.mean(members, axis=0), **SAME)
 
 
 def test_inspection(model):
+    X = table_of(model)
     model.fit(X, Y)
     importance = permutation_importance(model, X, Y, n_repeats=1, random_state=0)
-    assert importance.importances.shape == (5, 1) and np.isfinite(importance.importances).all()
+    assert (
+        importance.importances.shape == (X.shape[1], 1)
+        and np.isfinite(importance.importances).all()
+    )
     found = partial_dependence(model, X, ["q1"], grid_resolution=3)
     expected = [model.predict(X.assign(q1=value)).mean() for value in found["grid_values"][0]]
     np.testing.assert_allclose(found["average"][0], expected, **SAME)
@@ -225,8 +255,9 @@ def test_inspection(model):
 
 
 def test_shuffled_rows(model):
+    X = table_of(model)
     train, test, y_train, _ = train_test_split(X, Y, random_state=0)
-    if isinstance(model, EffectSearchCV):
+    if isinstance(model, EffectSearchCV | AutoregressiveRegressor):
         with pytest.raises(LogError, match="not in the order of time, as after train_test_split"):
             model.fit(train, y_train)
         return
@@ -254,6 +285,7 @@ def test_steps_that_need_a_sequence_refuse_shuffled_rows(transformer):
 
 
 def test_copies_files_and_single_precision(model, tmp_path):
+    X = table_of(model)
     expected = model.fit(X, Y).predict(X)
     np.testing.assert_array_equal(clone(model).fit(X, Y).predict(X), expected)
     np.testing.assert_array_equal(pickle.loads(pickle.dumps(model)).predict(X), expected)
@@ -267,6 +299,7 @@ def test_copies_files_and_single_precision(model, tmp_path):
 
 
 def test_two_processes(model):
+    X = table_of(model)
     scores = cross_val_score(model, X, Y, cv=SPLITS, n_jobs=2)
     np.testing.assert_allclose(scores, by_hand(model), **SAME)
 

@@ -16,6 +16,7 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 from skidyn._columns import ColumnSpec
 from skidyn._compat import Interval, fit_context
 from skidyn._keys import Keys, fitted_keys
+from skidyn._order import refuse_shuffled, taken, time_order
 from skidyn._signals import find_segments
 
 Array = NDArray[np.float64]
@@ -227,6 +228,9 @@ class AutoregressiveRegressor(_Forecaster):
             The forecaster.
         """
         X, targets = self._check(X, y)
+        keys = self._keys()
+        time = None if keys.time is None else X[:, keys.time]
+        refuse_shuffled(type(self).__name__, keys.trajectories(X), time)
         lags = self._lags(X)
         fits = []
         for j in range(targets.shape[1]):
@@ -260,4 +264,7 @@ class AutoregressiveRegressor(_Forecaster):
         """
         check_is_fitted(self)
         X = validate_data(self, X, reset=False, dtype=np.float64)
-        return self._shaped(np.einsum("njk,jk->nj", self._lags(X), self.coef_) + self.intercept_)
+        order = time_order(X, self._keys())
+        lags = self._lags(taken(X, order))
+        forecast = np.einsum("njk,jk->nj", lags, self.coef_) + self.intercept_
+        return self._shaped(forecast if order is None else forecast[np.argsort(order)])
