@@ -34,7 +34,7 @@ from skidyn._keys import Keys, fitted_keys
 from skidyn._order import taken, time_order
 from skidyn.model_selection import held_out_folds, order_of_log
 from skidyn.neural_network._base import SequenceRegressor, deferred_training, train_together
-from skidyn.neural_network._lstm import LSTMRegressor
+from skidyn.neural_network._lstm import LSTMRegressor, directions
 from skidyn.neural_network._skorch_member import SkorchMember
 from skidyn.preprocessing import without_keys_inside
 
@@ -202,6 +202,8 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             max_epochs=130,
             batch_size=32,
             per_joint=True,
+            linear=False,
+            direction=None,
         )
         network = MLPRegressor(
             hidden_layer_sizes=(100, 50, 25), learning_rate_init=0.01, early_stopping=True
@@ -313,6 +315,10 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         position = {"trajectory": keys.trajectory, "time": keys.time}
         wanted = {name: name.rpartition("__")[2] for name in names}
         member.set_params(**{n: position[key] for n, key in wanted.items() if key in position})
+        for name, last in wanted.items():
+            if last == "direction" and isinstance(names[name], str):
+                given = getattr(self, "feature_names_in_", None)
+                member.set_params(**{name: directions("auto", given, self.n_features_in_)})
         member = without_keys_inside(member, keys)
         if self.resample == "trajectory":
             if "resample" not in names:

@@ -49,12 +49,15 @@ class Plan:
     slow_parameters : str
         Name of a parameter that moves at a tenth of the learning rate and does not shrink; empty
         for none.
+    weight_decay : float
+        Of the default optimiser.
     """
 
     window: int
     stride: int
     settings: dict[str, Any]
     slow_parameters: str = ""
+    weight_decay: float = 0.05
 
     @property
     def callbacks(self) -> list[Any]:
@@ -220,7 +223,7 @@ def make_net(
     """
     settings = plan.settings.copy()
     if settings["optimizer"] is None:
-        tuned = {"weight_decay": 0.05, "betas": (0.8, 0.95), "fused": True}
+        tuned = {"weight_decay": plan.weight_decay, "betas": (0.8, 0.95), "fused": True}
         named = {f"optimizer__{name}": value for name, value in tuned.items()}
         settings = named | settings | {"optimizer": torch.optim.AdamW}
     if plan.slow_parameters:

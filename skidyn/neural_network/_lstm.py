@@ -3,9 +3,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
+
+from skidyn._columns import _key_column
+from skidyn._compat import StrOptions
+from skidyn._keys import Keys
 from skidyn.neural_network._base import SequenceRegressor
+from skidyn.neural_network._engine import Plan
+
+Array = NDArray[np.float64]
+
+#: Of networks that know no physics.
+WEIGHT_DECAY = 0.3
 
 
 class LSTMRegressor(SequenceRegressor):
@@ -16,7 +29,9 @@ class LSTMRegressor(SequenceRegressor):
     reads the `window` rows before each of them as history, and is trained on all rows of a piece
     at once.
 
-    Training is that of skorch: its callbacks, optimisers and nets are those of this regressor.
+    Weights decay (``optimizer__weight_decay=0.3``), since trajectories of minutes are few and a
+    network learns them by heart. Training is that of skorch: its callbacks, optimisers and nets are
+    those of this regressor.
 
     Without physics it has its place only where no model of the robot exists: with a URDF, a rigid
     body with friction predicts far better, and boosted trees may do so too
@@ -26,6 +41,15 @@ class LSTMRegressor(SequenceRegressor):
     ----------
     per_joint : bool, default=False
         Train one network per output instead of one for all.
+    linear : bool, default=True
+        Add a linear function of the row itself to the output. Torque is nearly linear in the
+        acceleration, also beyond the training range, where an LSTM is flat.
+    direction : "auto", sequence of int or str, or None, default="auto"
+        Velocities whose sign the network reads as well, since friction turns over with it:
+        ``"auto"`` takes the columns whose names begin with ``dq``, of an X without names none.
+    window : int, default=1
+        Rows of history: each prediction has at least `window` and less than `window + stride` rows
+        behind it. What the torque remembers for longer needs more.
     {PARAMETERS}
 
     Attributes
@@ -62,11 +86,59 @@ class LSTMRegressor(SequenceRegressor):
     _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
         **SequenceRegressor._parameter_constraints,
         "per_joint": ["boolean"],
+        "linear": ["boolean"],
+        "direction": [StrOptions({"auto"}), "array-like", None],
     }
 
-    def __init__(self, *, per_joint: bool = False, **parameters: Any) -> None:
-        super().__init__(**parameters)
+    def __init__(
+        self,
+        *,
+        per_joint: bool = False,
+        linear: bool = True,
+        direction: Any = "auto",
+        window: int = 1,
+        **parameters: Any,
+    ) -> None:
+        super().__init__(window=window, **parameters)
         self.per_joint = per_joint
+        self.linear = linear
+        self.direction = direction
+
+    def _inputs(self, X: Array, keys: Keys) -> Array:
+        names = getattr(self, "feature_names_in_", None)
+        velocities = directions(self.direction, names, X.shape[1])
+        return np.hstack([super()._inputs(X, keys), np.sign(X[:, velocities])])
+
+    def _network(self, n_inputs: int, n_outputs: int, seed: int) -> dict[str, Any]:
+        return super()._network(n_inputs, n_outputs, seed) | {"linear": self.linear}
+
+    def _plan(self) -> Plan:
+        return replace(super()._plan(), weight_decay=WEIGHT_DECAY)
+
+
+def directions(given: Any, names: Any, n_features: int) -> list[int]:
+    """Columns of velocities whose sign is an input.
+
+    Parameters
+    ----------
+    given : "auto", sequence of int or str, or None
+        As the user gave it.
+    names : sequence of str or None
+        Names of the columns.
+    n_features : int
+        Number of columns.
+
+    Returns
+    -------
+    list of int
+    """
+    columns = None if names is None else [str(name) for name in names]
+    if given is None:
+        return []
+    if isinstance(given, str):
+        return [k for k, name in enumerate(columns or ()) if name.startswith("dq")]
+    found = [_key_column("direction", spec, columns, n_features) for spec in given]
+    return [column for column in found if column is not None]
 
 
 class NDLRegressor(LSTMRegressor):
@@ -89,6 +161,15 @@ class NDLRegressor(LSTMRegressor):
         Share of the fully connected layer's outputs dropped in training.
     per_joint : bool, default=False
         Train one network per output instead of one for all.
+    linear : bool, default=True
+        Add a linear function of the row itself to the output. Torque is nearly linear in the
+        acceleration, also beyond the training range, where an LSTM is flat.
+    direction : "auto", sequence of int or str, or None, default="auto"
+        Velocities whose sign the network reads as well, since friction turns over with it:
+        ``"auto"`` takes the columns whose names begin with ``dq``, of an X without names none.
+    window : int, default=1
+        Rows of history: each prediction has at least `window` and less than `window + stride` rows
+        behind it. What the torque remembers for longer needs more.
     {PARAMETERS}
 
     Attributes

@@ -51,7 +51,7 @@ class LSTMNetwork(nn.Module):
     """One LSTM layer, optionally a fully connected layer with dropout, and a linear output.
 
     Input weights begin as Glorot's, the recurrence orthogonal, the bias of the forget gate at 1,
-    other biases at 0.
+    other biases and the path around the LSTM at 0.
 
     Parameters
     ----------
@@ -65,6 +65,8 @@ class LSTMNetwork(nn.Module):
         Width of the fully connected layer; 0 leaves it and the dropout out.
     dropout : float, default=0.0
         Share of its outputs dropped in training.
+    linear : bool, default=False
+        A linear path from the inputs of a row to its outputs, around the LSTM.
     seed : int, default=0
         Draws initial weights and dropout.
     """
@@ -77,6 +79,7 @@ class LSTMNetwork(nn.Module):
         hidden_size: int = 32,
         dense_size: int = 0,
         dropout: float = 0.0,
+        linear: bool = False,
         seed: int = 0,
     ) -> None:
         super().__init__()
@@ -86,11 +89,12 @@ class LSTMNetwork(nn.Module):
             self.lstm = nn.LSTM(n_inputs, hidden_size, batch_first=True)
             self.dense = nn.Linear(hidden_size, dense_size) if dense_size else None
             self.output = nn.Linear(dense_size or hidden_size, n_outputs)
+            self.linear = nn.Linear(n_inputs, n_outputs, bias=False) if linear else None
         self.dropout = _SeededDropout(dropout, seed)
         self.to_empty(device="cpu")
         generator = torch.Generator().manual_seed(seed)
         for name, parameter in self.named_parameters():
-            if "bias" in name:
+            if "bias" in name or name == "linear.weight":
                 nn.init.zeros_(parameter)
             elif name == "lstm.weight_hh_l0":
                 nn.init.orthogonal_(parameter, generator=generator)
@@ -107,7 +111,7 @@ class LSTMNetwork(nn.Module):
         if self.dense is not None:
             hidden = self.dropout(torch.relu(self.dense(hidden)))
         outputs: torch.Tensor = self.output(hidden)
-        return outputs
+        return outputs if self.linear is None else outputs + self.linear(x[:, self.window :])
 
 
 class Members(nn.ModuleList):

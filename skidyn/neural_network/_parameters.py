@@ -32,10 +32,10 @@ PARAMETERS = """\
     batch_size : int, default=32
         Pieces per step.
     optimizer : type of torch.optim.Optimizer or None, default=None
-        None is AdamW with ``weight_decay=0.05``, which keeps a network from learning joints as
-        functions of other joints, and ``betas=(0.8, 0.95)``, since torch's own want more steps than
-        a log of minutes gives. ``optimizer__weight_decay=0.0`` makes it plain Adam: parameters
-        named as in skorch are taken as well, ``optimizer__...``, ``callbacks__...`` and
+        None is AdamW with a weight decay (0.3, of SDL 0.05), which keeps a network from learning
+        joints as functions of other joints, and ``betas=(0.8, 0.95)``, since torch's own want more
+        steps than a log of minutes gives. ``optimizer__weight_decay=0.0`` makes it plain Adam:
+        parameters named as in skorch are taken as well, ``optimizer__...``, ``callbacks__...`` and
         ``module__...`` (`hidden_size`, `dense_size` and `dropout` of the network).
     callbacks : list of skorch callbacks or None, default=None
         Such as ``EarlyStopping`` and ``Checkpoint``. Rows are held out for those that watch the

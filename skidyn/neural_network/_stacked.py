@@ -122,6 +122,9 @@ class StackedNetwork(nn.Module):
                     torch.stack([state[f"{name}.bias"] for state in states]),
                 )
                 self.add_module(name, self.layers[name])
+        self.linear: nn.Parameter | None = None
+        if "linear.weight" in states[0]:
+            self.linear = nn.Parameter(torch.stack([s["linear.weight"] for s in states]))
         self.dropouts = nn.ModuleList([network.dropout for network in networks])
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
@@ -137,7 +140,11 @@ class StackedNetwork(nn.Module):
                 dropped = zip(self.dropouts, hidden, strict=True)
                 hidden = torch.stack([dropout(own) for dropout, own in dropped])
         output: torch.Tensor = self.layers["output"](hidden)
-        return output.reshape(n_members, n_targets, n_windows, -1).transpose(1, 2)
+        output = output.reshape(n_members, n_targets, n_windows, -1).transpose(1, 2)
+        if self.linear is None:
+            return output
+        own = x[:, :, self.window :].flatten(1, 2)
+        return output + torch.bmm(own, self.linear.mT).reshape(output.shape)
 
     def arrays(self) -> list[Weights]:
         """Weights of each network, named as in :class:`LSTMNetwork`."""
@@ -152,6 +159,8 @@ class StackedNetwork(nn.Module):
             for name, layer in self.layers.items():
                 weights[f"{name}.weight"] = layer.weight[k].detach()
                 weights[f"{name}.bias"] = layer.bias[k].detach()
+            if self.linear is not None:
+                weights["linear.weight"] = self.linear[k].detach()
             members.append({name: tensor.cpu().numpy().copy() for name, tensor in weights.items()})
         return members
 

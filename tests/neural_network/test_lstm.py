@@ -2,6 +2,7 @@
 import pickle
 
 import numpy as np
+import pandas as pd
 import polars as pl
 import pytest
 import torch
@@ -14,8 +15,9 @@ from sklearn.utils.estimator_checks import parametrize_with_checks
 from skorch import NeuralNet
 from skorch.callbacks import Callback, Checkpoint, EarlyStopping, GradientNormClipping
 
+from skidyn.exceptions import ColumnError
 from skidyn.model_selection import LeakageWarning, TrajectoryKFold
-from skidyn.neural_network import LSTMRegressor, NDLRegressor
+from skidyn.neural_network import BLLRegressor, LSTMRegressor, NDLRegressor
 
 SMALL = {"window": 8, "hidden_size": 12, "max_epochs": 15, "random_state": 0}
 
@@ -190,7 +192,9 @@ def test_tables_pipelines_and_searches(log):
     expected = model.fit(X, y).predict(X)
     polars = pl.from_pandas(X)
     np.testing.assert_array_equal(clone(model).fit(polars, y).predict(polars), expected)
-    by_position = model.set_params(trajectory=0, time=1).fit(X.to_numpy(), y)
+    velocities = [k for k, name in enumerate(X) if name.startswith("dq")]
+    by_position = model.set_params(trajectory=0, time=1, direction=velocities)
+    by_position.fit(X.to_numpy(), y)
     np.testing.assert_array_equal(by_position.predict(X.to_numpy()), expected)
     assert "LSTMRegressor" in model._repr_html_()
     pipeline = make_pipeline(StandardScaler().set_output(transform="pandas"), clone(model))
@@ -201,6 +205,37 @@ def test_tables_pipelines_and_searches(log):
     np.testing.assert_array_equal(
         by_group, cross_val_predict(pipeline, X, y, cv=TrajectoryKFold(2))
     )
+
+
+def test_the_direction_of_velocities_is_an_input():
+    rng = np.random.default_rng(0)
+    X = pd.DataFrame({"trajectory": np.repeat(np.arange(4), 150), "dq1": rng.normal(size=600)})
+    X["dq1"] += 3.0  # a turn is rare, and far from the mean
+    y = np.sign(X["dq1"].to_numpy())
+    named = LSTMRegressor(max_epochs=40, random_state=0).fit(X, y)
+    assert named.weights_[0]["lstm.weight_ih_l0"].shape[1] == 2
+    numbered = LSTMRegressor(max_epochs=40, random_state=0, trajectory=0, direction=[1])
+    np.testing.assert_array_equal(
+        numbered.fit(X.to_numpy(), y).predict(X.to_numpy()), named.predict(X)
+    )
+    without = LSTMRegressor(max_epochs=40, random_state=0, direction=None).fit(X, y)
+    assert without.weights_[0]["lstm.weight_ih_l0"].shape[1] == 1
+    assert named.score(X, y) > max(0.9, without.score(X, y))
+    with pytest.raises(ColumnError, match="dq2"):
+        LSTMRegressor(direction=["dq2"]).fit(X, y)
+    bagged = BLLRegressor(LSTMRegressor(max_epochs=1), n_estimators=1, random_state=0).fit(X, y)
+    assert bagged.bagging_.estimators_[0].direction == [1]
+
+
+def test_the_linear_path_reaches_beyond_the_training_range():
+    rng = np.random.default_rng(0)
+    X = rng.normal(size=(600, 2))
+    with_path, without = (
+        LSTMRegressor(linear=linear, random_state=0).fit(X, X @ [2.0, -1.0])
+        for linear in (True, False)
+    )
+    far = 3.0 * rng.normal(size=(200, 2))
+    assert with_path.score(far, far @ [2.0, -1.0]) > max(0.9, without.score(far, far @ [2.0, -1.0]))
 
 
 def test_one_network_per_joint_ignores_the_other_joints(log):
