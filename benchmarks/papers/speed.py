@@ -97,8 +97,9 @@ def lag_matrix(features: NDArray, trajectory: NDArray) -> NDArray:
 
 
 def ours(members: int, epochs: int, **changes: float) -> BLLRegressor:
-    """Our ensemble; what is not named is at its default."""
-    member = LSTMRegressor(window=3, hidden_size=HIDDEN, max_epochs=epochs, **changes)
+    """Our ensemble, of the networks of the naive bag; what is not named is at its default."""
+    settings = {"optimizer__weight_decay": 0.05, "linear": False, "direction": None, **changes}
+    member = LSTMRegressor(window=3, hidden_size=HIDDEN, max_epochs=epochs, **settings)
     return BLLRegressor(member, n_estimators=members, trajectory=0, random_state=0)
 
 

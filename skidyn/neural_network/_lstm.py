@@ -34,7 +34,7 @@ class LSTMRegressor(SequenceRegressor):
     those of this regressor.
 
     Without physics it has its place only where no model of the robot exists: with a URDF, a rigid
-    body with friction predicts far better, and boosted trees may do so too
+    body with friction predicts far better
     (:doc:`/user_guide/learners`).
 
     Parameters
