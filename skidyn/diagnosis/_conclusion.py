@@ -227,7 +227,7 @@ def _useless(
 def _vague(
     findings: Sequence[Hypothesis], intervals: dict[Term, dict[str, Any]]
 ) -> tuple[Hypothesis, list[Candidate]] | None:
-    """The last finding with terms whose coefficients may all be zero when folds are left out."""
+    """The last finding with terms whose coefficient may be zero when folds are left out."""
     for hypothesis in reversed(findings):
         if hypothesis.kind == UNKNOWN and hypothesis.torque is None:
             continue
@@ -236,6 +236,9 @@ def _vague(
             if candidate.term.trajectories is not None and len(candidate.term.trajectories) == 1:
                 continue  # no fold but its own recording tells of it
             effect = candidate.term.effect
+            sizes = [c for c in effect.coefficients if not c.is_zero]
+            if hypothesis.torque is None and len(sizes) > 1:
+                continue  # each of them may be zero beside the others, not all together
             others = {s.name for s in effect.shapes}
             if hypothesis.torque is not None:  # a line has a phase whatever its size
                 others |= {name for name, unit in effect.units().items() if unit == "rad"}

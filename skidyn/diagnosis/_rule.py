@@ -119,7 +119,7 @@ class Settings:
         the place of a name, and a later finding that removes no more on the same joints is the
         shadow of the earlier ones.
     exact_tolerance : float
-        The same where no effect has shape parameters, whose formulas are exact.
+        The same where every formula is exact (:attr:`Effect.is_exact`).
     nameless_tolerance : float
         The same for what a nameless function leaves: its form is only near the true one.
     simpler_share : float

@@ -425,10 +425,7 @@ class _Search:
 
     @property
     def _tolerance(self) -> Array:
-        """Share of the squared error removed so far that formulas may have left, by joint.
-
-        A formula without shape parameters is exact, or it is another kind's.
-        """
+        """Share of the squared error removed so far that formulas may have left, by joint."""
         settings = self.settings
         shares = np.full(self.problem.n_joints, settings.exact_tolerance)
         for h in self.findings:
@@ -436,7 +433,7 @@ class _Search:
                 continue
             nameless = h.kind == UNKNOWN
             for c in h.candidates:
-                if not nameless and not c.n_shapes:
+                if c.term.effect.is_exact:
                     continue
                 share = settings.nameless_tolerance if nameless else settings.form_tolerance
                 reached = list(c.rows)
@@ -594,10 +591,13 @@ class _Search:
             if rival.kind == UNKNOWN or rival.errors is None or _within(rival):
                 continue
             covered = [c for c in best.candidates if set(c.joints) <= set(rival.joints)]
-            joints = sorted({j for c in covered for j in c.joints})
-            # What differs between recordings is one finding a joint; a function of signals is not.
+            # What differs between recordings is one finding a joint; a function of signals is not,
+            # and may reach joints that it does not explain.
+            joints = sorted({j for c in covered for j in c.joints}) if single else list(best.joints)
             width = sum(c.width for c in covered)
-            enough = rival.n_parameters <= width if single else len(joints) == len(best.joints)
+            enough = (
+                rival.n_parameters <= width if single else bool(set(joints) & set(rival.joints))
+            )
             if not joints or not enough:
                 continue
             errors = rival.errors

@@ -140,6 +140,9 @@ class Effect:
         of the data are left out; for flexible functions, which no row may determine there.
     by_recording : bool
         Whether it may change from one recording to the next, and is tried for some of them alone.
+    is_exact : bool
+        Whether the formula describes nothing but this effect, so that what it leaves is another
+        one; other formulas leave traces of themselves.
     simplicity : int
         Rank among rivals that explain the data equally well; the lower is named.
     rivals : tuple of str
@@ -182,6 +185,7 @@ class Effect:
     grows: ClassVar[bool] = False
     by_recording: ClassVar[bool] = False
     softness: ClassVar[float] = 0.0
+    is_exact: ClassVar[bool] = False
     simplicity: ClassVar[int] = 50
     rivals: ClassVar[tuple[str, ...]] = ()
     separating_motion: ClassVar[str] = ""

@@ -22,6 +22,7 @@ class Viscous(Effect):
     title = "Viscous friction"
     formula = r"F_v\,\dot q"
     coefficients = (Coefficient("Fv", "N m s/rad", sign=1),)
+    is_exact = True
     simplicity = 1
     rivals = ("nonlinear_viscous", "asymmetric_friction", "coulomb")
     separating_motion = "sweeps at several constant speeds in both directions"
@@ -40,6 +41,7 @@ class Coulomb(Effect):
     title = "Coulomb friction"
     formula = r"F_c\,\mathrm{sign}(\dot q)"
     coefficients = (Coefficient("Fc", "N m", sign=1),)
+    is_exact = True
     simplicity = 2
     rivals = ("stribeck", "dahl", "nonlinear_viscous")
     separating_motion = "slow sweeps with reversals, below 0.1 rad/s"

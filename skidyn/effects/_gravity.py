@@ -30,6 +30,7 @@ class BaseTilt(Effect):
     )
     scope = "robot"
     needs = ("robot",)
+    is_exact = True
     simplicity = 12
     rivals = ("offset", "gravity_compensator")
     separating_motion = "the first joint turned over its whole travel at several arm poses"

@@ -17,6 +17,7 @@ class RotorInertia(Effect):
     title = "Rotor inertia"
     formula = r"I_a\,\ddot q"
     coefficients = (Coefficient("Ia", "kg m^2", sign=1),)
+    is_exact = True
     simplicity = 3
     rivals = ("joint_elasticity", "time_delay")
     separating_motion = "accelerations in several poses; on the first joint nothing separates it"

@@ -20,6 +20,7 @@ class Offset(Effect):
     title = "Torque offset"
     formula = r"\tau_0"
     coefficients = (Coefficient("tau0", "N m"),)
+    is_exact = True
     simplicity = 0
     rivals = ("asymmetric_friction", "spring", "temperature_offset")
     separating_motion = "poses in which gravity acts with both signs; the sensor zeroed anew"
@@ -37,6 +38,7 @@ class Spring(Effect):
     title = "Spring"
     formula = r"k\,(q - q_0)"
     coefficients = (Coefficient("k", "N m/rad", sign=1), Coefficient("tau0", "N m", is_zero=True))
+    is_exact = True
     simplicity = 4
     rivals = ("nonlinear_spring", "gravity_compensator", "offset", "end_stop")
     separating_motion = "slow motion over the whole travel"
