@@ -249,8 +249,8 @@ class UnexplainedTorque(Check):
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         seen = explained(measurement)
-        if seen is None:
-            return
+        if seen is None or measurement.stale:
+            return  # what rough derivatives leave is no other signal
         least = np.minimum(*seen.errors)
         steady = seen.scatter / np.sqrt(6)  # white noise is no mistake
         bad: NDArray[np.bool_] = (least > UNRELATED) & (least > BEYOND * steady)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from skidyn._signals import Array
 from skidyn.evidence import broken_notes
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
@@ -58,6 +59,10 @@ class CoarsePosition(Check):
             if not measurement.signals.prismatic[k]
         }
         coarse = {k: step for k, step in steps.items() if step > COARSE}
+        for k in steps:
+            if k not in coarse and _is_short(q[:, k]):
+                # the step of eleven binary digits at the largest position
+                coarse[k] = 2.0 ** np.floor(np.log2(np.abs(q[:, k]).max()) - 10)
         if coarse:
             largest = max(coarse.values())
             yield self.suspicion(
@@ -67,6 +72,13 @@ class CoarsePosition(Check):
                 "noted",
                 sorted(coarse),
             )
+
+
+def _is_short(values: Array) -> bool:
+    """Whether all values are numbers of half precision, eleven binary digits."""
+    if np.abs(values).max() > 6e4 or len(np.unique(values)) < 50:
+        return False
+    return bool(np.all(values == values.astype(np.float16)))
 
 
 class ConstantTorque(Check):
@@ -91,6 +103,8 @@ class ConstantTorque(Check):
                     [k],
                 )
                 continue
+            if len(measurement.leaps):
+                continue  # parts between leaps have no numbers of their own
             still = [
                 int(run) for run in runs if len(runs) > 1 and np.ptp(torque[number == run]) == 0
             ]

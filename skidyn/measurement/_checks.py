@@ -28,8 +28,10 @@ from skidyn.measurement._clock import (
     RepeatedRows,
     SlowSampling,
 )
-from skidyn.measurement._copies import RepeatedRecordings
+from skidyn.measurement._copies import CopiedTorque, RepeatedRecordings
+from skidyn.measurement._elapsed import LostRows
 from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._odd import OddRecording
 from skidyn.measurement._suspicion import CERTAINTIES, Suspicion
 from skidyn.measurement._torque import Columns, TorqueDelay, UnsignedTorque
 from skidyn.measurement._units import ClockUnit, PositionUnit, WrappedPosition
@@ -37,24 +39,27 @@ from skidyn.measurement._velocity import JoinedRecordings, Velocity, VelocityDel
 
 #: Nothing else in skidyn keeps a list of checks.
 CHECKS: tuple[Check, ...] = (
+    LostRows(),
     ClockUnit(),
     PositionUnit(),
     Velocity(),
     WrappedPosition(),
     JoinedRecordings(),
-    UnsignedTorque(),
-    Columns(),
-    TorqueScale(),
-    UnexplainedTorque(),
-    Bodies(),
     RepeatedRows(),
     RepeatedRecordings(),
     ClockJitter(),
     InterpolatedRows(),
+    UnsignedTorque(),
+    Columns(),
+    TorqueScale(),
+    UnexplainedTorque(),
+    OddRecording(),
+    Bodies(),
     VelocityDelay(),
     HeldTorque(),
     TorqueDelay(),
     ConstantTorque(),
+    CopiedTorque(),
     ClippedTorque(),
     ComputedTorque(),
     SmoothTorque(),
@@ -133,7 +138,7 @@ def check_measurement(measurement: Measurement) -> list[Suspicion]:
 
 #: Checks whose certain suspicions make every fit of the robot meaningless, and those of which
 #: mere suspicions do.
-_UNITS, _SCALES = CHECKS[:4], CHECKS[:2]
+_UNITS, _SCALES = CHECKS[:5], CHECKS[1:3]
 
 
 def units_in_doubt(found: list[Suspicion]) -> bool:

@@ -22,6 +22,9 @@ NEIGHBOURS = np.array([-2, -1, 1, 2])
 TOLD, CERTAIN = 20.0, 60.0
 #: Steps by which stamps may be off a clock that is still regular.
 WANDERING = 1.0
+#: Log-likelihood of the torque that even steps must gain for the stamps to do harm; share of a step
+#: by which stamps are off that do, where there is no robot to say so.
+HARM, OFF = 15.0, 0.02
 #: Share of rows that repeat, or lie on a line between their neighbours.
 REPEATED, ON_A_LINE = 0.02, 0.3
 #: Share of repeated rows from which accelerations, and with them findings, are wrong.
@@ -183,12 +186,21 @@ class ClockJitter(Check):
             )
         elif found.margin > TOLD:
             measurement.stale = True
+            gained = _gained_by_torque(measurement)
+            harmful = found.spread > OFF * step if gained is None else gained > HARM
+            says = (
+                ""
+                if gained is None
+                else f"; the torque gains {gained:.0f} by them (log-likelihood)"
+                + ("" if harmful else ", so that the stamps do little harm")
+            )
+            sure = harmful and found.margin > CERTAIN and found.ratio > 1.2
             yield self.suspicion(
                 "the time stamps jitter, but the samples were taken at even steps",
                 f"the stamps lie {size} around even steps of {1e3 * step:.4g} ms, and with even "
                 f"steps a position follows from its neighbours up to {found.ratio:.3g} times as "
-                "closely",
-                "certain" if found.margin > CERTAIN and found.ratio > 1.2 else "suspected",
+                f"closely{says}",
+                "certain" if sure else "suspected",
                 remedy=("--clock regular", "clock='regular'"),
             )
         elif measurement.jitter > 0.25:
@@ -200,6 +212,26 @@ class ClockJitter(Check):
                 + ", and derivatives use the recorded times",
                 "noted",
             )
+
+
+def _gained_by_torque(measurement: Measurement) -> float | None:
+    """Log-likelihood that the torque gains by even steps; None where no robot can say so.
+
+    Accelerations jitter much where motion is slow, but there they hardly matter.
+    """
+    fits = measurement.fits
+    if fits is None:
+        return None
+    from skidyn.measurement._fits import Reading, make_fits  # with it all columns of the evidence
+
+    signals = measurement.signals
+    even = signals.with_(time=regular_clock(signals.clock, signals.trajectory))
+    other = make_fits(even, measurement.torque, fits.robot)
+    if other is None or other.moving.shape != fits.moving.shape:
+        return None
+    other.moving = fits.moving  # likelihoods of the same rows
+    margin = other.identified(Reading()).margin(fits.identified(Reading()))
+    return float(margin.sum())
 
 
 class RepeatedRows(Check):

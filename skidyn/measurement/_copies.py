@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Recordings that are in a log twice: they would vouch for what was found in their twins."""
+"""Recordings and channels that are in a log twice."""
 
 from __future__ import annotations
 
@@ -12,6 +12,9 @@ from skidyn._signals import Array, Signals
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._suspicion import Suspicion
+
+#: Error that rounding leaves of a copy, as a share of its spread, and values that it has at least.
+ROUNDING, FEWEST_VALUES = 1e-6, 50
 
 
 def copied_rows(signals: Signals, torque: Array) -> NDArray[np.bool_]:
@@ -60,3 +63,44 @@ class RepeatedRecordings(Check):
                 "torque of an earlier one sample by sample; a diagnosis uses each once",
                 "suspected",
             )
+
+
+class CopiedTorque(Check):
+    """A torque that is another channel of the log."""
+
+    name = "copied_torque"
+    suspects = (
+        "torque that is a copy of another channel: another torque, a position or a velocity"
+    )
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        s, torque = measurement.signals, measurement.torque
+        channels = {"torque": torque, "position": s.q, "velocity": s.dq}
+        for k in range(measurement.n_joints):
+            for what, values in channels.items():
+                for j in range(measurement.n_joints):
+                    itself = what == "torque" and j >= k
+                    if not itself and _is_line(values[:, j], torque[:, k]):
+                        yield self.suspicion(
+                            f"the torque of {measurement.joint(k)} is the {what} of "
+                            f"{measurement.joint(j)}",
+                            "in every row, to the last digits and a factor",
+                            "certain" if what != "torque" else "suspected",
+                            [k] if what != "torque" else [j, k],
+                        )
+
+
+def _is_line(x: Array, y: Array) -> bool:
+    """Whether one channel is a multiple of another, with an offset, but for rounding."""
+    few = slice(None, None, max(1, len(x) // 50))
+    if not _nearly(x[few], y[few]):
+        return False
+    return len(np.unique(x)) > FEWEST_VALUES and _nearly(x, y)
+
+
+def _nearly(x: Array, y: Array) -> bool:
+    x, y = x - x.mean(), y - y.mean()
+    size = float(y @ y)
+    if size <= 0 or not x @ x > 0:
+        return False
+    return float(np.sum((y - (x @ y) / (x @ x) * x) ** 2)) < ROUNDING**2 * size

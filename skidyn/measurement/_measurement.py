@@ -47,7 +47,7 @@ class Measurement:
     identified : bool, optional
         Whether bodies are going to be identified, so that those of the description may be wrong; by
         default it is not known.
-    unsigned, delay, readable, stale, scaled, computed : optional
+    unsigned, delay, late_position, readable, stale, lost, scaled, computed : optional
         What checks found that others want to know; filled in by them.
 
     Examples
@@ -67,8 +67,10 @@ class Measurement:
     identified: bool | None = None
     unsigned: tuple[list[int], dict[int, float]] | None = field(default=None, repr=False)
     delay: Delay | None = field(default=None, repr=False)
+    late_position: float = field(default=0.0, repr=False)
     readable: bool = field(default=True, repr=False)
     stale: bool = field(default=False, repr=False)
+    lost: bool = field(default=False, repr=False)
     scaled: bool = field(default=False, repr=False)
     computed: bool = field(default=False, repr=False)
     #: Rows to which positions leap; trajectories are taken to end there.

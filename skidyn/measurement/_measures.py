@@ -15,6 +15,8 @@ HELD, AT_ONCE = 0.2, 0.7
 #: beyond what positions leave of even motion, and farther than this share of its range; recordings
 #: are joined in this many places at most, as a share of the rows.
 FARTHER, BEYOND, RANGE, PLACES = 4.0, 8.0, 1e-3, 2e-3
+#: Steps that a position may be held before it catches up.
+CATCH_UP = 5
 
 
 def position_step(position: np.ndarray) -> float:
@@ -148,6 +150,17 @@ def excited(position: np.ndarray, velocity: np.ndarray, segments: Sequence[slice
     return bool(span > 1e-3 and span > 20 * noise and reversals(velocity, segments) > 0)
 
 
+def _held_before(moved: np.ndarray) -> np.ndarray:
+    """How many steps without motion, of the last ``CATCH_UP``, come before every step."""
+    held = np.zeros(moved.shape, dtype=int)
+    still = np.ones(moved.shape, dtype=bool)
+    for back in range(1, CATCH_UP + 1):
+        still[:back] = False
+        still[back:] &= moved[:-back] == 0
+        held += still
+    return held
+
+
 def find_leaps(q: np.ndarray, time: np.ndarray, trajectory: np.ndarray) -> np.ndarray:
     """Rows to which positions leap from the row before, to stay there.
 
@@ -175,7 +188,8 @@ def find_leaps(q: np.ndarray, time: np.ndarray, trajectory: np.ndarray) -> np.nd
     # how fast it is before and after, and not the recorded velocity, whose unit may be another
     around = np.stack([np.roll(moved, k, axis=0) for k in (-3, -2, -1, 1, 2, 3)])
     beyond = np.abs(moved - np.median(around, axis=0))
-    far = np.abs(moved) > FARTHER * np.abs(around).max(axis=0)
+    # a position that was held catches up in one step
+    far = np.abs(moved) > FARTHER * (1 + _held_before(moved)) * np.abs(around).max(axis=0)
     far &= beyond > BEYOND * np.quantile(beyond, 0.995, axis=0)
     far &= beyond > RANGE * np.ptp(q, axis=0)
     turns = np.abs(moved - 2 * np.pi * np.round(moved / (2 * np.pi))) < 0.05 * 2 * np.pi
@@ -185,13 +199,11 @@ def find_leaps(q: np.ndarray, time: np.ndarray, trajectory: np.ndarray) -> np.nd
         ends = np.array([max(0, row - 4), min(n - 1, row + 5)], dtype=np.intp)
         if np.ptp(np.unique(trajectory[ends], return_inverse=True)[1]):
             continue  # too close to the end of a trajectory for two parts
-        stay, held = [], []
+        stay = []
         for k in np.flatnonzero(far[row]):
             before, after = q[max(0, row - 4) : row + 1, k], q[row + 1 : row + 6, k]
             leap = abs(q[row + 1, k] - q[row, k])
             stay.append(abs(np.median(after) - np.median(before)) > 0.5 * leap)
-            # a position that was held catches up in one step
-            held.append(before[-1] == before[0] or after[0] == after[-1])
-        if any(stay) and not all(held):
+        if any(stay):
             kept.append(row + 1)
     return np.array(kept if len(kept) <= max(PLACES * n, 2) else [], dtype=np.intp)

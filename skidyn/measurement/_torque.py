@@ -294,6 +294,10 @@ class TorqueDelay(Check):
             return  # held and interpolated values are late, or early, by themselves
         told = found.joints[np.isfinite(found.joints)]
         alike = np.abs(told - found.common) < max(ALIKE, 0.3 * abs(found.common))
+        # where positions are late, the torque is early by as much, and not by itself
+        early = measurement.late_position
+        if early and abs(found.common + early) < max(ALIKE, 0.3 * early):
+            return
         if (
             abs(found.common) > max(SMALLEST, ERRORS * found.error)
             and found.gain > LEAST
@@ -301,7 +305,7 @@ class TorqueDelay(Check):
             and len(told) > measurement.n_joints / 2
         ):
             ms = 1e3 * found.common
-            late = float(f"{found.common:.4f}")
+            late = float(f"{found.common + early:.4f}")
             yield self.suspicion(
                 f"torque is {'late' if ms > 0 else 'early'} against motion by about "
                 f"{abs(ms):.1f} ms",

@@ -22,6 +22,8 @@ from skidyn.measurement._units import (
     unnamed_scale,
 )
 
+#: Range of a position, rad or m, and spread of a velocity, that are those of a joint that moves.
+LEAST_MOTION, LEAST_SPEED = 0.02, 0.02
 #: Windows over which velocities are compared with positions, at most.
 WINDOWS = 3000
 #: Lags of the velocity that are tried, s; the least that is told, s and in time steps; the share
@@ -41,7 +43,11 @@ class Velocity(Check):
 
     def look(self, measurement: Measurement) -> Iterable[Suspicion]:
         shared = measurement.velocity_scale
-        if _of_units(shared) or (np.isfinite(shared) and unnamed_scale(measurement, shared)):
+        if (
+            measurement.lost
+            or _of_units(shared)
+            or (np.isfinite(shared) and unnamed_scale(measurement, shared))
+        ):
             return []  # the unit of the clock or of the positions
         order = _other_order(measurement)
         if order is not None:
@@ -55,6 +61,16 @@ class Velocity(Check):
                 "certain",
                 moved,
                 (f"--order dq={words}", f"order={{'dq': {numbers}}}"),
+            )
+            return [told]
+        constant = _constant(measurement)
+        if constant:
+            names = ", ".join(measurement.joint(k) for k in constant)
+            told = self.suspicion(
+                f"the velocity of {names} is not that of the position: one of them is constant",
+                "the other changes in most rows",
+                "certain",
+                constant,
             )
             return [told]
         groups: dict[str, list[int]] = {}
@@ -101,6 +117,16 @@ class Velocity(Check):
         return self.suspicion(
             f"{what} look like {unit} on {names}", evidence, "certain", joints, unit_remedy(units)
         )
+
+
+def _constant(measurement: Measurement) -> list[int]:
+    """Joints of which the position or the velocity never changes although the other does."""
+    s = measurement.signals
+    still, stands = np.ptp(s.q, axis=0) == 0, np.ptp(s.dq, axis=0) == 0
+    moves = np.mean(np.diff(s.q, axis=0) != 0, axis=0) > 0.5
+    moves &= np.ptp(s.q, axis=0) > LEAST_MOTION
+    turns = (np.mean(np.diff(s.dq, axis=0) != 0, axis=0) > 0.5) & (s.dq.std(axis=0) > LEAST_SPEED)
+    return [int(k) for k in np.flatnonzero((still & turns) | (stands & moves))]
 
 
 def _of_units(slope: float) -> bool:
@@ -174,6 +200,7 @@ class VelocityDelay(Check):
         late, early = ("velocity", "position") if common > 0 else ("position", "velocity")
         column = "dq" if common > 0 else "q"
         value = float(f"{abs(common):.2g}")
+        measurement.late_position = value if late == "position" else 0.0
         yield self.suspicion(
             f"the {late} is late against the {early} by about {1e3 * value:g} ms",
             f"at that lag it is the rate of the position, alike in {int(alike.sum())} of "

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Checks of the order of rows: what velocities say of the time between two rows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidyn._signals import Array
+from skidyn.measurement._check import Check
+from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._suspicion import Suspicion
+
+#: Share of the squared step of all positions that lies along their velocities, so that a step says
+#: how much time it took, with two joints and with more.
+ALONG_TWO, ALONG = 0.98, 0.9
+#: Steps of a position, in its scatter, from which single rows can be told.
+CLEAR = 4.0
+#: Share of moving rows that go backwards in time, and that skip others, to be told and to be sure.
+BACKWARDS, SKIPPED, SURELY = 0.1, 0.004, 0.02
+#: How many times as often steps are two or more as they are none, or between one and two.
+OTHERS = 3.0
+#: How nearly the time of a step is a whole number of steps of the clock.
+WHOLE = 0.25
+#: Steps from row to row, as shares of a joint's spread and of what velocities make of them, that
+#: rows in no order at all have.
+LARGE, FASTER = 0.2, 5.0
+
+
+@dataclass(frozen=True)
+class Elapsed:
+    """Time that every step of the positions took by the recorded velocities, in steps of the clock.
+
+    Attributes
+    ----------
+    steps : ndarray of shape (n_steps,)
+        Time of every step over that of the clock.
+    along : ndarray of shape (n_steps,) of bool
+        Whether the step of all positions lies along the velocities.
+    moving : ndarray of shape (n_steps,) of bool
+        Rows in the faster half.
+    clear : ndarray of shape (n_steps,) of bool
+        Rows whose steps stand out of the scatter of the positions.
+    disorder : float
+        Steps of the positions over those that velocities make of the clock, in the middle.
+    size : float
+        Steps of the positions over the spread of the positions, in the middle.
+    """
+
+    steps: Array
+    along: NDArray[np.bool_]
+    moving: NDArray[np.bool_]
+    clear: NDArray[np.bool_]
+    disorder: float
+    size: float
+
+
+def elapsed_steps(measurement: Measurement) -> Elapsed | None:
+    """What velocities say of the time between rows; None where fewer than two joints move.
+
+    Parameters
+    ----------
+    measurement : Measurement
+        What was recorded.
+
+    Returns
+    -------
+    Elapsed or None
+    """
+    s = measurement.signals
+    spread = s.q.std(axis=0)
+    used = np.flatnonzero((spread > 1e-3) & (s.dq.std(axis=0) > 1e-3))
+    together = s.trajectory[1:] == s.trajectory[:-1]
+    time = np.diff(s.clock)
+    together &= time > 0
+    if len(used) < 2 or together.sum() < 200:
+        return None
+    q, dq, time = s.q[:, used], s.dq[:, used], time[together]
+    moved = np.diff(q, axis=0)[together] / spread[used]
+    expected = ((dq[1:] + dq[:-1]) / 2)[together] * time[:, None] / spread[used]
+    product = np.sum(moved * expected, axis=1)
+    square, size = np.sum(expected**2, axis=1), np.sum(moved**2, axis=1)
+    steps = product / np.maximum(square, 1e-300)
+    cosine = product**2 / np.maximum(square * size, 1e-300)
+    moving = square > np.median(square)
+    scatter = np.median(np.abs(np.diff(moved, axis=0)), axis=0)
+    clear = square > CLEAR**2 * np.sum(scatter**2)
+    ratio = np.sqrt(size[moving] / square[moving])
+    return Elapsed(
+        steps,
+        cosine > (ALONG_TWO if len(used) == 2 else ALONG),
+        moving,
+        clear,
+        float(np.median(ratio)),
+        float(np.median(np.sqrt(size / len(used)))),
+    )
+
+
+class LostRows(Check):
+    """Rows that are not in the order of time, or between which others were lost."""
+
+    name = "lost_rows"
+    suspects = "rows that are not in the order of time, or between which others are missing"
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        found = elapsed_steps(measurement)
+        if found is None or not found.moving.any():
+            return
+        backwards = found.along & (found.steps < -WHOLE) & found.moving
+        share = float(backwards.sum() / found.moving.sum())
+        forwards = float(np.mean((found.steps > WHOLE)[found.moving & found.along]))
+        anyhow = found.size > LARGE and found.disorder > FASTER
+        if anyhow or (share > BACKWARDS and forwards > BACKWARDS):
+            measurement.lost = True
+            evidence = (
+                f"positions step by {100 * found.size:.0f} % of their spread from row to row, "
+                f"{found.disorder:.2g} times as far as their velocities take them"
+                if anyhow
+                else f"in {100 * share:.0f} % of the moving rows all joints go back along their "
+                "velocities at once"
+            )
+            yield self.suspicion(
+                "rows are not in the order of time: they were shuffled", evidence, "certain"
+            )
+            return
+        rows = found.clear & found.moving
+        if rows.sum() < 200:
+            return
+        steps = found.steps[rows & (found.along | (found.steps == 0))]
+        whole = np.abs(steps - np.round(steps)) < WHOLE
+        share, usual, between, none = (
+            float(np.sum(these) / rows.sum())
+            for these in (
+                whole & (steps > 1.5),
+                whole & (np.round(steps) == 1),
+                ~whole & (steps > 1) & (steps < 2),  # stamps that jitter
+                whole & (np.round(steps) == 0),  # rows that repeat, and catch up afterwards
+            )
+        )
+        if share > SKIPPED and usual > 0.5 and share > OTHERS * max(between, none):
+            measurement.lost = True
+            yield self.suspicion(
+                "rows are missing, and the clock does not say so",
+                f"in {100 * share:.2g} % of the moving rows all joints move two or more times as "
+                "far as their velocities take them in one step",
+                "certain" if share > SURELY else "suspected",
+            )

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Check of recordings against each other: one in other units, signs, or with another's torque."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from skidyn._signals import Array
+from skidyn.measurement._bodies import USUAL, Explained, explained
+from skidyn.measurement._check import Check
+from skidyn.measurement._fits import FEWEST, SAMPLES, student
+from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._suspicion import Suspicion
+
+#: Log-likelihood that another multiple must gain in a recording.
+LEAST = 15.0
+#: Least spread of what the other recordings predict, in residuals, for its multiple to be told.
+CLEAR = 2.0
+#: Correlation with the prediction from which a recording is only at another scale, and below which
+#: it has nothing to do with it.
+SCALED, UNLIKE = 0.8, 0.4
+#: Multiples that are those of the other recordings, and the share of these that have one.
+ONE, MOST = (0.7, 1.4), 0.6
+#: Residual of a recording over that of all from which its torque is of something else.
+LARGER = 3.0
+
+
+@dataclass(frozen=True)
+class Multiple:
+    """What the torque of a joint in a recording is of what all recordings predict."""
+
+    joint: int
+    run: int
+    multiple: float
+    likeness: float
+    gain: float
+    larger: float
+
+
+class OddRecording(Check):
+    """A recording whose torque is not that of the others."""
+
+    name = "odd_recording"
+    suspects = "single recordings in other units, with other signs, or with the torque of another"
+    stage = 2
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        if measurement.stale or measurement.lost:
+            return
+        seen = explained(measurement)
+        if seen is None:
+            return
+        told = _multiples(seen)
+        scaled, unlike = [], []
+        for k in sorted({one.joint for one in told}):
+            own = [one for one in told if one.joint == k]
+            usual = np.mean([ONE[0] < one.multiple < ONE[1] for one in own])
+            if len(own) < 3 or usual < MOST:
+                continue
+            for one in own:
+                within = USUAL[0] <= one.multiple <= USUAL[1]
+                if not within and one.gain > LEAST and abs(one.likeness) > SCALED:
+                    scaled.append(one)
+                elif one.gain > LEAST and one.larger > LARGER and one.likeness < UNLIKE:
+                    unlike.append(one)
+        for run in sorted({one.run for one in scaled}):
+            own = [one for one in scaled if one.run == run]
+            names = ", ".join(measurement.joint(one.joint) for one in own)
+            sizes = ", ".join(f"{one.multiple:.3g}" for one in own)
+            yield self.suspicion(
+                f"in trajectory {run} the torque of {names} has another sign or scale than in the "
+                "others",
+                f"it is {sizes} times what the other trajectories predict, which gains up to "
+                f"{max(one.gain for one in own):.0f} (log-likelihood); mend that file, or leave it "
+                "out",
+                "suspected",
+                [one.joint for one in own],
+            )
+        for run in sorted({one.run for one in unlike} - {one.run for one in scaled}):
+            own = [one for one in unlike if one.run == run]
+            names = ", ".join(measurement.joint(one.joint) for one in own)
+            shares = ", ".join(f"{one.larger:.2g}" for one in own)
+            yield self.suspicion(
+                f"in trajectory {run} the torque of {names} has little to do with the motion",
+                f"what the other trajectories predict leaves {shares} times as much there as in "
+                "all; it may be the torque of another recording, or its positions have another "
+                "zero",
+                "suspected",
+                [one.joint for one in own],
+            )
+
+
+def _multiples(seen: Explained) -> list[Multiple]:
+    """Multiples of every joint and recording with enough rows."""
+    fits, outcome = seen.fits, seen.identified
+    number = fits.signals.trajectory[::SAMPLES]
+    told = []
+    for k in seen.joints:
+        use = fits.moving[:, k]
+        y = fits.average(fits.torque[:, k])[use]
+        residual, scale = outcome.residual[k], float(outcome.scale[k])
+        predicted = y - residual
+        for run in np.unique(number[use]):
+            rows = number[use] == run
+            if rows.sum() >= FEWEST:
+                found = _multiple(y[rows], predicted[rows], scale)
+                if found is not None:
+                    size, likeness, gain, larger = found
+                    gain /= max(1.0, float(outcome.inflation[k]))
+                    told.append(Multiple(k, int(run), size, likeness, gain, larger))
+    return told
+
+
+def _multiple(y: Array, predicted: Array, scale: float) -> tuple[float, float, float, float] | None:
+    """Multiple, correlation, log-likelihood gained by it, and residual of it over the usual."""
+    p, t = predicted - predicted.mean(), y - y.mean()
+    if float(np.std(p)) < CLEAR * scale or not t @ t > 0:
+        return None
+    size, likeness = float(p @ t / (p @ p)), float(p @ t / np.sqrt((p @ p) * (t @ t)))
+    rest = t - size * p
+    own = max(scale, float(np.std(rest)))
+    gain = student(rest, own) - student(y - predicted, scale)
+    return size, likeness, gain, float(np.sqrt(np.mean((y - predicted) ** 2))) / scale
