@@ -4,7 +4,8 @@
 Usage: python benchmarks/measurement/mistakes.py [--cases FOLDER] [--seed 1] [--logs 5]
        [--only jitter,order] [--mend] [--verbose]
 
-Logs, half of them with a hidden effect, are spoiled in one way each (see ``spoils.py``). Printed
+Logs, half of them with a hidden effect, are spoiled in one way each (see ``spoils.py`` and
+``spoils_of_parts.py``). Printed
 are, by mistake, in how many logs it was named on the right joints with the right remedy, in how
 many of these it was certain, and in how many logs something else was suspected. ``--mend`` reads
 the spoiled log again with the remedy and prints in how many logs that gave back the recorded
@@ -26,6 +27,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from spoils import SPOILS, Spoiled
+from spoils_of_parts import PARTS
 
 from skidyn.datasets import (
     load_panda,
@@ -39,6 +41,7 @@ from skidyn.measurement import Suspicion
 from skidyn.robots import Robot
 
 ROBOTS = (load_panda, load_ur5, load_scara, load_planar_arm)
+MISTAKES = SPOILS | PARTS
 EFFECTS = (None, "stribeck", None, "payload", "torque_ripple", None, "spring", None)
 
 
@@ -146,11 +149,11 @@ def main() -> None:
     known: dict[str, Any] = {}
     totals = np.zeros(5, dtype=int)
     print(f"{'mistake':24s} {'named':>9s} {'certain':>9s} {'another':>9s} {'mended':>9s}")
-    for name in options.only.split(",") if options.only else SPOILS:
+    for name in options.only.split(",") if options.only else MISTAKES:
         counts, n = np.zeros(4, dtype=int), 0
         for i, case in enumerate(cases):
             rng = np.random.default_rng([options.seed, i])
-            spoiled = SPOILS[name](case.frame, case.robot, rng)
+            spoiled = MISTAKES[name](case.frame, case.robot, rng)
             if spoiled is None:  # a robot that cannot make this mistake
                 continue
             n += 1

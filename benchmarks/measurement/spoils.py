@@ -149,7 +149,9 @@ def true_gravity(log: pd.DataFrame, robot: Robot) -> np.ndarray:
     n = robot.n_joints
     tau = log[columns("tau", n)].to_numpy()
     rows = slice(None, None, max(1, len(log) // 4000))
-    model = RBDRegressor(robot, ("viscous", "coulomb")).fit(log.iloc[rows], tau[rows])
+    model = RBDRegressor(robot, ("viscous", "coulomb", "rotor_inertia")).fit(
+        log.iloc[rows], tau[rows]
+    )
     bodies = model.inertial_parameters_
     return robot.gravity_torque(log[columns("q", n)].to_numpy(), parameters=bodies)
 

@@ -36,8 +36,8 @@ from skidyn.measurement import (
     Measurement,
     check_measurement,
     copied_rows,
+    names_in_doubt,
     refuse_certain,
-    units_in_doubt,
 )
 from skidyn.robots import Robot
 
@@ -188,12 +188,13 @@ def _diagnose(
     if not force:
         refuse_certain(checks)
     notes = [str(check) for check in checks]
-    if not force and units_in_doubt(checks):
+    doubts = [] if force else names_in_doubt(checks)
+    if doubts:
         kinds = []
         notes.append(
-            "A unit is in doubt, so that no physical effect is named: what is missing is given as "
-            "a function of the signals. Settle the unit, or go on regardless with --force (in "
-            "Python: force=True)."
+            f"The measurement is in doubt ({'; '.join(doubts)}), so that no physical effect is "
+            "named: what is missing is given as a function of the signals. Settle it, or go on "
+            "regardless with --force (in Python: force=True)."
         )
     for note in notes:
         warnings.warn(note, LogWarning, stacklevel=4)

@@ -32,9 +32,10 @@ WRONG, TIMES, HEAVY = 0.2, 3.0, 0.3
 #: torque has little to do with the motion.
 UNRELATED, BEYOND = 0.67, 4.0
 #: Largest share of friction, and that of the joint in the middle, where there is none.
-FRICTIONLESS, HARDLY = 0.06, 0.02
-#: How near a computed torque is to that of the stated bodies, and how little it scatters.
-EQUAL, CLOSE, SILENT = 0.01, 0.05, 4e-3
+FRICTIONLESS, HARDLY = 0.12, 0.05
+#: How near a computed torque is to that of the stated bodies, how little friction it holds, and
+#: how little better any other bodies are.
+EQUAL, CLOSE, NONE, NO_BETTER = 0.01, 0.1, 0.01, 1.25
 
 
 @dataclass
@@ -246,11 +247,12 @@ class UnexplainedTorque(Check):
     name = "unexplained"
     suspects = "torque that has little to do with the motion: another signal, joint or time"
     stage = 2
+    misnames = True
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         seen = explained(measurement)
-        if seen is None or measurement.stale:
-            return  # what rough derivatives leave is no other signal
+        if seen is None or measurement.stale or measurement.frictionless:
+            return  # what rough derivatives, or another friction, leave is no other signal
         least = np.minimum(*seen.errors)
         steady = seen.scatter / np.sqrt(6)  # white noise is no mistake
         bad: NDArray[np.bool_] = (least > UNRELATED) & (least > BEYOND * steady)
@@ -280,6 +282,7 @@ class NoFriction(Check):
             return
         rubs = seen.shares[1]
         if len(rubs) > 1 and rubs.max() < FRICTIONLESS and np.median(rubs) < HARDLY:
+            measurement.frictionless = True
             yield self.suspicion(
                 "the torque holds no friction",
                 f"viscous and dry friction hold at most {100 * rubs.max():.1f} % of its spread: "
@@ -306,15 +309,16 @@ class ComputedTorque(Check):
         if (
             equal < EQUAL
             and np.median(stated) < CLOSE
-            and rubs.max() < FRICTIONLESS
-            and seen.scatter.max() < SILENT
+            and rubs.max() < NONE
+            and np.median(stated / identified) < NO_BETTER
         ):
             measurement.computed = True
             yield self.suspicion(
                 "the torque is that of the robot's description: it was commanded or computed, not "
                 "measured",
-                f"it is {np.median(gain):.4g} times the torque of the stated bodies, without "
-                f"friction, and scatters by {seen.scatter.max():.1g} of its spread",
+                f"it is {np.median(gain):.4g} times the torque of the stated bodies, friction "
+                f"holds at most {rubs.max():.1g} of its spread, and no other bodies explain it "
+                "better",
                 "suspected",
             )
         elif identified.max() < 1e-4 and seen.fits.n_rows > 200:

@@ -28,6 +28,9 @@ class Check(ABC):
         fits the robot to columns that are read rightly. A fit of columns in other units, or of the
         wrong joint, means nothing, so a check is left out where one of an earlier stage has found
         that (:func:`skidyn.measurement.check_measurement`).
+    misnames : bool
+        Whether an effect that a diagnosis names would be that of the mistake, so that it names none
+        where the check suspects something.
 
     Examples
     --------
@@ -39,6 +42,7 @@ class Check(ABC):
     name: ClassVar[str]
     suspects: ClassVar[str]
     stage: ClassVar[int] = 0
+    misnames: ClassVar[bool] = False
 
     @abstractmethod
     def look(self, measurement: Measurement) -> Iterable[Suspicion]:

@@ -52,18 +52,18 @@ CHECKS: tuple[Check, ...] = (
     UnsignedTorque(),
     Columns(),
     TorqueScale(),
+    NoFriction(),
     UnexplainedTorque(),
     OddRecording(),
     Bodies(),
     VelocityDelay(),
     HeldTorque(),
+    ComputedTorque(),
     TorqueDelay(),
     ConstantTorque(),
     CopiedTorque(),
     ClippedTorque(),
-    ComputedTorque(),
     SmoothTorque(),
-    NoFriction(),
     CoarsePosition(),
     SlowSampling(),
     Gaps(),
@@ -141,10 +141,8 @@ def check_measurement(measurement: Measurement) -> list[Suspicion]:
 _UNITS, _SCALES = CHECKS[:5], CHECKS[1:3]
 
 
-def units_in_doubt(found: list[Suspicion]) -> bool:
-    """Whether the unit of the clock or of a position is suspected to be another one.
-
-    Then a name of physics would be that of a scale.
+def names_in_doubt(found: list[Suspicion]) -> list[str]:
+    """What is suspected of a measurement that a diagnosis would give a name of physics.
 
     Parameters
     ----------
@@ -153,11 +151,11 @@ def units_in_doubt(found: list[Suspicion]) -> bool:
 
     Returns
     -------
-    bool
-
+    list of str
+        Empty where nothing of the kind is suspected.
     """
-    names = {check.name for check in _SCALES}
-    return any(s.check in names and s.certainty != "noted" for s in found)
+    names = {check.name for check in CHECKS if check.misnames}
+    return [s.suspicion for s in found if s.check in names and s.certainty != "noted"]
 
 
 def refuse_certain(found: list[Suspicion]) -> None:

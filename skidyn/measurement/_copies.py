@@ -69,9 +69,8 @@ class CopiedTorque(Check):
     """A torque that is another channel of the log."""
 
     name = "copied_torque"
-    suspects = (
-        "torque that is a copy of another channel: another torque, a position or a velocity"
-    )
+    suspects = "torque that is a copy of another channel: another torque, a position or a velocity"
+    misnames = True
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         s, torque = measurement.signals, measurement.torque

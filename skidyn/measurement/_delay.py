@@ -30,16 +30,24 @@ class Delay:
         Lag of all joints together; positive where torque is late, NaN where it cannot be told.
     error : float, s
         Its standard error.
-    joints : ndarray of shape (n_joints,), s
-        Lag of every joint by itself, NaN where it cannot be told.
+    joints, errors : ndarray of shape (n_joints,), s
+        Lag of every joint by itself and its standard error, NaN where it cannot be told.
     gain : float
         Log-likelihood gained by the common lag.
+    gains : ndarray of shape (n_joints,)
+        Log-likelihood that every joint gains by its own lag.
+    halves : ndarray of shape (n_joints, 2), s
+        Lag in the slower and in the faster rows of every joint: a delay is the same in both, what
+        friction does when a joint turns is not.
     """
 
     common: float
     error: float
     joints: Array
+    errors: Array
     gain: float
+    gains: Array
+    halves: Array
 
 
 def find_delay(fits: Fits) -> Delay:
@@ -55,7 +63,8 @@ def find_delay(fits: Fits) -> Delay:
     Delay
     """
     n = fits.n_joints
-    unknown = Delay(np.nan, np.nan, np.full(n, np.nan), 0.0)
+    own_errors, own_gains, halves = np.full(n, np.nan), np.zeros(n), np.full((n, 2), np.nan)
+    unknown = Delay(np.nan, np.nan, np.full(n, np.nan), own_errors, 0.0, own_gains, halves)
     s = fits.motion(Reading())
     regressor = fits.average(fits.robot.torque_regressor(s.q, s.dq, s.ddq))
     shifted = [fits.average(fits.torque_at(lag)) for lag in LAGS]
@@ -89,6 +98,11 @@ def find_delay(fits: Fits) -> Delay:
             continue
         tables.append((len(rest), errors))
         lags[j] = _lowest(total)
+        own_errors[j] = _spread([_lowest(total - errors[g]) for g in range(GROUPS)])
+        speed = np.abs(fits.average(s.dq[:, j])[use])
+        fast = speed > np.median(speed)
+        halves[j] = [_lowest((rest[rows] ** 2).sum(axis=0)) for rows in (~fast, fast)]
+        own_gains[j] = len(rest) / 2 * np.log(total[len(LAGS) // 2] / total.min())
     if not tables:
         return unknown
 
@@ -101,11 +115,15 @@ def find_delay(fits: Fits) -> Delay:
         return np.asarray(np.sum(errors, axis=0))
 
     common = _lowest(cost(None))
-    others = np.array([_lowest(cost(g)) for g in range(GROUPS)])
-    error = float(np.sqrt((GROUPS - 1) * np.mean((others - others.mean()) ** 2)))
+    error = _spread([_lowest(cost(g)) for g in range(GROUPS)])
     whole = sum(n / 2 * np.log(e.sum(axis=0)) for n, e in tables)
     gain = float(whole[len(LAGS) // 2] - whole.min())
-    return Delay(common, error, lags, gain)
+    return Delay(common, error, lags, own_errors, gain, own_gains, halves)
+
+
+def _spread(values: list[float]) -> float:
+    """Standard error from estimates that leave out one group of rows each."""
+    return float(np.sqrt((GROUPS - 1) * np.var(values)))
 
 
 def _sliding(fits: Fits, signals: Signals, joint: int) -> NDArray[np.bool_]:

@@ -27,7 +27,7 @@ OTHERS = 3.0
 WHOLE = 0.25
 #: Steps from row to row, as shares of a joint's spread and of what velocities make of them, that
 #: rows in no order at all have.
-LARGE, FASTER = 0.2, 5.0
+LARGE, FASTER = 0.05, 5.0
 
 
 @dataclass(frozen=True)
@@ -104,6 +104,7 @@ class LostRows(Check):
 
     name = "lost_rows"
     suspects = "rows that are not in the order of time, or between which others are missing"
+    misnames = True
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         found = elapsed_steps(measurement)

@@ -322,6 +322,38 @@ class Fits:
         return self._known[reading]
 
     def _identified(self, reading: Reading) -> Outcome:
+        columns, designs, places, targets = self._designs(reading)
+        return self._spread(columns, fit_together(designs, places, targets))
+
+    def predicted_without(self, rows: NDArray[np.bool_]) -> dict[int, tuple[Array, float]]:
+        """What bodies that are identified without some rows predict for these.
+
+        Parameters
+        ----------
+        rows : ndarray of shape (n_rows,) of bool
+            Rows that are left out.
+
+        Returns
+        -------
+        dict of int to (ndarray, float)
+            By joint: prediction of the rows left out in which it moves, and scale of the residual
+            of the others.
+        """
+        joints, designs, places, targets = self._designs(Reading())
+        out = [rows[self.moving[:, k]] for k in joints]
+        kept = [(d[~o], y[~o]) for d, y, o in zip(designs, targets, out, strict=True)]
+        if any(len(y) < FEWEST for _, y in kept):
+            return {}
+        fits = fit_together([d for d, _ in kept], places, [y for _, y in kept])
+        return {
+            k: (d[o] @ fit.coefficients, fit.scale)
+            for k, d, o, fit in zip(joints, designs, out, fits, strict=True)
+        }
+
+    def _designs(
+        self, reading: Reading
+    ) -> tuple[list[int], list[Array], list[NDArray[np.int64]], list[Array]]:
+        """Columns of the torque, and designs, places of coefficients and targets of their fit."""
         s = self.motion(reading)
         robot = self.robot
         if reading.gravity is not None:
@@ -339,8 +371,7 @@ class Fits:
             designs.append(np.hstack([regressor[use, j][:, felt], self.average(own)[use]]))
             places.append(np.append(felt, p + 4 * k + np.arange(4)))
             targets.append(read[j][1] * y[use])
-        columns = [read[j][0] for j in joints]
-        return self._spread(columns, fit_together(designs, places, targets))
+        return [read[j][0] for j in joints], designs, places, targets
 
     def _mean_regressor(self, robot: Robot, s: Signals, index: NDArray[np.int64]) -> Array:
         """Some columns of the mean regressor, (n_rows, n_joints, len(index)), chunk by chunk."""

@@ -47,7 +47,7 @@ class Measurement:
     identified : bool, optional
         Whether bodies are going to be identified, so that those of the description may be wrong; by
         default it is not known.
-    unsigned, delay, late_position, readable, stale, lost, scaled, computed : optional
+    unsigned, delay, late_position, readable, stale, lost, scaled, computed, frictionless : optional
         What checks found that others want to know; filled in by them.
 
     Examples
@@ -73,6 +73,7 @@ class Measurement:
     lost: bool = field(default=False, repr=False)
     scaled: bool = field(default=False, repr=False)
     computed: bool = field(default=False, repr=False)
+    frictionless: bool = field(default=False, repr=False)
     #: Rows to which positions leap; trajectories are taken to end there.
     leaps: Array = field(init=False, repr=False)
 

@@ -26,6 +26,11 @@ SCALED, UNLIKE = 0.8, 0.4
 ONE, MOST = (0.7, 1.4), 0.6
 #: Residual of a recording over that of all from which its torque is of something else.
 LARGER = 3.0
+#: Error of identified bodies, as a share of the spread, from which recordings are predicted by the
+#: bodies of the others alone.
+SPOILED = 0.12
+#: How many times as far as in the others all torques of a recording spread that is in another unit.
+FAR = 50.0
 
 
 @dataclass(frozen=True)
@@ -38,6 +43,8 @@ class Multiple:
     likeness: float
     gain: float
     larger: float
+    #: Whether the error of the other recordings falls to less than half without this one.
+    spoils: bool
 
 
 class OddRecording(Check):
@@ -46,21 +53,32 @@ class OddRecording(Check):
     name = "odd_recording"
     suspects = "single recordings in other units, with other signs, or with the torque of another"
     stage = 2
+    misnames = True
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         if measurement.stale or measurement.lost:
-            return
+            return  # what is left is that of the clock
         seen = explained(measurement)
         if seen is None:
+            return
+        sizes = _sizes(measurement)
+        for run, size in sizes.items():
+            yield self.suspicion(
+                f"in trajectory {run} all torques are in another unit or scale than in the others",
+                f"they spread {size:.3g} times as far; mend that file, or leave it out",
+                "certain",
+            )
+        if sizes:
             return
         told = _multiples(seen)
         scaled, unlike = [], []
         for k in sorted({one.joint for one in told}):
             own = [one for one in told if one.joint == k]
             usual = np.mean([ONE[0] < one.multiple < ONE[1] for one in own])
-            if len(own) < 3 or usual < MOST:
-                continue
+            alike = len(own) >= 3 and usual >= MOST
             for one in own:
+                if not (alike or one.spoils):
+                    continue
                 within = USUAL[0] <= one.multiple <= USUAL[1]
                 if not within and one.gain > LEAST and abs(one.likeness) > SCALED:
                     scaled.append(one)
@@ -69,16 +87,18 @@ class OddRecording(Check):
         for run in sorted({one.run for one in scaled}):
             own = [one for one in scaled if one.run == run]
             names = ", ".join(measurement.joint(one.joint) for one in own)
-            sizes = ", ".join(f"{one.multiple:.3g}" for one in own)
+            multiples = ", ".join(f"{one.multiple:.3g}" for one in own)
             yield self.suspicion(
                 f"in trajectory {run} the torque of {names} has another sign or scale than in the "
                 "others",
-                f"it is {sizes} times what the other trajectories predict, which gains up to "
+                f"it is {multiples} times what the other trajectories predict, which gains up to "
                 f"{max(one.gain for one in own):.0f} (log-likelihood); mend that file, or leave it "
                 "out",
                 "suspected",
                 [one.joint for one in own],
             )
+        if measurement.frictionless:
+            return  # what is left is that of another friction
         for run in sorted({one.run for one in unlike} - {one.run for one in scaled}):
             own = [one for one in unlike if one.run == run]
             names = ", ".join(measurement.joint(one.joint) for one in own)
@@ -93,24 +113,41 @@ class OddRecording(Check):
             )
 
 
+def _sizes(measurement: Measurement) -> dict[int, float]:
+    """Recordings in which all torques spread far more, or less, than in the others."""
+    number = measurement.signals.trajectory
+    runs = np.unique(number)
+    if len(runs) < 3:
+        return {}
+    spread = np.array([measurement.torque[number == run].std(axis=0) for run in runs])
+    size = spread / np.maximum(np.median(spread, axis=0), 1e-300)
+    odd = (size > FAR).all(axis=1) | ((size < 1 / FAR) & (size > 0)).all(axis=1)
+    return {int(run): float(np.median(x)) for run, x in zip(runs[odd], size[odd], strict=True)}
+
+
 def _multiples(seen: Explained) -> list[Multiple]:
     """Multiples of every joint and recording with enough rows."""
     fits, outcome = seen.fits, seen.identified
     number = fits.signals.trajectory[::SAMPLES]
+    # one recording of a few spoils the bodies that all of them identify
+    apart = bool(np.any(seen.errors[1] > SPOILED))
     told = []
-    for k in seen.joints:
-        use = fits.moving[:, k]
-        y = fits.average(fits.torque[:, k])[use]
-        residual, scale = outcome.residual[k], float(outcome.scale[k])
-        predicted = y - residual
-        for run in np.unique(number[use]):
-            rows = number[use] == run
-            if rows.sum() >= FEWEST:
-                found = _multiple(y[rows], predicted[rows], scale)
-                if found is not None:
-                    size, likeness, gain, larger = found
-                    gain /= max(1.0, float(outcome.inflation[k]))
-                    told.append(Multiple(k, int(run), size, likeness, gain, larger))
+    for run in np.unique(number):
+        rows = number == run
+        others = fits.predicted_without(rows) if apart else {}
+        for k in seen.joints:
+            use = fits.moving[:, k]
+            y = fits.average(fits.torque[:, k])[use]
+            own, scale = rows[use], float(outcome.scale[k])
+            predicted = (y - outcome.residual[k])[own]
+            if k in others:
+                predicted, scale = others[k]
+            found = _multiple(y[own], predicted, scale) if own.sum() >= FEWEST else None
+            if found is not None:
+                size, likeness, gain, larger = found
+                gain /= max(1.0, float(outcome.inflation[k]))
+                spoils = scale < outcome.scale[k] / 2
+                told.append(Multiple(k, int(run), size, likeness, gain, larger, bool(spoils)))
     return told
 
 

@@ -149,7 +149,7 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
             another = any(c.kind == "gravity" and c.gain > absent.gain - TIED for c in judged)
             if another and restored < LEAST:
                 return replace(absent, rivals=("gravity",))  # along it no joint feels a change
-            return replace(absent, restorable=restored > 0)
+            return replace(absent, restorable=restored > LEAST)
     accepted = []
     for change in judged:
         if change.kind == "no_gravity":

@@ -31,8 +31,12 @@ UNITS = {1e3: "Nmm", 1e2: "Ncm", 1e-3: "kNm"}
 #: Smallest delay that is told, s, how many standard errors it must have, and how far the lag of a
 #: joint may be from it.
 SMALLEST, ERRORS, ALIKE = 0.004, 5.0, 0.006
-#: Share of the joints whose lags must be alike; friction shifts each joint by another amount.
+#: Share of the joints whose lags must be alike, or of what they gain; friction shifts each joint by
+#: another amount.
 AGREEING = 0.75
+#: How far the lag of one joint must be from those of others, s, and how nearly it must be the same
+#: in its slower and its faster rows, as a share of it.
+APART, SAME = 0.008, 0.3
 
 
 class UnsignedTorque(Check):
@@ -41,6 +45,7 @@ class UnsignedTorque(Check):
     name = "unsigned_torque"
     suspects = "torque or current without its sign"
     stage = 1
+    misnames = True
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         cut = cut_columns(measurement)
@@ -177,6 +182,7 @@ class Columns(Check):
         "or torque from which gravity was taken off"
     )
     stage = 1
+    misnames = True
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         fits = measurement.fits
@@ -290,10 +296,12 @@ class TorqueDelay(Check):
         found = measured_delay(measurement)
         if found is None or not np.isfinite(found.common):
             return
-        if measurement.stale:
+        if measurement.stale or measurement.computed:
             return  # held and interpolated values are late, or early, by themselves
-        told = found.joints[np.isfinite(found.joints)]
-        alike = np.abs(told - found.common) < max(ALIKE, 0.3 * abs(found.common))
+        use = np.isfinite(found.joints)
+        near = max(ALIKE, 0.3 * abs(found.common))
+        alike = np.abs(found.joints[use] - found.common) < np.maximum(near, 2 * found.errors[use])
+        weight = found.gains[use] / max(float(found.gains[use].sum()), 1e-12)
         # where positions are late, the torque is early by as much, and not by itself
         early = measurement.late_position
         if early and abs(found.common + early) < max(ALIKE, 0.3 * early):
@@ -301,8 +309,8 @@ class TorqueDelay(Check):
         if (
             abs(found.common) > max(SMALLEST, ERRORS * found.error)
             and found.gain > LEAST
-            and alike.mean() >= AGREEING
-            and len(told) > measurement.n_joints / 2
+            and (alike.mean() >= AGREEING or weight[alike].sum() >= AGREEING)
+            and alike.sum() > measurement.n_joints / 2
         ):
             ms = 1e3 * found.common
             late = float(f"{found.common + early:.4f}")
@@ -315,6 +323,39 @@ class TorqueDelay(Check):
                 "suspected",
                 remedy=(f"--late tau={late:g}", f"late={{'tau': {late:g}}}"),
             )
+            return
+        for k in late_joints(found):
+            lag = float(f"{found.joints[k]:.4f}")
+            slow, fast = 1e3 * found.halves[k]
+            yield self.suspicion(
+                f"the torque of {measurement.joint(k)} is {'late' if lag > 0 else 'early'} by "
+                f"about {abs(1e3 * lag):.1f} ms, and that of other joints is not",
+                f"in its slower rows by {slow:.1f} ms, in its faster ones by {fast:.1f} ms, which "
+                f"gains {found.gains[k]:.0f} (log-likelihood)",
+                "suspected",
+                [k],
+                (f"--late tau{k + 1}={lag:g}", f"late={{'tau{k + 1}': {lag:g}}}"),
+            )
+
+
+def late_joints(found: Delay) -> list[int]:
+    """Joints whose torque is late or early by itself, from 0.
+
+    Friction that turns late looks like a delay of its joint, but by another time where the joint is
+    faster.
+    """
+    late = []
+    for k, lag in enumerate(found.joints):
+        others = np.delete(found.joints, k)
+        sure = others[np.isfinite(others) & (np.delete(found.errors, k) < SMALLEST)]
+        if not np.isfinite(lag) or len(sure) < len(others) / 2:
+            continue
+        common = float(np.median(sure))
+        apart = abs(lag - common) > max(APART, ERRORS * found.errors[k]) and abs(common) < SMALLEST
+        slow, fast = found.halves[k]
+        if apart and found.gains[k] > SURE and abs(slow - fast) < SAME * abs(lag):
+            late.append(k)
+    return late if len(late) < len(found.joints) / 2 or len(found.joints) == 2 else []
 
 
 def measured_delay(measurement: Measurement) -> Delay | None:

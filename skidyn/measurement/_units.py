@@ -37,6 +37,7 @@ class ClockUnit(Check):
 
     name = "clock_unit"
     suspects = "time in ms, us or ns, or a clock of another rate"
+    misnames = True
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         slopes = [s for s, r in measurement.velocities if np.isfinite(s) and r > ALIKE and s > 0]
@@ -99,6 +100,7 @@ class PositionUnit(Check):
 
     name = "position_unit"
     suspects = "positions in degrees, turns or counts of an encoder, or of motors before the gears"
+    misnames = True
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         slopes = [s for s, r in measurement.velocities if np.isfinite(s) and r > ALIKE]

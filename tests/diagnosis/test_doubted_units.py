@@ -14,7 +14,10 @@ def test_no_physics_is_named_while_a_unit_is_in_doubt():
     log = make_hidden_effect_log(arm, "spring", n_trajectories=8, duration=6.0, random_state=3)
     X = log.X.assign(time=1.5 * log.X["time"])  # the clock, or velocities at another scale
 
-    with pytest.warns(LogWarning, match="A unit is in doubt, so that no physical effect is named"):
+    told = (
+        r"measurement is in doubt \(.*scale of the clock.*\), so that no physical effect is named"
+    )
+    with pytest.warns(LogWarning, match=told):
         doubted = diagnose(RBDRegressor(arm, effects=["viscous", "coulomb"]), X, log.y)
 
     assert {(check.check, check.certainty) for check in doubted.checks} == {

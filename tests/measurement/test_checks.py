@@ -287,3 +287,34 @@ def test_torque_without_noise(signals):
     assert "smooth_torque" in [s.check for s in found(signals, smooth, None)]
     noisy = smooth + np.random.default_rng(0).normal(0, 1e-3, smooth.shape)
     assert found(signals, noisy, None) == []
+
+
+@pytest.mark.parametrize("column", ["q2", "dq2"])
+def test_a_position_or_velocity_that_never_changes(column):
+    told = told_of(LOG.frame.assign(**{column: 0.3}))["velocity"]
+    assert told.certainty == "certain" and told.joints == (2,) and "constant" in told.suspicion
+
+
+def test_torque_of_one_joint_that_is_late():
+    log = make_hidden_effect_log(ROBOT, None, n_trajectories=5, duration=6.0, random_state=5)
+    frame = log.frame
+    late = frame.groupby("trajectory")["tau2"].shift(3).bfill()
+    told = told_of(frame.assign(tau2=late))["torque_delay"]
+    assert told.joints == (2,) and told.remedy.option.startswith("--late tau2=0.0")
+
+
+def test_positions_in_half_precision():
+    short = {name: LOG.frame[name].astype(np.float16).astype(float) for name in ("q1", "q2")}
+    assert told_of(LOG.frame.assign(**short))["coarse_position"].joints == (1, 2)
+
+
+def test_stamps_are_certain_only_where_they_do_harm():
+    log = make_hidden_effect_log(ROBOT, None, n_trajectories=4, random_state=6)
+    noise = np.random.default_rng(0).uniform(-1, 1, len(log.frame))
+    certainties = {
+        size: told_of(log.frame.assign(time=log.frame["time"] + size * noise))["clock_jitter"]
+        for size in (2e-5, 1e-3)
+    }
+    assert certainties[2e-5].certainty == "suspected"
+    assert "little harm" in certainties[2e-5].evidence
+    assert certainties[1e-3].certainty == "certain"

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Rows that are not in the order of time, or between which others are missing."""
+
+import numpy as np
+
+from skidyn.datasets import load_planar_arm, load_scara, make_hidden_effect_log
+from skidyn.logs import check_log
+
+ROBOT = load_scara()
+FRAME = make_hidden_effect_log(ROBOT, None, n_trajectories=3, random_state=7).frame
+
+
+def told_of(frame, robot=ROBOT):
+    return {s.check: s for s in check_log(frame, robot).checks}
+
+
+def test_rows_in_order_are_not_told():
+    assert "lost_rows" not in told_of(FRAME)
+    arm = load_planar_arm()
+    frame = make_hidden_effect_log(arm, "stribeck", n_trajectories=3, random_state=2).frame
+    assert "lost_rows" not in told_of(frame, arm)
+
+
+def test_shuffled_rows():
+    signals = [c for c in FRAME if c not in ("time", "trajectory")]
+    far = FRAME.copy()
+    order = np.random.default_rng(0).permutation(len(FRAME))
+    far[signals] = FRAME[signals].to_numpy()[order]
+    near = FRAME.copy()
+    order = np.argsort(np.arange(len(FRAME)) + np.random.default_rng(1).uniform(0, 6, len(FRAME)))
+    near[signals] = FRAME[signals].to_numpy()[order]
+
+    for frame in (far, near):
+        told = told_of(frame)["lost_rows"]
+        assert told.certainty == "certain" and "not in the order of time" in told.suspicion
+
+
+def test_rows_that_were_lost_under_an_even_clock():
+    kept = FRAME[np.random.default_rng(2).random(len(FRAME)) > 0.05].reset_index(drop=True)
+    step = np.where(np.diff(kept["trajectory"]) != 0, 1.0, np.median(np.diff(FRAME["time"])))
+    kept["time"] = np.r_[0.0, np.cumsum(step)]
+
+    told = told_of(kept)
+
+    assert told["lost_rows"].certainty == "certain"
+    assert "rows are missing" in told["lost_rows"].suspicion
+    assert "clock_unit" not in told and "velocity" not in told
+
+
+def test_rows_that_the_clock_says_are_missing():
+    kept = FRAME[np.random.default_rng(2).random(len(FRAME)) > 0.05]
+    assert "lost_rows" not in told_of(kept.reset_index(drop=True))

@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Single recordings whose torque is not that of the others."""
+
+import pytest
+
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.logs import check_log
+
+ROBOT = load_planar_arm()
+FRAME = make_hidden_effect_log(
+    ROBOT, "stribeck", joints=[2], n_trajectories=6, duration=8.0, random_state=3
+).frame
+RUN = int(FRAME["trajectory"].unique()[2])
+
+
+def told_of(factor, joints=("tau1", "tau2")):
+    frame = FRAME.copy()
+    frame.loc[frame["trajectory"] == RUN, list(joints)] *= factor
+    return {s.check: s for s in check_log(frame, ROBOT).checks}
+
+
+def test_recordings_that_are_alike():
+    assert "odd_recording" not in told_of(1.0)
+
+
+@pytest.mark.parametrize("factor", [-1.0, 0.1])
+def test_another_sign_or_scale(factor):
+    told = told_of(factor)["odd_recording"]
+    assert told.suspicion.startswith(f"in trajectory {RUN} the torque of joint 1")
+    assert told.joints == (1, 2) and told.certainty == "suspected"
+
+
+def test_the_sign_of_one_joint():
+    assert told_of(-1.0, ["tau2"])["odd_recording"].joints == (2,)
+
+
+def test_another_unit():
+    told = told_of(1e3)["odd_recording"]
+    assert told.certainty == "certain" and f"in trajectory {RUN} all torques" in told.suspicion
