@@ -2,7 +2,7 @@
 """How many mistakes in logs are named, how many are named that are none, and what mending gives.
 
 Usage: python benchmarks/measurement/mistakes.py [--cases FOLDER] [--seed 1] [--logs 5]
-       [--only jitter,order] [--mend] [--verbose]
+       [--sample 5] [--only jitter,order] [--mend] [--verbose]
 
 Logs, half of them with a hidden effect, are spoiled in one way each (see ``spoils.py`` and
 ``spoils_of_parts.py``). Printed
@@ -138,6 +138,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--logs", type=int, default=5, help="logs of each robot")
     parser.add_argument("--first", type=int, help="only so many logs")
+    parser.add_argument("--sample", type=int, help="so many logs of each mistake, in turn")
     parser.add_argument("--only", help="mistakes, separated by commas")
     parser.add_argument("--mend", action="store_true", help="read again with the remedies")
     parser.add_argument("--diagnose", action="store_true", help="compare diagnoses, slow")
@@ -149,9 +150,11 @@ def main() -> None:
     known: dict[str, Any] = {}
     totals = np.zeros(5, dtype=int)
     print(f"{'mistake':24s} {'named':>9s} {'certain':>9s} {'another':>9s} {'mended':>9s}")
-    for name in options.only.split(",") if options.only else MISTAKES:
+    for turn, name in enumerate(options.only.split(",") if options.only else MISTAKES):
         counts, n = np.zeros(4, dtype=int), 0
-        for i, case in enumerate(cases):
+        taken = options.sample or len(cases)
+        for i in sorted({(turn * taken + k) % len(cases) for k in range(taken)}):
+            case = cases[i]
             rng = np.random.default_rng([options.seed, i])
             spoiled = MISTAKES[name](case.frame, case.robot, rng)
             if spoiled is None:  # a robot that cannot make this mistake
