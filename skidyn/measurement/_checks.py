@@ -50,11 +50,11 @@ CHECKS: tuple[Check, ...] = (
     ClockJitter(),
     InterpolatedRows(),
     UnsignedTorque(),
+    OddRecording(),
     Columns(),
     TorqueScale(),
     NoFriction(),
     UnexplainedTorque(),
-    OddRecording(),
     Bodies(),
     VelocityDelay(),
     HeldTorque(),
@@ -84,7 +84,7 @@ def list_checks() -> tuple[Check, ...]:
     --------
     >>> from skidyn.measurement import list_checks
     >>> [check.name for check in list_checks() if check.stage == 1]
-    ['unsigned_torque', 'reading']
+    ['unsigned_torque', 'odd_recording', 'reading']
     """
     return CHECKS
 

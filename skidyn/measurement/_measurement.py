@@ -47,7 +47,7 @@ class Measurement:
     identified : bool, optional
         Whether bodies are going to be identified, so that those of the description may be wrong; by
         default it is not known.
-    unsigned, delay, late_position, readable, stale, lost, scaled, computed, frictionless : optional
+    unsigned, delay, late_position, readable, stale, lost, odd, scaled, computed, frictionless : optional
         What checks found that others want to know; filled in by them.
 
     Examples
@@ -71,6 +71,7 @@ class Measurement:
     readable: bool = field(default=True, repr=False)
     stale: bool = field(default=False, repr=False)
     lost: bool = field(default=False, repr=False)
+    odd: bool = field(default=False, repr=False)
     scaled: bool = field(default=False, repr=False)
     computed: bool = field(default=False, repr=False)
     frictionless: bool = field(default=False, repr=False)

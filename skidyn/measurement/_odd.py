@@ -52,7 +52,7 @@ class OddRecording(Check):
 
     name = "odd_recording"
     suspects = "single recordings in other units, with other signs, or with the torque of another"
-    stage = 2
+    stage = 1
     misnames = True
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
@@ -69,6 +69,7 @@ class OddRecording(Check):
                 "certain",
             )
         if sizes:
+            measurement.odd = True
             return
         told = _multiples(seen)
         scaled, unlike = [], []
@@ -84,6 +85,7 @@ class OddRecording(Check):
                     scaled.append(one)
                 elif one.gain > LEAST and one.larger > LARGER and one.likeness < UNLIKE:
                     unlike.append(one)
+        measurement.odd = bool(scaled or unlike)
         for run in sorted({one.run for one in scaled}):
             own = [one for one in scaled if one.run == run]
             names = ", ".join(measurement.joint(one.joint) for one in own)

@@ -186,8 +186,8 @@ class Columns(Check):
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         fits = measurement.fits
-        if fits is None:
-            return
+        if fits is None or measurement.odd:
+            return  # recordings that contradict each other have no reading
         unsigned, _ = unsigned_columns(measurement)
         changes = find_changes(fits.without([*unsigned, *cut_columns(measurement)]))
         for kind in dict.fromkeys(change.kind for change in changes):
