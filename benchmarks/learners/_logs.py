@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from skidyn.datasets import (
     load_panda as load_panda_arm,
+    load_planar_arm,
     load_scara,
     load_srs_arm,
     load_ur5,
@@ -169,7 +170,7 @@ def emps() -> Log:
     return Log("EMPS, blocks", robot, X, y, fold, PLAIN[:3])
 
 
-def simulated(robot: Robot, effect: str, title: str, seed: int) -> Log:
+def simulated(robot: Robot, effect: str | None, title: str, seed: int) -> Log:
     """A simulated arm that hides an effect; 12 trajectories in three folds."""
     log = make_hidden_effect_log(robot, effect, n_trajectories=12, rate=30.0, random_state=seed)
     fold = log.X["trajectory"].to_numpy(int) % 3
@@ -223,6 +224,23 @@ def mtm() -> Log:
     X, y = table(runs_of(recordings("dvrk", "dvrk_mtm.npz")), 200.0, 5.0, 8)
     return Log("dVRK MTM, runs", None, X, y, X["trajectory"].to_numpy(int) % 3)
 
+
+def fresh(robot: Callable[[], Robot], effect: str | None, seed: int) -> Callable[[], Log]:
+    """A simulated log that was made when everything had been settled."""
+    return lambda: simulated(robot(), effect, f"simulated, {effect}, seed {seed}", seed)
+
+
+FRESH: dict[str, Callable[[], Log]] = {
+    f"fresh_{seed}": fresh(robot, effect, seed)
+    for robot, effect, seed in (
+        (load_panda_arm, "stribeck", 11),
+        (load_ur10e, "lugre", 12),
+        (load_srs_arm, "load_dependent_friction", 13),
+        (load_planar_arm, None, 14),
+        (load_ur5, "backlash", 15),
+        (load_scara, "spring", 16),
+    )
+}
 
 #: Logs of the table; defaults were settled on the first group. The second had no part in those of
 #: the learners, but was in sight when RBDRegressor's choice of rows was settled.

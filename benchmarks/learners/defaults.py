@@ -6,7 +6,8 @@
 Printed is the error on held-out parts: RMSE over the standard deviation of the torque, mean over
 the joints. Physics is ``RBDRegressor`` with plain friction; "Ridge" is ten lines of
 scikit-learn on the columns of rigid body and friction. ``--unseen`` takes the logs that had no part
-in settling learners; ``--only`` names logs, ``--models`` estimators, ``--joints`` prints joints.
+in settling learners, ``--fresh`` simulated ones that had none in anything; ``--only`` names logs,
+``--models`` estimators, ``--joints`` prints joints.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from _logs import LOGS, UNSEEN, Array, Log
+from _logs import FRESH, LOGS, UNSEEN, Array, Log
 from sklearn.ensemble import HistGradientBoostingRegressor
 from sklearn.linear_model import RidgeCV
 from sklearn.multioutput import MultiOutputRegressor
@@ -110,14 +111,15 @@ def held_out_errors(log: Log, make: Callable[[], Any]) -> Array:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--only", nargs="+", choices=[*LOGS, *UNSEEN])
+    parser.add_argument("--only", nargs="+", choices=[*LOGS, *UNSEEN, *FRESH])
     parser.add_argument("--unseen", action="store_true")
+    parser.add_argument("--fresh", action="store_true")
     parser.add_argument("--models", nargs="+")
     parser.add_argument("--joints", action="store_true", help="print every joint as well")
     options = parser.parse_args()
     warnings.filterwarnings("ignore")  # remarks on the data
-    for name in options.only or (UNSEEN if options.unseen else LOGS):
-        log = {**LOGS, **UNSEEN}[name]()
+    for name in options.only or (FRESH if options.fresh else UNSEEN if options.unseen else LOGS):
+        log = {**LOGS, **UNSEEN, **FRESH}[name]()
         print(f"\n**{log.title}**: {len(log.X)} rows, {log.y.shape[1]} joints\n")
         joints = "joints | ", "---|"
         head, line = joints if options.joints else ("", "")

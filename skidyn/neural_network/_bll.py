@@ -59,8 +59,7 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     ``HybridRegressor(physics, BLLRegressor())``.
 
     By itself it has its place only where no model of the robot exists: with a URDF, a rigid
-    body with friction predicts far better
-    (:doc:`/user_guide/learners`).
+    body with friction predicts far better on most logs (:doc:`/user_guide/learners`).
 
     Parameters
     ----------
