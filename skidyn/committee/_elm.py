@@ -13,6 +13,7 @@ from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils import check_random_state
 from sklearn.utils.parallel import Parallel, delayed
 from sklearn.utils.validation import _check_sample_weight, check_is_fitted, validate_data
+from threadpoolctl import threadpool_limits
 
 from skidyn._columns import ColumnSpec
 from skidyn._compat import Interval, StrOptions, fit_context
@@ -213,10 +214,13 @@ class ELMCommittee(RegressorMixin, BaseEstimator):
             )
         scaled = self._scaled(inputs)
         self.n_samples_seen_ += float(weight.sum())
-        Parallel(n_jobs=self.n_jobs, prefer="threads")(
-            delayed(self._learn_member)(k, scaled, targets, weight)
-            for k in range(len(self.hidden_bias_))
-        )
+        # How a product is shared among threads changes how it rounds, in single precision by more
+        # than the ridge forgives; members share the cores instead.
+        with threadpool_limits(1, user_api="blas"):
+            Parallel(n_jobs=self.n_jobs, prefer="threads")(
+                delayed(self._learn_member)(k, scaled, targets, weight)
+                for k in range(len(self.hidden_bias_))
+            )
         return self
 
     def _start(self, inputs: Array, targets: Array, one_dimensional: bool, weight: Array) -> None:

@@ -368,6 +368,7 @@ def _sure(finding: Finding, findings: Sequence[Finding], parts: Remainder, whole
         nameless=finding.kind != UNKNOWN and (beside or bool(parts.material[joints].any())),
         whole_recordings=whole,
         some_recordings=finding.trajectories is not None,
+        alike=finding.alike,
     )
     return replace(finding, confidence=probability)
 

@@ -65,6 +65,8 @@ class Finding:
         Times at which it was there, for a torque that comes and goes.
     curves : list of dict
         Effect and partial residual against its main signal, for each joint.
+    alike : bool
+        Whether a kind that acts on other joints explains as much.
 
     Examples
     --------
@@ -90,6 +92,7 @@ class Finding:
     trajectories: tuple[int, ...] | None = None
     when: list[Episode] = field(default_factory=list)
     curves: list[dict[str, Any]] = field(default_factory=list, repr=False)
+    alike: bool = False
 
     def _repr_html_(self) -> str:
         from skidyn.diagnosis._notebook import finding_card
@@ -215,6 +218,7 @@ def make_finding(
         hypothesis.margin,
         None,
         term.trajectories,
+        alike=hypothesis.alike,
     )
 
 

@@ -34,6 +34,9 @@ class Hypothesis:
         Candidates among which it was chosen.
     margin : float
         Share of its gain that the best other explanation of the same joints falls short of.
+    alike : bool
+        Whether a kind that acts on other joints explains as much, so that nothing in the data tells
+        them apart: a plane that a slider touches and the slider's own stop, for example.
     errors : ndarray of shape (n_folds, n_joints) or None
         Held-out squared error with it; None where it was judged otherwise.
     torque : ndarray of shape (n_samples, n_joints) or None
@@ -48,6 +51,7 @@ class Hypothesis:
     chances: tuple[float, ...] = ()
     tried: int = 1
     margin: float = 1.0
+    alike: bool = False
     errors: Array | None = None
     torque: Array | None = None
 

@@ -122,6 +122,9 @@ class Settings:
         The same where every formula is exact (:attr:`Effect.is_exact`).
     nameless_tolerance : float
         The same for what a nameless function leaves: its form is only near the true one.
+    alike : float
+        Two effects on different joints whose scores differ by less than this share are not told
+        apart by the data.
     simpler_share : float
         A simpler kind is named if it falls behind by less than this share.
     family_share : float
@@ -166,6 +169,7 @@ class Settings:
     form_tolerance: float = 0.015
     exact_tolerance: float = 0.0015
     nameless_tolerance: float = 0.15
+    alike: float = 0.005
     simpler_share: float = 0.05
     family_share: float = 0.95
     ripple_share: float = 0.8

@@ -168,8 +168,18 @@ class _Search:
                 judged = self._beside_another_kind(judged)
             if judged is not None:
                 rivals = _rivals(judged, offered)
-                return replace(judged, margin=_margin(judged, rivals))
+                margin, alike = _margin(judged, rivals), self._alike(judged, rivals)
+                return replace(judged, margin=margin, alike=alike)
         return None
+
+    def _alike(self, best: Hypothesis, rivals: Sequence[Hypothesis]) -> bool:
+        """Whether a known effect on other joints explains as much."""
+        return any(
+            h.kind != UNKNOWN
+            and h.joints != best.joints
+            and h.score >= (1 - self.settings.alike) * best.score
+            for h in rivals
+        )
 
     def _first_of_two_names(self, best: Hypothesis, ranking: list[Hypothesis]) -> Hypothesis:
         """A nameless function, or the first of two known effects that together do as well."""

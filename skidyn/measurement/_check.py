@@ -36,7 +36,7 @@ class Check(ABC):
     --------
     >>> from skidyn.measurement import list_checks
     >>> list_checks()[0].name
-    'clock_unit'
+    'lost_rows'
     """
 
     name: ClassVar[str]

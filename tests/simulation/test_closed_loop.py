@@ -69,7 +69,7 @@ def test_it_makes_the_instruments_that_undo_the_bias_of_noise(truth):
     measured = simulate_closed_loop(truth, reference, STIFFNESS, DAMPING)
     y = torque(measured) + rng.normal(0, 0.3, (len(measured), 2))
     q = measured[["q1", "q2"]].to_numpy()
-    low_pass = butter(4, 40, fs=500)
+    low_pass = butter(4, 60, fs=500)
     q = filtfilt(*low_pass, q + rng.normal(0, 3e-3, q.shape), axis=0)
     dq = np.gradient(q, 0.002, axis=0)
     noisy = measured.copy()

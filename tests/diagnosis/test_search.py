@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Several effects at once, and effects that become each other."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+from skidyn.datasets import load_planar_arm, load_scara, load_ur5, make_hidden_effect_log
+from skidyn.diagnosis import diagnose
+from skidyn.identification import RBDRegressor
+
+
+def found_in(robot, X, y, effects=("viscous", "coulomb")):
+    """Kinds and joints of what is named where the model has some effects."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        diagnosis = diagnose(RBDRegressor(robot, effects=list(effects)), X, y)
+    together = {}
+    for finding in diagnosis.findings:
+        together.setdefault(finding.kind, set()).update(finding.joints)
+    return together
+
+
+@pytest.fixture(scope="module")
+def arm_log():
+    return make_hidden_effect_log(load_planar_arm(), None, noise="low", random_state=4)
+
+
+def test_a_tilted_base_is_found_beside_large_friction_that_is_missing():
+    robot = load_ur5()
+    log = make_hidden_effect_log(robot, None, noise="low", random_state=6)
+    q = log.X[[f"q{j}" for j in range(1, 7)]].to_numpy()
+    still = np.zeros_like(q)
+    tilted = (9.81 * np.sin(np.deg2rad(3)), 0.0, -9.81 * np.cos(np.deg2rad(3)))
+    tilt = robot.inverse_dynamics(q, still, still, gravity=tilted)
+    tilt -= robot.inverse_dynamics(q, still, still)
+
+    kinds = found_in(robot, log.X, log.y + tilt, effects=["coulomb"])
+
+    assert {"viscous", "base_tilt"} <= set(kinds)
+
+
+def test_friction_whose_presliding_is_too_short_to_be_seen_is_coulomb_friction(arm_log):
+    kinds = found_in(load_planar_arm(), arm_log.X, arm_log.y, effects=["viscous"])
+
+    assert kinds == {"coulomb": {1, 2}}
+
+
+def test_fast_motion_under_a_precise_torque_makes_no_joint_elastic():
+    log = make_hidden_effect_log(load_scara(), None, noise="low", random_state=1022)
+
+    assert found_in(load_scara(), log.X, log.y) == {}
