@@ -247,7 +247,6 @@ class UnexplainedTorque(Check):
     name = "unexplained"
     suspects = "torque that has little to do with the motion: another signal, joint or time"
     stage = 2
-    misnames = True
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         seen = explained(measurement)

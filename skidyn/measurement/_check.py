@@ -30,7 +30,8 @@ class Check(ABC):
         that (:func:`skidyn.measurement.check_measurement`).
     misnames : bool
         Whether an effect that a diagnosis names would be that of the mistake, so that it names none
-        where the check suspects something.
+        where the check suspects something. Not where a missing effect may be taken for the
+        mistake: a spring for a zero or a sign, a payload of one recording for an odd one.
 
     Examples
     --------

@@ -53,7 +53,6 @@ class OddRecording(Check):
     name = "odd_recording"
     suspects = "single recordings in other units, with other signs, or with the torque of another"
     stage = 1
-    misnames = True
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         if measurement.stale or measurement.lost:

@@ -182,7 +182,6 @@ class Columns(Check):
         "or torque from which gravity was taken off"
     )
     stage = 1
-    misnames = True
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         fits = measurement.fits
