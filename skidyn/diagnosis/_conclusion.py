@@ -89,9 +89,10 @@ def conclude(
     while True:
         steps = _steps(problem, result, torque, sliding)
         terms = [*problem.terms, *_found_terms(problem, result.findings)]
-        useless = _useless(result.findings, steps, least_drop) or _vague(
-            result.findings, parameter_intervals(problem, terms, result.fit.noise, shapes=False)
-        )
+        # Averaged rows hardly show a line, whose size is told together with its frequency.
+        lines = any(h.torque is not None for h in result.findings)
+        own = parameter_intervals(problem, terms, result.fit.noise, shapes=lines)
+        useless = _useless(result.findings, steps, least_drop) or _vague(result.findings, own)
         if useless is None:
             break
         result = _without(problem, result, *useless)
