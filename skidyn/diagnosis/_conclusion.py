@@ -89,10 +89,8 @@ def conclude(
     while True:
         steps = _steps(problem, result, torque, sliding)
         terms = [*problem.terms, *_found_terms(problem, result.findings)]
-        # Averaged rows hardly show a line, whose size is told together with its frequency.
-        lines = any(h.torque is not None for h in result.findings)
-        own = parameter_intervals(problem, terms, result.fit.noise, shapes=lines)
-        useless = _useless(result.findings, steps, least_drop) or _vague(result.findings, own)
+        fixed = parameter_intervals(problem, terms, result.fit.noise, shapes=False)
+        useless = _useless(result.findings, steps, least_drop) or _vague(result.findings, fixed)
         if useless is None:
             break
         result = _without(problem, result, *useless)
@@ -230,19 +228,17 @@ def _vague(
 ) -> tuple[Hypothesis, list[Candidate]] | None:
     """The last finding with terms whose coefficient may be zero when folds are left out."""
     for hypothesis in reversed(findings):
-        if hypothesis.kind == UNKNOWN and hypothesis.torque is None:
-            continue
+        if hypothesis.kind == UNKNOWN or hypothesis.torque is not None:
+            continue  # a line is judged on samples, which averaged rows may not show
         terms = []
         for candidate in hypothesis.candidates:
             if candidate.term.trajectories is not None and len(candidate.term.trajectories) == 1:
                 continue  # no fold but its own recording tells of it
             effect = candidate.term.effect
             sizes = [c for c in effect.coefficients if not c.is_zero]
-            if hypothesis.torque is None and len(sizes) > 1:
+            if len(sizes) > 1:
                 continue  # each of them may be zero beside the others, not all together
             others = {s.name for s in effect.shapes}
-            if hypothesis.torque is not None:  # a line has a phase whatever its size
-                others |= {name for name, unit in effect.units().items() if unit == "rad"}
             found = [
                 value
                 for name, value in intervals[candidate.term].items()
