@@ -271,7 +271,8 @@ class _Search:
             if self._competed_again(old) is not None:
                 counts = self.problem.rows.counts
                 gain = float(log_likelihood_gain(before[None], self.left[None], counts).sum())
-                added = sum(map(self._count, self.findings)) - sum(map(self._count, kept[1]))
+                added = sum(h.n_parameters for h in self.findings)
+                added -= sum(h.n_parameters for h in kept[1])
                 if gain - 2 * self._price(self.chosen) * added > self.settings.least_gain:
                     self.findings = [h for h in self.findings if h is not shadow]
                     self.chosen = [c for c in self.chosen if c not in shadow.candidates]
@@ -281,9 +282,6 @@ class _Search:
                         return self.judged(found)
             self._restore(kept)
         return None
-
-    def _count(self, hypothesis: Hypothesis) -> int:
-        return hypothesis.n_parameters
 
     def _state(self) -> tuple[Any, ...]:
         return (
