@@ -9,20 +9,23 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.base import BaseEstimator, TransformerMixin
-from sklearn.utils.validation import _check_feature_names_in, check_is_fitted, validate_data
 
 from skidyn._columns import Columns, ColumnSpec, _key_column, resolve_columns
 from skidyn._exceptions import ColumnError, EffectError
 from skidyn._keys import Keys, resolve_keys
 from skidyn._order import refuse_shuffled
 from skidyn._signals import Array, signals_from
+from skidyn._transformer import LogTransformer
 from skidyn.effects._catalogue import make_terms
 from skidyn.effects._term import Term
 
 
-class FrictionTransformer(TransformerMixin, BaseEstimator):
+class FrictionTransformer(LogTransformer):
     """Append the columns of friction and other joint effects to X.
+
+    X is motion after the X contract. The new columns, one for each coefficient of each effect, are
+    called ``<kind>_<coefficient>_<joint>``, joints from 1. States of hysteresis start anew with
+    each trajectory.
 
     Parameters
     ----------
@@ -70,76 +73,26 @@ class FrictionTransformer(TransformerMixin, BaseEstimator):
         self.trajectory = trajectory
         self.time = time
 
-    def fit(self, X: Any, y: Any = None) -> FrictionTransformer:
-        """Find the columns of X and check the effects.
-
-        Parameters
-        ----------
-        X : DataFrame or array of shape (n_samples, n_features)
-            Motion, following the X contract.
-        y : None
-            Ignored.
-
-        Returns
-        -------
-        FrictionTransformer
-            The transformer itself.
-
-        Raises
-        ------
-        ColumnError
-            X does not follow the contract.
-        EffectError
-            An effect needs more than the motion of its joint, or its shape parameters.
-        """
-        X = validate_data(self, X, dtype=np.float64)
+    def _learn(self, X: Array) -> None:
         self.columns_ = self._resolve(X.shape[1])
         self.terms_ = make_terms(self.effects, self.columns_.n_joints)
         for term in self.terms_:
             _refuse(term, self.columns_)
-        return self
 
-    def transform(self, X: Any) -> Array:
-        """Append the effects' columns.
-
-        Parameters
-        ----------
-        X : DataFrame or array of shape (n_samples, n_features)
-            Motion. States of hysteresis start anew with each trajectory.
-
-        Returns
-        -------
-        ndarray of shape (n_samples, n_features + n_coefficients)
-            X, then one column per coefficient of each term.
-        """
-        check_is_fitted(self)
-        X = validate_data(self, X, reset=False, dtype=np.float64)
+    def _changed(self, X: Array) -> Array:
         signals = signals_from(X, self.columns_, to_derive=self.columns_.ddq is None)
         if not all(term.is_pointwise for term in self.terms_):
             refuse_shuffled("An effect with a memory", signals.trajectory, signals.time)
         blocks = [t.torque_columns(signals)[t.places[0]] for t in self.terms_]
         return np.hstack([X, *blocks])
 
-    def get_feature_names_out(self, input_features: Any = None) -> NDArray[Any]:
-        """Names of the columns of X, then ``<kind>_<coefficient>_<joint>``, joints from 1.
-
-        Parameters
-        ----------
-        input_features : array-like of str, default=None
-            Names of the columns of X; those seen in ``fit`` if None.
-
-        Returns
-        -------
-        ndarray of str
-            Names of the output's columns.
-        """
-        check_is_fitted(self)
-        names = list(_check_feature_names_in(self, input_features))
+    def _renamed(self, names: NDArray[Any]) -> list[str]:
+        named = [*names]
         for i, term in enumerate(self.terms_):
             own = [f"{term.kind}_{c.name}_{term.joints[0]}" for c in term.coefficients]
             # The same kind twice on a joint differs in its shape parameters alone.
-            names += [f"{name}_{i}" if name in names else name for name in own]
-        return np.asarray(names, dtype=object)
+            named += [f"{name}_{i}" if name in named else name for name in own]
+        return named
 
     def _resolve(self, n_features: int) -> Columns:
         given = getattr(self, "feature_names_in_", None)
@@ -187,7 +140,7 @@ def _with_further_columns(keys: Keys) -> Columns:
         f"dq{'' if ddq is None else ', ddq'} of {n} joint(s), and {max(0, len(own) - 3 * n)} "
         "further column(s) handed on. Name the columns q1.., dq1.., ddq1.., or give n_joints.",
         UserWarning,
-        stacklevel=4,
+        stacklevel=6,
     )
     return Columns(own[:n], own[n : 2 * n], ddq, keys.trajectory, keys.time)
 

@@ -7,14 +7,17 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator, OneToOneFeatureMixin, TransformerMixin
-from sklearn.utils.validation import check_is_fitted, validate_data
+from sklearn.utils.validation import check_is_fitted
+
+from skidyn._transformer import LogTransformer
 
 Array = NDArray[np.float64]
 
 
-class CurrentToTorque(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
+class CurrentToTorque(LogTransformer):
     """Joint torque from motor current: gear ratio times torque constant times current.
+
+    X has one column for each joint, in A; the result is in N m (N if prismatic).
 
     Parameters
     ----------
@@ -48,22 +51,7 @@ class CurrentToTorque(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         self.gear_ratio = gear_ratio
         self.torque_constant = torque_constant
 
-    def fit(self, X: Any, y: Any = None) -> CurrentToTorque:
-        """Check the gains against the number of columns.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_joints), A
-            Motor currents.
-        y : None
-            Ignored.
-
-        Returns
-        -------
-        self : object
-            The transformer.
-        """
-        X = validate_data(self, X, dtype=np.float64)
+    def _learn(self, X: Array) -> None:
         gain = np.asarray(self.gear_ratio, dtype=float) * np.asarray(self.torque_constant, float)
         if gain.ndim > 1 or gain.size not in (1, X.shape[1]):
             raise ValueError(
@@ -73,23 +61,9 @@ class CurrentToTorque(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         if (gain == 0).any() or not np.isfinite(gain).all():
             raise ValueError("gear_ratio and torque_constant must be finite and not zero.")
         self.gain_ = np.broadcast_to(gain, (X.shape[1],)).copy()
-        return self
 
-    def transform(self, X: Any) -> Array:
-        """Torque of every sample.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_joints), A
-            Motor currents.
-
-        Returns
-        -------
-        torque : ndarray of shape (n_samples, n_joints), N m (N if prismatic)
-            Joint torques.
-        """
-        check_is_fitted(self)
-        torque: Array = validate_data(self, X, reset=False, dtype=np.float64) * self.gain_
+    def _changed(self, X: Array) -> Array:
+        torque: Array = X * self.gain_
         return torque
 
     def inverse_transform(self, X: Any) -> Array:

@@ -8,13 +8,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.utils.validation import _check_feature_names_in, check_is_fitted, validate_data
 
 from skidyn._columns import ColumnSpec, _key_column
-from skidyn._compat import Interval, StrOptions, fit_context
+from skidyn._compat import Interval, StrOptions
 from skidyn.preprocessing._signals import (
+    SignalTransformer,
     _sampling_rate,
-    _SignalTransformer,
     refuse_columns_there,
 )
 from skidyn.preprocessing._smoothers import SMOOTHERS, Smoothed
@@ -27,13 +26,16 @@ CHOICE_ROWS, PER_OCTAVE, BLOCKS = 4_000, 2, 16
 LOWEST_CUTOFF, HIGHEST_SHARE = 0.7, 0.25
 
 
-class SmoothDerivatives(_SignalTransformer):
+class SmoothDerivatives(SignalTransformer):
     """Smooth signals and append their derivatives; method and cut-off chosen by cross-validation.
 
     Every candidate predicts each sample from its neighbours without the sample itself. The lowest
     cut-off whose error is within one standard error of the least is taken, since derivatives
     magnify what is left of the noise. One cut-off serves all columns: joints that are filtered
     differently would no longer belong to one motion. Nothing crosses the end of a segment.
+
+    The result is X with smoothed columns, then their first derivatives (unit/s, a ``d`` before the
+    name), then the second (unit/s^2, ``dd``) where two are appended.
 
     Parameters
     ----------
@@ -96,13 +98,12 @@ class SmoothDerivatives(_SignalTransformer):
     """
 
     _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
+        **SignalTransformer._parameter_constraints,
         "columns": ["array-like", None],
         "derivatives": [Interval(Integral, 1, 2, closed="both"), None],
         "method": [StrOptions({"auto", *SMOOTHERS})],
         "cutoff": [Interval(Real, 0, None, closed="neither"), None],
         "rate": [Interval(Real, 0, None, closed="neither"), None],
-        "trajectory": [str, Integral, None],
-        "time": [str, Integral, None],
     }
 
     def __init__(
@@ -124,23 +125,7 @@ class SmoothDerivatives(_SignalTransformer):
         self.trajectory = trajectory
         self.time = time
 
-    @fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X: Any, y: Any = None) -> SmoothDerivatives:
-        """Choose method and cut-off.
-
-        Parameters
-        ----------
-        X : DataFrame or array-like of shape (n_samples, n_features)
-            Log.
-        y : None
-            Ignored.
-
-        Returns
-        -------
-        self : object
-            The transformer.
-        """
-        X = validate_data(self, X, dtype=np.float64)
+    def _learn(self, X: Array) -> None:
         keys, names = self._keys(), self._names()
         velocities = [i for i, name in enumerate(names or []) if name.startswith("dq")]
         positions = [i for i, name in enumerate(names or []) if name.startswith("q")]
@@ -160,7 +145,6 @@ class SmoothDerivatives(_SignalTransformer):
                 f"({self.rate_ / 2:.4g} Hz)."
             )
         self._choose(X)
-        return self
 
     def _choose(self, X: Array) -> None:
         """Method and cut-off of least left-out error, by the rule of one standard error."""
@@ -217,21 +201,7 @@ class SmoothDerivatives(_SignalTransformer):
             )
         return times
 
-    def transform(self, X: Any) -> Array:
-        """Smooth, and append the derivatives.
-
-        Parameters
-        ----------
-        X : DataFrame or array-like of shape (n_samples, n_features)
-            Log.
-
-        Returns
-        -------
-        X_extended : ndarray of shape (n_samples, n_features_out)
-            X with smoothed columns, then first derivatives (unit/s) of all of them, then second
-            (unit/s^2) where two are appended.
-        """
-        X = self._checked(X)
+    def _changed(self, X: Array) -> Array:
         smoothed = X.copy()
         first = np.empty((len(X), len(self.columns_)))
         second = np.empty_like(first)
@@ -249,24 +219,10 @@ class SmoothDerivatives(_SignalTransformer):
             first[segment], second[segment] = result.first, result.second
         return np.hstack([smoothed, first, second][: 1 + self.derivatives_])
 
-    def get_feature_names_out(self, input_features: Any = None) -> NDArray[Any]:
-        """Return the names: those of X, then of each derivative with ``d`` or ``dd`` before.
-
-        Parameters
-        ----------
-        input_features : array-like of str, default=None
-            Names of the columns of X.
-
-        Returns
-        -------
-        names : ndarray of str
-            One per column.
-        """
-        check_is_fitted(self)
-        names = _check_feature_names_in(self, input_features)
+    def _renamed(self, names: NDArray[Any]) -> list[str]:
         prefixes = ("d", "dd")[: self.derivatives_]
         own = [f"{prefix}{names[i]}" for prefix in prefixes for i in self.columns_]
-        return np.array([*names, *own], dtype=object)
+        return [*names, *own]
 
 
 def _candidates(rate: float) -> Array:

@@ -3,24 +3,21 @@
 
 from __future__ import annotations
 
-from numbers import Integral
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.base import clone
 from sklearn.pipeline import Pipeline, make_pipeline
-from sklearn.utils.validation import _check_feature_names_in, check_is_fitted, validate_data
 
 from skidyn._columns import ColumnSpec
-from skidyn._compat import fit_context
 from skidyn._keys import Keys, knows_keys
-from skidyn.preprocessing._signals import _SignalTransformer
+from skidyn.preprocessing._signals import SignalTransformer
 
 Array = NDArray[np.float64]
 
 
-class DropKeys(_SignalTransformer):
+class DropKeys(SignalTransformer):
     """Take the key columns out of a table, before a learner that does not know them.
 
     A learner takes the number of a trajectory and the time for features, and learns the log by
@@ -49,65 +46,17 @@ class DropKeys(_SignalTransformer):
     1
     """
 
-    _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
-        "trajectory": [str, Integral, None],
-        "time": [str, Integral, None],
-    }
-
     def __init__(self, *, trajectory: ColumnSpec = "auto", time: ColumnSpec = "auto") -> None:
         self.trajectory = trajectory
         self.time = time
 
-    @fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X: Any, y: Any = None) -> DropKeys:
-        """Find the key columns.
+    def _learn(self, X: Array) -> None:
+        self._keys()  # tells of columns that are not there
 
-        Parameters
-        ----------
-        X : DataFrame or array-like of shape (n_samples, n_features)
-            Log.
-        y : None
-            Ignored.
+    def _changed(self, X: Array) -> Array:
+        return X[:, list(self._keys().features)]
 
-        Returns
-        -------
-        self : object
-            The transformer.
-        """
-        validate_data(self, X, dtype=np.float64)
-        self._keys()
-        return self
-
-    def transform(self, X: Any) -> Array:
-        """Drop the key columns.
-
-        Parameters
-        ----------
-        X : DataFrame or array-like of shape (n_samples, n_features)
-            Log.
-
-        Returns
-        -------
-        X_features : ndarray of shape (n_samples, n_features_out)
-            All other columns, in their order.
-        """
-        return self._checked(X)[:, list(self._keys().features)]
-
-    def get_feature_names_out(self, input_features: Any = None) -> NDArray[Any]:
-        """Names of the columns that are left.
-
-        Parameters
-        ----------
-        input_features : array-like of str, default=None
-            Names of the columns of X; those seen in ``fit`` if None.
-
-        Returns
-        -------
-        ndarray of str
-            Names of the output's columns.
-        """
-        check_is_fitted(self)
-        names: NDArray[Any] = _check_feature_names_in(self, input_features)
+    def _renamed(self, names: NDArray[Any]) -> NDArray[Any]:
         return names[list(self._keys().features)]
 
 

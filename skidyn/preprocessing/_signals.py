@@ -9,36 +9,32 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
-from sklearn.base import BaseEstimator, OneToOneFeatureMixin, TransformerMixin
-from sklearn.utils.validation import _check_feature_names_in, check_is_fitted, validate_data
+from sklearn.utils.validation import check_is_fitted
 
 from skidyn._columns import ColumnSpec, _key_column
-from skidyn._compat import Interval, fit_context
+from skidyn._compat import Interval
 from skidyn._exceptions import ColumnError
 from skidyn._keys import Keys, fitted_keys
 from skidyn._order import refuse_shuffled
+from skidyn._transformer import LogTransformer
 from skidyn.preprocessing._affine import scaling_of
 
 Array = NDArray[np.float64]
 
 
-class _SignalTransformer(TransformerMixin, BaseEstimator):
-    """Checks and key columns that all transformers of signals share."""
+class SignalTransformer(LogTransformer):
+    """Base of transformers of signals, which know key columns and keep to their segments."""
 
     trajectory: ColumnSpec
     time: ColumnSpec
 
-    def _names(self) -> list[str] | None:
-        names = getattr(self, "feature_names_in_", None)
-        return None if names is None else [str(name) for name in names]
+    _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
+        "trajectory": [str, Integral, None],
+        "time": [str, Integral, None],
+    }
 
     def _keys(self) -> Keys:
         return fitted_keys(self)
-
-    def _checked(self, X: Any) -> Array:
-        check_is_fitted(self)
-        checked: Array = validate_data(self, X, reset=False, dtype=np.float64)
-        return checked
 
     def _segments(self, X: Array) -> list[slice]:
         """Runs of rows that follow each other."""
@@ -74,7 +70,7 @@ def _low_pass(values: Array, cutoff: float, order: int, rate: float) -> Array:
     return filtered
 
 
-class ButterworthFilter(OneToOneFeatureMixin, _SignalTransformer):
+class ButterworthFilter(SignalTransformer):
     """Zero-phase Butterworth low-pass of all signals, within each segment.
 
     Parameters
@@ -110,11 +106,10 @@ class ButterworthFilter(OneToOneFeatureMixin, _SignalTransformer):
     """
 
     _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
+        **SignalTransformer._parameter_constraints,
         "cutoff": [Interval(Real, 0, None, closed="neither")],
         "order": [Interval(Integral, 1, None, closed="left")],
         "rate": [Interval(Real, 0, None, closed="neither"), None],
-        "trajectory": [str, Integral, None],
-        "time": [str, Integral, None],
     }
 
     def __init__(
@@ -132,40 +127,10 @@ class ButterworthFilter(OneToOneFeatureMixin, _SignalTransformer):
         self.trajectory = trajectory
         self.time = time
 
-    @fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X: Any, y: Any = None) -> ButterworthFilter:
-        """Find the sampling rate.
-
-        Parameters
-        ----------
-        X : DataFrame or array-like of shape (n_samples, n_features)
-            Log.
-        y : None
-            Ignored.
-
-        Returns
-        -------
-        self : object
-            The transformer.
-        """
-        X = validate_data(self, X, dtype=np.float64)
+    def _learn(self, X: Array) -> None:
         self.rate_ = _sampling_rate(X, self._keys(), self._segments(X), self.rate)
-        return self
 
-    def transform(self, X: Any) -> Array:
-        """Filter every signal.
-
-        Parameters
-        ----------
-        X : DataFrame or array-like of shape (n_samples, n_features)
-            Log.
-
-        Returns
-        -------
-        X_filtered : ndarray of shape (n_samples, n_features)
-            Smoothed signals, key columns as they were.
-        """
-        X = self._checked(X)
+    def _changed(self, X: Array) -> Array:
         keys = self._keys()
         filtered: Array = X.copy()
         features = list(keys.features)
@@ -176,8 +141,10 @@ class ButterworthFilter(OneToOneFeatureMixin, _SignalTransformer):
         return filtered
 
 
-class TimeDerivative(_SignalTransformer):
+class TimeDerivative(SignalTransformer):
     """Append time derivatives by central differences, within each segment.
+
+    The result is X, then the derivatives in units per second, with a ``d`` before their names.
 
     Parameters
     ----------
@@ -215,11 +182,10 @@ class TimeDerivative(_SignalTransformer):
     """
 
     _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
+        **SignalTransformer._parameter_constraints,
         "columns": ["array-like", None],
         "cutoff": [Interval(Real, 0, None, closed="neither"), None],
         "rate": [Interval(Real, 0, None, closed="neither"), None],
-        "trajectory": [str, Integral, None],
-        "time": [str, Integral, None],
     }
 
     def __init__(
@@ -237,23 +203,7 @@ class TimeDerivative(_SignalTransformer):
         self.trajectory = trajectory
         self.time = time
 
-    @fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X: Any, y: Any = None) -> TimeDerivative:
-        """Find the columns and the sampling rate.
-
-        Parameters
-        ----------
-        X : DataFrame or array-like of shape (n_samples, n_features)
-            Log.
-        y : None
-            Ignored.
-
-        Returns
-        -------
-        self : object
-            The transformer.
-        """
-        X = validate_data(self, X, dtype=np.float64)
+    def _learn(self, X: Array) -> None:
         keys, names = self._keys(), self._names()
         velocities = [i for i, name in enumerate(names or []) if name.startswith("dq")]
         if self.columns is not None:
@@ -265,22 +215,8 @@ class TimeDerivative(_SignalTransformer):
         self.columns_ = np.array(found, dtype=int)
         refuse_columns_there(names, self.columns_, 1)
         self.rate_ = _sampling_rate(X, keys, self._segments(X), self.rate)
-        return self
 
-    def transform(self, X: Any) -> Array:
-        """Append the derivatives.
-
-        Parameters
-        ----------
-        X : DataFrame or array-like of shape (n_samples, n_features)
-            Log.
-
-        Returns
-        -------
-        X_extended : ndarray of shape (n_samples, n_features + n_columns)
-            X, then the derivatives in units per second.
-        """
-        X = self._checked(X)
+    def _changed(self, X: Array) -> Array:
         keys = self._keys()
         derivative = np.empty((len(X), len(self.columns_)))
         for segment in self._segments(X):
@@ -308,25 +244,11 @@ class TimeDerivative(_SignalTransformer):
         extended: Array = np.c_[X, derivative]
         return extended
 
-    def get_feature_names_out(self, input_features: Any = None) -> NDArray[Any]:
-        """Return the names of the columns: those of X, then each derivative's with a ``d`` before.
-
-        Parameters
-        ----------
-        input_features : array-like of str, default=None
-            Names of the columns of X.
-
-        Returns
-        -------
-        names : ndarray of str
-            One per column.
-        """
-        check_is_fitted(self)
-        names = _check_feature_names_in(self, input_features)
-        return np.array([*names, *(f"d{names[i]}" for i in self.columns_)], dtype=object)
+    def _renamed(self, names: NDArray[Any]) -> list[str]:
+        return [*names, *(f"d{names[i]}" for i in self.columns_)]
 
 
-class SignalScaler(OneToOneFeatureMixin, _SignalTransformer):
+class SignalScaler(SignalTransformer):
     """Scale signals to the range 0 to 1 or to unit variance, leaving key columns as they are.
 
     Parameters
@@ -359,9 +281,8 @@ class SignalScaler(OneToOneFeatureMixin, _SignalTransformer):
     """
 
     _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
+        **SignalTransformer._parameter_constraints,
         "kind": [str],
-        "trajectory": [str, Integral, None],
-        "time": [str, Integral, None],
     }
 
     def __init__(
@@ -375,44 +296,16 @@ class SignalScaler(OneToOneFeatureMixin, _SignalTransformer):
         self.trajectory = trajectory
         self.time = time
 
-    @fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X: Any, y: Any = None) -> SignalScaler:
-        """Find ranges.
-
-        Parameters
-        ----------
-        X : DataFrame or array-like of shape (n_samples, n_features)
-            Log.
-        y : None
-            Ignored.
-
-        Returns
-        -------
-        self : object
-            The transformer.
-        """
+    def _learn(self, X: Array) -> None:
         if self.kind not in ("minmax", "standard"):
             raise ValueError(f"kind={self.kind!r}; use 'minmax' or 'standard'.")
-        X = validate_data(self, X, dtype=np.float64)
         features = list(self._keys().features)
         self.offset_, self.scale_ = np.zeros(X.shape[1]), np.ones(X.shape[1])
         self.offset_[features], self.scale_[features] = scaling_of(X[:, features], self.kind)
-        return self
 
-    def transform(self, X: Any) -> Array:
-        """Scale.
-
-        Parameters
-        ----------
-        X : DataFrame or array-like of shape (n_samples, n_features)
-            Log.
-
-        Returns
-        -------
-        X_scaled : ndarray of shape (n_samples, n_features)
-            Scaled signals, key columns as they were.
-        """
-        return (self._checked(X) - self.offset_) / self.scale_
+    def _changed(self, X: Array) -> Array:
+        scaled: Array = (X - self.offset_) / self.scale_
+        return scaled
 
     def inverse_transform(self, X: Any) -> Array:
         """Undo the scaling.
