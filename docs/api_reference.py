@@ -415,6 +415,7 @@ PAGES: tuple[Page, ...] = (
             Section("Your own files", ("merge_mjcf", "merge_urdf", "merge_usd")),
             Section("Servos", ("BamModel", "fit_bam", "read_bam", "write_bam")),
             Section("In memory", ("c_source", "python_source", "to_onnx")),
+            Section("Log viewers", ("write_traces",)),
         ),
     ),
 )

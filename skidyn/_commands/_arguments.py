@@ -55,6 +55,13 @@ class Motion(Output):
     endings = (".csv",)
 
 
+class Traces(Output):
+    """Signals for a log viewer."""
+
+    __slots__ = ()
+    endings = (".mcap", ".rrd")
+
+
 class TestReport(Output):
     """Result for tools that collect tests."""
 

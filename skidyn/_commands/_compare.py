@@ -8,9 +8,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from skidyn._commands._arguments import Input, Page, TestReport, command, with_log
+from skidyn._commands._arguments import Input, Page, TestReport, Traces, command, with_log
 from skidyn._commands._gate import gate
-from skidyn._commands._input import read_model_and_log, recorded_options
+from skidyn._commands._input import read_model_and_log, read_robot, recorded_options
 from skidyn._commands._output import (
     print_comparison,
     print_json,
@@ -27,10 +27,12 @@ if TYPE_CHECKING:
 
 DESCRIPTION = """\
 Compare a model with a log: the error on motion that the fit has not seen, by joint and trajectory,
-and by regime (at rest, around reversals, slow, fast, loaded). Nothing is searched.
+and by regime (at rest, around reversals, slow, fast, loaded). Nothing is searched. --traces writes
+the torques and their difference for PlotJuggler, Foxglove, ROS 2 (.mcap) or Rerun (.rrd).
 
   skidyn compare run*.csv --urdf robot.urdf
   skidyn compare run*.csv --urdf robot.urdf --model rigid_body,viscous,coulomb,stribeck
+  skidyn compare run*.csv --urdf robot.urdf --traces errors.mcap
 
 Compare two models, or two recordings, or two reports of skidyn diagnose, with each other: both are
 diagnosed, and their curves, errors, findings and coefficients are shown side by side, as a page and
@@ -67,7 +69,12 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--html", type=Page, metavar="HTML", help="page of the two; its numbers as JSON beside"
     )
-
+    parser.add_argument(
+        "--traces",
+        type=Traces,
+        metavar="FILE",
+        help="measured, predicted and residual torque of one log as .mcap or .rrd",
+    )
     parser.add_argument(
         "--fail-above",
         type=float,
@@ -91,6 +98,8 @@ def _compare(options: argparse.Namespace) -> None:
     if pair is None:
         _compare_with_log(options)
         return
+    if options.traces:
+        raise SkidynError("--traces are of one model and one log: leave out the other")
     from skidyn.report import summarize_comparison, write_comparison
 
     if options.html:
@@ -117,6 +126,11 @@ def _compare_with_log(options: argparse.Namespace) -> None:
     model, frame, tau = read_model_and_log(options)
     diagnosis = run_diagnosis(model, frame, tau, options, kinds=())
     comparison = diagnosis.comparison
+    if options.traces:
+        from skidyn.export import write_traces
+
+        torques = comparison.measured, comparison.predicted
+        write_traces(options.traces, frame, *torques, read_robot(options))
     if options.json:
         print_json(
             {"table": comparison.table(), "failures": [asdict(f) for f in diagnosis.failures]}
@@ -127,6 +141,8 @@ def _compare_with_log(options: argparse.Namespace) -> None:
     options.told = list(diagnosis.warnings)
     print_comparison(comparison)
     print_regimes(diagnosis)
+    if options.traces:
+        print(f"written: {Path(options.traces).resolve()}")
 
 
 def _pair(options: argparse.Namespace) -> list[argparse.Namespace] | None:

@@ -77,8 +77,10 @@ def _check(options: argparse.Namespace) -> None:
         raise SkidynError("--fail-above needs a healthy recording: --against LOG [LOG ...]")
     if not options.urdf:
         raise SkidynError("--urdf is missing: the description of the robot")
-    if options.against_model or options.html or options.names:
-        raise SkidynError("--fail-above makes no page: leave out --against-model, --html, --names")
+    if options.against_model or options.html or options.names or options.traces:
+        raise SkidynError(
+            "--fail-above makes no page: leave out --against-model, --html, --names, --traces"
+        )
 
 
 def _moving(

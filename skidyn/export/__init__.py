@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Models out of skidyn: functions in C, Python and ONNX, and descriptions in URDF and MJCF."""
+"""Models out of skidyn as functions and descriptions, and their errors for log viewers."""
 
 from skidyn.export._bam import BamModel, read_bam, write_bam
 from skidyn.export._bam_fit import fit_bam
@@ -9,6 +9,7 @@ from skidyn.export._mjcf import write_mjcf
 from skidyn.export._onnx import to_onnx, write_onnx
 from skidyn.export._python import python_source, write_python
 from skidyn.export._ros2 import write_ros2
+from skidyn.export._traces import write_traces
 from skidyn.export._urdf import write_urdf
 from skidyn.export._usd import merge_usd
 
@@ -28,6 +29,7 @@ __all__ = [
     "write_onnx",
     "write_python",
     "write_ros2",
+    "write_traces",
     "write_urdf",
 ]
 

@@ -60,3 +60,14 @@ def test_two_reports(here, capsys, tmp_path):
 def test_what_is_missing_is_said(here, capsys, words, complaint):
     assert cli.main(["compare", *words]) == cli.BAD_INPUT
     assert complaint in capsys.readouterr().err
+
+
+def test_traces_of_one_log(here, capsys, tmp_path):
+    pytest.importorskip("mcap_ros2", reason="needs skidyn[io]")
+    file = tmp_path / "errors.mcap"
+    assert cli.main(["compare", *LOG, "--traces", str(file)]) == cli.DONE
+    assert str(file) in capsys.readouterr().out
+    assert file.read_bytes().startswith(b"\x89MCAP0")
+    words = ["compare", *LOG, "--against", "log.csv", "--traces", str(file)]
+    assert cli.main(words) == cli.BAD_INPUT
+    assert "--traces are of one model" in capsys.readouterr().err
