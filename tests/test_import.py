@@ -35,6 +35,12 @@ def test_physics_needs_neither_torch_nor_pictures_nor_tables(name):
     assert not loaded.intersection({"matplotlib", "pandas", "skorch", "torch"})
 
 
+def test_a_log_is_checked_without_scikit_learn():
+    """A third of the time until the first answer."""
+    loaded = modules_after("import skidyn.logs, skidyn.evidence, skidyn.measurement")
+    assert not loaded.intersection(HEAVY)
+
+
 def test_a_robot_and_its_torques_need_numpy_only():
     code = (
         "from skidyn.datasets import load_planar_arm; "

@@ -3,15 +3,17 @@
 
 Usage: python benchmarks/diagnosis/seconds.py [--old CHECKOUT] [--only NAME ...] [--rows 300000]
 
-Every case runs in a fresh process: CPU seconds of it, the start of Python included, wall seconds
-and peak memory. ``--old`` names the root of another version (``git worktree add`` makes one) that
-is run in turn with this one, for the ratio of CPU seconds. On a machine that others use, only CPU
-seconds and ratios of one run are worth comparing.
+Every case runs in a fresh process: CPU seconds of it, the start of Python included (modules were
+compiled before, as after an installation), wall seconds and peak memory. ``--old`` names the root
+of another version (``git worktree add`` makes one) that is run in turn with this one, for the ratio
+of CPU seconds. On a machine that others use, only CPU seconds and ratios of one run are worth
+comparing.
 """
 
 from __future__ import annotations
 
 import argparse
+import compileall
 import os
 import subprocess
 import sys
@@ -85,7 +87,11 @@ def prepare(folder: Path, rows: int) -> dict[str, list[str]]:
 
 def measure(command: list[str], root: Path) -> tuple[float, float, float, int]:
     """CPU seconds, wall seconds, peak GB and exit code of a command."""
-    environment = os.environ | {"PYTHONPATH": str(root), "OMP_NUM_THREADS": "1"}
+    environment = os.environ | {
+        "PYTHONPATH": str(root),
+        "OMP_NUM_THREADS": "1",
+        "PYTHONDONTWRITEBYTECODE": "",
+    }
     start = time.perf_counter()
     process = subprocess.Popen(
         [sys.executable, "-m", "skidyn", *command],
@@ -108,6 +114,9 @@ def main() -> None:
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         cases = prepare(Path(name), options.rows)
+        roots = [HERE, *([options.old.resolve()] if options.old else [])]
+        for root in roots:
+            compileall.compile_dir(root / "skidyn", quiet=2)
         print(
             f"{'':<28}{'CPU s':>8}{'wall s':>8}{'GB':>7}" + "  old CPU s  ratio" * bool(options.old)
         )

@@ -4,8 +4,9 @@
 Usage: python benchmarks/scale/start_up.py [--old CHECKOUT] [--repeats 5]
 
 Every case runs in fresh processes; the least CPU time of the repeats is printed, the start of
-Python included. ``--old`` names the root of another version (``git worktree add`` makes one) that
-is run in turn with this one, for the ratio.
+Python included, with modules that were compiled before, as after an installation. ``--old`` names
+the root of another version (``git worktree add`` makes one) that is run in turn with this one, for
+the ratio.
 """
 
 from __future__ import annotations
@@ -39,7 +40,11 @@ CASES = {
 def cpu_seconds(code: str, root: Path) -> float:
     """User and system time of a fresh interpreter."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    environment = os.environ | {"PYTHONPATH": str(root), "OMP_NUM_THREADS": "1"}
+    environment = os.environ | {
+        "PYTHONPATH": str(root),
+        "OMP_NUM_THREADS": "1",
+        "PYTHONDONTWRITEBYTECODE": "",
+    }
     subprocess.run(
         [sys.executable, "-c", code], cwd=root, env=environment, check=True, capture_output=True
     )
@@ -59,7 +64,7 @@ def main() -> None:
         for name, code in CASES.items():
             code = code.replace("{log!r}", repr(log))
             now, old = [], []
-            for _ in range(options.repeats):
+            for _ in range(options.repeats + 1):  # the first one compiles the modules
                 now.append(cpu_seconds(code, HERE))
                 if options.old:
                     old.append(cpu_seconds(code, options.old.resolve()))

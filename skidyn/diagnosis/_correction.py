@@ -5,23 +5,22 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from sklearn.base import BaseEstimator, MetaEstimatorMixin, RegressorMixin, clone
-from sklearn.compose import TransformedTargetRegressor
 from sklearn.exceptions import NotFittedError
-from sklearn.model_selection import GroupKFold
-from sklearn.pipeline import Pipeline
 from sklearn.utils import _safe_indexing
 from sklearn.utils.validation import check_is_fitted
 
-from skidyn._compat import BaseSearchCV
 from skidyn._signals import Array, Signals, read_signals
 from skidyn.effects import Term, make_terms
 from skidyn.evidence import Problem, make_problem
 from skidyn.identification import named_recordings, recognise, remember
 from skidyn.robots import Robot
+
+if TYPE_CHECKING:
+    from sklearn.pipeline import Pipeline
 
 
 class CorrectedRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
@@ -206,6 +205,8 @@ def refitted_errors(
         Root mean square at every step; None for a regressor that cannot be refitted, and for a
         single trajectory, of which nothing can be left out.
     """
+    from sklearn.model_selection import GroupKFold  # with all that is imported for it: 0.2 s
+
     if not (hasattr(regressor, "fit") and hasattr(regressor, "get_params")):
         return None
     torque = np.asarray(y, dtype=float)
@@ -248,6 +249,8 @@ class Opened:
 
     def closed(self, model: Any) -> Any:
         """A better model where the old one was, fitted."""
+        from sklearn.pipeline import Pipeline
+
         for pipeline in reversed(self.outer):
             model = Pipeline([*pipeline.steps[:-1], (pipeline.steps[-1][0], model)])
         return model
@@ -280,6 +283,14 @@ def open_model(model: Any, X: Any, y: Any) -> Opened:
     Opened
         With a model of the robot inside, or the given one where none is.
     """
+    if hasattr(model, "with_effects"):
+        return Opened(model, X)
+    # What these import takes longer than most of what is done with a model that is in none of them.
+    from sklearn.compose import TransformedTargetRegressor
+    from sklearn.pipeline import Pipeline
+
+    from skidyn._compat import BaseSearchCV
+
     inner, table, outer = model, X, []
     while True:
         if isinstance(inner, BaseSearchCV):

@@ -9,8 +9,6 @@ from typing import Any
 
 import numpy as np
 from sklearn.base import BaseEstimator, MetaEstimatorMixin, RegressorMixin, clone
-from sklearn.metrics import check_scoring
-from sklearn.model_selection import check_cv, cross_val_score
 from sklearn.utils.metaestimators import available_if
 from sklearn.utils.validation import _check_sample_weight, check_is_fitted, validate_data
 
@@ -183,6 +181,9 @@ class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         self, X: Any, y: Any, groups: Any, weights: dict[str, Any], name: str, start: list[Any]
     ) -> None:
         """Scores of the models along the history, as scikit-learn's searches hold them."""
+        from sklearn.metrics import check_scoring
+        from sklearn.model_selection import check_cv, cross_val_score
+
         history, findings = self.diagnosis_.history, self.diagnosis_.findings
         # One model a step, with the effects found up to it; what was added in several at once last.
         steps: list[list[Term]] = [[]]

@@ -20,7 +20,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import ttest_1samp
-from sklearn.ensemble import HistGradientBoostingRegressor
 
 from skidyn._signals import Array
 from skidyn.diagnosis._pursuit import Products, pursue
@@ -85,6 +84,9 @@ def _by_trees(
     signals: dict[str, Array], y: Array, fold: NDArray[np.int64]
 ) -> list[tuple[str, ...]]:
     """The strongest signal, it and the second, and so on."""
+    # not paid for by who only reads a report
+    from sklearn.ensemble import HistGradientBoostingRegressor
+
     names = list(signals)
     X = np.column_stack([signals[name] for name in names])
     left, cost = np.zeros(len(y)), np.zeros(len(names))

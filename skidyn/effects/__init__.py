@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Physical effects: what can be added to a rigid-body model, and the catalogue of all kinds."""
 
+from typing import TYPE_CHECKING, Any
+
 from skidyn.effects._base import Coefficient, Effect, Shape
 from skidyn.effects._catalogue import make_terms
 from skidyn.effects._formula import formula
@@ -12,7 +14,9 @@ from skidyn.effects._registry import (
     unregister_effect,
 )
 from skidyn.effects._term import Term, TermSum
-from skidyn.effects._transformer import FrictionTransformer
+
+if TYPE_CHECKING:
+    from skidyn.effects._transformer import FrictionTransformer
 
 __all__ = [
     "Coefficient",
@@ -38,3 +42,11 @@ from skidyn.effects._nameless import (
     NamelessEffect as NamelessEffect,
 )
 from skidyn.effects._registry import nameless_kinds as nameless_kinds
+
+
+def __getattr__(name: str) -> Any:
+    if name == "FrictionTransformer":  # the only effect that needs scikit-learn, half a second
+        from skidyn.effects._transformer import FrictionTransformer
+
+        return FrictionTransformer
+    raise AttributeError(f"module 'skidyn.effects' has no attribute {name!r}")

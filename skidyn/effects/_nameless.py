@@ -12,7 +12,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
-from scipy.interpolate import BSpline
 
 from skidyn._signals import Array, Signals
 from skidyn.effects._base import Coefficient, Effect
@@ -79,6 +78,8 @@ class _Spline(NamelessEffect):
         return [{"low": low, "high": high}] if high > low else []
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        from scipy.interpolate import BSpline  # not paid for by who only checks a log
+
         x = getattr(signals, self.signal)[:, joint]
         low, high = shape["low"], shape["high"]
         degree = 3

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from skidyn._local_polynomial import local_polynomial
 from skidyn._signals import Array, Signals
@@ -110,9 +109,10 @@ def _local_polynomial(time: Array, q: Array, rate: float, half: int) -> list[Arr
     # Times that are equal or step back cannot be interpolated over; they belong to data checks.
     even = np.ptp(np.diff(time)) < EVEN_STEPS * step or np.any(np.diff(time) <= 0)
     grid = time if even else np.arange(time[0], time[-1] + step / 2, step)
-    values = q if even else CubicSpline(time, q)(grid)
-    smoothed = list(local_polynomial(values, 2 * half + 1, ORDER, step))
     if even:
-        return smoothed
+        return list(local_polynomial(q, 2 * half + 1, ORDER, step))
+    from scipy.interpolate import CubicSpline
+
+    smoothed = local_polynomial(CubicSpline(time, q)(grid), 2 * half + 1, ORDER, step)
     inside = np.clip(time, grid[0], grid[-1])
     return [CubicSpline(grid, x)(inside) for x in smoothed]

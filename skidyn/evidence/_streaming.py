@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from joblib import Parallel, delayed, effective_n_jobs
 
 from skidyn._exceptions import LogError, SkidynError
 from skidyn._signals import Array, Signals
@@ -155,6 +154,8 @@ def evidence_of_sources(
     """
     if client is not None:
         return _on_cluster(client, sources, robot, terms, options).evidence
+    from joblib import Parallel, delayed, effective_n_jobs
+
     parts = Parallel(n_jobs=n_jobs)(
         delayed(_of_files)(chunk, robot, terms, options)
         for chunk in _chunks(sources, effective_n_jobs(n_jobs))
