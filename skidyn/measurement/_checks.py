@@ -130,7 +130,7 @@ def check_measurement(measurement: Measurement) -> list[Suspicion]:
             misread = 1
         elif check in _SCALES and any(s.certainty == "suspected" for s in told):
             misread = 1
-        elif check.stage == 1 and told:
+        elif check.stage == 1 and any(s.certainty != "noted" for s in told):
             misread = min(misread, 2)
     measurement.readable = misread > 1
     return sorted(found, key=lambda s: CERTAINTIES.index(s.certainty))

@@ -226,7 +226,7 @@ class Fits:
                 later[rows, k] = np.interp(clock + lag, clock, source.torque[rows, k])
         return np.asarray(later[source.picked])
 
-    def _rows(self, column: int) -> tuple[Array, NDArray[np.bool_]]:
+    def mean_torque(self, column: int) -> tuple[Array, NDArray[np.bool_]]:
         """Torque of a column in rows, and which rows count."""
         return self._mean_torque[:, column], self.moving[:, column]
 
@@ -359,13 +359,13 @@ class Fits:
         if reading.gravity is not None:
             robot = replace(robot, gravity=np.asarray(reading.gravity))
         base = base_parameter_index(robot)
-        regressor = self._mean_regressor(robot, s, base)
+        regressor = self.mean_regressor(robot, s, base)
         read = [self.torque_column(reading, j) for j in range(self.n_joints)]
         joints = [j for j, (column, _) in enumerate(read) if self.usable(column)]
         p = len(base)
         designs, places, targets = [], [], []
         for k, j in enumerate(joints):
-            y, use = self._rows(read[j][0])
+            y, use = self.mean_torque(read[j][0])
             own = np.column_stack([friction(s, j), np.ones(len(s.q))])
             felt = np.flatnonzero(regressor[:, j].any(axis=0))  # bodies that the joint moves
             designs.append(np.hstack([regressor[use, j][:, felt], self.average(own)[use]]))
@@ -373,7 +373,7 @@ class Fits:
             targets.append(read[j][1] * y[use])
         return [read[j][0] for j in joints], designs, places, targets
 
-    def _mean_regressor(self, robot: Robot, s: Signals, index: NDArray[np.int64]) -> Array:
+    def mean_regressor(self, robot: Robot, s: Signals, index: NDArray[np.int64]) -> Array:
         """Some columns of the mean regressor, (n_rows, n_joints, len(index)), chunk by chunk."""
         step = SAMPLES * max(1, CHUNK // (SAMPLES * robot.n_joints))
         parts = [slice(start, start + step) for start in range(0, s.n_samples, step)]

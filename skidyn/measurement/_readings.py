@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from skidyn._signals import Array
+from skidyn.measurement._duel import fight
 from skidyn.measurement._fits import Fits, Outcome, Reading, friction
 
 #: Log-likelihood, after the likeness of neighbouring rows is taken off, that a change must gain.
@@ -42,6 +43,8 @@ GRAVITY, LEAST_ANGLE = 9.81, 20.0
 UPRIGHT = 0.995
 #: Offsets of a position that are tried, rad.
 OFFSETS = np.deg2rad([-135, -90, -45, 45, 90, 135, 180])
+#: What a reading may be instead if it gains little over bodies near those of the description.
+OTHER_BODIES = "bodies that are not those stated"
 #: Rounds of the fits that only rank, and how many changes are looked at more closely.
 SCREENED, FINALISTS = 1, 12
 #: Rows of these fits at least, and at most over the number of joints.
@@ -67,6 +70,8 @@ class Change:
         Share of the residual's spread that it takes off, of the joint that gains most.
     rivals : tuple of str
         Other kinds of change of the same joints that explain as much.
+    other : str
+        What explains as much and is no reading, such as a physical effect; empty if nothing does.
     restorable : bool
         Of torque without gravity: it was taken off with the bodies of the description.
     """
@@ -78,6 +83,7 @@ class Change:
     confirmed: float = 0.0
     drop: float = 0.0
     rivals: tuple[str, ...] = ()
+    other: str = ""
     restorable: bool = False
 
 
@@ -170,15 +176,36 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
             within = max(TIED, RIVALS * change.gain)
             rivals = tuple(dict.fromkeys(c.kind for c in alike if change.gain - c.gain < within))
             accepted.append(replace(change, confirmed=confirmed, rivals=rivals))
+    while accepted:
+        best = _first(accepted)
+        held = _against_effects(fits, reading, here, best)
+        if held is not None:
+            return _sharpened(fits, held) if held.kind == "zero" else held
+        accepted.remove(best)
+    return None
+
+
+def _first(accepted: list[Change]) -> Change:
+    """The change that gains most; a fixed one goes before an angle that is free."""
     # both are likelihoods of the same torque; turning all of it round changes nothing identified
-    if not accepted:
-        return None
     first = max(accepted, key=lambda c: c.gain + c.confirmed)
     close = max(TIED, ALIKE * first.gain)
     tied = [c for c in accepted if c.gain + c.confirmed >= first.gain + first.confirmed - close]
     # an angle that is free fits at least as well as one that is not
-    best = next((c for c in tied if c.kind != "zero"), first) if first.kind == "zero" else first
-    return _sharpened(fits, best) if best.kind == "zero" else best
+    return next((c for c in tied if c.kind != "zero"), first) if first.kind == "zero" else first
+
+
+def _against_effects(fits: Fits, reading: Reading, here: Outcome, change: Change) -> Change | None:
+    """The change, with what else it may be; None where an effect, or other bodies, explain it."""
+    most = int(np.argmax(fits.nominal(change.reading).margin(here)))
+    duel = fight(fits, reading, change.reading, change.joints or (most,))
+    if min(duel.gain, duel.beside) >= LEAST and duel.beside >= BESIDE * duel.gain:
+        return change
+    if duel.gain < LEAST and duel.rival < LEAST and duel.gain > 0:
+        return replace(change, other=OTHER_BODIES)
+    if duel.gain < LEAST or max(duel.beside, duel.gain - duel.rival) <= 0:
+        return None
+    return replace(change, other=duel.effect)
 
 
 def _refined(fits: Fits, change: Change) -> Change:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -191,7 +192,7 @@ class Columns(Check):
         changes = find_changes(fits.without([*unsigned, *cut_columns(measurement)]))
         for kind in dict.fromkeys(change.kind for change in changes):
             alike = [change for change in changes if change.kind == kind]
-            yield self._told(measurement, kind, alike, changes[-1].reading)
+            yield _one_of_two(self._told(measurement, kind, alike, changes[-1].reading), alike)
 
     def _told(
         self, measurement: Measurement, kind: str, changes: list[Change], final: Reading
@@ -263,6 +264,20 @@ _RIVALS = {
     "gravity": "another direction of gravity",
     "no_gravity": "no gravity",
 }
+
+
+def _one_of_two(told: Suspicion, changes: Iterable[Change]) -> Suspicion:
+    """What is told of a reading, as one of two where something else explains the torque as well."""
+    others = dict.fromkeys(change.other for change in changes if change.other)
+    if not others:
+        return told
+    names = " or ".join(other[:1].lower() + other[1:] for other in others)
+    return replace(
+        told,
+        suspicion=f"either {told.suspicion}, or it is another cause: {names}",
+        evidence=f"{told.evidence}; the other, on the same joints, explains it as well",
+        certainty="noted",
+    )
 
 
 def _sure(changes: Iterable[Change]) -> bool:
