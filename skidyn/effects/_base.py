@@ -138,6 +138,9 @@ class Effect:
     softness : float
         Share of its largest column's square by which its coefficients are drawn to zero when parts
         of the data are left out; for flexible functions, which no row may determine there.
+    drawn : float
+        The same share wherever a model is fitted; for functions of several signals, which are asked
+        for predictions between and beyond the places that the rows fill.
     by_recording : bool
         Whether it may change from one recording to the next, and is tried for some of them alone.
     is_exact : bool
@@ -185,6 +188,7 @@ class Effect:
     grows: ClassVar[bool] = False
     by_recording: ClassVar[bool] = False
     softness: ClassVar[float] = 0.0
+    drawn: ClassVar[float] = 0.0
     is_exact: ClassVar[bool] = False
     simplicity: ClassVar[int] = 50
     rivals: ClassVar[tuple[str, ...]] = ()

@@ -216,6 +216,7 @@ class FunctionOfSignals(NamelessEffect):
 
     n_signals: ClassVar[int] = 1
     search = "screened"
+    drawn = 1e-2
 
     def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
         return tuple(shape["of"])

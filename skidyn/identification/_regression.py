@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array
-from skidyn.effects import Term
+from skidyn.effects import Term, TermSum
 from skidyn.evidence import (
     Evidence,
     Fit,
@@ -57,7 +57,8 @@ class Regression:
     n_folds : int
         Number of folds.
     fit : Fit or None
-        The weighted fit that found effects' shapes and loads, where there was one.
+        The weighted fit that found effects' shapes and loads, where there was one and nothing draws
+        its coefficients.
     instruments : list of ndarray of shape (n_rows_j, n_coefficients) or None
         The same columns along a motion whose errors have nothing to do with those of the log.
     """
@@ -79,7 +80,7 @@ class Regression:
     ) -> Regression:
         """The averaged rows of a log."""
         assert problem.robot is not None
-        return cls(
+        regression = cls(
             problem.robot,
             problem.rigid_index,
             fit.terms,
@@ -91,6 +92,7 @@ class Regression:
             fit,
             instruments,
         )
+        return regression._drawn()
 
     @classmethod
     def from_evidence(
@@ -134,7 +136,7 @@ class Regression:
             sum(evidence.counts[k, j] for k in keys if (k, j) in evidence.counts)
             for j in range(robot.n_joints)
         ]
-        return cls(
+        regression = cls(
             robot,
             base[shown],
             tuple(terms),
@@ -144,6 +146,30 @@ class Regression:
             fold,
             len(keys),
         )
+        return regression._drawn()
+
+    def _drawn(self) -> Regression:
+        """With rows in every fold that draw the coefficients of flexible functions to zero."""
+        places = TermSum(self.terms).slices(self.n_rigid)
+        flexible = [(own, term) for term, own in places if term.effect.drawn]
+        if not flexible:
+            return self
+        design, target, folds = [*self.design], [*self.target], [*self.fold]
+        others = None if self.instruments is None else [*self.instruments]
+        for own, term in flexible:
+            for j in term.places:
+                rows = [np.eye(len(design[j].T))[own]] * self.n_folds
+                for f in range(self.n_folds):
+                    squares = (design[j][folds[j] == f, own] ** 2).sum(axis=0)
+                    rows[f] = np.sqrt(term.effect.drawn * squares.max(initial=0.0)) * rows[f]
+                more = np.repeat(np.arange(self.n_folds), len(rows[0]))
+                order = np.argsort(np.r_[folds[j], more], kind="stable")
+                folds[j] = np.r_[folds[j], more][order]
+                design[j] = np.vstack([design[j], *rows])[order]
+                target[j] = np.r_[target[j], np.zeros(len(more))][order]
+                if others is not None:
+                    others[j] = np.vstack([others[j], *rows])[order]
+        return replace(self, design=design, target=target, fold=folds, fit=None, instruments=others)
 
     @property
     def n_rigid(self) -> int:

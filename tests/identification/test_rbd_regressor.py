@@ -3,6 +3,7 @@ import pickle
 from importlib import resources
 
 import numpy as np
+import pandas as pd
 import polars
 import pytest
 from sklearn.base import clone
@@ -13,6 +14,7 @@ from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from skidyn._columns import Columns
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.effects import Term
 from skidyn.exceptions import ColumnError
 from skidyn.identification import RBDRegressor, is_consistent
 from skidyn.model_selection import TrajectoryKFold
@@ -225,3 +227,33 @@ def test_parameters_of_another_kind_are_refused(exact, wrong, message):
     robot, _, X, y = exact
     with pytest.raises(ValueError, match=message):
         RBDRegressor(**({"robot": robot} | wrong)).fit(X, y)
+
+
+def swings(amplitudes, speeds, centres):
+    """A pendulum with friction that depends on its position, one recording an amplitude."""
+    robot, t, frames = Robot.from_urdf(ONE_JOINT), np.arange(400) * 0.01, []
+    for k, (a, w, c) in enumerate(zip(amplitudes, speeds, centres, strict=True)):
+        wave = a * np.sin(w * t)
+        motion = {"q1": c + wave, "dq1": a * w * np.cos(w * t), "ddq1": -w * w * wave}
+        frames.append(pd.DataFrame({"trajectory": k, "time": t, **motion}))
+    X = pd.concat(frames, ignore_index=True)
+    q, dq, ddq = (X[[name]].to_numpy() for name in ("q1", "dq1", "ddq1"))
+    friction = 0.3 * np.sin(3 * q) * np.tanh(dq)
+    noise = 0.02 * np.random.default_rng(0).normal(size=q.shape)
+    return X, robot.inverse_dynamics(q, dq, ddq) + friction + noise
+
+
+@pytest.mark.parametrize("estimator", ["weighted", "ordinary", "robust", "entropic"])
+def test_a_function_of_several_signals_holds_beside_the_places_that_the_log_fills(estimator):
+    X, y = swings(
+        [0.3, 0.35, 0.4, 0.3, 0.5, 0.4], [2, 3, 2.5, 4, 2, 3], [-0.6, -0.3, 0, 0.2, 0.4, 0.1]
+    )
+    Z, target = swings([0.3, 0.3], [5, 4.5], [0.9, -0.9])
+    shape = {"of": ("q1", "dq1", "ddq1"), "low": (-0.9, -1.2, -4.5), "high": (0.8, 1.2, 4.5)}
+    term, errors = Term("function_of_three_signals", (1,), shape), []
+    for more in ([], [term]):
+        model = RBDRegressor(
+            Robot.from_urdf(ONE_JOINT), ["viscous", "coulomb", *more], estimator=estimator
+        )
+        errors.append(np.std(model.fit(X, y).predict(Z) - target))
+    assert errors[1] < 0.7 * errors[0]
