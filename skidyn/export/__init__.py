@@ -35,8 +35,9 @@ __all__ = [
 
 # For other packages of skidyn; no part of the public interface.
 from skidyn.export._bam import (
-    BAM_MODELS as BAM_MODELS,
+    checked_actuator as checked_actuator,
     friction_budget as friction_budget,
+    friction_parameters as friction_parameters,
 )
 from skidyn.export._model import (
     check_model as check_model,

@@ -88,9 +88,7 @@ class BamModel:
     parameters: Mapping[str, float]
 
     def __post_init__(self) -> None:
-        if self.name not in BAM_MODELS:
-            raise SkidynError(f"name is {self.name!r}; BAM has the models {', '.join(BAM_MODELS)}")
-        for key in (*ALWAYS, *BAM_MODELS[self.name]):
+        for key in friction_parameters(self.name):
             if key not in self.parameters:
                 raise SkidynError(f"BAM's model {self.name} needs the parameter {key!r}")
         for key, value in self.parameters.items():
@@ -125,6 +123,31 @@ class BamModel:
         return np.asarray(
             np.sign(speed) * friction_budget(self.name, self.parameters, motor, outside, speed)
         )
+
+
+def friction_parameters(name: str) -> tuple[str, ...]:
+    """Parameters of the friction of a model, which is refused if BAM has none of this name."""
+    if name not in BAM_MODELS:
+        raise SkidynError(f"name is {name!r}; BAM has the models {', '.join(BAM_MODELS)}")
+    return *ALWAYS, *BAM_MODELS[name]
+
+
+def motor_constants(motor: Mapping[str, float] | None) -> dict[str, float]:
+    """Numbers by name, as they go into a file beside those of friction."""
+    given = {} if motor is None else motor
+    if not isinstance(given, Mapping) or not all(
+        isinstance(v, int | float) and not isinstance(v, bool) for v in given.values()
+    ):
+        raise SkidynError(f"motor is {motor!r}; expected numbers by name, such as kt and R")
+    return dict(given)
+
+
+def checked_actuator(actuator: str | None) -> str:
+    """The servo, which has to be named: BAM's law of control depends on it."""
+    if not isinstance(actuator, str):
+        given = "missing" if actuator is None else repr(actuator)
+        raise SkidynError(f"actuator is {given}: the servo as BAM calls it, such as 'xl330'")
+    return actuator
 
 
 def friction_budget(
@@ -260,7 +283,7 @@ def write_bam(
         if joint is not None or actuator is not None or motor is not None:
             raise SkidynError("joint, actuator and motor go with a fitted model, not a BamModel")
     else:
-        model, left = _of_joint(model, joint, actuator, motor or {})
+        model, left = _of_joint(model, joint, checked_actuator(actuator), motor_constants(motor))
     write_json(path, {**model.parameters, "model": model.name, "actuator": model.actuator})
     return left
 
@@ -281,16 +304,12 @@ def joint_place(robot: Any, joint: str | int | None) -> int:
 
 
 def _of_joint(
-    model: RBDRegressor, joint: str | int | None, actuator: str | None, motor: Mapping[str, float]
+    model: RBDRegressor, joint: str | int | None, actuator: str, motor: Mapping[str, float]
 ) -> tuple[BamModel, tuple[str, ...]]:
     """What BAM's m1 or m2 holds of a joint, and names of the joint's other effects."""
     check_model(model)
-    if not isinstance(motor, Mapping):
-        raise SkidynError(f"motor is {motor!r}; expected numbers by name, such as kt and R")
     if not isinstance(model, RBDRegressor):
         raise SkidynError("BAM's format holds friction; give a fitted RBDRegressor or a BamModel")
-    if actuator is None:
-        raise SkidynError("actuator is missing: the servo as BAM calls it, such as 'xl330'")
     number = joint_place(model.robot_, joint)
     values = {"armature": 0.0, "friction_base": 0.0, "friction_viscous": 0.0}
     places = {
@@ -311,7 +330,5 @@ def _of_joint(
             values["alpha"] = float(term.shape["delta"])
         else:
             left.append(name_term(model.robot_, term))
-    if not all(isinstance(value, int | float) for value in motor.values()):
-        raise SkidynError(f"motor is {dict(motor)!r}; expected numbers by name, such as kt and R")
     name = "m2" if "alpha" in values else "m1"
     return BamModel(name, actuator, {**values, **motor}), tuple(left)

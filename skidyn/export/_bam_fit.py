@@ -14,7 +14,14 @@ from skidyn._columns import column_names, resolve_columns
 from skidyn._exceptions import SkidynError
 from skidyn._signals import signals_from
 from skidyn.evidence import smooth_motion
-from skidyn.export._bam import ALWAYS, BAM_MODELS, BamModel, friction_budget, joint_place
+from skidyn.export._bam import (
+    BamModel,
+    checked_actuator,
+    friction_budget,
+    friction_parameters,
+    joint_place,
+    motor_constants,
+)
 from skidyn.robots import Robot
 
 #: Velocity (rad/s) below which friction may be anything up to its size.
@@ -80,8 +87,8 @@ def fit_bam(
     >>> bool(servo.parameters["friction_base"] > 0)
     True
     """
-    if name not in BAM_MODELS:
-        raise SkidynError(f"name is {name!r}; BAM has the models {', '.join(BAM_MODELS)}")
+    keys = ["armature", *friction_parameters(name)]
+    constants, servo = motor_constants(motor), checked_actuator(actuator)
     j = joint_place(robot, joint)
     q, dq, ddq = _motion(robot, X)
     torque = np.asarray(y, dtype=float).reshape(len(q), -1)
@@ -91,7 +98,6 @@ def fit_bam(
         )
     whole = np.isfinite(torque[:, j]) & np.isfinite(np.hstack([q, dq, ddq])).all(axis=1)
     rows = np.flatnonzero(whole & (np.abs(dq[:, j]) > _RESTS))
-    keys = ["armature", *ALWAYS, *BAM_MODELS[name]]
     if len(rows) < 10 * len(keys):
         raise SkidynError(
             f"{len(rows)} samples of {robot.joint_names[j]} move faster than {_RESTS} rad/s; its "
@@ -121,7 +127,7 @@ def fit_bam(
         )
     best = min(fits, key=lambda fit: float(fit.cost))
     found = dict(zip(keys, map(float, best.x), strict=True))
-    return BamModel(name, actuator, {**found, **(motor or {})})
+    return BamModel(name, servo, {**found, **constants})
 
 
 def _motion(robot: Robot, X: Any) -> tuple[Any, Any, Any]:

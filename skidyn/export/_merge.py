@@ -204,11 +204,12 @@ def merge_mjcf(
         )
     world = mujoco.MjModel.from_xml_path(str(edits.path))
     joints, bodies = _joints_in_bodies(edits.root)
-    lost = [name for name in robot.joint_names if name not in joints]
+    needed = dict.fromkeys([*robot.joint_names, *robot.body_joints])
+    lost = [name for name in needed if name not in joints]
     if lost:
         raise SkidynError(
             f"{edits.path} has no joint {lost[0]!r} with this name in the file itself; the robot "
-            f"has {', '.join(robot.joint_names)}"
+            f"has {', '.join(needed)}"
         )
     frames = _frames(mujoco, world, robot, edits.path)
     stiffness, torque = own.joints["spring"].T
@@ -278,9 +279,6 @@ def _frames(
     index = [
         mujoco.mj_name2id(world, mujoco.mjtObj.mjOBJ_JOINT, name) for name in robot.body_joints
     ]
-    lost = [n for n, i in zip(robot.body_joints, index, strict=True) if i < 0]
-    if lost:
-        raise SkidynError(f"{path} has no joint {lost[0]!r}, which the robot has")
     carriers = [int(world.jnt_bodyid[i]) for i in index]
     own = [mujoco.mj_name2id(world, mujoco.mjtObj.mjOBJ_JOINT, name) for name in robot.joint_names]
     rng, data = np.random.default_rng(0), mujoco.MjData(world)

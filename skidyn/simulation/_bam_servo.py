@@ -14,7 +14,7 @@ from scipy.optimize import least_squares
 from skidyn._columns import column_names, with_columns
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Array
-from skidyn.export import BAM_MODELS, BamModel, friction_budget
+from skidyn.export import BamModel, checked_actuator, friction_budget, friction_parameters
 from skidyn.robots import Robot
 
 #: Step of BAM's simulation, s.
@@ -156,11 +156,9 @@ def fit_bam_servo(
     ... )  # doctest: +SKIP
     >>> write_bam(servo, "m6.json")  # doctest: +SKIP
     """
-    if name not in BAM_MODELS:
-        raise SkidynError(f"name is {name!r}; BAM has the models {', '.join(BAM_MODELS)}")
+    keys = ["kt", "R", "armature", "q_offset", *friction_parameters(name)]
+    servo = checked_actuator(actuator)
     bench = _read(robot, log, gain, volts, step)
-    keys = ["kt", "R", "armature", "q_offset", "friction_base", "friction_viscous"]
-    keys += BAM_MODELS[name]
     rows = np.array(
         [_TYPICAL.get(k, _QUADRATIC if k.endswith("quad") else _LOAD) for k in keys], dtype=float
     )
@@ -200,7 +198,7 @@ def fit_bam_servo(
             )
         )
     best = min(fits, key=lambda fit: float(fit.cost))
-    return BamModel(name, actuator, dict(zip(keys, map(float, best.x), strict=True)))
+    return BamModel(name, servo, dict(zip(keys, map(float, best.x), strict=True)))
 
 
 @dataclass(frozen=True)
