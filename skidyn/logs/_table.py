@@ -210,6 +210,12 @@ def _clean(
     else:
         number, restarts = split_at_restarts(time)
         number += 1  # as files and joints are counted
+        if restarts > len(time) / 2:
+            raise LogError(
+                f"{source}: time goes back in {restarts} of {len(time) - 1} steps (from "
+                f"{time[0]:.6g} to {time[-1]:.6g}): the rows are in reverse order. Sort them by "
+                "time."
+            )
         if restarts:
             match.notes.append(
                 f"{source}: the clock starts anew {restarts} time(s); each is a trajectory"

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import SIGN_BLUR, Array, Signals
-from skidyn.measurement._fits import FEWEST, Fits, Reading, friction
+from skidyn.measurement._fits import FEWEST, SAMPLES, Fits, Reading, friction
 
 #: Lags that are tried, s, and groups of rows that are left out in turn.
 LAGS = np.linspace(-0.06, 0.06, 13)
@@ -39,6 +39,11 @@ class Delay:
     halves : ndarray of shape (n_joints, 2), s
         Lag in the slower and in the faster rows of every joint: a delay is the same in both, what
         friction does when a joint turns is not.
+    early, late : float, s
+        Common lag in the first and in the second half of the recordings; clocks of other rates
+        drift apart.
+    drift_error : float, s
+        Standard error of their difference.
     """
 
     common: float
@@ -48,6 +53,9 @@ class Delay:
     gain: float
     gains: Array
     halves: Array
+    early: float = np.nan
+    late: float = np.nan
+    drift_error: float = np.nan
 
 
 def find_delay(fits: Fits) -> Delay:
@@ -68,7 +76,8 @@ def find_delay(fits: Fits) -> Delay:
     s = fits.motion(Reading())
     regressor = fits.average(fits.robot.torque_regressor(s.q, s.dq, s.ddq))
     shifted = [fits.average(fits.torque_at(lag)) for lag in LAGS]
-    tables, lags = [], np.full(n, np.nan)
+    tables, firsts, lags = [], [], np.full(n, np.nan)
+    first = _first_half(fits)
     for j in range(n):
         use = _sliding(fits, s, j)
         if not fits.usable(j) or use.sum() < FEWEST:
@@ -97,6 +106,8 @@ def find_delay(fits: Fits) -> Delay:
         ):
             continue
         tables.append((len(rest), errors))
+        sooner = rest * first[use][:, None]
+        firsts.append(np.stack([(p**2).sum(axis=0) for p in np.array_split(sooner, GROUPS)]))
         lags[j] = _lowest(total)
         own_errors[j] = _spread([_lowest(total - errors[g]) for g in range(GROUPS)])
         speed = np.abs(fits.average(s.dq[:, j])[use])
@@ -109,16 +120,30 @@ def find_delay(fits: Fits) -> Delay:
     # squared errors, and not their logarithms, are a parabola of the lag
     noise = [float(e.sum(axis=0).min()) / n for n, e in tables]
 
-    def cost(left_out: int | None) -> Array:
+    def lag(parts: list[Array], left_out: int | None = None) -> float:
         keep = [g for g in range(GROUPS) if g != left_out]
-        errors = [e[keep].sum(axis=0) / (2 * s) for s, (_, e) in zip(noise, tables, strict=True)]
-        return np.asarray(np.sum(errors, axis=0))
+        cost = [e[keep].sum(axis=0) / (2 * s) for s, e in zip(noise, parts, strict=True)]
+        return _lowest(np.asarray(np.sum(cost, axis=0)))
 
-    common = _lowest(cost(None))
-    error = _spread([_lowest(cost(g)) for g in range(GROUPS)])
+    whole_log = [errors for _, errors in tables]
+    seconds = [errors - sooner for errors, sooner in zip(whole_log, firsts, strict=True)]
+    common = lag(whole_log)
+    error = _spread([lag(whole_log, g) for g in range(GROUPS)])
+    drift = _spread([lag(seconds, g) - lag(firsts, g) for g in range(GROUPS)])
     whole = sum(n / 2 * np.log(e.sum(axis=0)) for n, e in tables)
     gain = float(whole[len(LAGS) // 2] - whole.min())
-    return Delay(common, error, lags, own_errors, gain, own_gains, halves)
+    early, late = lag(firsts), lag(seconds)
+    return Delay(common, error, lags, own_errors, gain, own_gains, halves, early, late, drift)
+
+
+def _first_half(fits: Fits) -> NDArray[np.bool_]:
+    """Rows in the first half of their recording."""
+    time, number = fits.average(fits.signals.clock), fits.signals.trajectory[::SAMPLES]
+    first = np.zeros(fits.n_rows, dtype=bool)
+    for run in np.unique(number):
+        rows = number == run
+        first[rows] = time[rows] < (time[rows].min() + time[rows].max()) / 2
+    return first
 
 
 def _spread(values: list[float]) -> float:

@@ -93,6 +93,36 @@ def fight(fits: Fits, before: Reading, reading: Reading, joints: Sequence[int]) 
     return duel
 
 
+def left_by_effects(fits: Fits, joint: int, rows: NDArray[np.bool_]) -> float:
+    """How much some rows leave at best, in residuals of all, if an effect acts on their joint.
+
+    Parameters
+    ----------
+    fits : Fits
+        Rows.
+    joint : int
+        Joint, from 0.
+    rows : ndarray of shape (n_rows,) of bool
+        Rows of a recording that seems to have another torque: a payload or a force at the tool may
+        act in it alone.
+
+    Returns
+    -------
+    float
+        Root mean square of the residual over its scale.
+    """
+    reading = Reading()
+    gains = np.nan_to_num(fits.nominal(reading).gain)
+    here = _Bodies(fits, reading, gains, np.maximum(fits.identified(reading).inflation, 1.0))
+    k = here.joints.index(joint)
+    own = rows[here.rows[k]]
+    left = []
+    for _, columns, _ in [*_likely(here, [joint]), *_likely(here, [joint], rows)]:
+        fit = here.fit(columns)
+        left.append(float(np.sqrt(np.mean(fit.residuals[k][own] ** 2))) / fit.scales[k])
+    return min(left, default=np.inf)
+
+
 @dataclass(frozen=True)
 class _Columns:
     """Columns of an effect, by joint.
@@ -123,6 +153,7 @@ class _Fit:
     gram: Array
     weights: list[Array]
     residuals: list[Array]
+    scales: list[float]
 
 
 class _Bodies:
@@ -225,7 +256,7 @@ class _Bodies:
             departure += 0.5 * float(np.sum(extra.precision * found[-extra.count :] ** 2))
         # bodies are integrated out: a description that is known well has less to choose from
         narrowed = 0.5 * float(np.linalg.slogdet(gram[bodies, bodies] * share**2)[1])
-        return _Fit(sum(alike) - departure - narrowed, gram, weights, residuals)
+        return _Fit(sum(alike) - departure - narrowed, gram, weights, residuals, scales)
 
     def promise(self, extra: _Columns, factor: tuple[Array, bool]) -> float:
         """About what columns gain: with the weights of the fit without them."""
@@ -273,20 +304,26 @@ def _effects() -> Iterator[Effect]:
     for kind in list_effects():
         effect = get_effect(kind)
         plain = not set(effect.needs) - {"robot"} and effect.search != "spectrum"
-        if plain and not effect.nameless and effect.family != "hysteresis":
+        # the direction of gravity is a reading itself
+        if plain and not effect.nameless and effect.family != "hysteresis" and kind != "base_tilt":
             yield effect
 
 
-def _likely(bodies: _Bodies, joints: Sequence[int]) -> list[tuple[Effect, _Columns, float]]:
-    """Effects on some joints that promise most, in their best shapes, and what they cost."""
+def _likely(
+    bodies: _Bodies, joints: Sequence[int], rows: NDArray[np.bool_] | None = None
+) -> list[tuple[Effect, _Columns, float]]:
+    """Effects on some joints that promise most, in their best shapes, and what they cost.
+
+    Where rows are given, the effects are those that may act in one recording alone, in them.
+    """
     factor = cho_factor(bodies.plain.gram)
     promising = []
     for effect in _effects():
-        if effect.kind == "base_tilt":
-            continue  # the direction of gravity is a reading itself
+        if rows is not None and not (effect.by_recording or effect.search == "trajectories"):
+            continue
         tried = [
             (bodies.promise(columns, factor), columns)
-            for columns in _shapes(effect, bodies, joints)
+            for columns in _shapes(effect, bodies, joints, rows)
         ]
         if tried:
             gain, columns = max(tried, key=lambda pair: pair[0])
@@ -297,7 +334,9 @@ def _likely(bodies: _Bodies, joints: Sequence[int]) -> list[tuple[Effect, _Colum
     return [(effect, columns, cost) for _, effect, columns, cost in promising[:FINALISTS]]
 
 
-def _shapes(effect: Effect, bodies: _Bodies, joints: Sequence[int]) -> Iterator[_Columns]:
+def _shapes(
+    effect: Effect, bodies: _Bodies, joints: Sequence[int], rows: NDArray[np.bool_] | None
+) -> Iterator[_Columns]:
     """Columns of an effect on some joints, in all shapes of its grid."""
     signals, fits = bodies.signals, bodies.fits
     positive = tuple(k for k, c in enumerate(effect.coefficients) if c.sign == 1)
@@ -319,6 +358,8 @@ def _shapes(effect: Effect, bodies: _Bodies, joints: Sequence[int]) -> Iterator[
                 j: fits.average(np.asarray(values))
                 for j, values in effect.torque_columns(signals, site, **shape).items()
             }
+            if rows is not None:
+                columns = {j: c * rows[:, None] for j, c in columns.items()}
             size = np.sqrt(sum(np.mean(c**2, axis=0) for c in columns.values())) + 1e-12
             scaled = {j: c / size for j, c in columns.items()}
             yield _Columns(scaled, positive, LOOSE + 1 / (spread * size) ** 2)

@@ -7,11 +7,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.measurement._bodies import USUAL, Explained, explained
 from skidyn.measurement._check import Check
-from skidyn.measurement._fits import FEWEST, SAMPLES, student
+from skidyn.measurement._duel import left_by_effects
+from skidyn.measurement._fits import FEWEST, SAMPLES, Fits, student
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._suspicion import Suspicion
 
@@ -83,7 +85,9 @@ class OddRecording(Check):
                 if not within and one.gain > LEAST and abs(one.likeness) > SCALED:
                     scaled.append(one)
                 elif one.gain > LEAST and one.larger > LARGER and one.likeness < UNLIKE:
-                    unlike.append(one)
+                    # a contact, or a payload of one recording, would look like it
+                    if left_by_effects(seen.fits, k, _rows_of(seen.fits, one.run)) > LARGER:
+                        unlike.append(one)
         measurement.odd = bool(scaled or unlike)
         for run in sorted({one.run for one in scaled}):
             own = [one for one in scaled if one.run == run]
@@ -126,15 +130,19 @@ def _sizes(measurement: Measurement) -> dict[int, float]:
     return {int(run): float(np.median(x)) for run, x in zip(runs[odd], size[odd], strict=True)}
 
 
+def _rows_of(fits: Fits, run: int) -> NDArray[np.bool_]:
+    """Rows of a recording."""
+    return np.asarray(fits.signals.trajectory[::SAMPLES] == run)
+
+
 def _multiples(seen: Explained) -> list[Multiple]:
     """Multiples of every joint and recording with enough rows."""
     fits, outcome = seen.fits, seen.identified
-    number = fits.signals.trajectory[::SAMPLES]
     # one recording of a few spoils the bodies that all of them identify
     apart = bool(np.any(seen.errors[1] > SPOILED))
     told = []
-    for run in np.unique(number):
-        rows = number == run
+    for run in np.unique(fits.signals.trajectory):
+        rows = _rows_of(fits, run)
         others = fits.predicted_without(rows) if apart else {}
         for k in seen.joints:
             use = fits.moving[:, k]

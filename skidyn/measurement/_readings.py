@@ -42,7 +42,7 @@ GRAVITY, LEAST_ANGLE = 9.81, 20.0
 #: Cosine of the angle to an axis from which gravity is along that axis.
 UPRIGHT = 0.995
 #: Offsets of a position that are tried, rad.
-OFFSETS = np.deg2rad([-135, -90, -45, 45, 90, 135, 180])
+OFFSETS = np.deg2rad([-135, -90, -45, -15, 15, 45, 90, 135, 180])
 #: What a reading may be instead if it gains little over bodies near those of the description.
 OTHER_BODIES = "bodies that are not those stated"
 #: Rounds of the fits that only rank, and how many changes are looked at more closely.

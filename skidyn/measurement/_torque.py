@@ -32,6 +32,9 @@ UNITS = {1e3: "Nmm", 1e2: "Ncm", 1e-3: "kNm"}
 #: Smallest delay that is told, s, how many standard errors it must have, and how far the lag of a
 #: joint may be from it.
 SMALLEST, ERRORS, ALIKE = 0.004, 5.0, 0.006
+#: How many standard errors lags in the halves of recordings must differ by: that there is a lag is
+#: known then.
+DRIFTING = 3.0
 #: Share of the joints whose lags must be alike, or of what they gain; friction shifts each joint by
 #: another amount.
 AGREEING = 0.75
@@ -303,7 +306,9 @@ class TorqueDelay(Check):
     """Torque that is late or early against the motion, alike in all joints."""
 
     name = "torque_delay"
-    suspects = "torque that is late or early against the motion"
+    suspects = (
+        "torque that is late or early against the motion, or whose clock runs at another rate"
+    )
     stage = 2
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
@@ -312,6 +317,17 @@ class TorqueDelay(Check):
             return
         if measurement.stale or measurement.computed:
             return  # held and interpolated values are late, or early, by themselves
+        drift = found.late - found.early
+        if abs(drift) > max(SMALLEST, DRIFTING * found.drift_error) and found.gain > LEAST:
+            yield self.suspicion(
+                "the clock of the torque runs at another rate than that of the motion",
+                f"torque is late by {1e3 * found.early:.1f} ms in the first half of the recordings "
+                f"and by {1e3 * found.late:.1f} ms in the second (standard error of the difference "
+                f"{1e3 * found.drift_error:.1f} ms); stamp both with one clock, or cut the "
+                "recordings into short ones that are set right each",
+                "suspected",
+            )
+            return
         use = np.isfinite(found.joints)
         near = max(ALIKE, 0.3 * abs(found.common))
         alike = np.abs(found.joints[use] - found.common) < np.maximum(near, 2 * found.errors[use])

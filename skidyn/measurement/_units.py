@@ -16,12 +16,14 @@ from skidyn.measurement._suspicion import Suspicion
 
 DEGREE = np.pi / 180
 #: Units of time, of velocities and of positions, by the slope of integrated velocity on position.
-CLOCKS = {1e3: "ms", 1e6: "us", 1e9: "ns"}
+CLOCKS = {1e3: "ms", 1e6: "us", 1e9: "ns", 1 / 60: "min"}
 VELOCITIES = {1 / DEGREE: "deg/s", 30 / np.pi: "rpm", 0.5 / np.pi: "rev/s"}
 POSITIONS = {DEGREE: "deg", 2 * np.pi: "rev"}
-NAMES = {"deg": "degrees", "rev": "turns"}
+NAMES = {"deg": "degrees", "rev": "turns", "min": "minutes"}
 #: How far the slope may be off a unit's factor, and off 1.
 NEAR = 0.1
+#: How nearly a slope is that of minutes, which are but 5 % from degrees.
+MINUTES = 0.02
 #: How many times its limit a position reaches that is suspicious, and that is no position.
 FAR, DISTANT = 1.5, 4.0
 #: Largest positions, rad, that would hardly be a motion if they were degrees.
@@ -32,20 +34,27 @@ WHOLE = 2e-3
 LEAST = 15.0
 
 
+def is_near(slope: float, factor: float) -> bool:
+    """Whether a slope is that of a unit's factor."""
+    near = MINUTES if factor == 1 / 60 else NEAR
+    minutes = factor == DEGREE and abs(60 * slope - 1) < MINUTES
+    return bool(abs(slope / factor - 1) < near) and not minutes
+
+
 class ClockUnit(Check):
     """Time in another unit than seconds, or at another rate."""
 
     name = "clock_unit"
-    suspects = "time in ms, us or ns, or a clock of another rate"
+    suspects = "time in ms, us, ns or minutes, or a clock of another rate"
     misnames = True
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         slopes = [s for s, r in measurement.velocities if np.isfinite(s) and r > ALIKE and s > 0]
         typical = float(np.median(slopes)) if slopes else np.nan
         for factor, unit in CLOCKS.items():
-            if abs(typical / factor - 1) < NEAR:
+            if is_near(typical, factor):
                 yield self.suspicion(
-                    f"time looks like {unit}",
+                    f"time looks like {NAMES.get(unit, unit)}",
                     f"the integrated velocities are {typical:.4g} times the positions they lead to "
                     f"(median over {len(slopes)} joints)",
                     "certain",
@@ -54,7 +63,11 @@ class ClockUnit(Check):
                 return
         if measurement.rate < 2:
             # the unit in which a robot would have been sampled at a usual rate
-            usual = [u for factor, u in CLOCKS.items() if 20 <= measurement.rate * factor <= 2e4]
+            usual = [
+                u
+                for factor, u in CLOCKS.items()
+                if factor > 1 and 20 <= measurement.rate * factor <= 2e4
+            ]
             unit = usual[0] if usual else "ms"
             agrees = np.isfinite(typical) and abs(typical - 1) < NEAR
             yield self.suspicion(
@@ -75,8 +88,8 @@ class ClockUnit(Check):
         gains = {"time": 0.0, "dq": 0.0, "q": 0.0}
         fits = measurement.fits
         if fits is not None:
-            gains["time"] = _gained(fits, Reading(stretch=shared))
-            gains["q"] = _gained(fits, Reading(size=1 / shared))
+            gains["time"] = gained(fits, Reading(stretch=shared))
+            gains["q"] = gained(fits, Reading(size=1 / shared))
         best = max(gains, key=lambda name: gains[name])
         others = [gain for name, gain in gains.items() if name != best]
         told = fits is not None and gains[best] - max(others) > LEAST
@@ -106,7 +119,7 @@ class PositionUnit(Check):
         slopes = [s for s, r in measurement.velocities if np.isfinite(s) and r > ALIKE]
         typical = float(np.median(slopes)) if slopes else 1.0
         for factor, unit in POSITIONS.items():
-            if abs(typical / factor - 1) < NEAR:
+            if is_near(typical, factor):
                 yield self.suspicion(
                     f"positions look like {NAMES[unit]}",
                     f"velocities are {typical:.4g} times the differentiated positions (median over "
@@ -232,7 +245,7 @@ def unnamed_scale(measurement: Measurement, shared: float) -> bool:
     return several and shared > 0 and not any(abs(shared / f - 1) < NEAR for f in known)
 
 
-def _gained(fits: Fits, reading: Reading) -> float:
+def gained(fits: Fits, reading: Reading) -> float:
     """Log-likelihood that a reading gains over the log as it is."""
     return float(fits.nominal(reading).margin(fits.nominal(Reading())).sum())
 

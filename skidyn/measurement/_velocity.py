@@ -10,14 +10,18 @@ from scipy.optimize import linear_sum_assignment
 
 from skidyn._signals import Signals
 from skidyn.measurement._check import Check
+from skidyn.measurement._fits import Reading
 from skidyn.measurement._measurement import ALIKE, Measurement
 from skidyn.measurement._measures import velocity_consistency
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._units import (
     CLOCKS,
+    LEAST,
     NEAR,
     POSITIONS,
     VELOCITIES,
+    gained,
+    is_near,
     unit_remedy,
     unnamed_scale,
 )
@@ -87,6 +91,13 @@ class Velocity(Check):
             for k in joints
         )
         evidence = f"the velocity is {slopes} times the differentiated position"
+        if cause == "sign" and _runs_backwards(measurement, joints):
+            return self.suspicion(
+                "rows run backwards in time",
+                f"{evidence}, and friction brakes the joints only if time runs the other way; turn "
+                "the rows of every recording round, and leave the clock as it is",
+                "certain",
+            )
         if cause == "sign":
             columns = [f"dq{k + 1}" for k in joints]
             return self.suspicion(
@@ -119,6 +130,13 @@ class Velocity(Check):
         )
 
 
+def _runs_backwards(measurement: Measurement, joints: list[int]) -> bool:
+    """Whether the torque, too, is explained better if time runs the other way."""
+    every = set(joints) >= {k for k, moves in enumerate(measurement.excited) if moves}
+    fits = measurement.fits
+    return every and fits is not None and gained(fits, Reading(stretch=-1.0)) > LEAST
+
+
 def _constant(measurement: Measurement) -> list[int]:
     """Joints of which the position or the velocity never changes although the other does."""
     s = measurement.signals
@@ -131,7 +149,7 @@ def _constant(measurement: Measurement) -> list[int]:
 
 def _of_units(slope: float) -> bool:
     """Whether a slope that all joints share is told as a unit of the clock or of positions."""
-    return any(abs(slope / factor - 1) < NEAR for factor in (*CLOCKS, *POSITIONS))
+    return any(is_near(slope, factor) for factor in (*CLOCKS, *POSITIONS))
 
 
 def _cause(slope: float, correlation: float) -> str:
@@ -142,7 +160,7 @@ def _cause(slope: float, correlation: float) -> str:
             if abs(slope / factor - 1) < NEAR:
                 return f"dq={unit}"
         for factor, unit in POSITIONS.items():
-            if abs(slope / factor - 1) < NEAR:
+            if is_near(slope, factor):
                 return f"q={unit}"
     return "scale" if abs(correlation) > 0.99 else "other"
 

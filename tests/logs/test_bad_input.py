@@ -105,6 +105,12 @@ def test_time_going_backwards(saved):
         check_log(disorder)
 
 
+def test_rows_in_reverse_order(saved):
+    one = LOG[LOG["trajectory"] == 1].drop(columns="trajectory")
+    with pytest.raises(LogError, match=r"reverse order. Sort them by time"):
+        read_log(saved(one[::-1]))
+
+
 def test_gaps_are_counted():
     gap = LOG.drop(index=range(100, 200))
     quality = check_log(gap)

@@ -318,3 +318,17 @@ def test_stamps_are_certain_only_where_they_do_harm():
     assert certainties[2e-5].certainty == "suspected"
     assert "little harm" in certainties[2e-5].evidence
     assert certainties[1e-3].certainty == "certain"
+
+
+def test_time_in_minutes(signals, torque):
+    told = found(signals.with_(time=signals.time / 60), torque)
+    assert told[0].suspicion == "time looks like minutes"
+    assert told[0].certainty == "certain" and told[0].remedy.option == "--units time=min"
+
+
+def test_rows_that_run_backwards(signals, torque):
+    backwards = signals.with_(q=signals.q[::-1], dq=signals.dq[::-1])
+    told = found(backwards, torque[::-1])
+    assert told[0].suspicion == "rows run backwards in time" and told[0].certainty == "certain"
+    flipped = found(signals.with_(dq=-signals.dq), torque)
+    assert flipped[0].remedy.option == "--flip dq1,dq2"

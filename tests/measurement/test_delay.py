@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Torque on another clock than the motion."""
+
+import numpy as np
+import pytest
+
+from skidyn.datasets import load_ur5, make_hidden_effect_log
+from skidyn.logs import check_log
+
+ROBOT = load_ur5()
+FRAME = make_hidden_effect_log(ROBOT, None, n_trajectories=5, duration=10.0, random_state=4).frame
+TORQUES = [f"tau{k + 1}" for k in range(6)]
+
+
+def late(lag):
+    """Torque that is late by a lag (s) that depends on the time since the recording began."""
+    frame = FRAME.copy()
+    for rows in FRAME.groupby("trajectory").groups.values():
+        time = FRAME.loc[rows, "time"].to_numpy()
+        for name in TORQUES:
+            values = FRAME.loc[rows, name].to_numpy()
+            frame.loc[rows, name] = np.interp(time - lag(time - time[0]), time, values)
+    return [s for s in check_log(frame, ROBOT).checks if s.check == "torque_delay"]
+
+
+def test_torque_on_the_clock_of_the_motion():
+    assert late(np.zeros_like) == []
+
+
+def test_torque_that_is_late():
+    (told,) = late(lambda since: np.full_like(since, 0.02))
+    name, value = told.remedy.option.split("=")
+    assert name == "--late tau" and float(value) == pytest.approx(0.02, abs=0.003)
+
+
+def test_clocks_of_other_rates():
+    (told,) = late(lambda since: 0.005 * since)
+    assert told.suspicion == "the clock of the torque runs at another rate than that of the motion"
+    assert told.remedy is None
