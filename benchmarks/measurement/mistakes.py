@@ -5,12 +5,12 @@ Usage: python benchmarks/measurement/mistakes.py [--cases FOLDER] [--seed 1] [--
        [--sample 5] [--only jitter,order] [--mend] [--verbose]
 
 Logs, half of them with a hidden effect, are spoiled in one way each (see ``spoils.py``,
-``spoils_of_parts.py`` and ``spoils_of_clocks.py``). Printed are, by mistake, in how many logs it was named on the right joints with the right remedy, in how
-many of these it was certain, and in how many logs something else was suspected. ``--mend`` reads
-the spoiled log again with the remedy and prints in how many logs that gave back the recorded
-columns; ``--diagnose`` compares the diagnosis of the mended log with that of the clean one where it
-did not. ``--cases`` takes a folder of logs of another simulator (``*/log.parquet`` and
-``robot.urdf``).
+``spoils_of_parts.py`` and ``spoils_of_clocks.py``). Printed are, by mistake, in how many logs it
+was named on the right joints with the right remedy, in how many of these it was certain, and in how
+many logs something else was suspected. ``--mend`` reads the spoiled log again with the remedy and
+prints in how many logs that gave back the recorded columns; ``--diagnose`` compares the diagnosis
+of the mended log with that of the clean one where it did not. ``--cases`` takes a folder of logs of
+another simulator (``*/log.parquet`` and ``robot.urdf``).
 """
 
 from __future__ import annotations

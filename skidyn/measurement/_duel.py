@@ -93,8 +93,8 @@ def fight(fits: Fits, before: Reading, reading: Reading, joints: Sequence[int]) 
     return duel
 
 
-def left_by_effects(fits: Fits, joint: int, rows: NDArray[np.bool_]) -> float:
-    """How much some rows leave at best, in residuals of all, if an effect acts on their joint.
+def left_by_effects(fits: Fits, joint: int, rows: NDArray[np.bool_]) -> tuple[float, float]:
+    """What some rows leave, and leave at best where an effect acts on their joint.
 
     Parameters
     ----------
@@ -108,19 +108,20 @@ def left_by_effects(fits: Fits, joint: int, rows: NDArray[np.bool_]) -> float:
 
     Returns
     -------
-    float
-        Root mean square of the residual over its scale.
+    without, least : float
+        Root mean squares of the residual over its scale.
     """
     reading = Reading()
     gains = np.nan_to_num(fits.nominal(reading).gain)
     here = _Bodies(fits, reading, gains, np.maximum(fits.identified(reading).inflation, 1.0))
     k = here.joints.index(joint)
     own = rows[here.rows[k]]
-    left = []
-    for _, columns, _ in [*_likely(here, [joint]), *_likely(here, [joint], rows)]:
-        fit = here.fit(columns)
-        left.append(float(np.sqrt(np.mean(fit.residuals[k][own] ** 2))) / fit.scales[k])
-    return min(left, default=np.inf)
+    effects = [*_likely(here, [joint]), *_likely(here, [joint], rows)]
+    left = [
+        float(np.sqrt(np.mean(fit.residuals[k][own] ** 2))) / fit.scales[k]
+        for fit in (here.plain, *(here.fit(columns) for _, columns, _ in effects))
+    ]
+    return left[0], min(left)
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,8 @@ SCALED, UNLIKE = 0.8, 0.4
 ONE, MOST = (0.7, 1.4), 0.6
 #: Residual of a recording over that of all from which its torque is of something else.
 LARGER = 3.0
+#: Share of its residual that the best effect may leave, and still be what is odd in a recording.
+LEFT = 0.5
 #: Error of identified bodies, as a share of the spread, from which recordings are predicted by the
 #: bodies of the others alone.
 SPOILED = 0.12
@@ -86,7 +88,8 @@ class OddRecording(Check):
                     scaled.append(one)
                 elif one.gain > LEAST and one.larger > LARGER and one.likeness < UNLIKE:
                     # a contact, or a payload of one recording, would look like it
-                    if left_by_effects(seen.fits, k, _rows_of(seen.fits, one.run)) > LARGER:
+                    without, left = left_by_effects(seen.fits, k, _rows_of(seen.fits, one.run))
+                    if left > max(LARGER, LEFT * without):
                         unlike.append(one)
         measurement.odd = bool(scaled or unlike)
         for run in sorted({one.run for one in scaled}):
