@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from skidyn._progress import track
 from skidyn._signals import Array
-from skidyn.effects import Term, get_effect
+from skidyn.effects import Effect, Term, get_effect
 from skidyn.evidence import Problem
 
 
@@ -86,13 +86,12 @@ def catalogue_candidates(problem: Problem, kinds: Iterable[str]) -> list[Candida
     list of Candidate
     """
     present = {(term.kind, term.places) for term in problem.terms}
-    candidates = []
-    for kind in track(list(kinds), "Preparing effects"):
+    terms: list[Term] = []
+    for kind in kinds:
         effect = get_effect(kind)
         if effect.search == "trajectories" and not problem.rigid_body and problem.robot is not None:
             # With the URDF's own bodies even a load carried all the time shows.
-            term = Term.at(kind, tuple(range(problem.n_joints)))
-            candidates.append(Candidate(kind, term, problem.term_rows(term)))
+            terms.append(Term.at(kind, tuple(range(problem.n_joints))))
             continue
         if effect.search != "grid" or ("robot" in effect.needs and problem.robot is None):
             continue
@@ -103,8 +102,14 @@ def catalogue_candidates(problem: Problem, kinds: Iterable[str]) -> list[Candida
             # An effect of the whole robot shows as soon as one joint shows it.
             if (kind, joints) in present or all(hidden) or (len(joints) < 3 and any(hidden)):
                 continue
-            for shape in effect.grid(problem.signals, joints):
-                term = Term.at(kind, joints, shape)
-                rows = problem.term_rows(term)
-                candidates.append(Candidate(kind, term, rows, n_shapes=len(effect.shapes)))
-    return candidates
+            terms += [Term.at(kind, joints, s) for s in effect.grid(problem.signals, joints)]
+    # What kinds with the same needs share for a joint is kept for one joint at a time.
+    ordered = sorted(terms, key=lambda term: (term.effect.needs, term.places))
+    for term in track(ordered, "Preparing effects"):
+        problem.term_rows(term)
+    return [Candidate(t.kind, t, problem.term_rows(t), n_shapes=_refined(t.effect)) for t in terms]
+
+
+def _refined(effect: Effect) -> int:
+    """Shape parameters that are refined."""
+    return 0 if effect.search == "trajectories" else len(effect.shapes)

@@ -87,7 +87,7 @@ def conclude(
     robot = problem.robot
     assert robot is not None
     while True:
-        steps = _steps(problem, result, torque, sliding)
+        steps, held = _steps(problem, result, torque, sliding)
         terms = [*problem.terms, *_found_terms(problem, result.findings)]
         fixed = parameter_intervals(problem, terms, result.fit.noise, shapes=False)
         useless = _useless(result.findings, steps, least_drop) or _vague(result.findings, fixed)
@@ -95,7 +95,6 @@ def conclude(
             break
         result = _without(problem, result, *useless)
     intervals = parameter_intervals(problem, terms, result.fit.noise)
-    held = steps[-1].held
     history = [step.entry for step in steps]
     shown = [entry["rmse"] for entry in history]
     if not hasattr(model, "with_effects") or not hasattr(model, "effects"):
@@ -173,17 +172,16 @@ def _refitted(
 
 @dataclass(frozen=True)
 class _Step:
-    """The model after a finding: its held-out residual and errors."""
+    """The model after a finding: its held-out prediction and errors."""
 
-    held: HeldOut
     comparison: Comparison
     entry: dict[str, Any]
 
 
 def _steps(
     problem: Problem, result: SearchResult, torque: Array, sliding: NDArray[np.bool_]
-) -> list[_Step]:
-    """The model as given, and after each finding."""
+) -> tuple[list[_Step], HeldOut]:
+    """The model as given, and after each finding; what the last one leaves, by finding."""
     steps = []
     dry = [t for t in problem.terms if t.is_dry]
     for k in track(range(len(result.findings) + 1), "Judging what was found"):
@@ -193,8 +191,9 @@ def _steps(
         comparison = _comparison(problem, torque, held, sliding, dry)
         last = result.findings[k - 1] if k else None
         kind, joints = (last.kind, last.joints) if last else (None, ())
-        steps.append(_Step(held, comparison, _entry(comparison, kind, joints)))
-    return steps
+        steps.append(_Step(comparison, _entry(comparison, kind, joints)))
+    # All terms at every sample would be most of the memory of a long log.
+    return steps, HeldOut(held.residual, {t: held.torque[t] for t in found})
 
 
 def _found_terms(problem: Problem, findings: Sequence[Hypothesis]) -> list[Term]:

@@ -7,7 +7,7 @@ trajectory alone. They are judged on interleaved quarters of every trajectory in
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -87,8 +87,17 @@ def split_effects(
         if best is not None:
             shape = {"trajectories": tuple(sorted(int(name) for name in best[1]))}
             split = term.with_shape(**shape)
-            found.append(Split(Candidate(kind, split, problem.term_rows(split)), best[0]))
+            found.append(Split(Candidate(kind, split, _within(problem, term, best[1])), best[0]))
     return found
+
+
+def _within(problem: Problem, term: Term, names: Iterable[Any]) -> dict[int, Array]:
+    """Averaged columns of a term in some trajectories only; no window reaches into another."""
+    own = list(names)
+    return {
+        j: np.where(np.isin(problem.rows.trajectory[j], own)[:, None], block, 0.0)
+        for j, block in problem.term_rows(term).items()
+    }
 
 
 def _own_estimates(

@@ -449,9 +449,10 @@ def regressor_rows(problem: Problem, index: NDArray[np.int64] | None = None) -> 
     assert robot is not None
     index = np.arange(10 * robot.n_bodies) if index is None else index
     rows = [np.zeros((count, len(index))) for count in problem.rows.counts]
+    weights = [w.tocsc() for w in problem.rows.weights]  # of which chunks of samples are taken
     for chunk, regressor in robot.iter_torque_regressor(signals.q, signals.dq, signals.ddq):
         for j, block in enumerate(rows):
-            block += problem.rows.weights[j][:, chunk] @ regressor[j][index].T
+            block += weights[j][:, chunk] @ regressor[j][index].T
         tell("Computing the rigid body", chunk.stop / len(signals.q))
     return rows
 
@@ -518,7 +519,7 @@ def _folds(rows: Rows, guard: float) -> tuple[Rows, list[NDArray[np.int64]], int
         fold.append(label[index])
         order.append(index)
     sorted_rows = Rows(
-        [w.tocsr()[i].tocsc() for w, i in zip(rows.weights, order, strict=True)],
+        [w[i] for w, i in zip(rows.weights, order, strict=True)],
         [x[i] for x, i in zip(rows.trajectory, order, strict=True)],
         [x[i] for x, i in zip(rows.time, order, strict=True)],
         [x[i] for x, i in zip(rows.quarter, order, strict=True)],

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
-from scipy.sparse import csc_matrix, diags
+from scipy.sparse import csr_matrix
 
 from skidyn._signals import Array, Signals
 
@@ -35,7 +35,7 @@ class Rows:
 
     Attributes
     ----------
-    weights : list of csc_matrix of shape (n_rows_j, n_samples)
+    weights : list of csr_matrix of shape (n_rows_j, n_samples)
         Per joint, the weights of every row.
     trajectory : list of ndarray of shape (n_rows_j,)
         Trajectory of every row.
@@ -47,7 +47,7 @@ class Rows:
         Samples that enter.
     """
 
-    weights: list[csc_matrix]
+    weights: list[csr_matrix]
     trajectory: list[NDArray[np.int64]]
     time: list[Array]
     quarter: list[NDArray[np.int64]]
@@ -67,7 +67,7 @@ class Rows:
         """Rows of a joint from values at every sample, shape (n_samples,) or (n_samples, k)."""
         return np.asarray(self.weights[joint] @ values)
 
-    def thinned(self, index: NDArray[np.int64]) -> list[csc_matrix]:
+    def thinned(self, index: NDArray[np.int64]) -> list[csr_matrix]:
         """Weights on some samples alone, by joint; those of every row sum up to as much as before.
 
         Parameters
@@ -77,15 +77,15 @@ class Rows:
 
         Returns
         -------
-        list of csc_matrix of shape (n_rows_j, n)
+        list of csr_matrix of shape (n_rows_j, n)
         """
-        thin = [w[:, index] for w in self.weights]
+        thin = [w[:, index].sorted_indices() for w in self.weights]
         sums = [
             (np.asarray(w.sum(1)).ravel(), np.asarray(t.sum(1)).ravel())
             for w, t in zip(self.weights, thin, strict=True)
         ]
         return [
-            csc_matrix(diags(all_ / np.where(some > 0, some, 1.0)) @ t)
+            _scaled(t, all_ / np.where(some > 0, some, 1.0))
             for (all_, some), t in zip(sums, thin, strict=True)
         ]
 
@@ -108,7 +108,7 @@ class Rows:
         keep = [np.flatnonzero(m > 0) for m in mean]
         return Rows(
             [
-                csc_matrix(diags(np.sqrt(m[k] / unit)) @ w.tocsr()[k])
+                _scaled(w[k], np.sqrt(m[k] / unit))
                 for w, m, k in zip(self.weights, mean, keep, strict=True)
             ],
             [x[k] for x, k in zip(self.trajectory, keep, strict=True)],
@@ -116,6 +116,12 @@ class Rows:
             [x[k] for x, k in zip(self.quarter, keep, strict=True)],
             self.sliding,
         )
+
+
+def _scaled(weights: csr_matrix, factor: Array) -> csr_matrix:
+    """Weights whose rows are multiplied by a factor each."""
+    data = weights.data * np.repeat(factor, np.diff(weights.indptr))
+    return csr_matrix((data, weights.indices, weights.indptr), shape=weights.shape)
 
 
 def every_sample(signals: Signals) -> Rows:
@@ -133,7 +139,7 @@ def every_sample(signals: Signals) -> Rows:
     n, joints = signals.n_samples, range(signals.n_joints)
     order = np.arange(n)
     return Rows(
-        [csc_matrix((np.ones(n), (order, order)), shape=(n, n)) for _ in joints],
+        [csr_matrix((np.ones(n), (order, order)), shape=(n, n)) for _ in joints],
         [signals.trajectory.astype(np.int64) for _ in joints],
         [order.astype(float) for _ in joints],
         [order * 8 // max(1, n) % 4 for _ in joints],
@@ -250,9 +256,9 @@ def _weigh(span: _Windows, use: NDArray[np.bool_]) -> tuple[Entries, NDArray[np.
     return (number[row], sample, weight[inside] / gain[row], int(keep.sum())), keep
 
 
-def _stack(parts: list[Entries], n_samples: int) -> csc_matrix:
+def _stack(parts: list[Entries], n_samples: int) -> csr_matrix:
     shift = np.cumsum([0, *(part[3] for part in parts)])
     row = np.concatenate([part[0] + s for part, s in zip(parts, shift[:-1], strict=True)])
     sample = np.concatenate([part[1] for part in parts])
     value = np.concatenate([part[2] for part in parts])
-    return csc_matrix((value, (row, sample)), shape=(int(shift[-1]), n_samples))
+    return csr_matrix((value, (row, sample)), shape=(int(shift[-1]), n_samples))

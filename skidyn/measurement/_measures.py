@@ -186,10 +186,15 @@ def find_leaps(q: np.ndarray, time: np.ndarray, trajectory: np.ndarray) -> np.nd
     together = (trajectory[1:] == trajectory[:-1]) & (step < 3 * usual) & (step > 0)
     moved = np.where(together[:, None], np.diff(q, axis=0), 0.0)
     # how fast it is before and after, and not the recorded velocity, whose unit may be another
-    around = np.stack([np.roll(moved, k, axis=0) for k in (-3, -2, -1, 1, 2, 3)])
-    beyond = np.abs(moved - np.median(around, axis=0))
+    middle, most = np.empty_like(moved), np.empty_like(moved)
+    for joint, steps in enumerate(moved.T):
+        around = np.stack([np.roll(steps, shift) for shift in (-3, -2, -1, 1, 2, 3)])
+        most[:, joint] = np.abs(around).max(axis=0)
+        around.sort(axis=0)
+        middle[:, joint] = (around[2] + around[3]) / 2
+    beyond = np.abs(moved - middle)
     # a position that was held catches up in one step
-    far = np.abs(moved) > FARTHER * (1 + _held_before(moved)) * np.abs(around).max(axis=0)
+    far = np.abs(moved) > FARTHER * (1 + _held_before(moved)) * most
     far &= beyond > BEYOND * np.quantile(beyond, 0.995, axis=0)
     far &= beyond > RANGE * np.ptp(q, axis=0)
     turns = np.abs(moved - 2 * np.pi * np.round(moved / (2 * np.pi))) < 0.05 * 2 * np.pi

@@ -200,8 +200,9 @@ def _body_rows(
     columns = slice(10 * body, 10 * body + 10)
     s = problem.signals
     rows = [np.zeros((count, 10)) for count in problem.rows.counts]
+    weights = [w.tocsc() for w in problem.rows.weights]  # of which chunks of samples are taken
     for chunk, regressor in robot.iter_torque_regressor(s.q, s.dq, s.ddq):
         for j, block in enumerate(rows):
             there = regressor[j, columns].T * carries[chunk, None]
-            block += problem.rows.weights[j][:, chunk] @ there
+            block += weights[j][:, chunk] @ there
     return [block @ frame for block in rows]
