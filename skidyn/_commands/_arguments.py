@@ -29,7 +29,7 @@ class Output(str):
     def __new__(cls, name: str) -> Output:
         if cls.endings and not name.lower().endswith(cls.endings):
             raise argparse.ArgumentTypeError(
-                f"{name!r} must end in {' or '.join(cls.endings)}, which says what it becomes"
+                f"{name!r} must end in {' or '.join(cls.endings)}, which decides the format"
             )
         return super().__new__(cls, name)
 
@@ -147,7 +147,7 @@ def with_remedies(parser: Any) -> None:
     )
     mend.add_argument("--zero", metavar="q2=1.57", help="what positions read at the robot's zero")
     mend.add_argument("--late", metavar="tau=0.008", help="delays in s, to be taken out")
-    mend.add_argument("--unwrap", action="store_true", help="take jumps by a whole turn out")
+    mend.add_argument("--unwrap", action="store_true", help="remove jumps by whole turns")
     mend.add_argument(
         "--torque-sign",
         choices=("recorded", "command"),
@@ -158,7 +158,7 @@ def with_remedies(parser: Any) -> None:
         "--clock",
         choices=("recorded", "regular"),
         default="recorded",
-        help="regular: samples were taken at even steps, only the stamps jitter",
+        help="regular: samples were taken at even steps and only the time stamps jitter",
     )
     mend.add_argument(
         "--drop-repeated", action="store_true", help="leave out rows that repeat the one before"

@@ -55,7 +55,7 @@ def add_parser(commands: Any) -> None:
         commands,
         "compare",
         run,
-        "print held-out errors by joint, trajectory, regime; or compare two",
+        "print held-out errors by joint, trajectory and regime, or compare two models or logs",
         DESCRIPTION,
     )
     with_log(parser, urdf_required=False)
@@ -65,9 +65,12 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--against-model", type=Input, metavar="MODEL", help="the other model, as --model"
     )
-    parser.add_argument("--names", metavar="A,B", help="what the two are called on the page")
+    parser.add_argument("--names", metavar="A,B", help="names of the two on the page")
     parser.add_argument(
-        "--html", type=Page, metavar="HTML", help="page of the two; its numbers as JSON beside"
+        "--html",
+        type=Page,
+        metavar="HTML",
+        help="page that compares the two; a JSON file of its numbers is written beside it",
     )
     parser.add_argument(
         "--traces",
@@ -120,7 +123,7 @@ def _compare(options: argparse.Namespace) -> None:
 def _compare_with_log(options: argparse.Namespace) -> None:
     if options.html or options.names:
         raise SkidynError(
-            "--html and --names are for two: add --against, --against-model, or give two reports. "
+            "--html and --names compare two: add --against, --against-model, or give two reports. "
             "The page of one model and one log is made by skidyn diagnose --html"
         )
     model, frame, tau = read_model_and_log(options)

@@ -70,9 +70,9 @@ def gate(options: argparse.Namespace) -> bool:
 
 def _check(options: argparse.Namespace) -> None:
     if options.fail_above is None:
-        raise SkidynError("--junit is the result of --fail-above; give both")
+        raise SkidynError("--junit writes the result of --fail-above; give both")
     if not options.fail_above > 0:
-        raise SkidynError(f"--fail-above {options.fail_above:g}: a ratio of errors is above 0")
+        raise SkidynError(f"--fail-above is {options.fail_above:g}; expected a ratio above 0")
     if not options.against:
         raise SkidynError("--fail-above needs a healthy recording: --against LOG [LOG ...]")
     if not options.urdf:

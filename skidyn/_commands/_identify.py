@@ -13,9 +13,9 @@ from skidyn._commands._output import parameters, print_json, working, write_json
 #: Those that need nothing but a log.
 ESTIMATORS = ("weighted", "ordinary", "robust", "ridge", "entropic")
 DESCRIPTION = """\
-Identify inertial parameters and effects together and print them with standard errors that survive
-autocorrelation. Single masses can rarely be identified: what is printed are the combinations
-that can, how well the motion excites them, and which ones the data leaves open.
+Identify inertial parameters and effects together and print them with standard errors that hold for
+autocorrelated residuals. Single masses can rarely be identified: what is printed are the
+combinations that can, how well the motion excites them, and which ones the data leaves open.
 
   skidyn identify run*.csv --urdf robot.urdf --out parameters.json
   skidyn identify run*.csv --urdf robot.urdf --consistent     only bodies that can exist

@@ -48,7 +48,7 @@ def add_parser(commands: Any) -> None:
         "--com",
         metavar="X,Y,Z",
         help="centre of mass in the frame of the link in m, where it is known: weighs a payload of "
-        "which the motion shows the first moment only",
+        "which the motion shows only the first moment",
     )
     parser.add_argument(
         "--model",

@@ -13,7 +13,7 @@ from skidyn._commands._output import print_json, provenance, run_diagnosis, writ
 
 DESCRIPTION = """\
 Turn a report into one HTML page that needs no network. The log is read anew and the diagnosis run
-again; a warning tells if a file has changed since.
+again; a warning is given if a file has changed since.
 
   skidyn report --from report.json --html report.html
 """

@@ -193,8 +193,8 @@ def diagnose_parquet(
     refused = [t.kind for t in make_terms(model.effects, robot.n_joints) if t.effect.needs_fit]
     if refused:
         raise SkidynError(
-            f"the columns of {refused[0]!r} need a fit of the model first, so recordings cannot be "
-            "gone through once; leave it out, or diagnose data in memory"
+            f"the columns of {refused[0]!r} need a fit of the model first, so one pass is not "
+            "enough; leave it out, or diagnose data in memory"
         )
     files = parquet_files(paths)
     lengths = [trajectory_lengths(file, robot, columns) for file in files]

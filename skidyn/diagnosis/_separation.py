@@ -90,7 +90,7 @@ class SeparatingMotion:
         if self.gain < LEAST_GAIN:
             return (
                 f"No motion of {which} within the limits separates {self.kind} from {self.rival}: "
-                "with the coefficients that this log gives them, one does what the other does."
+                "with their coefficients from this log, both cause the same torque."
             )
         text = (
             f"This motion of {which} ({self.time[-1]:.0f} s) separates {self.kind} from "

@@ -137,7 +137,7 @@ def _verdict(
         if named and not nameless and all(line["guess"] for line in lines):
             joints = sorted({joint for line in lines for joint in line["joints"]})
             text = f"Something is missing on {joints_told(joints)}; best guess: {top}{open_ends}"
-            return "?", text, "No name is sure: more or other motion would tell."
+            return "?", text, "No name is sure; a recording of more or other motion could decide."
         if len(lines) <= SHORT:
             told = [f"{_brief(line['what'])} on {line['where']}" for line in lines]
             return mark, f"Missing: {listed(told)}{open_ends}", text

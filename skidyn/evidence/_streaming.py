@@ -228,8 +228,8 @@ def linear_terms(effects: Iterable[Any], n_joints: int) -> list[Term]:
     for term in terms:
         if term.effect.needs_fit:
             raise SkidynError(
-                f"the columns of {term.kind!r} need a fit of the model first, so no evidence can "
-                "be had in one pass; leave it out, or fit an RBDRegressor on data in memory"
+                f"the columns of {term.kind!r} need a fit of the model first, so one pass is not "
+                "enough; leave it out, or fit an RBDRegressor on data in memory"
             )
         if term.is_open:
             names = ", ".join(shape.name for shape in term.effect.shapes) or "found from the log"

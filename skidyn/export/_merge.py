@@ -199,7 +199,7 @@ def merge_mjcf(
     settings = {} if compiler is None else compiler.attributes
     if settings.get("inertiafromgeom") == "true":
         raise SkidynError(
-            f'{edits.path} says <compiler inertiafromgeom="true"/>, by which MuJoCo overlooks '
+            f'{edits.path} says <compiler inertiafromgeom="true"/>, by which MuJoCo ignores '
             'every <inertial>; change it to "auto"'
         )
     world = mujoco.MjModel.from_xml_path(str(edits.path))

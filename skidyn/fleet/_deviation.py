@@ -136,8 +136,8 @@ def compare_fleet(
     """
     if len(evidence) < FEWEST_ROBOTS:
         raise SkidynError(
-            f"{len(evidence)} robots do not tell how robots of a type differ; {FEWEST_ROBOTS} are "
-            "needed"
+            f"{len(evidence)} robots are too few to see how robots of a type differ; "
+            f"{FEWEST_ROBOTS} are needed"
         )
     parts = list(evidence.values())
     if any(part.columns != parts[0].columns for part in parts):

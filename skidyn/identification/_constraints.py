@@ -156,7 +156,7 @@ def _ranges(
 ) -> Iterator[tuple[Array, float, float]]:
     for name, (low, high) in known.mass.items():
         if not (low <= high and high > 0):
-            raise ValueError(f"mass of {name!r} between {low} and {high} kg: no body has that")
+            raise ValueError(f"mass of {name!r}: no body has a mass between {low} and {high} kg")
         yield _unit(10 * _body(name, names), width), float(low), float(high)
     if known.total_mass is not None:
         total = np.zeros(width)

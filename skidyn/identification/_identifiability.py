@@ -116,8 +116,13 @@ def _sentence(named: dict[str, float], effect: float) -> str:
         f"{'raising' if factor > 0 else 'lowering'} {name} by {abs(factor):.3g}"
         for name, factor in others
     ]
-    left = "nothing" if effect < 1e-7 else f"{100 * effect:.2g} % of that torque"
-    return f"Raising {lead} by 1 and {', '.join(changes)} leaves {left} to be seen."
+    moved = f"{lead} by 1 and {', '.join(changes)}"
+    if effect < 1e-7:
+        return f"Raising {moved} changes no torque."
+    return (
+        f"Raising {moved} changes the torque by {100 * effect:.2g} % of what raising {lead} "
+        "alone does."
+    )
 
 
 def essential_parameters(

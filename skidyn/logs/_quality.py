@@ -308,7 +308,7 @@ def _joints(measurement: Measurement) -> list[JointQuality]:
 
 
 _SINGLE = (
-    "there is a single trajectory: errors on held-out trajectories cannot be had, only on held-out "
+    "there is a single trajectory: held-out trajectories cannot be judged, only held-out "
     "stretches of it (split_gaps, split_dwells or several files give more)."
 )
 _MOTION_HEAD = "  position range  coverage     step   speed reversals"

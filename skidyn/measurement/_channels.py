@@ -68,7 +68,7 @@ class CoarsePosition(Check):
             yield self.suspicion(
                 "positions come in coarse steps",
                 f"of up to {largest:.3g} rad, {2 * np.pi / largest:.0f} a turn; accelerations, "
-                "and small effects on them, are told less surely",
+                "and small effects on them, are less certain",
                 "noted",
                 sorted(coarse),
             )

@@ -233,8 +233,8 @@ def _estimate(runs: Runs, robot: Robot, known: Array, nominal: Array) -> DriveGa
     if hardly.any():
         names = ", ".join(np.array(robot.joint_names)[hardly])
         notes.append(
-            f"These runs show little of the gain of {names}: little ties its current to the load. "
-            "Turn the load about it, out of balance."
+            f"These runs say little about the gain of {names}, whose current hardly depends on the "
+            "load. Record motion in which that joint turns the load out of balance."
         )
     body = known.copy()
     body[system.unknown] = solution[: len(system.unknown)]

@@ -125,7 +125,7 @@ class PayloadEstimate:
             f"joint {j + 1} {100 * self.by_joint[j]:.0f} ± {100 * self.by_joint_std[j]:.0f}"
             for j in felt
         )
-        return [f"weighed by single joints, in % of this: {shares}"]
+        return [f"mass estimated from single joints, in % of this: {shares}"]
 
     def _body(self) -> list[str]:
         if not np.isfinite(self.mass):
@@ -376,7 +376,7 @@ def _estimate(runs: Runs, link: str, notes: list[str], com: Array | None = None)
         )
     if is_open.any():
         names = ", ".join(np.array(SYMBOLS)[is_open])
-        notes.append(f"This motion leaves open: {names}. They are those of a small sphere.")
+        notes.append(f"This motion does not determine {names}; they are those of a small sphere.")
     if com is not None:
         notes.append("The centre of mass is the one that was given; the mass rests on it.")
         parameters = _sphere(body[0], com) if is_open[4:].any() else body

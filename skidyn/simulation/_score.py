@@ -399,7 +399,8 @@ def judge_by_simulation(
         task = read_task(model, X, y, controller, horizon)
         if len(task.windows.rows) < 2:
             raise SkidynError(
-                "one piece cannot tell a change from chance; give a longer log or a shorter horizon"
+                "one piece is not enough to tell a change from chance; give a longer log or a "
+                "shorter horizon"
             )
         errors.append(errors_of(model, task, *run(ForwardModel(model), task, step), horizon))
     return compare_errors(*errors)

@@ -36,7 +36,7 @@ def base_tilt(world: World, joints: Sequence[int], size: float) -> Outcome:
     heading = world.rng.uniform(-np.pi, np.pi)
     nominal = np.asarray(world.robot.gravity, dtype=float)
     if not np.linalg.norm(nominal) > 0:
-        raise SkidynError("base_tilt: the robot has no gravity to tilt.")
+        raise SkidynError("base_tilt: the robot has no gravity whose direction could change.")
     aside = np.cross(nominal, [0.0, 1.0, 0.0] if abs(nominal[1]) < 5 else [1.0, 0.0, 0.0])
     across = np.cross(nominal, aside) / np.linalg.norm(nominal)
     direction = (np.cos(heading) * aside + np.sin(heading) * across) / np.linalg.norm(aside)
@@ -105,7 +105,7 @@ def _strongest(world: World, per_unit: Array, size: float) -> float:
     loaded = world.scale > LOADED_SHARE * world.scale.max()
     share = np.where(loaded, rms(per_unit) / world.scale, 0.0)
     if not share.max() > 0:
-        raise SkidynError("this robot does not feel the effect: no joint takes torque from it.")
+        raise SkidynError("the effect causes no torque in any joint of this robot.")
     return float(size / share.max())
 
 

@@ -136,7 +136,7 @@ class _Run:
             carried = data.qfrc_applied + data.qfrc_passive + data.qfrc_constraint
             moment.load = carried[dofs]
             if not np.isfinite(after).all() or np.abs(after).max() > 60:
-                raise FloatingPointError(f"the simulation ran away in trajectory {g}")
+                raise FloatingPointError(f"the simulation diverged in trajectory {g}")
         first = round(SETTLE / STEP)
         kept = {name: values[first:] for name, values in rows.items()}
         return Recording(clock + since[first:], **kept, before=rows["tau"][:first])

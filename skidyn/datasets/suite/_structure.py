@@ -66,7 +66,7 @@ def base_tilt(s: Setting) -> Hidden:
         "base_tilt",
         list(range(s.n_joints)),
         {"gravity": gravity, "tilt_deg": np.rad2deg(tilt)},
-        "gravity points elsewhere than the URDF says",
+        "gravity has another direction than in the URDF",
         ("tilt_deg",),
         anywhere=True,
         gravity=gravity,
