@@ -54,7 +54,7 @@ def test_two_reports(here, capsys, tmp_path):
     [
         (["log.csv"], "--urdf is missing"),
         (["a.json"], "two reports"),
-        ([*LOG, "--html", "x.html"], "are for two"),
+        ([*LOG, "--html", "x.html"], "compare two"),
     ],
 )
 def test_what_is_missing_is_said(here, capsys, words, complaint):
