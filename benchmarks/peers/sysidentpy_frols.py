@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""SysIdentPy: polynomial terms of the signals by FROLS, their number by its Bayesian criterion.
+
+What the base model leaves depends on the present signals, so the model is a static one (NFIR,
+second degree, no lags). Rows and signals are thinned to what FROLS orders in seconds.
+"""
+
+import numpy as np
+from _answers import by_signals
+from sysidentpy.basis_function import Polynomial
+from sysidentpy.model_structure_selection import FROLS
+from sysidentpy.parameter_estimation import LeastSquares
+
+PACKAGE = "sysidentpy"
+
+
+class Terms:
+    """Standardised signals; the model is linear in its terms."""
+
+    def fit(self, X, y):
+        self.middle, self.spread = X.mean(axis=0), np.maximum(X.std(axis=0), 1e-9)
+        self.model = FROLS(
+            order_selection=True,
+            n_info_values=12,
+            info_criteria="bic",
+            xlag=[[1]] * X.shape[1],
+            model_type="NFIR",
+            basis_function=Polynomial(degree=2),
+            estimator=LeastSquares(),
+        )
+        self.model.fit(X=self._late(X), y=self._padded(y)[:, None])
+        return self
+
+    def predict(self, X):
+        told = self.model.predict(X=self._late(X), y=np.zeros((len(X) + 1, 1)))
+        return np.ravel(told)[1:]
+
+    def _late(self, X):
+        """A lag of one row is the least there is: signals are moved one row up."""
+        Z = (X - self.middle) / self.spread
+        return np.vstack([Z, Z[-1:]])
+
+    @staticmethod
+    def _padded(y):
+        return np.concatenate([[0.0], y])
+
+
+def answer(log, robot) -> dict:
+    return by_signals(log, Terms, most=800)
