@@ -65,6 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _keep_freed_memory()
         parser = make_parser()
         options = parser.parse_args(arguments)
+        options.words = list(sys.argv[1:] if arguments is None else arguments)
         if not hasattr(options, "run"):
             parser.print_help()
             return BAD_INPUT

@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import argparse
+import shlex
+from collections.abc import Sequence
 from typing import Any
 
 from skidyn._commands._arguments import command, with_log_only
@@ -45,7 +47,21 @@ def run(options: argparse.Namespace) -> None:
         print(quality)
         remedies = [c.remedy.option for c in quality.checks if c.remedy and c.certainty != "noted"]
         if remedies:
-            robot_option = f" --urdf {options.urdf}" if options.urdf else ""
-            logs = " ".join(options.logs)
             print("\nto mend all of it, and check again:")
-            print(f"  skidyn check {logs}{robot_option} {' '.join(remedies)}")
+            print(f"  skidyn {shlex.join(_with_remedies(options.words, remedies))}")
+
+
+def _with_remedies(words: Sequence[str], remedies: Sequence[str]) -> list[str]:
+    """The words of a command with the options that mend its log.
+
+    What belongs to an option that is there already joins its value: of two options of one name, the
+    last alone counts.
+    """
+    mended = list(words)
+    for remedy in remedies:
+        flag, _, value = remedy.partition(" ")
+        if value and flag in mended[:-1]:
+            mended[mended.index(flag) + 1] += f",{value}"
+        else:
+            mended += [flag, value] if value else [flag]
+    return mended

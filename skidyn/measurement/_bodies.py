@@ -63,8 +63,9 @@ class Explained:
 
     @cached_property
     def spread(self) -> Array:
-        """Spread of the torque."""
-        return np.array([_spread(self._torque(k)) + 1e-12 for k in self.joints])
+        """Spread of the torque; half its deviation at least, where it is mostly the same."""
+        torques = [self._torque(k) for k in self.joints]
+        return np.array([max(_spread(t), 0.5 * float(np.std(t))) + 1e-12 for t in torques])
 
     @cached_property
     def errors(self) -> tuple[Array, Array]:

@@ -108,7 +108,10 @@ def cut_columns(measurement: Measurement) -> list[int]:
             # a joint that is not driven has zeros alone
             if CUT < _cut(values) < 0.98 and len(np.unique(values)) > 50:
                 found.append(k)
-    return found
+    moving = {k for k, moves in enumerate(measurement.excited) if moves}
+    others = [k for k in sorted(moving - set(found)) if measurement.torque[:, k].min() >= 0]
+    # among magnitudes, zeros are those of a joint that is at rest
+    return [] if len(others) >= 2 and moving <= {*found, *others} else found
 
 
 def _turns(measurement: Measurement, k: int) -> int:

@@ -30,6 +30,15 @@ def test_check_says_first_what_matters_with_the_command_that_mends_it(flipped, c
     assert json.loads(capsys.readouterr().out)["checks"] == []
 
 
+def test_the_command_that_mends_a_log_keeps_its_options(tmp_path, capsys):
+    path = tmp_path / "log.csv"
+    motion = {name: 57.29578 * LOG[name] for name in ("q1", "q2", "dq1", "dq2")}
+    LOG.assign(**motion, time=1e3 * LOG["time"]).to_csv(path, index=False)
+    assert main(["check", str(path), "--urdf", URDF, "--units", "time=ms"]) == 0
+    mended = f"skidyn check {path} --urdf {URDF} --units time=ms,q=deg,dq=deg/s"
+    assert mended in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     "option, words",
     [
