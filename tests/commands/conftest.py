@@ -25,6 +25,28 @@ def work(tmp_path_factory):
     return folder
 
 
+@pytest.fixture(scope="session")
+def diagnosed(tmp_path_factory):
+    """A folder with a robot and a log that hides Stribeck friction on joint 2, diagnosed."""
+    pytest.importorskip("pandas", reason="needs skidyn[io]")
+    pytest.importorskip("jinja2", reason="needs skidyn[report]")
+    folder = tmp_path_factory.mktemp("diagnosed")
+    urdf = files("skidyn.datasets").joinpath("robots", "planar_arm.urdf").read_text("utf-8")
+    (folder / "arm.urdf").write_text(urdf, encoding="utf-8")
+    log = make_hidden_effect_log(load_planar_arm(), "stribeck", joints=[2], n_trajectories=6)
+    log.frame.to_csv(folder / "log.csv", index=False)
+    words = ["diagnose", str(folder / "log.csv"), "--urdf", str(folder / "arm.urdf")]
+    written = ["--out", str(folder / "report.json"), "--html", str(folder / "report.html")]
+    assert cli.main([*words, *written]) == cli.DONE
+    return folder
+
+
+@pytest.fixture
+def arguments(diagnosed):
+    """Log and robot of that folder, as words of a command."""
+    return [str(diagnosed / "log.csv"), "--urdf", str(diagnosed / "arm.urdf")]
+
+
 @pytest.fixture
 def run(capsys):
     def run_command(*words):

@@ -71,3 +71,13 @@ def test_traces_of_one_log(here, capsys, tmp_path):
     words = ["compare", *LOG, "--against", "log.csv", "--traces", str(file)]
     assert cli.main(words) == cli.BAD_INPUT
     assert "--traces are of one model" in capsys.readouterr().err
+
+
+def test_compare_knows_joints_trajectories_and_regimes(capsys, run, arguments):
+    code, content = run("compare", *arguments)
+    assert code == cli.DONE
+    assert {(row["joint"], row["trajectory"]) for row in content["table"]} == {
+        (j, t) for j in (1, 2) for t in range(1, 7)
+    }
+    assert cli.main(["compare", *arguments]) == cli.DONE
+    assert "reversal" in capsys.readouterr().out

@@ -3,6 +3,13 @@
 
 from __future__ import annotations
 
+import json
+import signal
+import subprocess
+import sys
+
+import pytest
+
 from skidyn import cli
 from skidyn.diagnosis import Diagnosis
 
@@ -20,3 +27,49 @@ def test_findings_are_judged_by_simulation_where_it_is_asked_for(work, run, monk
     assert code == cli.DONE
     assert len(judged) == 1 and len(judged[0]) == len(report["effects"]) == 1
     assert not [note for note in report["warnings"] if "worsens the simulated" in note]
+
+
+def test_diagnose_writes_report_and_page(diagnosed):
+    report = json.loads((diagnosed / "report.json").read_text("utf-8"))
+    assert report["schema"] == "skidyn.diagnosis/1"
+    assert report["verdict"] == "missing"
+    assert [(e["kind"], e["joints"]) for e in report["effects"]] == [("stribeck", [2])]
+    assert set(report["provenance"]["sha256"]) == {
+        str(diagnosed / "log.csv"),
+        str(diagnosed / "arm.urdf"),
+    }
+    assert "executable" not in report["provenance"]["versions"]
+    assert "</html>" in (diagnosed / "report.html").read_text("utf-8")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C is another thing there")
+def test_ctrl_c_leaves_no_half_written_file(tmp_path, arguments):
+    """A real signal to a real process, while it works."""
+    out, page = tmp_path / "report.json", tmp_path / "report.html"
+    words = ["diagnose", *arguments, "--out", str(out), "--html", str(page)]
+    process = subprocess.Popen(
+        [sys.executable, "-c", STOPPABLE, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    assert process.stdout is not None
+    process.stdout.readline()  # the report is written beside its place, and not yet put there
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=120)
+    assert (process.returncode, errors.decode().splitlines()[-1]) == (
+        cli.STOPPED,
+        "stopped; no file was left half written",
+    )
+    assert list(tmp_path.iterdir()) == []
+
+
+STOPPABLE = """
+import os, signal, sys, time
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a background shell ignores it
+from skidyn.cli import main
+
+def slow(*paths):
+    print("now", flush=True)
+    time.sleep(60)
+
+os.replace = slow
+sys.exit(main(sys.argv[1:]))
+"""

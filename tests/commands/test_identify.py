@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``skidyn identify``."""
+
+import json
+
+import numpy as np
+import pytest
+
+from skidyn import cli
+from skidyn._commands._identify import ESTIMATORS
+
+
+def test_identify_writes_parameters(diagnosed, run, arguments):
+    out = diagnosed / "parameters.json"
+    code, content = run("identify", *arguments, "--out", out)
+    assert code == cli.DONE
+    assert content == json.loads(out.read_text("utf-8"))
+    assert np.shape(content["inertial_parameters"]) == (2, 10)
+    assert {e["kind"] for e in content["effects"]} == {"viscous", "coulomb"}
+    assert content["condition_number"] > 1 and content["open_combinations"] == []
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_identify_by_any_estimator_and_only_what_is_essential(capsys, estimator, arguments):
+    words = ["identify", *arguments, "--estimator", estimator, "--consistent"]
+    assert cli.main([*words, "--essential"]) == cli.DONE
+    out = capsys.readouterr().out
+    assert "condition number of the excitation" in out and "others left out" in out
