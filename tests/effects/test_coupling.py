@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Effects of two joints on each other."""
+
+import numpy as np
+import pytest
+
+from skidyn._signals import Signals
+from skidyn.datasets import load_scara
+from skidyn.effects import (
+    get_effect,
+)
+
+
+def test_couplings_act_on_both_joints(signals):
+    for kind, state in (("coupled_inertia", signals.ddq), ("coupling_spring", signals.q)):
+        blocks = get_effect(kind).torque_columns(signals, (0, 1), ratio=-2.0)
+        x = state[:, 0] - 2 * state[:, 1]
+        np.testing.assert_allclose(blocks[0][:, 0], x)
+        np.testing.assert_allclose(blocks[1], -2 * blocks[0])
+
+
+def test_a_slider_and_a_rotary_joint_can_be_coupled():
+    slides = np.array([kind == "prismatic" for kind in load_scara().joint_types])
+    zero = np.zeros((3, 4))
+    scara = Signals(zero, zero, zero, trajectory=np.zeros(3), prismatic=slides)
+    spring = get_effect("coupling_spring")
+    assert (2, 3) in spring.sites(scara)
+    for pair, expected in (((2, 3), (0.01, 0.1, 1.0)), ((0, 1), (1.0,))):
+        ratios = sorted({abs(shape["ratio"]) for shape in spring.grid(scara, pair)})
+        assert ratios == pytest.approx(expected)

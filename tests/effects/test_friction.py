@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Columns of friction against their formulas."""
+
+import numpy as np
+
+from skidyn.effects import (
+    dahl_state,
+)
+
+
+def test_friction(signals, columns_of):
+    v, sign = signals.dq[:, 0], np.sign(signals.dq[:, 0])
+    fast = np.abs(v) > 0.02
+    stribeck = columns_of("stribeck", signals, vs=0.1, delta=2.0)[:, 0]
+    np.testing.assert_allclose(stribeck[fast], (sign * np.exp(-((v / 0.1) ** 2)))[fast], atol=1e-4)
+    np.testing.assert_allclose(columns_of("coulomb", signals)[fast, 0], sign[fast], atol=1e-4)
+    power = columns_of("nonlinear_viscous", signals, power=2.0)[:, 0]
+    np.testing.assert_allclose(power, v * np.abs(v), atol=1e-4)
+    np.testing.assert_array_equal(columns_of("asymmetric_friction", signals)[:, 0], np.abs(v))
+    load = columns_of("load_dependent_friction", signals)[:, 0]
+    np.testing.assert_allclose(load[fast], (np.abs(signals.load[:, 0]) * sign)[fast], atol=1e-4)
+    lugre = columns_of("lugre", signals, presliding=0.02, vs=0.1)
+    state = dahl_state(signals.q[:, 0], signals.segments, 0.02)
+    expected = np.column_stack([state, state * np.exp(-((v / 0.1) ** 2))])
+    np.testing.assert_allclose(lugre, expected)

@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Delay, saturation and gain of a torque."""
+
+import numpy as np
+
+from skidyn.effects import (
+    get_effect,
+)
+
+
+def test_delay_is_a_shift(signals):
+    torque, delay = signals.model_torque, 0.004
+    change = get_effect("time_delay").torque_columns(signals, (0, 1))
+    shifted = np.sin(3 * (signals.time - delay))
+    inner = np.r_[2:298, 302:598]
+    np.testing.assert_allclose(
+        (torque[:, 0] + delay * change[0][:, 0])[inner], shifted[inner], atol=2e-4
+    )
+
+
+def test_saturation_and_gain(signals, columns_of):
+    torque = signals.model_torque[:, 0]
+    cut = torque + columns_of("saturation", signals, limit=0.6)[:, 0]
+    np.testing.assert_allclose(cut, np.clip(torque, -0.6, 0.6))
+    np.testing.assert_array_equal(columns_of("torque_gain", signals)[:, 0], torque)

@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Columns of springs and stops against their formulas."""
+
+import numpy as np
+
+from skidyn.effects import (
+    Term,
+    get_effect,
+)
+
+
+def test_springs(signals, columns_of):
+    q = signals.q[:, 0]
+    spring = get_effect("spring")
+    found = spring.parameters(np.array([4.0, -2.0]), {})
+    np.testing.assert_allclose(
+        spring.columns(signals, 0) @ [4.0, -2.0], found["k"] * (q - found["q0"])
+    )
+    high = columns_of("end_stop", signals, q_lim=0.4, side=1.0)[:, 0]
+    np.testing.assert_allclose(high, np.where(q > 0.4, q - 0.4, 0))
+    low = columns_of("end_stop", signals, q_lim=-0.4, side=-1.0)[:, 0]
+    np.testing.assert_allclose(low, np.where(q < -0.4, q + 0.4, 0))
+    cubic = columns_of("nonlinear_spring", signals, q_middle=0.1) @ [1.0, 2.0, 3.0, 4.0]
+    x = q - 0.1
+    np.testing.assert_allclose(cubic, x + 2 * x**2 + 3 * x**3 + 4)
+    one = Term("offset", (1,), {"trajectories": (1,)}).torque_columns(signals)[0][:, 0]
+    np.testing.assert_array_equal(one, signals.trajectory == 1)

@@ -1,0 +1,18 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Columns that follow a temperature."""
+
+import numpy as np
+
+from skidyn.effects import (
+    get_effect,
+)
+
+
+def test_temperature(signals, columns_of):
+    warm, v = signals.temperature[:, 1] - 30.0, signals.dq[:, 1]
+    block = columns_of("temperature_friction", signals, 1)
+    expected = np.column_stack([warm * v, warm * signals.sign[:, 1], warm**2 * v])
+    np.testing.assert_allclose(block, expected)
+    np.testing.assert_allclose(columns_of("temperature_offset", signals, 1)[:, 0], warm)
+    cold = signals.with_(temperature=None)
+    assert "no temperature" in get_effect("temperature_friction").not_shown(cold, 0)

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Payload, force and contact at the tool against the dynamics of the robot."""
+
+import numpy as np
+
+from skidyn.effects import (
+    Term,
+    get_effect,
+)
+
+
+def test_payload_is_a_heavier_last_link(signals, robot):
+    body = np.array([0.7, 0.1, 0.02, -0.05, 0.02, 0.001, 0.0, 0.03, 0.0, 0.04])
+    heavier = robot.inertial_parameters.copy()
+    heavier[-1] += body
+    state = signals.q, signals.dq, signals.ddq
+    change = robot.inverse_dynamics(*state, parameters=heavier) - robot.inverse_dynamics(*state)
+    blocks = Term("payload", (1, 2), {"trajectories": (1,)}).torque_columns(signals)
+    for j in range(2):
+        np.testing.assert_allclose(blocks[j][300:] @ body, change[300:, j], atol=1e-10)
+        assert not blocks[j][:300].any()
+
+
+def test_wrench_works_against_the_motion_of_the_tool(signals, robot):
+    force, step = np.array([1.0, -2.0, 0.5]), 1e-6
+    blocks = get_effect("external_wrench").torque_columns(signals, (0, 1))
+    for j in range(2):
+        moved = signals.q + step * np.eye(2)[j]
+        before, after = (robot.forward_kinematics(q)[0] for q in (signals.q, moved))
+        work = (after - before) @ force / step
+        np.testing.assert_allclose(blocks[j] @ force, -work, atol=1e-5)
+
+
+def test_contact_only_below_its_plane(signals, robot):
+    tool = robot.forward_kinematics(signals.q)[0][:, 2]
+    plane = float(np.median(tool))
+    contact = get_effect("environment_contact")
+    blocks = contact.torque_columns(signals, (0, 1), z0=plane, side=1.0, axis=2)
+    assert not blocks[0][tool > plane].any()
+    expected = -np.maximum(0, plane - tool) * robot.jacobian(signals.q)[:, 2, 0]
+    np.testing.assert_allclose(blocks[0][:, 0], expected)
