@@ -108,6 +108,18 @@ def test_bit_equal_for_any_number_of_processes_and_global_state_untouched(log):
     assert torch.equal(before, torch.get_rng_state())
 
 
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="torch sees no GPU")
+@pytest.mark.parametrize("kind", [LSTMRegressor, NDLRegressor])
+def test_a_gpu_learns_what_a_cpu_learns(kind, log):
+    X, y = log
+    there = kind(**SMALL, device="cuda").fit(X, y)
+    torque = there.predict(X)
+    np.testing.assert_allclose(there.set_params(device="cpu").predict(X), torque, atol=1e-3)
+    here = kind(**SMALL).fit(X, y)
+    errors = [np.sqrt(np.mean((np.asarray(y) - p) ** 2)) for p in (torque, here.predict(X))]
+    assert errors[0] < 1.2 * errors[1]
+
+
 def test_rows_of_weight_zero_are_not_learned_but_read(log):
     X, y = log
     spoiled = y.copy()
