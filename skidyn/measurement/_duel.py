@@ -196,9 +196,10 @@ class _Bodies:
             y, own = torque[use], gains[column] * regressor[use, j]
             rubs = fits.average(friction(self.signals, j))[use]
             rubs = np.column_stack([rubs / (np.abs(rubs).max(axis=0) + 1e-12), np.ones(len(y))])
+            moved = np.flatnonzero(own.any(axis=0))  # not by bodies before the joint
             self.rows.append(use)
-            self.designs.append(np.hstack([own * size, (np.std(y) + 1e-12) * rubs]))
-            self.places.append(np.append(every, first + np.arange(4)))
+            self.designs.append(np.hstack([(own * size)[:, moved], (np.std(y) + 1e-12) * rubs]))
+            self.places.append(np.append(moved, first + np.arange(4)))
             self.positive += range(first, first + 3)  # negative friction would feed energy
             self.targets.append(sign * y - own @ stated)
 
