@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Names of columns: what is recognised, and what is left alone."""
 
+import sys
+
 import pytest
 
 from skidyn._names import match_names
 from skidyn.exceptions import LogError
+from skidyn.logs import read_log
+from skidyn.robots import Robot
 
 JOINTS = ("shoulder_pan_joint", "elbow_joint")
 
@@ -86,3 +90,90 @@ def test_mappings_that_cannot_be_met(columns, message):
 def test_a_damaged_number_makes_no_billions_of_joints():
     with pytest.raises(LogError, match="a column of joint 99999999991, but only 2 columns"):
         match_names(["time", "q99999999991"])
+
+
+def read(path, text):
+    path.write_text(text)
+    return read_log(path, check=False)
+
+
+def calls(function):
+    """How often Python calls something meanwhile: no clock decides."""
+    count = 0
+
+    def note(frame, event, argument):
+        nonlocal count
+        count += 1
+
+    sys.setprofile(note)
+    try:
+        function()
+    except LogError:
+        pass
+    finally:
+        sys.setprofile(None)
+    return count
+
+
+def counted(path, number, names, **options):
+    """Calls for a log of so many columns."""
+    columns = ["time", "q1", "tau1", *names] if "robot" not in options else ["time", *names]
+    rows = [",".join(str(k) for _ in columns) for k in range(3)]
+    path.write_text("\n".join([",".join(columns), *rows]))
+    return calls(lambda: read_log(path, check=False, **options))
+
+
+def robot_with(joints):
+    link = '<link name="{}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" '
+    link += 'ixz="0" iyz="0"/></inertial></link>'
+    text = "<robot name='r'>" + link.format("l0")
+    for k, name in enumerate(joints):
+        text += link.format(f"l{k + 1}") + (
+            f'<joint name="{name}" type="continuous"><parent link="l{k}"/>'
+            f'<child link="l{k + 1}"/><axis xyz="0 1 0"/></joint>'
+        )
+    return Robot.from_urdf(text + "</robot>")
+
+
+def test_columns_and_names_without_end_are_refused(tmp_path):
+    many = ",".join(f"c{k}" for k in range(20_000))
+    with pytest.raises(LogError, match="20003 columns; at most 10000 are read"):
+        read(tmp_path / "log.csv", f"time,q1,tau1,{many}\n" + "1," * 20_002 + "1\n")
+    with pytest.raises(LogError, match="name has 16000 letters; at most 250"):
+        read(tmp_path / "log.csv", f"time,q1,tau1,{'a_' * 8000}\n1,2,3,4\n2,3,4,5\n")
+
+
+@pytest.mark.parametrize("piece", ["_", " ", "[", "1", "a_", "(a)", "/", "q", "]"])
+def test_twice_the_columns_are_twice_the_work(tmp_path, piece):
+    path = tmp_path / "log.csv"
+    numbers = [counted(path, n, [f"{piece * 50}x{k}" for k in range(n)]) for n in (200, 400)]
+    assert numbers[1] < 2.5 * numbers[0]
+
+
+@pytest.mark.parametrize("alike", [True, False])
+def test_twice_the_joints_are_twice_the_work(tmp_path, alike):
+    """Joints that are named almost as in the log, and joints that are not in it."""
+    path, numbers = tmp_path / "log.csv", []
+    for n in (200, 400):
+        robot = robot_with([f"A{k}b" for k in range(n)])
+        own = [f"{'a' if alike else 'c'}{k}B" for k in range(n)]
+        names = [f"{joint}_{word}" for word in ("position", "effort") for joint in own]
+        numbers.append(counted(path, n, names, robot=robot))
+    assert numbers[1] < 2.5 * numbers[0]
+
+
+def test_what_was_meant_is_looked_for_among_some_short_names(tmp_path):
+    """Names of the same letters in another order are the slowest to compare."""
+    path, letters = tmp_path / "log.csv", list("ab" * 100)
+    few, many = (
+        counted(path, n, names, columns={"q": ["ab" * 100]})
+        for n in (50, 100)
+        for names in [["".join(letters[k:] + letters[:k]) + f"x{k}" for k in range(n)]]
+    )
+    assert many < few + 20_000  # one such comparison takes about 40,000 calls
+
+
+def test_one_column_is_never_two_joints(tmp_path):
+    (tmp_path / "log.csv").write_text("time,elbow_pos,elbow_effort\n0,1,2\n1,1,2\n2,1,2\n")
+    with pytest.raises(LogError, match="no q of the joint"):
+        read_log(tmp_path / "log.csv", robot=robot_with(["Elbow", "elbow_joint"]), check=False)

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What readers used to lose without a word: each is read as it is meant, or refused."""
+
+import numpy as np
+import pytest
+
+pandas = pytest.importorskip("pandas", reason="needs skidyn[io]")
+
+from skidyn.exceptions import LogError, LogWarning  # noqa: E402
+from skidyn.logs import read_log  # noqa: E402
+
+ROWS = "1,0.1,0.2\n2,0.2,0.3\n3,0.3,0.4\n"
+HEADER = "time,q1,tau1\n"
+
+
+def read(path, text):
+    path.write_text(text)
+    return read_log(path, check=False)
+
+
+def test_row_names_of_r_shift_no_column(tmp_path):
+    rows = "".join(f"{k},{row}\n" for k, row in enumerate(ROWS.split(), 1))
+    with pytest.warns(LogWarning, match="names of rows, as R writes them"):
+        frame = read(tmp_path / "log.csv", HEADER + rows)
+    np.testing.assert_array_equal(frame[["time", "q1", "tau1"]].iloc[1], [2, 0.2, 0.3])
+
+
+def test_quoted_row_names_of_r_separated_by_blanks(tmp_path):
+    rows = "".join(f'"{k}" {row}\n' for k, row in enumerate(ROWS.replace(",", " ").splitlines()))
+    with pytest.warns(LogWarning, match="as R writes them"):
+        frame = read(tmp_path / "log.txt", '"time" "q1" "tau1"\n' + rows)
+    np.testing.assert_array_equal(frame["q1"], [0.1, 0.2, 0.3])
+
+
+def test_a_separator_at_the_end_of_rows_is_no_field(tmp_path):
+    frame = read(tmp_path / "log.csv", HEADER + ROWS.replace("\n", ",\n"))
+    np.testing.assert_array_equal(frame["tau1"], [0.2, 0.3, 0.4])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (HEADER + ROWS + "4,0.4\n", "line 5 has 2 fields, the lines before 3"),
+        (HEADER + ROWS + "4,0.4,0.5,0.6\n", "line 5 has 4 fields"),
+        (HEADER + ROWS.replace("\n", ",8,9\n"), "rows have 5 fields, the header 3"),
+        ("time,q1,position_1,tau1\n1,2,3,4\n2,3,4,5\n", "'?q1'?, '?position_1'? are all q"),
+        ("time,elbow_q,q_elbow,elbow_tau\n1,2,3,4\n2,3,4,5\n", "elbow_q.*are all q of joint"),
+        ("time,trajectory,q1,tau1\n1,0,3,4\n2,1e300,4,5\n", "trajectory column holds 1e\\+300"),
+    ],
+)
+def test_what_cannot_be_told_is_refused(tmp_path, text, message):
+    with pytest.raises(LogError, match=message):
+        read(tmp_path / "log.csv", text)
+
+
+def test_a_choice_of_columns_settles_it(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("time,q1,position_1,tau1\n1,2,3,4\n2,3,4,5\n3,4,5,6\n")
+    frame = read_log(path, columns={"q": ["position_1"]}, check=False)
+    np.testing.assert_array_equal(frame["q1"], [3.0, 4.0, 5.0])
+
+
+def test_two_clocks_and_which_was_taken_is_said(tmp_path):
+    with pytest.warns(LogWarning, match="time is taken from 'time', not from stamp"):
+        read(tmp_path / "log.csv", "time,stamp,q1,tau1\n1,2,3,4\n2,3,4,5\n")
+
+
+@pytest.mark.parametrize("suffix", ["npz", "mat", "h5"])
+def test_a_signal_that_is_one_row_short_is_refused(tmp_path, suffix):
+    path = tmp_path / f"log.{suffix}"
+    arrays = {"time": np.arange(9.0), "q": np.ones((9, 2)), "tau": np.ones((9, 2))}
+    arrays["dq"] = np.ones((8, 2))
+    write(path, arrays)
+    with pytest.raises(LogError, match="dq has 8 rows, .* has 9"):
+        read_log(path, check=False)
+
+
+def test_constants_of_other_lengths_are_left_out_with_a_word(tmp_path):
+    path = tmp_path / "log.npz"
+    arrays = {"time": np.arange(9.0), "q": np.ones((9, 2)), "tau": np.ones((9, 2))}
+    write(path, {**arrays, "gains": np.ones(3), "q0": np.zeros(2)})
+    with pytest.warns(LogWarning, match=r"left out: gains \(3\), q0 \(2\)"):
+        assert len(read_log(path, check=False)) == 9
+
+
+def write(path, arrays):
+    if path.suffix == ".npz":
+        np.savez(path, **arrays)
+    elif path.suffix == ".mat":
+        from scipy.io import savemat
+
+        savemat(path, arrays)
+    else:
+        h5py = pytest.importorskip("h5py")
+        with h5py.File(path, "w") as file:
+            for name, array in arrays.items():
+                file[name] = array
