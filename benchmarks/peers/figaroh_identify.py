@@ -31,12 +31,14 @@ def regressor(model, q, dq, ddq) -> np.ndarray:
     return build_regressor_basic(robot, q, dq, ddq, settings | dict.fromkeys(more, True))
 
 
-def identify(model, motion, use) -> tuple[np.ndarray, dict[tuple[str, int], tuple[float, float]]]:
+def identify(
+    model, motion, use, rest=REST
+) -> tuple[np.ndarray, dict[tuple[str, int], tuple[float, float]]]:
     """All parameters (zero where others stand for them); those of drives with their deviation."""
     n = model.nv
     some = np.flatnonzero(use)[:: max(1, int(use.sum()) // SAMPLES)]
     speed = np.abs(motion["dq"][some])
-    moves = (speed > REST * np.quantile(speed, 0.95, axis=0)).T.ravel()
+    moves = (speed >= rest * np.quantile(speed, 0.95, axis=0)).T.ravel()
     joint = np.repeat(np.arange(n), len(some))[moves]
     W = regressor(model, *(motion[key][some] for key in ("q", "dq", "ddq")))[moves]
     tau = motion["tau"][some].T.ravel()[moves]

@@ -44,9 +44,9 @@ def make(folder: Path, case: SuiteCase) -> dict:
 
 
 def ask(folder: Path, peer: str, cases: list[str], python: str, seconds: float) -> list[dict]:
-    """The peer's answers, those that the folder lacks made in a process of its own."""
+    """The peer's answers; what the folder lacks of them is made in a process of its own."""
     files = {case: folder / "answers" / peer / f"{case}.json" for case in cases}
-    missing = [folder / "cases" / case for case, file in files.items() if not file.exists()]
+    missing = [folder / "cases" / case for case, file in files.items() if not _whole(file)]
     source = PEERS / f"{peer}.py"
     if missing and source.exists():
         threads = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
@@ -54,6 +54,11 @@ def ask(folder: Path, peer: str, cases: list[str], python: str, seconds: float) 
         if subprocess.run(words, env=os.environ | threads, stdout=subprocess.DEVNULL).returncode:
             print(f"{peer} did not answer every case", file=sys.stderr)
     return [json.loads(file.read_text()) for file in files.values() if file.exists()]
+
+
+def _whole(file: Path) -> bool:
+    """Whether nothing is missing of an answer, its error on held-out trajectories included."""
+    return file.exists() and json.loads(file.read_text()).get("error_held_out", 0) is not None
 
 
 def score(truths: list[dict], answers: list[dict]) -> dict:

@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A UR10e and a Panda identified by mujoco.sysid and by skidyn, both simulated by MuJoCo.
+
+    pip install "mujoco[sysid]"
+    SKIDYN_DATA=FOLDER python benchmarks/identification/beside_mujoco.py [--iterations 10]
+
+mujoco.sysid fits inertias (its pseudo-inertia parametrisation, which keeps bodies possible), dry
+friction, damping and armature of every joint so that rollouts of a quarter of a second from
+recorded states follow the recording, started from the URDF. skidyn fits ``RBDRegressor`` with the
+same effects and bodies that can exist, and exports it as MJCF. Both models are then run by MuJoCo
+under the torque of recordings that neither saw, in pieces of a quarter of a second; the error is
+that of the position at the pieces' ends, in mrad, beside the URDF's own. Needs the data of
+``ur10e.py``; the Panda's one run is divided after two thirds.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import tempfile
+import time
+import warnings
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from mujoco import sysid
+from scipy.signal import butter, filtfilt
+from ur10e import recording
+
+from skidyn.export import write_mjcf
+from skidyn.identification import RBDRegressor
+from skidyn.logs import load_recording
+from skidyn.robots import Robot
+
+DATA = Path(os.environ.get("SKIDYN_DATA", "no folder given"))
+PIECE, STEP = 0.25, 0.0025
+PIECES = 40
+EFFECTS = ("viscous", "coulomb", "rotor_inertia")
+
+
+def ur10e():
+    """Description, joints, run to fit and run to test."""
+    train = recording("ur10e_excitation.npz", "ur-20_02_10-30sec_12harm", slice(634, 3510))
+    test = recording("ur10e_excitation.npz", "ur-20_02_12-50sec_12harm", slice(354, 5090))
+    return DATA / "ur10e" / "ur10e_min.urdf", 6, train, test
+
+
+def panda():
+    """Description, joints, the first two thirds of the run and the rest."""
+    frame = load_recording(DATA / "panda" / "panda_gaz.npz").frame.iloc[::5]
+    names = [f"dq{j}" for j in range(1, 8)]
+    frame[names] = filtfilt(*butter(4, 10, fs=200), frame[names].to_numpy(), axis=0)
+    clock = frame["time"].to_numpy()
+    frame[[f"d{n}" for n in names]] = np.gradient(frame[names].to_numpy(), clock, axis=0)
+    third = int(len(frame) * 2 / 3)
+    return DATA / "panda" / "panda_min.urdf", 7, frame.iloc[:third], frame.iloc[third:]
+
+
+def read(path: Path, n: int, model: str | None = None):
+    """Model with a motor and two sensors for each joint, without contacts and limits."""
+    spec = mujoco.MjSpec.from_string(model or path.read_text())
+    spec.option.timestep = STEP
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
+    joints = [joint.name for joint in spec.joints][:n]
+    for name in joints:
+        motor = spec.add_actuator(name=f"{name} motor", target=name)
+        motor.trntype = mujoco.mjtTrn.mjTRN_JOINT
+    for kind in (mujoco.mjtSensor.mjSENS_JOINTPOS, mujoco.mjtSensor.mjSENS_JOINTVEL):
+        for name in joints:
+            sensor = spec.add_sensor(name=f"{name} {kind.name}", type=kind, objname=name)
+            sensor.objtype = mujoco.mjtObj.mjOBJ_JOINT
+    return spec, joints
+
+
+def pieces(spec, n: int, table) -> list:
+    """Pieces of the recording as mujoco.sysid takes them."""
+    model = spec.compile()
+    clock = table["time"].to_numpy()
+    values = {k: table[[f"{k}{j + 1}" for j in range(n)]].to_numpy() for k in ("q", "dq", "tau")}
+    starts = np.linspace(clock[0], clock[-1] - PIECE - STEP, PIECES)
+    out = []
+    for start in starts:
+        times = start + STEP * np.arange(round(PIECE / STEP) + 1)
+        at = {
+            k: np.column_stack([np.interp(times, clock, x) for x in v.T]) for k, v in values.items()
+        }
+        control = sysid.TimeSeries.from_control_names(times - start, at["tau"], model)
+        seen = np.hstack([at["q"], at["dq"]])
+        sensed = sysid.TimeSeries.from_names(times - start, seen, model)
+        begin = sysid.create_initial_state(model, at["q"][0], at["dq"][0])
+        out.append(sysid.SystemTrajectory(model, control, sensed, begin, None))
+    return out
+
+
+def set_joint(name: str, what: str):
+    """What writes a parameter into the description."""
+
+    def modify(spec, parameter) -> None:
+        value = float(parameter.value[0])
+        setattr(spec.joint(name), what, [value, 0, 0] if what == "damping" else value)
+
+    return modify
+
+
+def set_body(name: str):
+    """What writes a pseudo-inertia into the description.
+
+    mujoco.sysid's own takes the inertia from the geometry first, which a bare URDF lacks.
+    """
+
+    def modify(spec, parameter) -> None:
+        numbers = sysid.model_modifier.pi_from_theta(parameter.value)
+        mass, moment, about_frame = numbers[0], numbers[1:4], numbers[4:].reshape(3, 3)
+        middle = moment / mass
+        inertia = about_frame - mass * (middle @ middle * np.eye(3) - np.outer(middle, middle))
+        sizes, axes = np.linalg.eigh(inertia)
+        axes[:, 0] *= np.sign(np.linalg.det(axes))
+        body, turn = spec.body(name), np.empty(4)
+        mujoco.mju_mat2Quat(turn, axes.ravel())
+        body.mass, body.ipos, body.inertia, body.iquat = mass, middle, sizes, turn
+        body.fullinertia = np.full(6, np.nan)
+
+    return modify
+
+
+def with_mujoco(path: Path, n: int, train, iterations: int):
+    """Description with the parameters that mujoco.sysid finds."""
+    spec, joints = read(path, n)
+    model = spec.compile()
+    known = pieces(spec, n, train)
+    parameters = sysid.ParameterDict()
+    for name in joints:
+        for what, start, most in (
+            ("frictionloss", 2.0, 60.0),
+            ("damping", 2.0, 80.0),
+            ("armature", 0.5, 10.0),
+        ):
+            own = sysid.Parameter(
+                f"{name} {what}", start, 0.0, most, modifier=set_joint(name, what)
+            )
+            parameters.add(own)
+        body = spec.joint(name).parent.name
+        words = {"inertia_type": sysid.InertiaType.Pseudo, "modifier": set_body(body)}
+        parameters.add(sysid.body_inertia_param(spec, model, body, **words))
+
+    def build(found):
+        return sysid.apply_param_modifiers(found, spec)
+
+    def residual(x, found):
+        out, *more = sysid.model_residual(x, found, build, known, resample_true=False, n_threads=1)
+        if x.ndim > 1:  # columns are steps of the finite differences times pieces
+            cube = out.reshape(len(out), x.shape[1], len(known))
+            out = np.moveaxis(cube, 2, 0).reshape(-1, x.shape[1])
+        return [out], *more
+
+    best, _ = sysid.optimize(
+        parameters, residual, max_iters=iterations, verbose=False, x_scale="jac"
+    )
+    return sysid.apply_param_modifiers(best, spec)
+
+
+def with_skidyn(path: Path, n: int, train, _):
+    """Description with the parameters that skidyn finds."""
+    names = [f"tau{j + 1}" for j in range(n)]
+    model = RBDRegressor(Robot.from_urdf(path), EFFECTS, consistent=True).fit(train, train[names])
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "model.xml")
+        write_mjcf(model, file)
+        return read(path, n, file.read_text())[0].compile()
+
+
+def as_described(path: Path, n: int, *_):
+    """The URDF as it is."""
+    return read(path, n)[0].compile()
+
+
+def error(model, path: Path, n: int, test) -> np.ndarray:
+    """Error of the position at the pieces' ends, mrad, root mean square over pieces."""
+    spec, _ = read(path, n)
+    data, left = mujoco.MjData(model), []
+    for piece in pieces(spec, n, test):
+        mujoco.mj_setState(
+            model, data, piece.initial_state, mujoco.mjtState.mjSTATE_FULLPHYSICS.value
+        )
+        for torque in piece.control.data[:-1]:
+            data.ctrl[:] = torque
+            mujoco.mj_step(model, data)
+        left.append(data.qpos[:n] - piece.sensordata.data[-1, :n])
+    return 1e3 * np.sqrt(np.mean(np.square(left), axis=0))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--iterations", type=int, default=10)
+    parser.add_argument("--robots", default="ur10e,panda")
+    options = parser.parse_args()
+    if not DATA.is_dir():
+        sys.exit("set SKIDYN_DATA to the folder that holds ur10e/ and panda/")
+    warnings.simplefilter("ignore")
+    for name in options.robots.split(","):
+        path, n, train, test = {"ur10e": ur10e, "panda": panda}[name]()
+        print(f"{name}: position after {PIECE:g} s, mrad, joints 1 to {n}; mean; CPU s of the fit")
+        methods = {"as described": as_described, "mujoco.sysid": with_mujoco, "skidyn": with_skidyn}
+        for title, method in methods.items():
+            start = time.process_time()
+            model = method(path, n, train, options.iterations)
+            seconds = time.process_time() - start
+            miss = error(model, path, n, test)
+            cells = "".join(f"{e:8.1f}" for e in miss)
+            print(f"  {title:14s}{cells}{miss.mean():9.1f}{seconds:8.1f}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
