@@ -331,7 +331,8 @@ class TorqueDelay(Check):
                 "suspected",
             )
             return
-        use = np.isfinite(found.joints)
+        # a joint whose lag is not known to itself agrees with nothing
+        use = np.isfinite(found.joints) & (found.errors < max(abs(found.common), SMALLEST))
         near = max(ALIKE, 0.3 * abs(found.common))
         alike = np.abs(found.joints[use] - found.common) < np.maximum(near, 2 * found.errors[use])
         weight = found.gains[use] / max(float(found.gains[use].sum()), 1e-12)
@@ -342,8 +343,8 @@ class TorqueDelay(Check):
         if (
             abs(found.common) > max(SMALLEST, ERRORS * found.error)
             and found.gain > LEAST
-            and (alike.mean() >= AGREEING or weight[alike].sum() >= AGREEING)
             and alike.sum() > measurement.n_joints / 2
+            and (alike.mean() >= AGREEING or weight[alike].sum() >= AGREEING)
         ):
             ms = 1e3 * found.common
             late = float(f"{found.common + early:.4f}")
