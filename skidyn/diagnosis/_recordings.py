@@ -130,10 +130,12 @@ def _zeroed_anew(
             continue
         rows = {j: np.hstack([c.rows[j] for c in own]) for j in own[0].rows}
         together = tester.test(rows)
+        if not significant(together.chance):
+            continue
         # One that does nearly all of it stands out by itself.
         alone = [tester.test(c.rows) for c in own]
         strongest = max((t.drop for t in alone if significant(t.chance)), default=0.0)
-        if significant(together.chance) and strongest < MOSTLY * together.drop:
+        if strongest < MOSTLY * together.drop:
             chosen += own
     return chosen
 
