@@ -8,6 +8,9 @@ recordings, in mrad. Parameters that BAM has published for this servo are read f
 turn; those that BAM published were fitted to recordings that may be among them.
 
     python benchmarks/identification/bam_xl330.py bam_pendulum.npz --published bam/params/xl330
+
+``--in-bam`` lets BAM's own program (``pip install better-actuator-models``) simulate instead of our
+steps, to which ours stay fitted.
 """
 
 import argparse
@@ -25,6 +28,8 @@ from skidyn.simulation import fit_bam_servo, simulate_bam_servo
 #: Share of the voltage for each rad of error and unit of kp: encoder counts per rad over the
 #: servo's divisor and the limit of its pulse width, as BAM states them.
 GAIN = (4096 / (2 * np.pi)) / (256 * 885)
+#: Step of the clock that BAM's own program gets, s.
+BAM_STEP = 0.005
 #: BAM's pendulum is a mass at the end of a rod without mass.
 URDF = """<robot name="pendulum"><link name="stand"/>
   <link name="arm"><inertial><origin xyz="0 0 {z}"/><mass value="{mass}"/>
@@ -62,20 +67,57 @@ def errors(servo, robot, frame):
     return apart.groupby(frame["trajectory"]).mean().to_numpy()
 
 
+def errors_in_bam(servo, robot, frame):
+    """The same with BAM's own program, whose clock is regular."""
+    from bam.model import load_model_from_dict
+    from bam.simulate import Simulator
+
+    link = robot.inertial_parameters[0]
+    apart = []
+    for _, run in frame.groupby("trajectory"):
+        t = run["time"].to_numpy() - run["time"].iloc[0]
+        clock = np.arange(0, t[-1], BAM_STEP)
+        on = run["enabled"].to_numpy()[np.searchsorted(t, clock, side="right") - 1]
+        q, dq, goal = (np.interp(clock, t, run[c]) for c in ("q1", "dq1", "q_ref1"))
+        keys = ("position", "speed", "goal_position", "torque_enable")
+        log = {
+            "mass": link[0],
+            "length": abs(link[3]) / link[0],
+            "arm_mass": 0.0,
+            "kp": run["kp"].iloc[0],
+            "vin": run["volts"].iloc[0],
+            "dt": BAM_STEP,
+            "entries": [
+                dict(zip(keys, row, strict=True))
+                for row in zip(q, dq, goal, on.astype(bool), strict=True)
+            ],
+        }
+        model = load_model_from_dict(
+            {**servo.parameters, "model": servo.name, "actuator": servo.actuator}
+        )
+        positions = Simulator(model).rollout_log(log, simulate_control=True)[0]
+        apart.append(1e3 * np.mean(np.abs(np.array(positions) - q)))
+    return np.array(apart)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("recordings", type=Path)
     parser.add_argument("--published", type=Path, help="folder with m1.json to m6.json")
     parser.add_argument("--models", nargs="*", default=["m1", "m2", "m3", "m4", "m5", "m6"])
+    parser.add_argument("--in-bam", action="store_true", help="BAM's own program simulates")
+    parser.add_argument("--gains", type=float, nargs="*", help="only these gains are left out")
     options = parser.parse_args()
+    judge = errors_in_bam if options.in_bam else errors
     frame, robot = read(options.recordings)
     print(f"{'model':6s} {'published':>10s} {'left out':>10s} {'same':>10s} {'seconds':>8s}")
     for name in options.models:
         published = np.nan
         if options.published:
-            published = errors(read_bam(options.published / f"{name}.json"), robot, frame).mean()
+            published = judge(read_bam(options.published / f"{name}.json"), robot, frame).mean()
         start, left_out = time.perf_counter(), []
-        for kp in [*sorted(frame["kp"].unique()), None]:
+        every = [*sorted(frame["kp"].unique()), None]
+        for kp in options.gains or every:
             train = frame[frame["kp"] != kp].reset_index(drop=True)
             test = frame[(frame["kp"] == kp) | (kp is None)].reset_index(drop=True)
             servo = fit_bam_servo(
@@ -86,8 +128,10 @@ def main():
                 name=name,
                 actuator="xl330",
             )
-            found = errors(servo, robot, test)
+            found = judge(servo, robot, test)
             left_out += [] if kp is None else list(found)
+            if options.gains:
+                print(f"{name} without gain {kp:g}: {found.round(1)}", flush=True)
         seconds = time.perf_counter() - start
         print(
             f"{name:6s} {published:10.1f} {np.mean(left_out):10.1f} {found.mean():10.1f} "

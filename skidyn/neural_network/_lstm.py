@@ -155,7 +155,7 @@ class NDLRegressor(LSTMRegressor):
     Parameters
     ----------
     dense_size : int, default=32
-        Width of the fully connected layer (rectifier; the paper does not name its activation).
+        Width of the fully connected layer (tanh; the paper does not name its activation).
     dropout : float, default=0.1
         Share of the fully connected layer's outputs dropped in training.
     per_joint : bool, default=False

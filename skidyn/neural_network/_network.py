@@ -109,7 +109,7 @@ class LSTMNetwork(nn.Module):
         """Outputs of the rows after the history of every window."""
         hidden = self.lstm(x)[0][:, self.window :]
         if self.dense is not None:
-            hidden = self.dropout(torch.relu(self.dense(hidden)))
+            hidden = self.dropout(torch.tanh(self.dense(hidden)))
         outputs: torch.Tensor = self.output(hidden)
         return outputs if self.linear is None else outputs + self.linear(x[:, self.window :])
 

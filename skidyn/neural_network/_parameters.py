@@ -21,7 +21,7 @@ PARAMETERS = """\
     hidden_size : int, default=32
         Cells of the LSTM.
     dense_size : int, default=0
-        Width of the fully connected layer with rectifiers after the LSTM; 0 is none.
+        Width of the fully connected layer (tanh) after the LSTM; 0 is none.
     dropout : float, default=0.0
         Share of the fully connected layer's outputs dropped in training.
     max_epochs : int, default=100

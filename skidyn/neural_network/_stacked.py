@@ -135,7 +135,7 @@ class StackedNetwork(nn.Module):
         # (n_members, n_targets * n_windows, n_hidden)
         hidden = hidden.transpose(0, 1).reshape(n_members, -1, size)
         if "dense" in self.layers:
-            hidden = torch.relu(self.layers["dense"](hidden))
+            hidden = torch.tanh(self.layers["dense"](hidden))
             if self.training:
                 dropped = zip(self.dropouts, hidden, strict=True)
                 hidden = torch.stack([dropout(own) for dropout, own in dropped])
