@@ -369,18 +369,11 @@ def time_blocks(problem: Problem, length: float) -> tuple[list[NDArray[np.int64]
         Number of blocks.
     """
     rows = problem.rows
-    trajectory, time = np.concatenate(rows.trajectory), np.concatenate(rows.time)
     if problem.signals.time is None:  # rows are samples: one after the other
-        length = float(len(np.unique(time))) / 50
-    names, place = np.unique(trajectory, return_inverse=True)
-    start = np.full(len(names), np.inf)
-    end = np.full(len(names), -np.inf)
-    np.minimum.at(start, place, time)
-    np.maximum.at(end, place, time)
-    span = np.maximum(end - start, 1e-9)
+        length = float(len(np.unique(np.concatenate(rows.time)))) / 50
+    place, span, share = rows.spans
     number = np.maximum(1, np.round(span / length)).astype(np.int64)
     first = np.cumsum(number) - number
-    share = (time - start[place]) / span[place]
     block = first[place] + np.minimum((share * number[place]).astype(np.int64), number[place] - 1)
     edges = np.cumsum([len(t) for t in rows.time])[:-1]
     return np.split(block, edges), int(number.sum())
@@ -394,8 +387,7 @@ def _duration(problem: Problem) -> float:
 
 def correlation_time(problem: Problem, residual: Sequence[Array], joints: Sequence[int]) -> float:
     """Time over which the residual of the most persistent one of some joints stays alike, in s."""
-    steps = np.concatenate([np.diff(t) for t in problem.rows.time if len(t) > 1] or [np.ones(1)])
-    hop = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
+    hop = problem.rows.hop
     inflation = variance_inflation(problem, [residual[j] for j in joints], joints)
     return hop * float(np.max(inflation, initial=1.0))
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +63,34 @@ class Rows:
     def counts(self) -> NDArray[np.int64]:
         """Number of rows of every joint."""
         return np.array([w.shape[0] for w in self.weights])
+
+    @cached_property
+    def spans(self) -> tuple[NDArray[np.intp], Array, Array]:
+        """Where the rows of all joints, one joint after the other, lie in their trajectories.
+
+        Returns
+        -------
+        place : ndarray of shape (n_rows,)
+            Which of the sorted trajectories a row belongs to.
+        length : ndarray of shape (n_trajectories,), s
+            Time from the first to the last row, of whatever joint.
+        share : ndarray of shape (n_rows,)
+            Share of it that has passed at a row.
+        """
+        trajectory, time = np.concatenate(self.trajectory), np.concatenate(self.time)
+        names, place = np.unique(trajectory, return_inverse=True)
+        start = np.full(len(names), np.inf)
+        end = np.full(len(names), -np.inf)
+        np.minimum.at(start, place, time)
+        np.maximum.at(end, place, time)
+        length = np.maximum(end - start, 1e-9)
+        return place, length, (time - start[place]) / length[place]
+
+    @cached_property
+    def hop(self) -> float:
+        """Usual time from one row to the next, in s."""
+        steps = np.concatenate([np.diff(t) for t in self.time if len(t) > 1] or [np.ones(1)])
+        return float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
 
     def average(self, values: Array, joint: int) -> Array:
         """Rows of a joint from values at every sample, shape (n_samples,) or (n_samples, k)."""
