@@ -8,9 +8,9 @@ Logs, half of them with a hidden effect, are spoiled in one way each (see ``spoi
 ``spoils_of_parts.py`` and ``spoils_of_clocks.py``). Printed are, by mistake, in how many logs it
 was named on the right joints with the right remedy, in how many of these it was certain, and in how
 many logs something else was suspected. ``--mend`` reads the spoiled log again with the remedy and
-prints in how many logs that gave back the recorded columns; ``--diagnose`` compares the diagnosis
-of the mended log with that of the clean one where it did not. ``--cases`` takes a folder of logs of
-another simulator (``*/log.parquet`` and ``robot.urdf``).
+prints in how many of the logs with one that gave back the recorded columns; ``--diagnose`` compares
+the diagnosis of the mended log with that of the clean one where it did not. ``--cases`` takes a
+folder of logs of another simulator (``*/log.parquet`` and ``robot.urdf``).
 """
 
 from __future__ import annotations
@@ -148,10 +148,10 @@ def main() -> None:
     cases = stored(options.cases) if options.cases else made(options.seed, options.logs)
     cases = cases[: options.first]
     known: dict[str, Any] = {}
-    totals = np.zeros(5, dtype=int)
+    totals = np.zeros(6, dtype=int)
     print(f"{'mistake':24s} {'named':>9s} {'certain':>9s} {'another':>9s} {'mended':>9s}")
     for turn, name in enumerate(options.only.split(",") if options.only else MISTAKES):
-        counts, n = np.zeros(4, dtype=int), 0
+        counts, n, mendable = np.zeros(4, dtype=int), 0, 0
         taken = options.sample or len(cases)
         for i in sorted({(turn * taken + k) % len(cases) for k in range(taken)}):
             case = cases[i]
@@ -167,15 +167,22 @@ def main() -> None:
             certain = any(c.certainty == "certain" for c in right)
             counts[:3] += [bool(right), certain, bool(other)]
             good = None
-            if right and (options.mend or options.diagnose):
+            if (options.mend or options.diagnose) and any(c.remedy for c in right):
+                mendable += 1
                 good = mend(case, spoiled, right, known, options.diagnose)
                 counts[3] += good
             if options.verbose and (other or (spoiled.checks and not right) or good is False):
                 print("   ", case.name, spoiled.says, good, *map(short, checks), sep=" ; ")
-        print(f"{name:24s}" + "".join(f" {c:4d}/{n:<4d}" for c in counts), flush=True)
+        print(row(name, counts, n, mendable), flush=True)
         if name != "nothing":
-            totals += [*counts, n]
-    print(f"{'all':24s}" + "".join(f" {c:4d}/{totals[4]:<4d}" for c in totals[:4]))
+            totals += [*counts, n, mendable]
+    print(row("all", totals[:4], totals[4], totals[5]))
+
+
+def row(name: str, counts: np.ndarray, n: int, mendable: int) -> str:
+    """A row of the table; what was mended is counted among what was told with a remedy."""
+    of = (n, n, n, mendable)
+    return f"{name:24s}" + "".join(f" {c:4d}/{m:<4d}" for c, m in zip(counts, of, strict=True))
 
 
 def short(told: Suspicion) -> str:
