@@ -71,7 +71,7 @@ def main() -> None:
                 tau = used[[f"tau{k + 1}" for k in range(log.robot.n_joints)]].to_numpy()
                 model = RBDRegressor(log.robot, ("viscous", "coulomb"))
                 result = diagnose(model, used, tau, force=True)
-                print("", result.verdict, [f.effect for f in result.findings], end="")
+                print("", result.verdict, [f.kind for f in result.findings], end="")
             print(flush=True)
 
 

@@ -129,7 +129,7 @@ def findings(frame: pd.DataFrame, robot: Robot) -> frozenset[tuple[str, tuple[in
     tau = frame[[f"tau{k + 1}" for k in range(n)]].to_numpy()
     model = RBDRegressor(robot, ("viscous", "coulomb"))
     result = diagnose(model, frame, tau, force=True)
-    return frozenset((f.effect, tuple(f.joints)) for f in result.findings)
+    return frozenset((f.kind, tuple(f.joints)) for f in result.findings)
 
 
 def main() -> None:

@@ -41,7 +41,7 @@ def zero_of_a_run(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> 
     changed.loc[changed.index[runs[rng.integers(len(runs))]], f"q{k + 1}"] += offset
     if not felt(log, robot, robot.gravity_torque(joints_of(changed, "q", robot))):
         return None
-    return Spoiled(changed, robot, ("odd_recording",), "", None, ALSO)
+    return Spoiled(changed, robot, ("odd_recording",), "", (k + 1,), ALSO)
 
 
 def small_zero(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled | None:

@@ -350,6 +350,30 @@ class Fits:
             for k, d, o, fit in zip(joints, designs, out, fits, strict=True)
         }
 
+    def only(self, rows: NDArray[np.bool_]) -> Fits:
+        """Some of the rows."""
+        samples = np.repeat(rows, SAMPLES)
+        recorded = replace(self.recorded, picked=self.recorded.picked[samples])
+        signals, torque = self.signals.take(samples), self.torque[samples]
+        return Fits(self.robot, signals, torque, self.moving[rows], recorded, self.left_out)
+
+    def bodies(self) -> tuple[Array, dict[int, float]]:
+        """Identified coefficients of the log as it is, and scale of the residual by joint."""
+        joints, designs, places, targets = self._designs(Reading())
+        fits = fit_together(designs, places, targets)
+        found = np.zeros(1 + max((int(place.max()) for place in places), default=0))
+        for place, fit in zip(places, fits, strict=True):
+            found[place] = fit.coefficients
+        return found, {k: fit.scale for k, fit in zip(joints, fits, strict=True)}
+
+    def residuals(self, bodies: Array, reading: Reading) -> dict[int, Array]:
+        """What identified coefficients leave of the torque of every joint, read in some way."""
+        joints, designs, places, targets = self._designs(reading)
+        return {
+            k: y - d @ bodies[place]
+            for k, d, place, y in zip(joints, designs, places, targets, strict=True)
+        }
+
     def _designs(
         self, reading: Reading
     ) -> tuple[list[int], list[Array], list[NDArray[np.int64]], list[Array]]:
@@ -364,12 +388,12 @@ class Fits:
         joints = [j for j, (column, _) in enumerate(read) if self.usable(column)]
         p = len(base)
         designs, places, targets = [], [], []
-        for k, j in enumerate(joints):
+        for j in joints:
             y, use = self.mean_torque(read[j][0])
             own = np.column_stack([friction(s, j), np.ones(len(s.q))])
             felt = np.flatnonzero(regressor[:, j].any(axis=0))  # bodies that the joint moves
             designs.append(np.hstack([regressor[use, j][:, felt], self.average(own)[use]]))
-            places.append(np.append(felt, p + 4 * k + np.arange(4)))
+            places.append(np.append(felt, p + 4 * j + np.arange(4)))
             targets.append(read[j][1] * y[use])
         return [read[j][0] for j in joints], designs, places, targets
 

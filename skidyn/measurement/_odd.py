@@ -13,7 +13,7 @@ from skidyn._signals import Array
 from skidyn.measurement._bodies import USUAL, Explained, explained
 from skidyn.measurement._check import Check
 from skidyn.measurement._duel import left_by_effects
-from skidyn.measurement._fits import FEWEST, SAMPLES, Fits, student
+from skidyn.measurement._fits import FEWEST, SAMPLES, Fits, Reading, student
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._suspicion import Suspicion
 
@@ -30,6 +30,8 @@ ONE, MOST = (0.7, 1.4), 0.6
 LARGER = 3.0
 #: Share of its residual that the best effect may leave, and still be what is odd in a recording.
 LEFT = 0.5
+#: Residual from which another zero of a position is tried, and the least that is told, rad.
+SHIFTED, LEAST_ZERO = 3.0, np.deg2rad(4)
 #: Error of identified bodies, as a share of the spread, from which recordings are predicted by the
 #: bodies of the others alone.
 SPOILED = 0.12
@@ -55,7 +57,10 @@ class OddRecording(Check):
     """A recording whose torque is not that of the others."""
 
     name = "odd_recording"
-    suspects = "single recordings in other units, with other signs, or with the torque of another"
+    suspects = (
+        "single recordings in other units, with other signs, with another zero of a joint, or with "
+        "the torque of another"
+    )
     stage = 1
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
@@ -91,7 +96,23 @@ class OddRecording(Check):
                     without, left = left_by_effects(seen.fits, k, _rows_of(seen.fits, one.run))
                     if left > max(LARGER, LEFT * without):
                         unlike.append(one)
-        measurement.odd = bool(scaled or unlike)
+        shifted = {}
+        worst = max(told, key=lambda one: one.larger, default=None)
+        if worst and worst.larger > SHIFTED and worst.run not in {one.run for one in scaled}:
+            zero = _zero_of(seen.fits, worst.run)
+            if zero is not None:
+                shifted[worst.run] = zero
+                unlike = [one for one in unlike if one.run != worst.run]
+        measurement.odd = bool(scaled or unlike or shifted)
+        for run, (joint, angle, gain) in shifted.items():
+            yield self.suspicion(
+                f"in trajectory {run} the zero of {measurement.joint(joint)} is off by about "
+                f"{np.rad2deg(angle):.0f} deg against the others",
+                f"with it, the bodies of the others explain the torques of that trajectory better "
+                f"by {gain:.0f} (log-likelihood); mend that file, or leave it out",
+                "suspected",
+                [joint],
+            )
         for run in sorted({one.run for one in scaled}):
             own = [one for one in scaled if one.run == run]
             names = ", ".join(measurement.joint(one.joint) for one in own)
@@ -131,6 +152,44 @@ def _sizes(measurement: Measurement) -> dict[int, float]:
     size = spread / np.maximum(np.median(spread, axis=0), 1e-300)
     odd = (size > FAR).all(axis=1) | ((size < 1 / FAR) & (size > 0)).all(axis=1)
     return {int(run): float(np.median(x)) for run, x in zip(runs[odd], size[odd], strict=True)}
+
+
+def _zero_of(fits: Fits, run: int) -> tuple[int, float, float] | None:
+    """Joint, angle and gain of another zero in a recording, for bodies of the others."""
+    rows = _rows_of(fits, run)
+    if rows.all() or rows.sum() < FEWEST:
+        return None
+    bodies, scales = fits.only(~rows).bodies()
+    own = fits.only(rows)
+    inflation = np.maximum(fits.identified(Reading()).inflation, 1.0)
+
+    def likelihood(joint: int, angle: float) -> float:
+        left = own.residuals(bodies, Reading(zero=((joint, angle),)))
+        return float(sum(student(left[k], scales[k]) / inflation[k] for k in left if k in scales))
+
+    def errors(joint: int, angle: float) -> dict[int, float]:
+        left = own.residuals(bodies, Reading(zero=((joint, angle),)))
+        return {k: float(np.sqrt(np.mean(left[k] ** 2))) / scales[k] for k in left if k in scales}
+
+    plain = likelihood(0, 0.0)
+    best = (0, 0.0, plain)
+    for joint in np.flatnonzero(~fits.signals.prismatic).tolist():
+        angle, value, step = 0.0, plain, np.deg2rad(30)
+        while step > np.deg2rad(1):
+            near, other = max((likelihood(joint, a), a) for a in (angle - step, angle + step))
+            if near > value:
+                value, angle = near, other
+            else:
+                step /= 2
+        best = max(best, (joint, angle, value), key=lambda found: found[2])
+    joint, angle, value = best
+    before, after = errors(joint, 0.0), errors(joint, angle)
+    worst = max(before, key=lambda k: before[k], default=None)
+    if worst is None or value - plain < LEAST or abs(angle) < LEAST_ZERO:
+        return None
+    without, left = left_by_effects(fits, worst, rows)
+    share = after[worst] / before[worst]
+    return (joint, angle, value - plain) if share < min(LEFT, left / without) else None
 
 
 def _rows_of(fits: Fits, run: int) -> NDArray[np.bool_]:

@@ -37,3 +37,11 @@ def test_the_sign_of_one_joint():
 def test_another_unit():
     told = told_of(1e3)["odd_recording"]
     assert told.certainty == "certain" and f"in trajectory {RUN} all torques" in told.suspicion
+
+
+def test_the_zero_of_a_joint_in_one_recording():
+    frame = FRAME.copy()
+    frame.loc[frame["trajectory"] == RUN, "q2"] += 0.6
+    (told,) = [s for s in check_log(frame, ROBOT).checks if s.certainty != "noted"]
+    assert told.check == "odd_recording" and told.joints == (2,)
+    assert f"in trajectory {RUN} the zero of joint 2 (joint2) is off by about 3" in told.suspicion
