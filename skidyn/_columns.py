@@ -118,8 +118,9 @@ def resolve_columns(
         raise ColumnError(
             f"X has {n_features} columns; a robot with {n} joints needs {3 * n} by position "
             f"(q, dq, ddq of {', '.join(joint_names)}) and {keys} key column(s) are declared. "
-            "Pass a DataFrame with the columns q1.., dq1.., ddq1.., or declare key columns by "
-            "position, for example trajectory=0."
+            "Pass a DataFrame with the columns q1.., dq1.., ddq1.. (a Pipeline hands one on after "
+            "set_output(transform='pandas')), or declare key columns by position, for example "
+            "trajectory=0."
         )
     return Columns(
         tuple(rest[:n]), tuple(rest[n : 2 * n]), tuple(rest[2 * n :]), key_trajectory, key_time

@@ -149,8 +149,7 @@ class NDLRegressor(LSTMRegressor):
     :class:`LSTMRegressor`.
 
     Without physics it has its place only where no model of the robot exists: with a URDF, a rigid
-    body with friction predicts far better, and boosted trees may do so too
-    (:doc:`/user_guide/learners`).
+    body with friction predicts far better on most logs (:doc:`/user_guide/learners`).
 
     Parameters
     ----------
