@@ -300,9 +300,10 @@ def _opponents(
         for other in others:
             if other.kind in names:
                 return step.added, other
+    asked = f"finding {kind}" if kind else "finding"
+    wanted = f"the rival {rival}" if rival else "a rival"
     raise EffectError(
-        f"no finding {kind or ''} with the rival {rival or ''}; the search has weighed: "
-        + ("; ".join(known) or "nothing")
+        f"no {asked} with {wanted}; the search has weighed: " + ("; ".join(known) or "nothing")
     )
 
 
