@@ -52,7 +52,8 @@ def chain(n: int) -> str:
 def prepare(folder: Path, rows: int) -> dict[str, list[str]]:
     """Logs of all cases; the commands."""
     panda = str(HERE / "skidyn/datasets/robots/panda.urdf")
-    logs = {"7": (load_panda(), 100.0), "long": (load_panda(), rows / 300.0)}
+    logs = {name: (load_panda(), 100.0) for name in ("7", "many")}
+    logs["long"] = (load_panda(), rows / 300.0)
     for n in (14, 30):
         (folder / f"chain{n}.urdf").write_text(chain(n))
         logs[f"{n}"] = (Robot.from_urdf(folder / f"chain{n}.urdf"), 100.0)
@@ -61,7 +62,7 @@ def prepare(folder: Path, rows: int) -> dict[str, list[str]]:
             robot,
             "stribeck",
             joints=[2],
-            n_trajectories=10,
+            n_trajectories=40 if name == "many" else 10,
             duration=30.0 if name == "long" else 10.0,
             rate=rate,
         )
@@ -79,6 +80,7 @@ def prepare(folder: Path, rows: int) -> dict[str, list[str]]:
             "--html",
             f"{folder}/long.html",
         ],
+        "diagnose, 40,000 x 7": diagnose("many", panda, "many.json"),
         "diagnose, 10,000 x 14": diagnose("14", f"{folder}/chain14.urdf", "14.json"),
         "diagnose, 10,000 x 30": diagnose("30", f"{folder}/chain30.urdf", "30.json"),
         "add": ["add", "--from", report, "--effect", "stribeck", "--joints", "2"],
