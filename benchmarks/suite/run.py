@@ -76,7 +76,8 @@ def score(truths: list[dict], answers: list[dict]) -> dict:
 
 
 def print_table(peers: dict[str, dict]) -> None:
-    """Every peer a line, and who solves what; nothing is rerun."""
+    """Every peer a line, skidyn's first, and who solves what; nothing is rerun."""
+    peers = dict(sorted(peers.items(), key=lambda item: not item[0].startswith("skidyn")))
     first = next(iter(peers.values()))["cases"]
     print(f"{len(first)} logs; solved with its Wilson interval of 95 %\n")
     heads = ("solved", "clean", "false", "silent", "value", "error", "s")
