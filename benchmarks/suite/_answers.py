@@ -13,6 +13,8 @@ from _log import Log, Rows
 CLEAR = 0.1
 #: A signal counts if it matters at least this share of the most important one.
 MATTERS = 0.25
+#: A joint with fewer averaged rows hardly moves, and nothing is asked of it.
+FEWEST = 30
 
 
 def by_columns(log: Log, choose: Callable[[Rows], dict[int, float]]) -> dict:
@@ -21,7 +23,7 @@ def by_columns(log: Log, choose: Callable[[Rows], dict[int, float]]) -> dict:
     ``choose`` gives the coefficients of the chosen columns. Columns and torque have unit size, so
     that a coefficient's square is about the share that its column explains.
     """
-    weights = [choose(rows) for rows in log.joints]
+    weights = [choose(rows) if len(rows.torque) >= FEWEST else {} for rows in log.joints]
     size: dict[tuple[str, tuple[int, ...]], float] = {}
     for rows, chosen in zip(log.joints, weights, strict=True):
         for i, w in chosen.items():
@@ -33,7 +35,7 @@ def by_columns(log: Log, choose: Callable[[Rows], dict[int, float]]) -> dict:
 
     def predict(other: Log) -> list[np.ndarray]:
         return [
-            rows.columns[:, list(chosen)] @ np.array(list(chosen.values()))
+            rows.columns[:, list(chosen)] @ np.array(list(chosen.values()), float)
             for rows, chosen in zip(other.joints, weights, strict=True)
         ]
 
@@ -47,9 +49,13 @@ def by_signals(log: Log, make: Callable[[], Any], most: int = 4000) -> dict:
     Fitted to two thirds of the trajectories and judged on the others, by the share of the square
     that is predicted; signals by how much shuffling them harms (permutation importance).
     """
-    found, models = [], []
+    found: list[tuple[float, dict]] = []
+    models: list[Any] = []
     rng = np.random.default_rng(0)
     for j, rows in enumerate(log.joints):
+        if len(rows.torque) < FEWEST:
+            models.append(None)
+            continue
         groups = np.unique(rows.trajectory)
         held = np.isin(rows.trajectory, groups[::3])
         some = np.flatnonzero(~held)
@@ -72,7 +78,8 @@ def by_signals(log: Log, make: Callable[[], Any], most: int = 4000) -> dict:
         found.append((size, {"kind": "unknown", "joints": [j + 1], "variables": names}))
 
     def predict(other: Log) -> list[np.ndarray]:
-        return [r.gain * m.predict(r.signals) for m, r in zip(models, other.joints, strict=True)]
+        pairs = zip(models, other.joints, strict=True)
+        return [0 * r.torque if m is None else r.gain * m.predict(r.signals) for m, r in pairs]
 
     effects = [effect for _, effect in sorted(found, key=lambda item: -item[0])]
     verdict = "unknown" if effects else "complete"
