@@ -106,7 +106,7 @@ def conclude(
     for i, hypothesis in enumerate(result.findings):
         others = rivals.get(hypothesis.kind, ())
         for candidate, chance in zip(hypothesis.candidates, hypothesis.chances, strict=True):
-            drop = _drop(shown[i], shown[i + 1], candidate.joints)
+            drop = _drop(shown[i], shown[i + 1], tuple(candidate.rows))
             joints = [j + 1 for j in candidate.joints]
             own = [u for u in unknowns if hypothesis.kind == UNKNOWN and u.joint in joints]
             q = false_discovery_rate(chance, hypothesis.tried)
@@ -214,7 +214,8 @@ def _useless(
         errors = [(_mean_error(step.comparison), step.entry["rmse"]) for step in steps[k : k + 2]]
         terms = []
         for candidate in findings[k].candidates:
-            drops = [_drop(a, b, candidate.joints) for a, b in zip(*errors, strict=True)]
+            # A link that gives way moves all that it carries: other joints may feel it more.
+            drops = [_drop(a, b, tuple(candidate.rows)) for a, b in zip(*errors, strict=True)]
             if float(np.mean(drops)) < least or drops[1] <= 0:
                 terms.append(candidate)
         if terms:

@@ -37,7 +37,7 @@ class Coefficient:
         Whether it is a share of a shape parameter, so that its own size says nothing.
     is_zero : bool
         Whether it only says where the effect is zero, as the constant beside a spring: a finding
-        must be more than chance without it.
+        must be more than chance beside it.
 
     Examples
     --------
@@ -146,6 +146,8 @@ class Effect:
     is_exact : bool
         Whether the formula describes nothing but this effect, so that what it leaves is another
         one; other formulas leave traces of themselves.
+    moves_link : bool
+        Whether it moves the link away from the position that the encoder logged.
     simplicity : int
         Rank among rivals that explain the data equally well; the lower is named.
     rivals : tuple of str
@@ -190,6 +192,7 @@ class Effect:
     softness: ClassVar[float] = 0.0
     drawn: ClassVar[float] = 0.0
     is_exact: ClassVar[bool] = False
+    moves_link: ClassVar[bool] = False
     simplicity: ClassVar[int] = 50
     rivals: ClassVar[tuple[str, ...]] = ()
     separating_motion: ClassVar[str] = ""

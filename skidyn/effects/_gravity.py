@@ -25,8 +25,8 @@ class BaseTilt(Effect):
     coefficients = (
         Coefficient("gx", "m/s^2"),
         Coefficient("gy", "m/s^2"),
-        Coefficient("first_cos", "N m"),
-        Coefficient("first_sin", "N m"),
+        Coefficient("first_cos", "N m", is_zero=True),
+        Coefficient("first_sin", "N m", is_zero=True),
     )
     scope = "robot"
     needs = ("robot",)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,20 +14,32 @@ from skidyn.effects._base import Array, Coefficient, Effect, Shape
 from skidyn.effects._derivatives import smooth_derivatives
 
 
-def _oscillator(load: Array, signals: Signals, resonance: float, damping: float) -> Array:
-    """Wind-up of a spring-mass under a load, times the stiffness.
+def _oscillator(
+    load: Array,
+    carried: Array | None,
+    inertia: Array,
+    signals: Signals,
+    resonance: float,
+    damping: float,
+) -> Array:
+    """Torque of the spring between motor and link: its wind-up times its stiffness.
 
     The link swings on its spring: far below the resonance the wind-up follows the load, near it the
-    wind-up is larger and late.
+    wind-up is larger and late. How the link swung when a recording began is found from the torque
+    that was measured, where there is one; else it starts at rest on its spring.
 
     Parameters
     ----------
     load : ndarray of shape (n_samples,), N m or N
         Torque of the rigid body if nothing gave way.
+    carried : ndarray of shape (n_samples,) or None, N m or N
+        Torque that the spring was measured to carry, NaN where this is not known.
+    inertia : ndarray of shape (n_samples,)
+        Inertia that swings, in units of its median.
     signals : Signals
         For its segments and clock.
     resonance : float, Hz
-        With the motor held.
+        With the motor held and the median inertia.
     damping : float
         Damping ratio.
 
@@ -35,28 +47,51 @@ def _oscillator(load: Array, signals: Signals, resonance: float, damping: float)
     -------
     ndarray of shape (n_samples,), N m or N
     """
-    from scipy.signal import lfilter
-
-    omega = 2 * np.pi * resonance
-    wind_up = np.zeros_like(load)
+    torque = np.zeros_like(load)
     for rows in signals.segments:
         if rows.stop - rows.start < 7:
             continue
-        rate = 1.0 / float(np.median(np.diff(signals.clock[rows])))
+        step = float(np.median(np.diff(signals.clock[rows])))
         # The swing of a link faster than the sampling cannot be seen; it follows at once.
-        w = min(omega, rate)
-        b, a, settled = _swing(w, damping, rate)
-        wind_up[rows] = lfilter(b, a, load[rows], zi=settled * load[rows.start])[0]
-    return wind_up
+        omega = min(2 * np.pi * resonance, 1 / step)
+        swing = partial(_swing, inertia[rows], omega, damping, step)
+        torque[rows] = swing(load[rows], load[rows.start], load[rows.start])
+        known = np.flatnonzero(np.isfinite(carried[rows])) if carried is not None else []
+        if len(known) < _ENOUGH_KNOWN:
+            continue
+        assert carried is not None
+        still = np.zeros_like(load[rows])
+        starts = (1.0, np.cos(omega * step)), (0.0, np.sin(omega * step))
+        free = np.stack([swing(still, *start) for start in starts], axis=1)
+        missing = (carried[rows] - torque[rows])[known]
+        torque[rows] += free @ np.linalg.lstsq(free[known], missing, rcond=1e-6)[0]
+    return torque
 
 
-@lru_cache(maxsize=256)
-def _swing(omega: float, damping: float, rate: float) -> tuple[Array, Array, Array]:
-    """Digital filter of a spring-mass at a sampling rate, and its state under a unit load."""
-    from scipy.signal import bilinear, lfilter_zi
+#: Samples of a recording from which the start of a swing is found.
+_ENOUGH_KNOWN = 20
 
-    b, a = bilinear([1.0], [1 / omega**2, 2 * damping / omega, 1.0], rate)
-    return b, a, lfilter_zi(b, a)
+
+def _swing(
+    inertia: Array, omega: float, damping: float, step: float, load: Array, first: float, second: float
+) -> Array:
+    """Torque of a spring under a load, from its first two samples on.
+
+    The rule of Newmark with average acceleration, which neither adds nor takes energy
+    (N. M. Newmark (1959), J. Engineering Mechanics 85(3), 67-94), as one banded system.
+    """
+    from scipy.linalg import solve_banded
+
+    n = len(load)
+    banded, right = np.zeros((3, n)), np.empty(n)
+    banded[0, :2] = 1.0
+    right[:2] = first, second
+    mass, drag, stiff = inertia[1:-1] / step**2, damping * omega / step, omega**2 / 4
+    banded[0, 2:] = mass + drag + stiff
+    banded[1, 1:-1] = 2 * (stiff - mass)
+    banded[2, :-2] = mass - drag + stiff
+    right[2:] = stiff * (load[2:] + 2 * load[1:-1] + load[:-2])
+    return np.asarray(solve_banded((2, 0), banded, right))
 
 
 #: Step of the difference quotients: they err by about this share, and round by a thousandth of it.
@@ -99,6 +134,14 @@ def _differentiate_torque(signals: Signals, joint: int) -> tuple[Array, Array, A
     return by_position, by_velocity, by_acceleration
 
 
+def _link_inertia(signals: Signals, joint: int) -> Array:
+    """Inertia that the free link presents to its own joint, kg m^2 or kg."""
+    inertia = _torque_slopes(signals, joint)[2][:, joint]
+    # Identified parameters need not be consistent; an inertia that vanishes would fly at once.
+    inertia = np.maximum(inertia, 0.05 * np.abs(np.median(inertia)))
+    return np.maximum(inertia, np.finfo(float).tiny)
+
+
 class _LinkSideEffect(Effect):
     """The link is displaced from the logged position by ``-c s(load)``.
 
@@ -107,6 +150,7 @@ class _LinkSideEffect(Effect):
     """
 
     needs = ("robot", "load", "time")
+    moves_link = True
 
     def displacement(self, signals: Signals, joint: int, **shape: Any) -> Array:
         """Displacement of the link for a unit coefficient, shape (n_samples,)."""
@@ -137,7 +181,8 @@ class JointElasticity(_LinkSideEffect):
     coefficients = (Coefficient("compliance", "rad/(N m)", sign=1),)
     shapes = (
         Shape("resonance", "Hz", (25.0, 10.0, 6.5, 4.5, 3.2), 1.0, 100.0, scales=False),
-        Shape("damping", "1", (0.05,), 0.005, 1.0, scales=False),
+        # How the link swung before the log began is not known: strong damping forgets it.
+        Shape("damping", "1", (0.05, 0.3), 0.005, 1.0, scales=False),
     )
     simplicity = 19
     rivals = ("time_delay", "rotor_inertia", "backlash", "base_tilt")
@@ -146,7 +191,10 @@ class JointElasticity(_LinkSideEffect):
 
     def displacement(self, signals: Signals, joint: int, **shape: Any) -> Array:
         assert signals.load is not None
-        return _oscillator(signals.load[:, joint], signals, **shape)
+        carried = None if signals.carried is None else signals.carried[:, joint]
+        inertia = _link_inertia(signals, joint)
+        inertia = inertia / np.median(inertia)
+        return _oscillator(signals.load[:, joint], carried, inertia, signals, **shape)
 
     def parameters(
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
@@ -166,7 +214,8 @@ class Backlash(_LinkSideEffect):
     drawn_against = "load"
     formula = r"\tau(q - g\,x) - \tau(q),\quad m\,\ddot x = \tau_\mathrm{load}/g,\ |x| \le 1/2"
     coefficients = (Coefficient("share", "1", sign=1, is_share=True),)
-    shapes = (Shape("gap", "rad", (0.003, 0.008, 0.02), 2e-4, 0.2),)
+    # The time of a flight, and with it everything, changes with the root of the gap.
+    shapes = (Shape("gap", "rad", (0.002, 0.003, 0.0045, 0.006, 0.009, 0.013, 0.02), 2e-4, 0.2),)
     simplicity = 18
     rivals = ("joint_elasticity", "dahl")
     separating_motion = "slow motion through poses in which the load changes sign"
@@ -174,12 +223,7 @@ class Backlash(_LinkSideEffect):
 
     def displacement(self, signals: Signals, joint: int, **shape: Any) -> Array:
         assert signals.load is not None
-        # Inertia that the free link presents to its own joint.
-        inertia = _torque_slopes(signals, joint)[2][:, joint]
-        # Identified parameters need not be consistent; an inertia that vanishes would fly at once.
-        inertia = np.maximum(inertia, 0.05 * np.abs(np.median(inertia)))
-        inertia = np.maximum(inertia, np.finfo(float).tiny)
-        free = signals.load[:, joint] / inertia
+        free = signals.load[:, joint] / _link_inertia(signals, joint)
         position: Array = np.zeros_like(free)
         for rows in signals.segments:
             step = float(np.median(np.diff(signals.clock[rows]))) if len(free[rows]) > 1 else 1.0
