@@ -230,7 +230,7 @@ class _Search:
                 self._refined_anew(old)
 
     def _competed_again(self, old: Hypothesis) -> Step | None:
-        """Put the kind that now wins in the place of an earlier finding, if it is another one."""
+        """Put what now wins in the place of an earlier finding: another kind, or a better shape."""
         kept = self._state()
         place = self.findings.index(old)
         self.findings.remove(old)
@@ -244,8 +244,8 @@ class _Search:
         best = self.accepted(ranking)
         self._reconsidering = False
         again = self._finals([list(old.candidates)])
-        known = best is not None and best.kind not in (old.kind, UNKNOWN)
-        if best is None or not known or any(h.score > best.score for h in again):
+        known = best is not None and best.kind != UNKNOWN
+        if best is None or not known or any(h.score >= best.score for h in again):
             self._restore(kept)
             return None
         self.add(best)

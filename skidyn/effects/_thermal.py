@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from skidyn._signals import Signals
-from skidyn.effects._base import Array, Coefficient, Effect
+from skidyn.effects._base import Array, Coefficient, Effect, Shape
 
 #: Temperature at which the derivatives are stated, in degrees Celsius.
 REFERENCE_TEMPERATURE = 30.0
@@ -76,20 +76,29 @@ class TemperatureOffset(Effect):
 
 
 class FrictionDrift(Effect):
-    """Friction that changes slowly over the log where no temperature is logged."""
+    """Friction that changes slowly over the log where no temperature is logged.
+
+    A gear warms up quickly at first and then ever more slowly: friction is a parabola of a warm-up
+    that approaches its end with a time constant. The first two coefficients are the change from the
+    start of the log to its end.
+    """
 
     kind = "friction_drift"
     drawn_against = "time"
     title = "Friction drift"
     formula = (
-        r"(a\,\dot q + b\,\mathrm{sign}\,\dot q)\,x + (c\,\dot q + d\,\mathrm{sign}\,\dot q)\,x^2,"
-        r"\quad x = (t-t_0)/s"
+        r"(a\,\dot q + b\,\mathrm{sign}\,\dot q)\,x"
+        r" + (c\,\dot q + d\,\mathrm{sign}\,\dot q)\,x\,(1-x),"
+        r"\quad x = \frac{1-e^{-(t-t_0)/T}}{1-e^{-s/T}}"
     )
     coefficients = (
         Coefficient("dFv", "N m s/rad"),
         Coefficient("dFc", "N m"),
         Coefficient("d2Fv", "N m s/rad"),
         Coefficient("d2Fc", "N m"),
+    )
+    shapes = (
+        Shape("time_constant", "s", (0.2, 0.6, 3.0), 1.0, 1e6, scales=False, has_interval=False),
     )
     needs = ("time",)
     simplicity = 31
@@ -98,17 +107,26 @@ class FrictionDrift(Effect):
     reference = _BITTENCOURT
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        # The reference time and span belong to the log; they are kept with the term so that
-        # another log is predicted on the same time axis.
+        # The start and the span belong to the log; they are kept with the term so that another log
+        # is predicted on the same time axis.
         clock = signals.clock
-        span = max(float(np.ptp(clock)) / 2, 1e-9)
-        return [{"t0": float(clock.mean()), "span": span}]
+        span = max(float(np.ptp(clock)), 1e-9)
+        (shape,) = self.shapes  # its grid: shares of the span
+        constants = np.clip(span * np.array(shape.grid), shape.low, shape.high)
+        start = float(clock.min())
+        return [{"time_constant": float(c), "t0": start, "span": span} for c in constants]
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        x = (signals.clock - shape["t0"]) / shape["span"]
+        since, time_constant = signals.clock - shape["t0"], shape["time_constant"]
+        # Before the log began, as it changed at its start.
+        risen = np.where(
+            since > 0, -np.expm1(-since.clip(0) / time_constant), since / time_constant
+        )
+        x = risen / -np.expm1(-shape["span"] / time_constant)
         dq = signals.dq[:, joint]
         sign = signals.sign[:, joint]
-        return np.column_stack([x * dq, x * sign, x**2 * dq, x**2 * sign])
+        bent = x * (1 - x)
+        return np.column_stack([x * dq, x * sign, bent * dq, bent * sign])
 
     def not_shown(self, signals: Signals, joint: int) -> str | None:
         if signals.temperature is not None:

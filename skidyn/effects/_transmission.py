@@ -73,7 +73,13 @@ _ENOUGH_KNOWN = 20
 
 
 def _swing(
-    inertia: Array, omega: float, damping: float, step: float, load: Array, first: float, second: float
+    inertia: Array,
+    omega: float,
+    damping: float,
+    step: float,
+    load: Array,
+    first: float,
+    second: float,
 ) -> Array:
     """Torque of a spring under a load, from its first two samples on.
 
