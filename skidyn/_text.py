@@ -49,6 +49,24 @@ def digits(value: float) -> str:
     return f"{value:.{decimals}f}"
 
 
+def give_or_take(value: float, half: float) -> str:
+    """A value with half its interval, both to the digits that the interval leaves.
+
+    >>> give_or_take(10.534, 0.013), give_or_take(3.5, 0.4), give_or_take(971.2, 316.0)
+    ('10.534 ± 0.013', '3.50 ± 0.40', '971 ± 316')
+    """
+    if not (math.isfinite(value) and math.isfinite(half) and half > 0):
+        return digits(value)
+    largest = max(abs(value), half)
+    if not 1e-4 <= largest < 1e5:
+        return f"{value:.3g} ± {half:.2g}"
+    decimals = max(0, 1 - math.floor(math.log10(float(f"{half:.1e}"))))
+    # An interval that is far narrower than anybody needs leaves five digits of the value.
+    decimals = min(decimals, max(0, 4 - math.floor(math.log10(largest))))
+    half_text = f"{half:.{decimals}f}" if round(half, decimals) > 0 else f"{half:.1g}"
+    return f"{value:.{decimals}f} ± {half_text}"
+
+
 def times(ratio: float) -> str:
     """A ratio in words, such as ``"2.1 times"``; beyond a thousand its digits tell nothing.
 
@@ -80,7 +98,7 @@ def listed(parts: Sequence[str], word: str = "and") -> str:
 
 
 def measure(name: str, value: object, unit: str = "") -> str:
-    """A parameter with half its interval, such as ``"k = 3.5 ± 0.40 N m/rad"``.
+    """A parameter with half its interval, such as ``"k = 3.50 ± 0.40 N m/rad"``.
 
     Parameters
     ----------
@@ -98,11 +116,11 @@ def measure(name: str, value: object, unit: str = "") -> str:
     Examples
     --------
     >>> measure("k", (3.5, 3.1, 3.9), "N m/rad")
-    'k = 3.5 ± 0.40 N m/rad'
+    'k = 3.50 ± 0.40 N m/rad'
     """
     if isinstance(value, tuple) and len(value) == 3:
         middle, low, high = value
-        text = digits(middle) if low == high else f"{digits(middle)} ± {digits((high - low) / 2)}"
+        text = give_or_take(middle, (high - low) / 2)
     else:
         text = digits(value) if isinstance(value, float) else str(value)
     return f"{name} = {text.replace('-', '−')}{'' if unit in ('', '1') else f' {raised(unit)}'}"

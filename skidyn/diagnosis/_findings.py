@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from skidyn._signals import Array
-from skidyn._text import inside, listed
+from skidyn._text import give_or_take, inside, listed
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._episodes import Episode
 from skidyn.diagnosis._hypothesis import UNKNOWN, Hypothesis, Step
@@ -266,7 +266,7 @@ def _value(name: str, row: dict[str, Any]) -> str:
     """The first parameter of a finding in words."""
     value, unit = row["value"], "" if row["unit"] == "1" else f" {row['unit']}".rstrip()
     if isinstance(value, float) and row["low"] is not None:
-        return f": {name} = {value:.3g} ± {(row['high'] - row['low']) / 2:.2g}{unit}"
+        return f": {name} = {give_or_take(value, (row['high'] - row['low']) / 2)}{unit}"
     return ""
 
 

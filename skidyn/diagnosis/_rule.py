@@ -155,6 +155,8 @@ class Settings:
         Kinds compared with noise re-estimated.
     refined : int
         So many of them with their shape parameters refined.
+    repeated : int
+        Times a fit is repeated at most whose columns follow it, as that of a saturation.
 
     Examples
     --------
@@ -183,6 +185,7 @@ class Settings:
     max_findings: int = 4
     finalists: int = 8
     refined: int = 4
+    repeated: int = 6
 
 
 @dataclass(frozen=True)

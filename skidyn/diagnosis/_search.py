@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from operator import is_not
 from typing import Any
@@ -117,12 +117,16 @@ class _Search:
         self.fit = problem.fit(terms, sigma=self.fit.noise)
         if not any(_uses_the_fit(c) for c in self.chosen):
             return
-        # Their columns were made with the model as it was without them.
-        self.problem.set_fit(self.fit)
-        for candidate in filter(_uses_the_fit, self.chosen):
-            candidate.rows.update(self.problem.term_rows(candidate.term))
-        problem = replace_torque(self.problem, self.problem.torque - self.ripple)
-        self.fit = problem.fit(terms, sigma=self.fit.noise)
+        # Their columns were made with the model as it was without them, which had bent toward them.
+        for _ in range(self.settings.repeated):
+            before = self.fit.noise
+            self.problem.set_fit(self.fit)
+            for candidate in filter(_uses_the_fit, self.chosen):
+                candidate.rows.update(self.problem.term_rows(candidate.term))
+            problem = replace_torque(self.problem, self.problem.torque - self.ripple)
+            self.fit = problem.fit(terms, sigma=before)
+            if np.allclose(self.fit.noise, before, rtol=0.01):
+                break
 
     @property
     def _round(self) -> str:
@@ -144,6 +148,7 @@ class _Search:
             self.add(best)
             self.withdraw(best)
             self.refit()
+            best = self._settled(best, steps)
             self.reconsider(best, steps)
         self.sigma = self.fit.noise
         self.withdraw()
@@ -225,9 +230,9 @@ class _Search:
             step = self._competed_again(old)
             if step is not None:
                 steps[:] = [step if s.added is old else s for s in steps]
-                newest = self._refined_anew(newest)
+                newest = self._settled(newest, steps)
             elif set(old.joints) & set(newest.joints):
-                self._refined_anew(old)
+                self._settled(old, steps)
 
     def _competed_again(self, old: Hypothesis) -> Step | None:
         """Put what now wins in the place of an earlier finding: another kind, or a better shape."""
@@ -245,6 +250,10 @@ class _Search:
         self._reconsidering = False
         again = self._finals([list(old.candidates)])
         known = best is not None and best.kind != UNKNOWN
+        if best is not None and best.kind == old.kind == UNKNOWN:
+            best = self._name_in_place(old, ranking, kept)
+            known = best is not None
+            again = []
         if best is None or not known or any(h.score >= best.score for h in again):
             self._restore(kept)
             return None
@@ -253,6 +262,30 @@ class _Search:
         self.refit()
         self.sigma, self.left = self.fit.noise, self._left()
         return Step([best, *(h for h in ranking if h.kind != best.kind)], best)
+
+    def _name_in_place(
+        self, old: Hypothesis, ranking: Sequence[Hypothesis], kept: tuple[Any, ...]
+    ) -> Hypothesis | None:
+        """A known effect that does as well as a nameless one beside what was found later."""
+        joints = list(old.joints)
+        bare, with_old = self.left, kept[5]
+        weight = 1 / np.maximum(with_old[joints], 1e-300)
+        tolerated = self.settings.form_tolerance * float(weight @ (bare - with_old)[joints])
+        rivals = [h for h in ranking if h.kind != UNKNOWN and not _within(h)]
+        for rival in [h for h in rivals if set(joints) <= set(h.joints)][: self.settings.refined]:
+            first = self.judged(rival)
+            if first is None:
+                continue
+            before = self._state()
+            self.add(first)
+            self.refit()
+            for other in [h for h in self.findings if any(map(_uses_the_fit, h.candidates))]:
+                self._settled(other, [])
+            left = self._left()
+            self._restore(before)
+            if float(weight @ (left - with_old)[joints]) <= tolerated:
+                return first
+        return None
 
     def _beside_another_kind(self, shadow: Hypothesis) -> Hypothesis | None:
         """What looks like the shadow of an earlier finding, if that was the wrong kind.
@@ -517,6 +550,18 @@ class _Search:
         self.chosen = [*others, *better]
         self.refit()
         return self.findings[place]
+
+    def _settled(self, finding: Hypothesis, steps: list[Step]) -> Hypothesis:
+        """A finding with its shapes found again; until they stay if its columns follow the fit."""
+        follows = any(map(_uses_the_fit, finding.candidates))
+        for _ in range(self.settings.repeated if follows else 1):
+            shapes = [c.term.shape for c in finding.candidates]
+            newer = self._refined_anew(finding)
+            steps[:] = [replace(s, added=newer) if s.added is finding else s for s in steps]
+            finding = newer
+            if all(_close(a, c.term.shape) for a, c in zip(shapes, newer.candidates, strict=True)):
+                break
+        return finding
 
     def _needless(self, old: Hypothesis, without: list[Candidate]) -> bool:
         """Whether an earlier finding became the shadow of others."""
@@ -898,6 +943,12 @@ def replace_torque(problem: Problem, torque: Array) -> Problem:
 def _uses_the_fit(candidate: Candidate) -> bool:
     effect = candidate.term.effect
     return bool({"robot", "model_torque"} & set(effect.needs)) and effect.search == "grid"
+
+
+def _close(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    """Whether shape parameters are alike within a hundredth."""
+    numbers = [(one[k], other[k]) for k in one if isinstance(one[k], float)]
+    return all(np.isclose(a, b, rtol=0.01) for a, b in numbers)
 
 
 def _some_recordings(candidate: Candidate) -> bool:

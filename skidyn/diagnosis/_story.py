@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from skidyn._text import digits, fall, inside, joints_told, listed, raised, times
+from skidyn._text import digits, fall, give_or_take, inside, joints_told, listed, raised, times
 from skidyn.diagnosis._failures import FAILS
 from skidyn.diagnosis._findings import rival_title
 
@@ -278,7 +278,7 @@ def sure(finding: Finding) -> str:
 
 
 def sizes(finding: Finding) -> str:
-    """The parameters of a finding with half their intervals, ``"k = 3.5 ± 0.4 N m/rad"``."""
+    """The parameters of a finding with half their intervals, ``"k = 3.50 ± 0.40 N m/rad"``."""
     return ", ".join(_parameters(finding)[0][: _told(finding)])
 
 
@@ -301,7 +301,7 @@ def _parameters(finding: Finding) -> tuple[list[str], list[float]]:
         )
         bounds = list(zip(values, lows, highs, strict=True))
         numbers = [
-            v if low is None or low == high else f"{digits(v)} ± {digits((high - low) / 2)}"
+            v if low is None or low == high else give_or_take(v, (high - low) / 2)
             for v, low, high in bounds
         ]
         told = [digits(v) if isinstance(v, float) else str(v) for v in numbers]
