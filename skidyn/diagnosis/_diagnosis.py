@@ -20,6 +20,7 @@ from skidyn.diagnosis._conclusion import conclude
 from skidyn.diagnosis._correction import open_model
 from skidyn.diagnosis._hypothesis import SearchResult
 from skidyn.diagnosis._limits import Gates, Limit, find_limits, without_withdrawn
+from skidyn.diagnosis._links import look_at_links
 from skidyn.diagnosis._result import Diagnosis
 from skidyn.diagnosis._reversals import look_at_reversals
 from skidyn.diagnosis._rule import (
@@ -221,6 +222,8 @@ def _diagnose(
     steady = not {check.check for check in checks} & UNSTEADY
     result = search(problem, kinds, settings, vibration=steady)
     wider, completed = look_at_reversals(problem, result, kinds, settings)
+    if wider is problem:
+        wider, completed = look_at_links(problem, result, kinds, settings)
     limits = _limits(problem, result, completed, settings)
     sliding = problem.rows.sliding
     least = settings.least_drop

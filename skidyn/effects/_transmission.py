@@ -56,10 +56,11 @@ def _oscillator(
         omega = min(2 * np.pi * resonance, 1 / step)
         swing = partial(_swing, inertia[rows], omega, damping, step)
         torque[rows] = swing(load[rows], load[rows.start], load[rows.start])
-        known = np.flatnonzero(np.isfinite(carried[rows])) if carried is not None else []
+        if carried is None:
+            continue
+        known = np.flatnonzero(np.isfinite(carried[rows]))
         if len(known) < _ENOUGH_KNOWN:
             continue
-        assert carried is not None
         still = np.zeros_like(load[rows])
         starts = (1.0, np.cos(omega * step)), (0.0, np.sin(omega * step))
         free = np.stack([swing(still, *start) for start in starts], axis=1)
@@ -145,7 +146,7 @@ def _link_inertia(signals: Signals, joint: int) -> Array:
     inertia = _torque_slopes(signals, joint)[2][:, joint]
     # Identified parameters need not be consistent; an inertia that vanishes would fly at once.
     inertia = np.maximum(inertia, 0.05 * np.abs(np.median(inertia)))
-    return np.maximum(inertia, np.finfo(float).tiny)
+    return np.asarray(np.maximum(inertia, np.finfo(float).tiny))
 
 
 class _LinkSideEffect(Effect):

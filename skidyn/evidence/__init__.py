@@ -51,8 +51,10 @@ from skidyn.evidence._problem import (
     regressor_rows as regressor_rows,
     weighted_least_squares as weighted_least_squares,
     with_reversals as with_reversals,
+    with_short_windows as with_short_windows,
 )
 from skidyn.evidence._rows import (
+    FEWEST_SAMPLES as FEWEST_SAMPLES,
     REST as REST,
     sliding_samples as sliding_samples,
     window_rows as window_rows,

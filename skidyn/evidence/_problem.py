@@ -399,8 +399,31 @@ def with_reversals(problem: Problem, terms: Iterable[Term], joints: Sequence[int
     -------
     Problem
     """
-    rows, fold, n_folds, whole = _rows_and_folds(problem.motion, joints)
-    wider = replace(
+    return _with_rows(problem, terms, _rows_and_folds(problem.motion, joints))
+
+
+def with_short_windows(problem: Problem, terms: Iterable[Term], window: float) -> Problem:
+    """The same problem with rows that are averages over less time, for a model with other terms.
+
+    Parameters
+    ----------
+    problem : Problem
+        Problem with a clock.
+    terms : iterable of Term
+        Effects of the model.
+    window : float, s
+        Width of the windows.
+
+    Returns
+    -------
+    Problem
+    """
+    return _with_rows(problem, terms, _rows_and_folds(problem.motion, (), window=window))
+
+
+def _with_rows(problem: Problem, terms: Iterable[Term], rows_and_folds: _RowsAndFolds) -> Problem:
+    rows, fold, n_folds, whole = rows_and_folds
+    other = replace(
         problem,
         terms=TermSum(terms),
         rows=rows,
@@ -412,9 +435,9 @@ def with_reversals(problem: Problem, terms: Iterable[Term], joints: Sequence[int
         _cache={},
         _thinned={},
     )
-    if wider.rigid_body:
-        _add_rigid_body(wider)
-    return wider
+    if other.rigid_body:
+        _add_rigid_body(other)
+    return other
 
 
 def read_motion(signals: Signals, smooth: bool, torque: Array) -> SmoothedMotion:
@@ -425,7 +448,7 @@ def read_motion(signals: Signals, smooth: bool, torque: Array) -> SmoothedMotion
     return motion if smooth else replace(motion, signals=signals)
 
 
-def motion_rows(motion: SmoothedMotion, reversals: Sequence[int]) -> Rows:
+def motion_rows(motion: SmoothedMotion, reversals: Sequence[int], window: float = WINDOW) -> Rows:
     """Averaging windows over the samples that count."""
     signals = motion.signals
     if signals.time is None:
@@ -433,17 +456,23 @@ def motion_rows(motion: SmoothedMotion, reversals: Sequence[int]) -> Rows:
     margin = np.full(signals.n_joints, max(1, round(MARGIN * motion.half_width)))
     margin[list(reversals)] = SHORT_MARGIN
     use = sliding_samples(signals, motion.valid, margin.tolist())
-    return window_rows(signals, use)
+    return window_rows(signals, use, window)
+
+
+_RowsAndFolds = tuple[Rows, list[NDArray[np.int64]], int, bool]
 
 
 def _rows_and_folds(
-    motion: SmoothedMotion, reversals: Sequence[int], weight: Array | None = None
-) -> tuple[Rows, list[NDArray[np.int64]], int, bool]:
+    motion: SmoothedMotion,
+    reversals: Sequence[int],
+    weight: Array | None = None,
+    window: float = WINDOW,
+) -> _RowsAndFolds:
     """Averaging windows and the folds they fall into."""
     # A slow log has wider windows, which reach further over a border; samples reach over none.
     clock = motion.signals.time is not None
     guard = max(WINDOW_GUARD, _half_window(motion.rate)) if clock else 0.0
-    rows = motion_rows(motion, reversals)
+    rows = motion_rows(motion, reversals, window)
     return _folds(rows if weight is None else rows.weighted(weight), guard)
 
 

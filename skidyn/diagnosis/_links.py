@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A second look in short windows, at links that move away from the position that was logged.
+
+A link flies across its play, or swings on the spring of its gear, within hundredths of a second. An
+average over an eighth of a second holds a hundredth of what such motion does to the torque, and
+the ten times shorter flight across a small gap is lost in it. Slow effects are found in the long
+windows, in which noise of the derivatives averages out; what moves a link is looked for once more
+beside them in windows as short as the sampling allows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from skidyn.diagnosis._hypothesis import Hypothesis, SearchResult
+from skidyn.diagnosis._rule import LINK_WINDOW, Settings
+from skidyn.diagnosis._search import search
+from skidyn.effects import TermSum, get_effect
+from skidyn.evidence import FEWEST_SAMPLES, Problem, with_short_windows
+
+
+def look_at_links(
+    problem: Problem, result: SearchResult, kinds: list[str], settings: Settings
+) -> tuple[Problem, SearchResult]:
+    """Search for play and elasticity in short windows.
+
+    Parameters
+    ----------
+    problem : Problem
+        Problem of the long windows.
+    result : SearchResult
+        What was found there.
+    kinds : list of str
+        Kinds of the catalogue that may be named.
+    settings : Settings
+        Thresholds of the search.
+
+    Returns
+    -------
+    problem : Problem
+        With short windows if a link was found to move, else as given.
+    result : SearchResult
+        With the findings of both looks.
+    """
+    family = [k for k in kinds if get_effect(k).moves_link]
+    clocked = problem.signals.time is not None and problem.robot is not None
+    if not family or not clocked or problem.motion.rate * LINK_WINDOW < FEWEST_SAMPLES:
+        return problem, result
+    others = result
+    for _ in range(2):
+        slow = [h for h in others.findings if h.kind not in family]
+        room = settings.max_findings - len(slow)
+        if room < 1:
+            return problem, result
+        known = [c.term for h in slow if h.torque is None for c in h.candidates]
+        short = with_short_windows(problem, (*problem.terms, *known), LINK_WINDOW)
+        short.torque = problem.torque - others.ripple
+        moved = search(short, family, replace(settings, max_findings=room), nameless=False)
+        if not moved.findings:
+            return problem, result
+        # What was found before may have been the trace of this.
+        found = [c.term for h in moved.findings for c in h.candidates]
+        beside = replace(problem, terms=TermSum((*problem.terms, *found)), _cache={}, _thinned={})
+        gates = replace(settings, max_findings=settings.max_findings - len(moved.findings))
+        others = search(beside, [k for k in kinds if k not in family], gates)
+        if _sites(others.findings) == _sites(slow):
+            break
+    known = [c.term for h in others.findings if h.torque is None for c in h.candidates]
+    fit = short.fit((*problem.terms, *known, *found), sigma=moved.fit.sigma)
+    short = replace(short, terms=problem.terms, torque=problem.torque)
+    return short, replace(
+        moved,
+        findings=sorted([*others.findings, *moved.findings], key=lambda h: -h.score),
+        steps=others.steps + moved.steps,
+        fit=fit,
+        ripple=others.ripple,
+        candidates=result.candidates,
+    )
+
+
+def _sites(findings: Sequence[Hypothesis]) -> set[tuple[str, tuple[int, ...]]]:
+    return {c.site for h in findings for c in h.candidates}
