@@ -20,7 +20,6 @@ from skidyn.diagnosis._conclusion import conclude
 from skidyn.diagnosis._correction import open_model
 from skidyn.diagnosis._hypothesis import SearchResult
 from skidyn.diagnosis._limits import Gates, Limit, find_limits, without_withdrawn
-from skidyn.diagnosis._links import look_at_links
 from skidyn.diagnosis._result import Diagnosis
 from skidyn.diagnosis._reversals import look_at_reversals
 from skidyn.diagnosis._rule import (
@@ -31,6 +30,7 @@ from skidyn.diagnosis._rule import (
     time_blocks,
 )
 from skidyn.diagnosis._search import search
+from skidyn.diagnosis._swift import look_at_swift
 from skidyn.effects import Term, list_effects, make_terms
 from skidyn.evidence import Fit, Problem, make_problem
 from skidyn.measurement import (
@@ -223,7 +223,7 @@ def _diagnose(
     result = search(problem, kinds, settings, vibration=steady)
     wider, completed = look_at_reversals(problem, result, kinds, settings)
     if wider is problem:
-        wider, completed = look_at_links(problem, result, kinds, settings)
+        wider, completed = look_at_swift(problem, result, kinds, settings)
     limits = _limits(problem, result, completed, settings)
     sliding = problem.rows.sliding
     least = settings.least_drop

@@ -96,9 +96,9 @@ REVERSAL_FEWEST_ROWS, REVERSAL_AWAY = 20, 0.6
 #: Least share of a joint's squared error that hysteresis must remove there.
 REVERSAL_LEAST_SHARE = 0.06
 
-#: Windows, in s, in which play and elasticity are looked for (``_links.py``): flights across a play
+#: Windows, in s, in which swift effects are looked for (``_swift.py``): flights across a play
 #: of a few mrad take as long.
-LINK_WINDOW = 1 / 32
+SHORT_WINDOW = 1 / 32
 
 
 @dataclass(frozen=True)

@@ -148,6 +148,9 @@ class Effect:
         one; other formulas leave traces of themselves.
     moves_link : bool
         Whether it moves the link away from the position that the encoder logged.
+    is_swift : bool
+        Whether what it does is over within hundredths of a second, so that it is looked for in
+        short averages, too.
     simplicity : int
         Rank among rivals that explain the data equally well; the lower is named.
     rivals : tuple of str
@@ -193,6 +196,7 @@ class Effect:
     drawn: ClassVar[float] = 0.0
     is_exact: ClassVar[bool] = False
     moves_link: ClassVar[bool] = False
+    is_swift: ClassVar[bool] = False
     simplicity: ClassVar[int] = 50
     rivals: ClassVar[tuple[str, ...]] = ()
     separating_motion: ClassVar[str] = ""

@@ -218,6 +218,7 @@ class Backlash(_LinkSideEffect):
 
     kind = "backlash"
     title = "Backlash"
+    is_swift = True
     drawn_against = "load"
     formula = r"\tau(q - g\,x) - \tau(q),\quad m\,\ddot x = \tau_\mathrm{load}/g,\ |x| \le 1/2"
     coefficients = (Coefficient("share", "1", sign=1, is_share=True),)

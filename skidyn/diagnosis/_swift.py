@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A second look in short windows, at links that move away from the position that was logged.
+"""A second look in short windows, at what is over within hundredths of a second.
 
-A link flies across its play, or swings on the spring of its gear, within hundredths of a second. An
-average over an eighth of a second holds a hundredth of what such motion does to the torque, and
-the ten times shorter flight across a small gap is lost in it. Slow effects are found in the long
-windows, in which noise of the derivatives averages out; what moves a link is looked for once more
-beside them in windows as short as the sampling allows.
+A link flies across its play within hundredths of a second, and an average over an eighth of a
+second holds little of that. Slow effects are found in the long windows, in which the noise of the
+derivatives averages out; a swift one, beside them in windows as short as the sampling allows.
+
+Elasticity competes there, so that play does not take its place, but is not named there: the noise
+of the accelerations passes short windows, and a link that swings slower than that noise explains
+it in every log. A flight follows from the sign of the load, which noise hardly changes.
 """
 
 from __future__ import annotations
@@ -14,16 +16,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from skidyn.diagnosis._hypothesis import Hypothesis, SearchResult
-from skidyn.diagnosis._rule import LINK_WINDOW, Settings
+from skidyn.diagnosis._rule import SHORT_WINDOW, Settings
 from skidyn.diagnosis._search import search
 from skidyn.effects import TermSum, get_effect
 from skidyn.evidence import FEWEST_SAMPLES, Problem, with_short_windows
 
 
-def look_at_links(
+def look_at_swift(
     problem: Problem, result: SearchResult, kinds: list[str], settings: Settings
 ) -> tuple[Problem, SearchResult]:
-    """Search for play and elasticity in short windows.
+    """Search for swift effects in short windows.
 
     Parameters
     ----------
@@ -39,13 +41,14 @@ def look_at_links(
     Returns
     -------
     problem : Problem
-        With short windows if a link was found to move, else as given.
+        With short windows if something was found in them, else as given.
     result : SearchResult
         With the findings of both looks.
     """
-    family = [k for k in kinds if get_effect(k).moves_link]
+    swift = [k for k in kinds if get_effect(k).is_swift]
+    family = [k for k in kinds if get_effect(k).moves_link or k in swift]
     clocked = problem.signals.time is not None and problem.robot is not None
-    if not family or not clocked or problem.motion.rate * LINK_WINDOW < FEWEST_SAMPLES:
+    if not swift or not clocked or problem.motion.rate * SHORT_WINDOW < FEWEST_SAMPLES:
         return problem, result
     others = result
     for _ in range(2):
@@ -54,10 +57,10 @@ def look_at_links(
         if room < 1:
             return problem, result
         known = [c.term for h in slow if h.torque is None for c in h.candidates]
-        short = with_short_windows(problem, (*problem.terms, *known), LINK_WINDOW)
+        short = with_short_windows(problem, (*problem.terms, *known), SHORT_WINDOW)
         short.torque = problem.torque - others.ripple
         moved = search(short, family, replace(settings, max_findings=room), nameless=False)
-        if not moved.findings:
+        if not moved.findings or any(h.kind not in swift for h in moved.findings):
             return problem, result
         # What was found before may have been the trace of this.
         found = [c.term for h in moved.findings for c in h.candidates]
