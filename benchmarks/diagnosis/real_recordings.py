@@ -243,7 +243,7 @@ def _mass_is_known(payload: Finding) -> bool:
 
 
 def _run_is_loaded(payload: Finding) -> bool:
-    return payload.parameters["trajectories"]["value"] == (1,)  # run 1 carries the weight
+    return payload.trajectories == (1,)  # run 1 carries the weight
 
 
 #: What else a finding of the right kind must get right.
