@@ -87,9 +87,6 @@ class Signals:
         The robot, for effects that act through its kinematics or dynamics.
     load : ndarray of shape (n_samples, n_joints) or None
         Torque that the transmission carries: the rigid-body part of the model (N m or N).
-    carried : ndarray of shape (n_samples, n_joints) or None
-        What the transmission was measured to carry: the measured torque less that of everything on
-        the motor's side (N m or N); NaN where this is not known.
     model_torque : ndarray of shape (n_samples, n_joints) or None
         Torque of the whole model so far (N m or N).
     smooth_torque : ndarray of shape (n_samples, n_joints) or None
@@ -107,7 +104,6 @@ class Signals:
     prismatic: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
     robot: Robot | None = None
     load: Array | None = None
-    carried: Array | None = None
     model_torque: Array | None = None
     smooth_torque: Array | None = None
     inertial_parameters: Array | None = None
@@ -188,7 +184,7 @@ class Signals:
         """The same signals on some rows."""
         per_sample = (
             *("q", "dq", "ddq", "trajectory", "time", "temperature"),
-            *("load", "carried", "model_torque", "smooth_torque"),
+            *("load", "model_torque", "smooth_torque"),
         )
         values = {name: getattr(self, name) for name in per_sample}
         taken: dict[str, Any] = {k: None if v is None else v[rows] for k, v in values.items()}

@@ -60,7 +60,14 @@ def look_at_swift(
         short = with_short_windows(problem, (*problem.terms, *known), SHORT_WINDOW)
         short.torque = problem.torque - others.ripple
         moved = search(short, family, replace(settings, max_findings=room), nameless=False)
-        if not moved.findings or any(h.kind not in swift for h in moved.findings):
+        # A link that swings in the long windows, too, does not fly.
+        swings = {j for h in result.findings if h.kind in family for j in h.joints}
+        swings -= {j for h in result.findings if h.kind in swift for j in h.joints}
+        if (
+            not moved.findings
+            or any(h.kind not in swift for h in moved.findings)
+            or swings & {j for h in moved.findings for j in h.joints}
+        ):
             return problem, result
         # What was found before may have been the trace of this.
         found = [c.term for h in moved.findings for c in h.candidates]

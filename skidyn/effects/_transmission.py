@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -14,32 +14,20 @@ from skidyn.effects._base import Array, Coefficient, Effect, Shape
 from skidyn.effects._derivatives import smooth_derivatives
 
 
-def _oscillator(
-    load: Array,
-    carried: Array | None,
-    inertia: Array,
-    signals: Signals,
-    resonance: float,
-    damping: float,
-) -> Array:
-    """Torque of the spring between motor and link: its wind-up times its stiffness.
+def _oscillator(load: Array, signals: Signals, resonance: float, damping: float) -> Array:
+    """Wind-up of a spring-mass under a load, times the stiffness.
 
     The link swings on its spring: far below the resonance the wind-up follows the load, near it the
-    wind-up is larger and late. How the link swung when a recording began is found from the torque
-    that was measured, where there is one; else it starts at rest on its spring.
+    wind-up is larger and late.
 
     Parameters
     ----------
     load : ndarray of shape (n_samples,), N m or N
         Torque of the rigid body if nothing gave way.
-    carried : ndarray of shape (n_samples,) or None, N m or N
-        Torque that the spring was measured to carry, NaN where this is not known.
-    inertia : ndarray of shape (n_samples,)
-        Inertia that swings, in units of its median.
     signals : Signals
         For its segments and clock.
     resonance : float, Hz
-        With the motor held and the median inertia.
+        With the motor held.
     damping : float
         Damping ratio.
 
@@ -47,58 +35,28 @@ def _oscillator(
     -------
     ndarray of shape (n_samples,), N m or N
     """
-    torque = np.zeros_like(load)
+    from scipy.signal import lfilter
+
+    omega = 2 * np.pi * resonance
+    wind_up = np.zeros_like(load)
     for rows in signals.segments:
         if rows.stop - rows.start < 7:
             continue
-        step = float(np.median(np.diff(signals.clock[rows])))
+        rate = 1.0 / float(np.median(np.diff(signals.clock[rows])))
         # The swing of a link faster than the sampling cannot be seen; it follows at once.
-        omega = min(2 * np.pi * resonance, 1 / step)
-        swing = partial(_swing, inertia[rows], omega, damping, step)
-        torque[rows] = swing(load[rows], load[rows.start], load[rows.start])
-        if carried is None:
-            continue
-        known = np.flatnonzero(np.isfinite(carried[rows]))
-        if len(known) < _ENOUGH_KNOWN:
-            continue
-        still = np.zeros_like(load[rows])
-        starts = (1.0, np.cos(omega * step)), (0.0, np.sin(omega * step))
-        free = np.stack([swing(still, *start) for start in starts], axis=1)
-        missing = (carried[rows] - torque[rows])[known]
-        torque[rows] += free @ np.linalg.lstsq(free[known], missing, rcond=1e-6)[0]
-    return torque
+        w = min(omega, rate)
+        b, a, settled = _swing(w, damping, rate)
+        wind_up[rows] = lfilter(b, a, load[rows], zi=settled * load[rows.start])[0]
+    return wind_up
 
 
-#: Samples of a recording from which the start of a swing is found.
-_ENOUGH_KNOWN = 20
+@lru_cache(maxsize=256)
+def _swing(omega: float, damping: float, rate: float) -> tuple[Array, Array, Array]:
+    """Digital filter of a spring-mass at a sampling rate, and its state under a unit load."""
+    from scipy.signal import bilinear, lfilter_zi
 
-
-def _swing(
-    inertia: Array,
-    omega: float,
-    damping: float,
-    step: float,
-    load: Array,
-    first: float,
-    second: float,
-) -> Array:
-    """Torque of a spring under a load, from its first two samples on.
-
-    The rule of Newmark with average acceleration, which neither adds nor takes energy
-    (N. M. Newmark (1959), J. Engineering Mechanics 85(3), 67-94), as one banded system.
-    """
-    from scipy.linalg import solve_banded
-
-    n = len(load)
-    banded, right = np.zeros((3, n)), np.empty(n)
-    banded[0, :2] = 1.0
-    right[:2] = first, second
-    mass, drag, stiff = inertia[1:-1] / step**2, damping * omega / step, omega**2 / 4
-    banded[0, 2:] = mass + drag + stiff
-    banded[1, 1:-1] = 2 * (stiff - mass)
-    banded[2, :-2] = mass - drag + stiff
-    right[2:] = stiff * (load[2:] + 2 * load[1:-1] + load[:-2])
-    return np.asarray(solve_banded((2, 0), banded, right))
+    b, a = bilinear([1.0], [1 / omega**2, 2 * damping / omega, 1.0], rate)
+    return b, a, lfilter_zi(b, a)
 
 
 #: Step of the difference quotients: they err by about this share, and round by a thousandth of it.
@@ -188,8 +146,7 @@ class JointElasticity(_LinkSideEffect):
     coefficients = (Coefficient("compliance", "rad/(N m)", sign=1),)
     shapes = (
         Shape("resonance", "Hz", (25.0, 10.0, 6.5, 4.5, 3.2), 1.0, 100.0, scales=False),
-        # How the link swung before the log began is not known: strong damping forgets it.
-        Shape("damping", "1", (0.05, 0.3), 0.005, 1.0, scales=False),
+        Shape("damping", "1", (0.05,), 0.005, 1.0, scales=False),
     )
     simplicity = 19
     rivals = ("time_delay", "rotor_inertia", "backlash", "base_tilt")
@@ -198,10 +155,7 @@ class JointElasticity(_LinkSideEffect):
 
     def displacement(self, signals: Signals, joint: int, **shape: Any) -> Array:
         assert signals.load is not None
-        carried = None if signals.carried is None else signals.carried[:, joint]
-        inertia = _link_inertia(signals, joint)
-        inertia = inertia / np.median(inertia)
-        return _oscillator(signals.load[:, joint], carried, inertia, signals, **shape)
+        return _oscillator(signals.load[:, joint], signals, **shape)
 
     def parameters(
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None

@@ -293,12 +293,8 @@ class Problem:
         # What a sensor does to the torque acts on the torque before the sensor.
         before = [t for t in fit.terms if not t.effect.sees_model]
         smooth = [t for t in before if not t.is_dry]
-        bent = [t for t in fit.terms if t.effect.moves_link]
-        left = self.torque - self.explained(fit)
-        carried = load + self.term_torque(fit, bent) + left
         self.signals = self.signals.with_(
             load=load,
-            carried=np.where(self.rows.sliding, carried, np.nan),
             model_torque=load + self.term_torque(fit, before),
             smooth_torque=load + self.term_torque(fit, smooth),
             inertial_parameters=self.inertial_parameters(fit),

@@ -127,4 +127,4 @@ def test_sizes_of_several_joints_are_those_of_a_parameter_that_is_not_zero(missi
     history = [missing.history[0], {**missing.history[1], "joints": [1, 2]}]
     story = dataclasses.replace(missing, findings=[finding, other], history=history).story()
     (line,) = story["findings"]
-    assert line["size"].startswith("k3 = 2.0 ± 0.40") and "k1" not in line["size"]
+    assert line["size"].startswith("k3 = 2.00 ± 0.40") and "k1" not in line["size"]
