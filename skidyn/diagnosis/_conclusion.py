@@ -40,7 +40,7 @@ from skidyn.diagnosis._rule import (
     EPISODE_LEAST_RANGE,
     false_discovery_rate,
 )
-from skidyn.diagnosis._search import replace_torque
+from skidyn.diagnosis._search_state import replace_torque
 from skidyn.diagnosis._unknown import UnknownTorque, describe_unknowns
 from skidyn.effects import Term
 from skidyn.evidence import Problem

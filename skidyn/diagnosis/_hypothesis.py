@@ -1,12 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a search works with: hypotheses, steps, and its result."""
+"""What a search works with: hypotheses and what is asked of them, steps, and its result."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
 
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
+from skidyn.effects import get_effect
 from skidyn.evidence import Fit
 
 UNKNOWN = "unknown"
@@ -103,3 +108,75 @@ class SearchResult:
     inflation: Array
     candidates: list[Candidate] = field(default_factory=list)
     n_tests: int = 1
+
+
+def close_shapes(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    """Whether shape parameters are alike within a hundredth."""
+    numbers = [(one[k], other[k]) for k in one if isinstance(one[k], float)]
+    return all(np.isclose(a, b, rtol=0.01) for a, b in numbers)
+
+
+def some_recordings(candidate: Candidate) -> bool:
+    """Whether a candidate acts in some recordings only."""
+    return candidate.term.trajectories is not None
+
+
+def grouped_by_joints(candidates: Sequence[Candidate]) -> list[list[Candidate]]:
+    parts: dict[tuple[int, ...], list[Candidate]] = {}
+    for candidate in candidates:
+        parts.setdefault(candidate.joints, []).append(candidate)
+    return list(parts.values())
+
+
+def is_vibration(hypothesis: Hypothesis) -> bool:
+    return hypothesis.kind == UNKNOWN and hypothesis.torque is not None
+
+
+def says_little(hypothesis: Hypothesis) -> bool:
+    """Whether an explanation is one in name only: a vibration, or what differs between runs."""
+    return is_vibration(hypothesis) or (
+        hypothesis.kind == UNKNOWN and within_recordings(hypothesis)
+    )
+
+
+def within_recordings(hypothesis: Hypothesis) -> bool:
+    return any(map(some_recordings, hypothesis.candidates))
+
+
+def rivals_among(best: Hypothesis, ranking: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Other explanations of the same joints, members of the same family apart."""
+    own = set(best.joints)
+    family = family_of(best)
+    return [
+        h
+        for h in ranking
+        if h.kind != best.kind
+        and own & set(h.joints)
+        and (not family or family_of(h) != family)
+        and (
+            within_recordings(best) or not within_recordings(h)
+        )  # errors of single recordings are smaller
+        and not is_vibration(h)
+    ]
+
+
+def margin_over(best: Hypothesis, rivals: Sequence[Hypothesis]) -> float:
+    """Share of the best score by which the rivals fall short."""
+    if not rivals or best.score <= 0:
+        return 1.0
+    return 1.0 - max(h.score for h in rivals) / best.score
+
+
+def family_of(hypothesis: Hypothesis) -> str:
+    return "" if hypothesis.kind == UNKNOWN else get_effect(hypothesis.kind).family
+
+
+def simplicity_of(hypothesis: Hypothesis) -> int:
+    if hypothesis.kind == UNKNOWN:
+        return 100
+    return get_effect(hypothesis.kind).simplicity
+
+
+def uses_the_fit(candidate: Candidate) -> bool:
+    effect = candidate.term.effect
+    return bool({"robot", "model_torque"} & set(effect.needs)) and effect.search == "grid"

@@ -1,0 +1,245 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which explanation of a ranking is taken, and whether the rule accepts it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from skidyn._signals import Array
+from skidyn.diagnosis._candidates import Candidate
+from skidyn.diagnosis._hypothesis import (
+    UNKNOWN,
+    Hypothesis,
+    family_of,
+    simplicity_of,
+    within_recordings,
+)
+from skidyn.diagnosis._ranking import RankingSearch
+
+
+class JudgingSearch(RankingSearch):
+    """A search that picks and judges explanations."""
+
+    def pick(self, ranking: list[Hypothesis]) -> Hypothesis | None:
+        """The best explanation, or a simpler one that is as good within its standard error."""
+        if not ranking:
+            return None
+        best = self._named(ranking)
+        for rival in ranking[1:]:
+            if best.errors is None or rival.errors is None:
+                continue
+            if rival.n_parameters > best.n_parameters or simplicity_of(rival) >= simplicity_of(
+                best
+            ):
+                continue
+            if best.errors.shape != rival.errors.shape:
+                continue  # one is of some recordings, judged on other folds
+            variance = best.errors.sum(0) / np.maximum(self.problem.rows.counts, 1)
+            variance = np.where(variance > 0, variance, 1.0)  # a joint that rests
+            behind = ((rival.errors - best.errors) / variance).sum(1)
+            error = behind.std(ddof=1) * np.sqrt(len(behind))
+            cap = self.settings.simpler_share * best.score
+            if behind.sum() < min(max(error, 6.0), cap):
+                best = rival
+        return self._simplest_of_family(best, ranking)
+
+    def _named(self, ranking: list[Hypothesis]) -> Hypothesis:
+        """The first explanation, or one that says more whose formula is good enough beside it.
+
+        A name says more than a function of signals, and an effect that holds in every recording
+        more than one that has its own size in each.
+        """
+        best = ranking[0]
+        single = within_recordings(best)
+        if best.errors is None or not (best.kind == UNKNOWN or single):
+            return best
+        left = best.errors.sum(0)
+        removed = left * np.expm1(np.maximum(best.gain, 0) / self._counts)
+        for rival in ranking[1:]:
+            if rival.kind == UNKNOWN or rival.errors is None or within_recordings(rival):
+                continue
+            covered = [c for c in best.candidates if set(c.joints) <= set(rival.joints)]
+            # What differs between recordings is one finding a joint; a function of signals is not,
+            # and may reach joints that it does not explain.
+            joints = sorted({j for c in covered for j in c.joints}) if single else list(best.joints)
+            width = sum(c.width for c in covered)
+            enough = (
+                rival.n_parameters <= width if single else bool(set(joints) & set(rival.joints))
+            )
+            if not joints or not enough:
+                continue
+            errors = rival.errors
+            if errors.shape != best.errors.shape:
+                errors = self._errors(rival, within=single)
+            weight = 1 / np.maximum(left[joints], 1e-300)
+            behind = float(weight @ (errors.sum(0) - left)[joints])
+            if behind <= self.settings.form_tolerance * float(weight @ removed[joints]):
+                return rival
+        return best
+
+    def _simplest_of_family(self, best: Hypothesis, ranking: list[Hypothesis]) -> Hypothesis:
+        """Members of a family differ only in motion made for it: the simplest near one is named."""
+        family = family_of(best)
+        if not family:
+            return best
+        near = [
+            h
+            for h in ranking
+            if family_of(h) == family
+            and h.joints == best.joints
+            and h.score >= self.settings.family_share * best.score
+        ]
+        return min([best, *near], key=simplicity_of)
+
+    def judged(self, hypothesis: Hypothesis) -> Hypothesis | None:
+        """The hypothesis with those of its terms that are more than chance beside the others."""
+        if hypothesis.torque is not None:  # judged on single samples, by its line
+            chance = hypothesis.chances[0]
+            tried = self.tried(hypothesis.kind)
+            return replace(hypothesis, tried=tried) if self.significant(chance) else None
+        candidates = list(hypothesis.candidates)
+        if len(candidates) > 2 and within_recordings(hypothesis):
+            return self._judged_together(hypothesis)
+        while candidates:
+            chances = [
+                self.chance(c, [*self.chosen, *(o for o in candidates if o is not c)])
+                for c in candidates
+            ]
+            worst = int(np.argmax(chances))
+            if self.significant(chances[worst], hypothesis.kind):
+                kept = [j for c in candidates for j in c.rows]
+                gain = np.where(np.isin(np.arange(len(hypothesis.gain)), kept), hypothesis.gain, 0)
+                gain = hypothesis.gain if len(candidates) == len(hypothesis.candidates) else gain
+                return replace(
+                    hypothesis,
+                    candidates=tuple(candidates),
+                    chances=tuple(chances),
+                    tried=self.tried(hypothesis.kind),
+                    gain=gain,
+                )
+            del candidates[worst]
+        return None
+
+    def _judged_together(self, hypothesis: Hypothesis) -> Hypothesis | None:
+        """What differs between recordings: more than chance together, each by itself at 5 %.
+
+        Each recording by itself would have to stand out of all candidates, and one that does not
+        would spoil the test of the others.
+        """
+        kept = [
+            c
+            for c in hypothesis.candidates
+            if self.chance(c, [*self.chosen, *(o for o in hypothesis.candidates if o is not c)])
+            <= self.settings.member
+        ]
+        if not kept:
+            return None
+        reached = sorted({j for c in kept for j in c.rows})
+        counts = self.problem.rows.counts
+        rows = {
+            j: np.hstack([c.rows.get(j, np.zeros((int(counts[j]), c.width))) for c in kept])
+            for j in reached
+        }
+        chance = self.tester(self.chosen).test(rows).chance
+        if not self.significant(chance, hypothesis.kind):
+            return None
+        chances = (chance,) * len(kept)
+        tried = self.tried(hypothesis.kind)
+        return replace(hypothesis, candidates=tuple(kept), chances=chances, tried=tried)
+
+    def shadow(self, hypothesis: Hypothesis) -> bool:
+        """Whether an explanation is so small that earlier ones' imperfect formulas may leave it."""
+        joints = sorted({j for c in hypothesis.candidates for j in c.rows})
+        settings, tolerance = self.settings, self._tolerance
+        own, earlier = self._removed(self.left, hypothesis.gain), self.start - self.left
+        if not self._mostly_small(joints, hypothesis.gain, own, tolerance * earlier):
+            return False
+        # What an imperfect formula leaves does not become noise by one known effect.
+        known = hypothesis.kind != UNKNOWN and not within_recordings(hypothesis)
+        most = self._mostly_small(joints, hypothesis.gain, own, 0.5 * self.left)
+        return not known or most or self._price(hypothesis.candidates) > settings.white
+
+    @property
+    def _tolerance(self) -> Array:
+        """Share of the squared error removed so far that formulas may have left, by joint."""
+        settings = self.settings
+        shares = np.full(self.problem.n_joints, settings.exact_tolerance)
+        for h in self.findings:
+            if h.kind == UNKNOWN and h.torque is not None:
+                continue
+            nameless = h.kind == UNKNOWN
+            for c in h.candidates:
+                if c.term.effect.is_exact:
+                    continue
+                share = settings.nameless_tolerance if nameless else settings.form_tolerance
+                reached = list(c.rows)
+                shares[reached] = np.maximum(shares[reached], share)
+        return shares
+
+    def _mostly_small(self, joints: Sequence[int], gain: Array, own: Array, least: Array) -> bool:
+        """Whether most of a gain is had on joints of which less is removed than what is least.
+
+        Joint by joint: one whose error fell by a thousandth through another effect would call
+        everything small, whatever it does elsewhere.
+        """
+        gained = np.maximum(gain, 0.0)
+        large = [j for j in joints if own[j] >= least[j]]
+        return bool(gained[large].sum() < 0.5 * gained[list(joints)].sum())
+
+    def _removed(self, errors: Array, gain: Array) -> Array:
+        """Squared error of every joint that a gain of log-likelihood takes away."""
+        counts = np.maximum(self.problem.rows.counts, 1)
+        share: Array = -np.expm1(-np.maximum(gain, 0.0) / counts)
+        return errors * share
+
+    def _at_its_limit(self, hypothesis: Hypothesis) -> Hypothesis | None:
+        """The hypothesis, or the simpler kind that its unresolved terms are; what has them waits.
+
+        Pre-sliding shorter than can be seen is Coulomb friction. The terms that are resolved are
+        found again beside it.
+        """
+        unresolved = {c: kind for c in hypothesis.candidates if (kind := self._limit_kind(c))}
+        if not unresolved:
+            return hypothesis
+        simple = [
+            c
+            for c in self.pool
+            if (c.kind, c.joints) in {(kind, c.joints) for c, kind in unresolved.items()}
+        ]
+        for found in self._finals([simple] if simple else []):
+            return found
+        rest = tuple(c for c in hypothesis.candidates if c not in unresolved)
+        return replace(hypothesis, candidates=rest) if rest else None
+
+    def _limit_kind(self, candidate: Candidate) -> str:
+        """The kind that a candidate cannot be told from, for a shape that is not resolved."""
+        unit = self.problem.signals.unit[candidate.joints[0]]
+        for shape in candidate.term.effect.shapes:
+            low = shape.low * (unit if shape.scales else 1.0)
+            value = candidate.term.shape.get(shape.name, np.inf)
+            if shape.limit_kind and value < self.settings.resolved * low:
+                return shape.limit_kind
+        return ""
+
+    def _richer_known(self, hypothesis: Hypothesis) -> bool:
+        """Whether a member of the same family that is as rich was found on the same joints."""
+        family = family_of(hypothesis)
+        return any(
+            family
+            and family_of(h) == family
+            and set(hypothesis.joints) <= set(h.joints)
+            and simplicity_of(h) >= simplicity_of(hypothesis)
+            for h in self.findings
+        )
+
+    def _alike(self, best: Hypothesis, rivals: Sequence[Hypothesis]) -> bool:
+        """Whether a known effect on other joints explains as much."""
+        return any(
+            h.kind != UNKNOWN
+            and h.joints != best.joints
+            and h.score >= (1 - self.settings.alike) * best.score
+            for h in rivals
+        )

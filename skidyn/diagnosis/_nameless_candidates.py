@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Nameless functions of the signals as candidates, chosen by what the residual follows."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidyn._signals import Array
+from skidyn.diagnosis._candidates import Candidate
+from skidyn.diagnosis._clock import LOWEST, clock_line
+from skidyn.diagnosis._followed_signals import followed_signals
+from skidyn.diagnosis._hypothesis import (
+    UNKNOWN,
+)
+from skidyn.diagnosis._spectrum import SLOWEST
+from skidyn.effects import FunctionOfSignals, NamelessEffect, Term, get_effect, nameless_kinds
+from skidyn.evidence import Problem
+
+Mask = NDArray[np.bool_]
+
+
+def nameless_candidates(problem: Problem, residual: Array) -> list[Candidate]:
+    """Nameless functions of the signals for every joint."""
+    followed = [followed_signals(problem, j, residual[:, j]) for j in range(problem.n_joints)]
+    candidates = []
+    for kind in nameless_kinds():
+        effect = get_effect(kind)
+        assert isinstance(effect, NamelessEffect)
+        for joints in effect.sites(problem.signals):
+            joint = joints[0]
+            if effect.search == "spectrum" or effect.not_shown(problem.signals, joint):
+                continue
+            shapes = effect.grid(problem.signals, joints)
+            if isinstance(effect, FunctionOfSignals):
+                sets = [names for names in followed[joint] if len(names) == effect.n_signals]
+                shapes = [effect.shape_of(problem.signals, names) for names in sets]
+            if effect.search == "clock":
+                line = clock_line(
+                    problem.signals,
+                    residual[:, joint],
+                    problem.rows.sliding[:, joint],
+                    problem.motion.rate,
+                    (LOWEST, SLOWEST),
+                )
+                shapes = [] if line is None else [{"frequency": line.frequency}]
+            for shape in shapes:
+                term = Term.at(kind, joints, shape)
+                names = effect.variables(joint, shape)
+                candidates.append(Candidate(UNKNOWN, term, problem.screening_rows(term), names))
+    return candidates

@@ -1,0 +1,279 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Explanations of what the model so far leaves, ranked by what they explain held out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidyn._progress import track
+from skidyn._signals import Array
+from skidyn.diagnosis._candidates import Candidate
+from skidyn.diagnosis._hypothesis import (
+    UNKNOWN,
+    Hypothesis,
+    grouped_by_joints,
+    says_little,
+    some_recordings,
+)
+from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
+from skidyn.diagnosis._recordings import choose
+from skidyn.diagnosis._rule import (
+    RESOLVED,
+    Tester,
+)
+from skidyn.diagnosis._screen import Screen
+from skidyn.diagnosis._search_state import SearchState
+from skidyn.diagnosis._spectrum import Line, find_lines, find_vibrations
+from skidyn.diagnosis._split import split_effects
+
+Mask = NDArray[np.bool_]
+
+
+class RankingSearch(SearchState):
+    """A search that ranks explanations."""
+
+    def rank(self) -> list[Hypothesis]:
+        """Explanations of the residual, best first."""
+        rough = self._greedy_by_kind() + self._splits()
+        rough.sort(key=lambda item: item[1])
+        ranking = self._finals([candidates for candidates, _ in rough[: self.settings.finalists]])
+        ranking += [self._against_functions(h, ranking) for h in self._lines()]
+        ranking += self._recordings()
+        # What says least comes last: differences between recordings, and vibration.
+        return sorted(ranking, key=lambda h: (says_little(h), -h.score))
+
+    def _greedy_by_kind(self, nameless: bool = True) -> list[tuple[list[Candidate], float]]:
+        """For each kind, terms added joint by joint while each lowers the held-out error."""
+        screen = Screen(self.problem, self.sigma, self.pool, self.target)
+        kinds = np.array([c.kind for c in self.pool])
+        base_model = screen.model(self.blocks)
+        base = screen.held_out(base_model)
+        first = screen.step(base_model)
+        tester = self.tester(self.chosen)
+        found = []
+        wanted = [kind for kind in dict.fromkeys(kinds) if nameless or kind != UNKNOWN]
+        for kind in track(wanted, f"{self._round}: screening effects"):
+            chosen, drop = self._greedy(screen, kinds == kind, base, first, tester)
+            if chosen:
+                found.append((chosen, -(drop - 2 * sum(c.width for c in chosen))))
+        return found
+
+    def _greedy(
+        self, screen: Screen, wanted: Mask, base: Array, first: Array, tester: Tester
+    ) -> tuple[list[Candidate], float]:
+        pool, errors, now = wanted.copy(), first, base
+        chosen: list[Candidate] = []
+        widths = np.array([c.width for c in self.pool])
+        while pool.any():
+            drops = np.where(pool, now.sum() - errors.sum(1), -np.inf)
+            # Nameless functions have very different widths: each coefficient has its price, which
+            # is that of the noise left by the best of them.
+            price = 2.0
+            if self.pool[int(np.argmax(drops))].kind == UNKNOWN:
+                price = self._price([self.pool[int(np.argmax(drops))]], chosen) / 3
+            found = self._first_significant(drops, drops - price * widths, tester)
+            if found is None:
+                break
+            i, candidate = found, self.pool[found]
+            chosen.append(candidate)
+            now = errors[i]
+            pool &= self._still_open(candidate, chosen)
+            if pool.any():
+                model = screen.model([*self.blocks, *(c.rows for c in chosen)])
+                errors = screen.step(model, pool)
+                tester = self.tester([*self.chosen, *chosen])
+        return chosen, float(base.sum() - now.sum())
+
+    def _first_significant(self, drops: Array, order: Array, tester: Tester) -> int | None:
+        """The first of the best few candidates that is large enough and more than chance."""
+        for i in np.argsort(-order)[: self.settings.shapes_tested]:
+            candidate = self.pool[i]
+            n_rows = int(self.problem.rows.counts[list(candidate.joints)].sum())
+            if not drops[i] > self.settings.least_share * n_rows:
+                continue
+            if self.significant(
+                tester.test(candidate.rows, candidate.zeros).chance, candidate.kind
+            ):
+                return int(i)
+        return None
+
+    def _still_open(self, added: Candidate, chosen: list[Candidate]) -> Mask:
+        """Which candidates may join one of the same kind."""
+        if len(added.joints) == self.problem.n_joints and self.problem.n_joints > 1:
+            return np.zeros(len(self.pool), dtype=bool)  # acts on the whole robot already
+        if added.kind == UNKNOWN:
+            same = {added.variables}
+            if len(chosen) >= 3:
+                return np.zeros(len(self.pool), dtype=bool)
+            return np.array(
+                [
+                    set(c.variables) == set(v) and c.joints != added.joints
+                    for c in self.pool
+                    for v in same
+                ]
+            )
+        taken = {c.joints for c in chosen}
+        whole = self.problem.n_joints > 1
+        return np.array(
+            [
+                c.joints not in taken and not (whole and len(c.joints) == self.problem.n_joints)
+                for c in self.pool
+            ]
+        )
+
+    def _splits(self) -> list[tuple[list[Candidate], float]]:
+        """Payloads and tool forces of some trajectories, once."""
+        if any(c.term.effect.search == "trajectories" for c in self.chosen):
+            return []
+        splits = split_effects(self.problem, self.kinds, self.blocks, self.sigma, self.target)
+        return [
+            ([s.candidate], -float(s.drop.sum()) + 2 * s.candidate.width)
+            for s in splits
+            if s.drop.sum() > 0
+        ]
+
+    def _finals(self, rough: list[list[Candidate]]) -> list[Hypothesis]:
+        """Compare the best kinds with their shape refined and the noise re-estimated."""
+        before = {
+            within: profile_error(self.problem, self.blocks, self.sigma, self.target, within=within)
+            for within in (False, True)
+        }
+        ranking = []
+        for i, candidates in enumerate(track(rough, f"{self._round}: refining the best")):
+            kind = candidates[0].kind
+            candidates = [replace(c, rows=self.problem.term_rows(c.term)) for c in candidates]
+            within = any(some_recordings(c) for c in candidates)
+            if i < self.settings.refined:
+                candidates = refine(self.problem, self.blocks, candidates, self.sigma, self.target)
+            hypothesis = Hypothesis(kind, tuple(candidates), np.zeros(0), 0.0, 0)
+            after = self._errors(hypothesis, within)
+            gain = log_likelihood_gain(before[within], after, self.problem.rows.counts)
+            count = self._n_parameters(candidates)
+            price = 2 * self._price(candidates)
+            score = float(gain.sum()) - price * count
+            if kind == UNKNOWN:
+                # The error held out has paid for its coefficients already.
+                score = float(gain.sum()) - price * min(count, self.settings.nameless_price)
+            ranking.append(Hypothesis(kind, tuple(candidates), gain, score, count, errors=after))
+        return [h for h in ranking if h.score > self.settings.least_gain]
+
+    def _lines(self) -> list[Hypothesis]:
+        """Torque ripple and vibration, judged on the residual at the full rate."""
+        problem = self.problem
+        fit = replace(self.fit, terms=problem.terms + (c.term for c in self.chosen))
+        residual = problem.torque - self.ripple - problem.explained(fit)
+        found = []
+        least = self.settings.least_share
+        if "torque_ripple" in self.kinds:
+            # A few waves a turn are what a nameless function left of its own edges.
+            lines = [
+                line
+                for line in find_lines(problem, residual)
+                if line.term.shape["N"] >= RESOLVED or not self._follows_position(line.joint)
+            ]
+            found.append(self._of_lines("torque_ripple", "N", 1.0, lines, least))
+        if self.vibration:
+            # On samples, of which there are many more than rows.
+            least = self.settings.least_drop * len(residual) / max(1, problem.rows.counts.max())
+            lines = find_vibrations(problem, residual)
+            found.append(self._of_lines(UNKNOWN, "frequency", 0.1, lines, least))
+        return [h for h in found if h is not None]
+
+    def _of_lines(
+        self, kind: str, position: str, width: float, lines: Sequence[Line], least: float
+    ) -> Hypothesis | None:
+        """The strongest line of every joint that is large enough, more than chance and new."""
+        problem = self.problem
+        known = [c for h in self.findings if h.torque is not None for c in h.candidates]
+        best: dict[int, Line] = {}
+        for line in lines:
+            at = line.term.shape[position]
+            if any(
+                c.term.kind == line.term.kind
+                and c.joints == (line.joint,)
+                and abs(c.term.shape[position] - at) < width
+                for c in known
+            ):
+                continue
+            strong = line.gain.sum() > least * int(problem.rows.counts[line.joint])
+            if (
+                strong
+                and self.significant(line.chance)
+                and (line.joint not in best or line.gain.sum() > best[line.joint].gain.sum())
+            ):
+                best[line.joint] = line
+        if not best:
+            return None
+        gain, torque = np.zeros(problem.n_joints), np.zeros_like(problem.torque)
+        candidates = []
+        for joint, line in best.items():
+            gain[joint] = line.gain.sum()
+            torque[:, joint] = line.torque
+            variables = ("time",) if kind == UNKNOWN else ()
+            rows = problem.term_rows(line.term)
+            candidates.append(Candidate(kind, line.term, rows, variables))
+        count = 3 * len(candidates)
+        score = float(gain.sum()) - 2 * count
+        chances = tuple(best[c.joints[0]].chance for c in candidates)
+        return Hypothesis(kind, tuple(candidates), gain, score, count, chances, torque=torque)
+
+    def _follows_position(self, joint: int) -> bool:
+        """Whether a nameless function of the joint's own position was added."""
+        own = f"q{joint + 1}"
+        return any(
+            h.kind == UNKNOWN and own in h.variables and joint in h.joints for h in self.findings
+        )
+
+    def _against_functions(self, ripple: Hypothesis, ranking: Sequence[Hypothesis]) -> Hypothesis:
+        """A ripple as it is, or judged on rows where a function of the signals says much more.
+
+        Few waves per turn follow any torque that depends on the position, a bump for example.
+        """
+        rivals = [h for h in ranking if h.kind == UNKNOWN and set(h.joints) & set(ripple.joints)]
+        if not rivals or ripple.kind == UNKNOWN:
+            return ripple
+        before = profile_error(self.problem, self.blocks, self.sigma, self.target)
+        blocks = [*self.blocks, *(c.rows for c in ripple.candidates)]
+        after = profile_error(self.problem, blocks, self.sigma, self.target)
+        score = float(log_likelihood_gain(before, after, self.problem.rows.counts).sum())
+        if score > self.settings.ripple_share * max(h.score for h in rivals):
+            return ripple
+        return replace(ripple, score=min(score, ripple.score))
+
+    def _recordings(self) -> list[Hypothesis]:
+        """What changed from one recording to the next."""
+        found = []
+        for kind in dict.fromkeys(c.kind for c in self.by_recording):
+            if any(c.kind == kind and some_recordings(c) for c in self.chosen):
+                continue
+            pool = [c for c in self.by_recording if c.kind == kind]
+            chosen = choose(pool, lambda more: self.tester([*self.chosen, *more]), self.significant)
+            chosen = [c for c in chosen if self._can_be(c, chosen)]
+            if chosen:
+                found += self._same_or_own(chosen)
+        return self._finals(found)
+
+    def _can_be(self, candidate: Candidate, chosen: Sequence[Candidate]) -> bool:
+        """Whether a candidate's coefficients have a sign that its effect can have."""
+        others = [*self.chosen, *(c for c in chosen if c is not candidate)]
+        coefficients = self.tester(others).test(candidate.rows).coefficients
+        return not np.any(coefficients * candidate.term.signs < 0)
+
+    def _same_or_own(self, chosen: Sequence[Candidate]) -> list[list[Candidate]]:
+        """Effects of few recordings by their name, those of many without one.
+
+        Sizes of its own in many recordings are what any slow torque that is missing leaves, unless
+        what remains of the joint is white.
+        """
+        most, white = self.settings.most_recordings, self.settings.white
+        few, many = [], []
+        for part in grouped_by_joints(chosen):
+            named = len(part) <= most or self._price(part) <= white
+            few += part if named else []
+            many += [] if named else part
+        many = [replace(c, kind=UNKNOWN, variables=("trajectory",)) for c in many]
+        return [part for part in (few, many) if part]

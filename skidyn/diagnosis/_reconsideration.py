@@ -1,0 +1,268 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Findings beside each other: two names for one function, earlier findings again, withdrawals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from skidyn.diagnosis._acceptance import JudgingSearch
+from skidyn.diagnosis._candidates import Candidate
+from skidyn.diagnosis._hypothesis import (
+    UNKNOWN,
+    Hypothesis,
+    Step,
+    close_shapes,
+    family_of,
+    margin_over,
+    rivals_among,
+    uses_the_fit,
+    within_recordings,
+)
+from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
+
+
+class ReconsideringSearch(JudgingSearch):
+    """A search that judges findings beside each other."""
+
+    def accepted(self, ranking: list[Hypothesis]) -> Hypothesis | None:
+        """The best explanation that the rule accepts, with the terms that it accepts."""
+        offered = ranking
+        ranking = list(ranking)
+        while (best := self.pick(ranking)) is not None:
+            ranking.remove(best)
+            if self._richer_known(best):
+                continue
+            best = self._first_of_two_names(best, offered)
+            simpler = self._at_its_limit(best)
+            judged = None if simpler is None else self.judged(simpler)
+            if judged is not None and self.shadow(judged):
+                judged = self._beside_another_kind(judged)
+            if judged is not None:
+                rivals = rivals_among(judged, offered)
+                margin, alike = margin_over(judged, rivals), self._alike(judged, rivals)
+                return replace(judged, margin=margin, alike=alike)
+        return None
+
+    def _first_of_two_names(self, best: Hypothesis, ranking: list[Hypothesis]) -> Hypothesis:
+        """A nameless function, or the first of two known effects that together do as well."""
+        if (
+            best.kind != UNKNOWN
+            or best.errors is None
+            or within_recordings(best)
+            or self._reconsidering
+        ):
+            return best
+        joints = list(best.joints)
+        left = best.errors.sum(0)
+        weight = 1 / np.maximum(left[joints], 1e-300)
+        removed = left * np.expm1(np.maximum(best.gain, 0) / self._counts)
+        tolerated = self.settings.form_tolerance * float(weight @ removed[joints])
+        rivals = [
+            h
+            for h in ranking
+            if h.kind != UNKNOWN
+            and h.errors is not None
+            and not within_recordings(h)
+            and set(joints) <= set(h.joints)
+        ]
+        for rival in rivals[: self.settings.refined]:
+            first = self.judged(rival)
+            if first is None:
+                continue
+            kept = self._state()
+            self.add(first)
+            self.refit()
+            self.sigma = self.fit.noise
+            known = sorted(self._greedy_by_kind(nameless=False), key=lambda item: item[1])
+            second = [
+                h
+                for h in self._finals([c for c, _ in known[: self.settings.refined]])
+                if set(joints) <= set(h.joints)
+            ]
+            errors = [h.errors.sum(0) for h in second if h.errors is not None]
+            self._restore(kept)
+            if any(float(weight @ (e - left)[joints]) <= tolerated for e in errors):
+                return rival
+        return best
+
+    def reconsider(self, newest: Hypothesis, steps: list[Step]) -> None:
+        """Let every kind compete again for what earlier findings explain, beside the newest."""
+        for old in [h for h in self.findings if h is not newest and h.torque is None]:
+            step = self._competed_again(old)
+            if step is not None:
+                steps[:] = [step if s.added is old else s for s in steps]
+                newest = self._settled(newest, steps)
+            elif set(old.joints) & set(newest.joints):
+                self._settled(old, steps)
+
+    def _competed_again(self, old: Hypothesis) -> Step | None:
+        """Put what now wins in the place of an earlier finding: another kind, or a better shape."""
+        kept = self._state()
+        place = self.findings.index(old)
+        self.findings.remove(old)
+        self.chosen = [c for c in self.chosen if c not in old.candidates]
+        taken = {c.site for c in self.chosen}
+        self.pool = [c for c in self.whole_pool if c.site not in taken]
+        self.refit()
+        self.sigma, self.left = self.fit.noise, self._left()
+        self._reconsidering = True
+        ranking = self.rank()
+        best = self.accepted(ranking)
+        self._reconsidering = False
+        again = self._finals([list(old.candidates)])
+        known = best is not None and best.kind != UNKNOWN
+        if best is not None and best.kind == old.kind == UNKNOWN:
+            best = self._name_in_place(old, ranking, kept)
+            known = best is not None
+            again = []
+        if best is None or not known or any(h.score >= best.score for h in again):
+            self._restore(kept)
+            return None
+        self.add(best)
+        self.findings.insert(place, self.findings.pop())
+        self.refit()
+        self.sigma, self.left = self.fit.noise, self._left()
+        return Step([best, *(h for h in ranking if h.kind != best.kind)], best)
+
+    def _name_in_place(
+        self, old: Hypothesis, ranking: Sequence[Hypothesis], kept: tuple[Any, ...]
+    ) -> Hypothesis | None:
+        """A known effect that does as well as a nameless one beside what was found later."""
+        joints = list(old.joints)
+        bare, with_old = self.left, kept[5]
+        weight = 1 / np.maximum(with_old[joints], 1e-300)
+        tolerated = self.settings.form_tolerance * float(weight @ (bare - with_old)[joints])
+        rivals = [h for h in ranking if h.kind != UNKNOWN and not within_recordings(h)]
+        for rival in [h for h in rivals if set(joints) <= set(h.joints)][: self.settings.refined]:
+            first = self.judged(rival)
+            if first is None:
+                continue
+            before = self._state()
+            self.add(first)
+            self.refit()
+            for other in [h for h in self.findings if any(map(uses_the_fit, h.candidates))]:
+                self._settled(other, [])
+            left = self._left()
+            self._restore(before)
+            if float(weight @ (left - with_old)[joints]) <= tolerated:
+                return first
+        return None
+
+    def _beside_another_kind(self, shadow: Hypothesis) -> Hypothesis | None:
+        """What looks like the shadow of an earlier finding, if that was the wrong kind.
+
+        Two effects on one joint may first look like a third one, beside which the second of them is
+        small.
+        """
+        if self._reconsidering or shadow.kind == UNKNOWN or within_recordings(shadow):
+            return None
+        own = set(shadow.joints)
+        for old in [h for h in self.findings if h.torque is None and own & set(h.joints)]:
+            kept = self._state()
+            before = self.left
+            self.add(shadow)
+            self.refit()
+            if self._competed_again(old) is not None:
+                counts = self.problem.rows.counts
+                gain = float(log_likelihood_gain(before[None], self.left[None], counts).sum())
+                added = sum(h.n_parameters for h in self.findings)
+                added -= sum(h.n_parameters for h in kept[1])
+                if gain - 2 * self._price(self.chosen) * added > self.settings.least_gain:
+                    self.findings = [h for h in self.findings if h is not shadow]
+                    self.chosen = [c for c in self.chosen if c not in shadow.candidates]
+                    self.refit()
+                    self.sigma, self.left = self.fit.noise, self._left()
+                    for found in self._finals([list(shadow.candidates)]):
+                        return self.judged(found)
+            self._restore(kept)
+        return None
+
+    def withdraw(self, newest: Hypothesis | None = None) -> None:
+        """Take back what no longer holds beside all that was added after it."""
+        for old in [h for h in self.findings if h is not newest and h.torque is None]:
+            without = [c for c in self.chosen if c not in old.candidates]
+            richer = newest is not None and family_of(old) == family_of(newest) != ""
+            if richer and newest is not None and old.joints == newest.joints:
+                # A richer member of the family takes the place of the simpler one.
+                self._replace(old, (), without)
+                newest = self._refined_anew(newest)
+                continue
+            together = len(old.candidates) > 2 and within_recordings(old)
+            kept = tuple(
+                c
+                for c in old.candidates
+                if (chance := self.chance(c, [o for o in self.chosen if o is not c]))
+                <= self.settings.member
+                and (together or self.significant(chance, c.kind))
+            )
+            if kept and newest is not None and self._needless(old, without):
+                kept = ()
+            if len(kept) < len(old.candidates):
+                self._replace(old, kept, without)
+
+    def _refined_anew(self, finding: Hypothesis) -> Hypothesis:
+        """A finding with its shapes found again, now that others have changed."""
+        if finding.torque is not None or not any(c.n_shapes for c in finding.candidates):
+            return finding
+        others = [c for c in self.chosen if c not in finding.candidates]
+        own = [self.problem.term_rows(term) for term in self.problem.terms]
+        blocks = [*own, *(c.rows for c in others)]
+        better = tuple(
+            refine(self.problem, blocks, finding.candidates, self.fit.noise, self.target)
+        )
+        place = self.findings.index(finding)
+        self.findings[place] = replace(finding, candidates=better)
+        self.chosen = [*others, *better]
+        self.refit()
+        return self.findings[place]
+
+    def _settled(self, finding: Hypothesis, steps: list[Step]) -> Hypothesis:
+        """A finding with its shapes found again; until they stay if its columns follow the fit."""
+        follows = any(map(uses_the_fit, finding.candidates))
+        for _ in range(self.settings.repeated if follows else 1):
+            shapes = [c.term.shape for c in finding.candidates]
+            newer = self._refined_anew(finding)
+            steps[:] = [replace(s, added=newer) if s.added is finding else s for s in steps]
+            finding = newer
+            if all(
+                close_shapes(a, c.term.shape) for a, c in zip(shapes, newer.candidates, strict=True)
+            ):
+                break
+        return finding
+
+    def _needless(self, old: Hypothesis, without: list[Candidate]) -> bool:
+        """Whether an earlier finding became the shadow of others."""
+        within = within_recordings(old)
+        errors = [
+            profile_error(
+                self.problem,
+                [*map(self.problem.term_rows, self.problem.terms), *(c.rows for c in some)],
+                self.sigma,
+                self.target,
+                within=within,
+            )
+            for some in (without, self.chosen)
+        ]
+        before, after = (e.sum(0) for e in errors)
+        joints = sorted({j for c in old.candidates for j in c.rows})
+        gain = self._counts * np.log(np.maximum(before, 1e-300) / np.maximum(after, 1e-300))
+        least = self._tolerance * (self.start - after)
+        return self._mostly_small(joints, gain, before - after, least)
+
+    def _replace(
+        self, old: Hypothesis, kept: tuple[Candidate, ...], without: list[Candidate]
+    ) -> None:
+        self.chosen = [*without, *kept]
+        place = self.findings.index(old)
+        if kept:
+            chances = tuple(
+                p for c, p in zip(old.candidates, old.chances, strict=True) if c in kept
+            )
+            self.findings[place] = replace(old, candidates=kept, chances=chances)
+        else:
+            del self.findings[place]
+        self.refit()

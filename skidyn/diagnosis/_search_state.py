@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a search knows: the model so far, its fit, the pool of candidates, and tests beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from operator import is_not
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidyn._signals import Array
+from skidyn.diagnosis._candidates import Candidate, catalogue_candidates
+from skidyn.diagnosis._hypothesis import (
+    UNKNOWN,
+    Hypothesis,
+    uses_the_fit,
+)
+from skidyn.diagnosis._nameless_candidates import nameless_candidates
+from skidyn.diagnosis._profile import profile_error
+from skidyn.diagnosis._recordings import recording_candidates
+from skidyn.diagnosis._rule import (
+    Settings,
+    Tester,
+    false_discovery_rate,
+    variance_inflation,
+)
+from skidyn.evidence import Problem
+
+
+class SearchState:
+    """The model so far, and what it leaves."""
+
+    def __init__(
+        self, problem: Problem, kinds: Sequence[str], settings: Settings, nameless: bool
+    ) -> None:
+        self.problem = problem
+        self.settings = settings
+        self.kinds = list(kinds)
+        self.vibration = nameless
+        self.ripple = np.zeros_like(problem.torque)
+        self.chosen: list[Candidate] = []
+        self.findings: list[Hypothesis] = []
+        base = problem.fit_own()
+        self.fit = base
+        self.pool = catalogue_candidates(problem, self.kinds)
+        if nameless and settings.max_findings:
+            self.pool += nameless_candidates(problem, problem.torque - problem.explained(base))
+        self.by_recording = recording_candidates(problem, self.kinds)
+        self.n_tests = max(1, len(self.pool) + len(self.by_recording))
+        self.whole_pool = self.pool
+        self.start = self.left = np.zeros(problem.n_joints)
+        self._reconsidering = False
+        self._kept_tester: tuple[list[Array], Tester | None] = ([], None)
+
+    @property
+    def target(self) -> list[Array]:
+        rows, torque = self.problem.rows, self.problem.torque - self.ripple
+        return [rows.average(torque[:, j], j) for j in range(self.problem.n_joints)]
+
+    @property
+    def blocks(self) -> list[dict[int, Array]]:
+        own = [self.problem.term_rows(term) for term in self.problem.terms]
+        return own + [c.rows for c in self.chosen]
+
+    def refit(self) -> None:
+        problem = replace_torque(self.problem, self.problem.torque - self.ripple)
+        terms = (*self.problem.terms, *(c.term for c in self.chosen))
+        self.fit = problem.fit(terms, sigma=self.fit.noise)
+        if not any(uses_the_fit(c) for c in self.chosen):
+            return
+        # Their columns were made with the model as it was without them, which had bent toward them.
+        for _ in range(self.settings.repeated):
+            before = self.fit.noise
+            self.problem.set_fit(self.fit)
+            for candidate in filter(uses_the_fit, self.chosen):
+                candidate.rows.update(self.problem.term_rows(candidate.term))
+            problem = replace_torque(self.problem, self.problem.torque - self.ripple)
+            self.fit = problem.fit(terms, sigma=before)
+            if np.allclose(self.fit.noise, before, rtol=0.01):
+                break
+
+    @property
+    def _round(self) -> str:
+        return f"Round {len(self.findings) + 1}"
+
+    def _state(self) -> tuple[Any, ...]:
+        return (
+            self.chosen,
+            list(self.findings),
+            self.pool,
+            self.ripple,
+            self.sigma,
+            self.left,
+            self.start,
+        )
+
+    def _restore(self, state: tuple[Any, ...]) -> None:
+        self.chosen, self.findings, self.pool, self.ripple, self.sigma, self.left, self.start = (
+            state
+        )
+        self.refit()
+
+    def add(self, best: Hypothesis) -> None:
+        if best.torque is not None:
+            self.ripple = self.ripple + best.torque
+        else:
+            self.chosen = [*self.chosen, *best.candidates]
+        self.findings.append(best)
+        taken = {c.site for c in best.candidates}
+        self.pool = [c for c in self.pool if c.site not in taken]
+
+    def significant(self, chance: float, kind: str = "") -> bool:
+        """Whether a candidate is more than chance among all that were tried."""
+        return false_discovery_rate(chance, self.tried(kind)) <= self.settings.level
+
+    def tried(self, kind: str) -> int:
+        """Candidates tried; nameless ones were chosen among products of functions as well."""
+        return self.n_tests * (self.settings.nameless_tried if kind == UNKNOWN else 1)
+
+    def chance(self, candidate: Candidate, others: Sequence[Candidate]) -> float:
+        """Chance of a candidate's coefficients beside the model and other candidates."""
+        return self.tester(others).test(candidate.rows, candidate.zeros).chance
+
+    def tester(self, others: Sequence[Candidate]) -> Tester:
+        """Tests beside the model and some candidates; the last one is kept for the next call."""
+        own = [self.problem.term_rows(term) for term in self.problem.terms]
+        blocks = [*own, *(c.rows for c in others)]
+        made_of = [self.sigma, self.ripple, *(b[j] for b in blocks for j in b)]
+        kept, tester = self._kept_tester
+        if tester is None or len(kept) != len(made_of) or any(map(is_not, kept, made_of)):
+            tester = Tester(self.problem, blocks, self.sigma, self.target)
+            self._kept_tester = made_of, tester
+        return tester
+
+    def _left(self) -> Array:
+        """Held-out squared error of every joint with all that was found so far."""
+        errors = profile_error(self.problem, self.blocks, self.sigma, self.target)
+        left: Array = errors.sum(0)
+        return left
+
+    @property
+    def _counts(self) -> NDArray[np.int64]:
+        return np.maximum(self.problem.rows.counts, 1)
+
+    def _errors(self, hypothesis: Hypothesis, within: bool) -> Array:
+        """Held-out errors of an explanation on the folds of single recordings, or of all."""
+        blocks = [*self.blocks, *(c.rows for c in hypothesis.candidates)]
+        soft = [c.term.effect.softness for c in hypothesis.candidates]
+        return profile_error(
+            self.problem, blocks, self.sigma, self.target, within=within, soft=soft
+        )
+
+    def _price(self, candidates: Sequence[Candidate], others: Sequence[Candidate] = ()) -> float:
+        """Price of a parameter: the inflation of the variance that is left after candidates."""
+        fitted = self.tester([*self.chosen, *others, *candidates])
+        joints = sorted({j for c in candidates for j in c.joints})
+        left = [fitted.residual[j] for j in joints]
+        return float(np.max(variance_inflation(self.problem, left, joints)))
+
+    def _n_parameters(self, candidates: Sequence[Candidate]) -> int:
+        # What a tool carries is told by its first coefficients; the others ride along.
+        count = sum((c.term.effect.leading or c.width) + c.n_shapes for c in candidates)
+        if any("trajectories" in c.term.shape for c in candidates):
+            count += len(np.unique(self.problem.signals.trajectory)) // 2
+        return count
+
+
+def replace_torque(problem: Problem, torque: Array) -> Problem:
+    """The same problem with another torque to explain."""
+    return replace(problem, torque=torque)
