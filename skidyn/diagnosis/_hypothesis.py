@@ -122,6 +122,7 @@ def some_recordings(candidate: Candidate) -> bool:
 
 
 def grouped_by_joints(candidates: Sequence[Candidate]) -> list[list[Candidate]]:
+    """Candidates of the same joints together, in the order of their first ones."""
     parts: dict[tuple[int, ...], list[Candidate]] = {}
     for candidate in candidates:
         parts.setdefault(candidate.joints, []).append(candidate)
@@ -129,6 +130,7 @@ def grouped_by_joints(candidates: Sequence[Candidate]) -> list[list[Candidate]]:
 
 
 def is_vibration(hypothesis: Hypothesis) -> bool:
+    """Whether it is a wave in time that no known effect causes."""
     return hypothesis.kind == UNKNOWN and hypothesis.torque is not None
 
 
@@ -140,6 +142,7 @@ def says_little(hypothesis: Hypothesis) -> bool:
 
 
 def within_recordings(hypothesis: Hypothesis) -> bool:
+    """Whether a term of it acts in some recordings only, so that folds lie within recordings."""
     return any(map(some_recordings, hypothesis.candidates))
 
 
@@ -153,9 +156,8 @@ def rivals_among(best: Hypothesis, ranking: Sequence[Hypothesis]) -> list[Hypoth
         if h.kind != best.kind
         and own & set(h.joints)
         and (not family or family_of(h) != family)
-        and (
-            within_recordings(best) or not within_recordings(h)
-        )  # errors of single recordings are smaller
+        # Errors of single recordings are smaller.
+        and (within_recordings(best) or not within_recordings(h))
         and not is_vibration(h)
     ]
 
@@ -168,15 +170,18 @@ def margin_over(best: Hypothesis, rivals: Sequence[Hypothesis]) -> float:
 
 
 def family_of(hypothesis: Hypothesis) -> str:
+    """Family of its kind, empty for none."""
     return "" if hypothesis.kind == UNKNOWN else get_effect(hypothesis.kind).family
 
 
 def simplicity_of(hypothesis: Hypothesis) -> int:
+    """Rank of its kind among rivals that explain as much; the lower is named."""
     if hypothesis.kind == UNKNOWN:
         return 100
     return get_effect(hypothesis.kind).simplicity
 
 
 def uses_the_fit(candidate: Candidate) -> bool:
+    """Whether its columns follow the fit of the model that it is part of."""
     effect = candidate.term.effect
     return bool({"robot", "model_torque"} & set(effect.needs)) and effect.search == "grid"
