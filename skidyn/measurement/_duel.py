@@ -260,7 +260,7 @@ class _Bodies:
         narrowed = 0.5 * float(np.linalg.slogdet(gram[bodies, bodies] * share**2)[1])
         return _Fit(sum(alike) - departure - narrowed, gram, weights, residuals, scales)
 
-    def promise(self, extra: _Columns, factor: tuple[Array, bool]) -> float:
+    def promise(self, extra: _Columns, factor: _Factored) -> float:
         """About what columns gain: with the weights of the fit without them."""
         m, plain = extra.count, self.plain
         own, right, cross = np.zeros((m, m)), np.zeros(m), np.zeros((self.size, m))
@@ -271,7 +271,7 @@ class _Bodies:
                 own += weighted.T @ columns
                 right += weighted.T @ plain.residuals[k]
                 cross[self.places[k]] += self.designs[k].T @ weighted
-        left = own - cross.T @ cho_solve(factor, cross)
+        left = own - cross.T @ factor.solve(cross)
         left[np.diag_indices(m)] += 1e-6 * np.trace(own) / m + 1e-300
         return 0.5 * float(right @ np.linalg.solve(left, right))
 
@@ -286,6 +286,24 @@ def sizes(robot: Robot) -> Array:
     return np.asarray(mass[:, None] * length[:, None] ** POWERS).ravel()
 
 
+#: Added to the diagonal of normal equations of unit size: a hundred times what rounding takes.
+ROUNDING = 1e-10
+
+
+class _Factored:
+    """Normal equations, solved in units in which every column has size one."""
+
+    def __init__(self, gram: Array) -> None:
+        self.scale = 1 / np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
+        even = gram * self.scale * self.scale[:, None]
+        even[np.diag_indices(len(even))] += ROUNDING
+        self.factor = cho_factor(even)
+
+    def solve(self, right: Array) -> Array:
+        scale = self.scale if right.ndim == 1 else self.scale[:, None]
+        return np.asarray(scale * cho_solve(self.factor, scale * right))
+
+
 def _solved(gram: Array, right: Array, positive: Sequence[int]) -> Array:
     """Least squares in which coefficients that would be negative and must not are left out."""
     free = np.ones(len(right), dtype=bool)
@@ -293,7 +311,7 @@ def _solved(gram: Array, right: Array, positive: Sequence[int]) -> Array:
     for _ in range(len(positive) + 1):
         use = np.flatnonzero(free)
         found = np.zeros(len(right))
-        found[use] = cho_solve(cho_factor(gram[np.ix_(use, use)]), right[use])
+        found[use] = _Factored(gram[np.ix_(use, use)]).solve(right[use])
         negative = [k for k in positive if found[k] < 0]
         if not negative:
             break
@@ -318,7 +336,7 @@ def _likely(
 
     Where rows are given, the effects are those that may act in one recording alone, in them.
     """
-    factor = cho_factor(bodies.plain.gram)
+    factor = _Factored(bodies.plain.gram)
     promising = []
     for effect in _effects():
         if rows is not None and not (effect.by_recording or effect.search == "trajectories"):

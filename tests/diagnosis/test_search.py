@@ -51,3 +51,29 @@ def test_fast_motion_under_a_precise_torque_makes_no_joint_elastic():
     log = make_hidden_effect_log(load_scara(), None, noise="low", random_state=1022)
 
     assert found_in(load_scara(), log.X, log.y) == {}
+
+
+def test_a_limit_of_the_drive_is_read_although_the_friction_had_bent_toward_it(arm_log):
+    torque = np.array(arm_log.y)
+    limit = 0.55 * np.abs(torque[:, 1]).max()
+    torque[:, 1] = np.clip(torque[:, 1], -limit, limit)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        (finding,) = diagnose(RBDRegressor(load_planar_arm()), arm_log.X, torque).findings
+
+    assert (finding.kind, finding.joints) == ("saturation", (2,))
+    assert finding.parameters["limit"]["value"] == pytest.approx(limit, rel=0.02)
+    assert finding.parameters["share"]["value"] == pytest.approx(1.0, abs=0.05)
+
+
+def test_friction_that_falls_while_a_gear_warms_up_is_one_drift(arm_log):
+    time, dq = arm_log.X["time"].to_numpy(), arm_log.X["dq1"].to_numpy()
+    since = time - time.min()
+    warm = 1 - np.exp(-since / (0.3 * np.ptp(time)))
+    torque = np.array(arm_log.y)
+    torque[:, 0] -= 0.8 * warm * dq
+
+    kinds = found_in(load_planar_arm(), arm_log.X, torque)
+
+    assert kinds == {"friction_drift": {1}}
