@@ -121,7 +121,9 @@ def _verdict(
     lines = _grouped(cards)
     if lines:
         nameless = [line for line in lines if line["kind"] == "unknown"]
-        named = len(lines) - len(nameless)
+        guesses = [line for line in lines if line["guess"] and line not in nameless]
+        told = [line for line in lines if line not in guesses]
+        named = len(told) - len(nameless)
         mark = "?" if nameless or material else "!"
         text = (
             "Judged on data that the fit has not seen, adding "
@@ -132,15 +134,22 @@ def _verdict(
             if material
             else ""
         )
-        best = max(lines, key=lambda line: line["fell"])
-        top = f"{_brief(best['what'])} on {best['where']}"
-        if named and not nameless and all(line["guess"] for line in lines):
+        best = max(told or lines, key=lambda line: line["fell"])
+        top = _what_and_where(best)
+        if not told:
             joints = sorted({joint for line in lines for joint in line["joints"]})
             text = f"Something is missing on {joints_told(joints)}; best guess: {top}{open_ends}"
             return "?", text, "No name is sure; a recording of more or other motion could decide."
         if len(lines) <= SHORT:
-            told = [f"{_brief(line['what'])} on {line['where']}" for line in lines]
-            return mark, f"Missing: {listed(told)}{open_ends}", text
+            perhaps = f"; perhaps {listed([*map(_what_and_where, guesses)])}" if guesses else ""
+            return (
+                mark,
+                f"Missing: {listed([*map(_what_and_where, told)])}{perhaps}{open_ends}",
+                text,
+            )
+        if guesses:
+            verb = "is a guess" if len(guesses) == 1 else "are guesses"
+            open_ends = f"; {len(guesses)} more {verb}{open_ends}"
         what = [f"{named} known effect{'s' if named > 1 else ''}"] if named else []
         what += ["something without a name"] if nameless else []
         verb = "is" if named + bool(nameless) == 1 else "are"
@@ -161,6 +170,10 @@ def _verdict(
     else:
         text = "On every joint the error on data that the fit has not seen is like the noise."
     return "✓", "Nothing significant is missing", text
+
+
+def _what_and_where(line: dict[str, Any]) -> str:
+    return f"{_brief(line['what'])} on {line['where']}"
 
 
 def _brief(title: str) -> str:

@@ -128,3 +128,10 @@ def test_sizes_of_several_joints_are_those_of_a_parameter_that_is_not_zero(missi
     story = dataclasses.replace(missing, findings=[finding, other], history=history).story()
     (line,) = story["findings"]
     assert line["size"].startswith("k3 = 2.00 ± 0.40") and "k1" not in line["size"]
+
+
+def test_a_guess_beside_a_sure_name_does_not_lead_the_headline(missing):
+    sure = missing.findings[0]
+    guess = dataclasses.replace(sure, kind="viscous", title="Viscous friction", confidence=0.1)
+    story = dataclasses.replace(missing, findings=[guess, sure]).story()
+    assert story["headline"] == "Missing: spring on joint 2; perhaps viscous friction on joint 2"
