@@ -74,11 +74,34 @@ class JudgingSearch(RankingSearch):
             errors = rival.errors
             if errors.shape != best.errors.shape:
                 errors = self._errors(rival, within=single)
-            weight = 1 / np.maximum(left[joints], 1e-300)
-            behind = float(weight @ (errors.sum(0) - left)[joints])
-            if behind <= self.settings.form_tolerance * float(weight @ removed[joints]):
+            if self._good_enough(errors.sum(0), left, removed, joints):
                 return rival
         return best
+
+    def _good_enough(
+        self, errors: Array, least: Array, removed: Array, joints: Sequence[int]
+    ) -> bool:
+        """Whether a name leaves no more than its formula may leave of what a function removes.
+
+        Parameters
+        ----------
+        errors : ndarray of shape (n_joints,)
+            Held-out squared error with the name.
+        least : ndarray of shape (n_joints,)
+            That with the function.
+        removed : ndarray of shape (n_joints,)
+            Squared error that the function removes.
+        joints : sequence of int
+            Joints, from 0, on which they are compared, each in units of what is left there.
+
+        Returns
+        -------
+        bool
+        """
+        own = list(joints)
+        weight = 1 / np.maximum(least[own], 1e-300)
+        behind = float(weight @ (errors - least)[own])
+        return behind <= self.settings.form_tolerance * float(weight @ removed[own])
 
     def _simplest_of_family(self, best: Hypothesis, ranking: list[Hypothesis]) -> Hypothesis:
         """Members of a family differ only in motion made for it: the simplest near one is named."""

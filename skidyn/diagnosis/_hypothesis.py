@@ -11,7 +11,7 @@ import numpy as np
 
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
-from skidyn.effects import get_effect
+from skidyn.effects import Term, get_effect
 from skidyn.evidence import Fit
 
 UNKNOWN = "unknown"
@@ -144,6 +144,11 @@ def says_little(hypothesis: Hypothesis) -> bool:
 def within_recordings(hypothesis: Hypothesis) -> bool:
     """Whether a term of it acts in some recordings only, so that folds lie within recordings."""
     return any(map(some_recordings, hypothesis.candidates))
+
+
+def terms_on_rows(findings: Sequence[Hypothesis]) -> list[Term]:
+    """Terms of findings but lines of a spectrum, which are taken off at every sample."""
+    return [c.term for h in findings if h.torque is None for c in h.candidates]
 
 
 def rivals_among(best: Hypothesis, ranking: Sequence[Hypothesis]) -> list[Hypothesis]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
+from skidyn._signals import Array
 from skidyn.diagnosis._acceptance import JudgingSearch
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._hypothesis import (
@@ -56,20 +56,10 @@ class ReconsideringSearch(JudgingSearch):
             or self._reconsidering
         ):
             return best
-        joints = list(best.joints)
         left = best.errors.sum(0)
-        weight = 1 / np.maximum(left[joints], 1e-300)
         removed = left * np.expm1(np.maximum(best.gain, 0) / self._counts)
-        tolerated = self.settings.form_tolerance * float(weight @ removed[joints])
-        rivals = [
-            h
-            for h in ranking
-            if h.kind != UNKNOWN
-            and h.errors is not None
-            and not within_recordings(h)
-            and set(joints) <= set(h.joints)
-        ]
-        for rival in rivals[: self.settings.refined]:
+        rivals = [h for h in ranking if h.errors is not None]
+        for rival in self._names_on(best.joints, rivals):
             first = self.judged(rival)
             if first is None:
                 continue
@@ -81,13 +71,18 @@ class ReconsideringSearch(JudgingSearch):
             second = [
                 h
                 for h in self._finals([c for c, _ in known[: self.settings.refined]])
-                if set(joints) <= set(h.joints)
+                if set(best.joints) <= set(h.joints)
             ]
             errors = [h.errors.sum(0) for h in second if h.errors is not None]
             self._restore(kept)
-            if any(float(weight @ (e - left)[joints]) <= tolerated for e in errors):
+            if any(self._good_enough(e, left, removed, best.joints) for e in errors):
                 return rival
         return best
+
+    def _names_on(self, joints: Sequence[int], ranking: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """The best few known effects that act on some joints in every recording."""
+        names = [h for h in ranking if h.kind != UNKNOWN and not within_recordings(h)]
+        return [h for h in names if set(joints) <= set(h.joints)][: self.settings.refined]
 
     def reconsider(self, newest: Hypothesis, steps: list[Step]) -> None:
         """Let every kind compete again for what earlier findings explain, beside the newest."""
@@ -116,7 +111,7 @@ class ReconsideringSearch(JudgingSearch):
         again = self._finals([list(old.candidates)])
         known = best is not None and best.kind != UNKNOWN
         if best is not None and best.kind == old.kind == UNKNOWN:
-            best = self._name_in_place(old, ranking, kept)
+            best = self._name_in_place(old, ranking, kept.left)
             known = best is not None
             again = []
         if best is None or not known or any(h.score >= best.score for h in again):
@@ -129,15 +124,11 @@ class ReconsideringSearch(JudgingSearch):
         return Step([best, *(h for h in ranking if h.kind != best.kind)], best)
 
     def _name_in_place(
-        self, old: Hypothesis, ranking: Sequence[Hypothesis], kept: tuple[Any, ...]
+        self, old: Hypothesis, ranking: Sequence[Hypothesis], with_old: Array
     ) -> Hypothesis | None:
         """A known effect that does as well as a nameless one beside what was found later."""
-        joints = list(old.joints)
-        bare, with_old = self.left, kept[5]
-        weight = 1 / np.maximum(with_old[joints], 1e-300)
-        tolerated = self.settings.form_tolerance * float(weight @ (bare - with_old)[joints])
-        rivals = [h for h in ranking if h.kind != UNKNOWN and not within_recordings(h)]
-        for rival in [h for h in rivals if set(joints) <= set(h.joints)][: self.settings.refined]:
+        removed = self.left - with_old
+        for rival in self._names_on(old.joints, ranking):
             first = self.judged(rival)
             if first is None:
                 continue
@@ -148,7 +139,7 @@ class ReconsideringSearch(JudgingSearch):
                 self._settled(other, [])
             left = self._left()
             self._restore(before)
-            if float(weight @ (left - with_old)[joints]) <= tolerated:
+            if self._good_enough(left, with_old, removed, old.joints):
                 return first
         return None
 
@@ -170,7 +161,7 @@ class ReconsideringSearch(JudgingSearch):
                 counts = self.problem.rows.counts
                 gain = float(log_likelihood_gain(before[None], self.left[None], counts).sum())
                 added = sum(h.n_parameters for h in self.findings)
-                added -= sum(h.n_parameters for h in kept[1])
+                added -= sum(h.n_parameters for h in kept.findings)
                 if gain - 2 * self._price(self.chosen) * added > self.settings.least_gain:
                     self.findings = [h for h in self.findings if h is not shadow]
                     self.chosen = [c for c in self.chosen if c not in shadow.candidates]
@@ -209,8 +200,7 @@ class ReconsideringSearch(JudgingSearch):
         if finding.torque is not None or not any(c.n_shapes for c in finding.candidates):
             return finding
         others = [c for c in self.chosen if c not in finding.candidates]
-        own = [self.problem.term_rows(term) for term in self.problem.terms]
-        blocks = [*own, *(c.rows for c in others)]
+        blocks = self.blocks_with(others)
         better = tuple(
             refine(self.problem, blocks, finding.candidates, self.fit.noise, self.target)
         )
@@ -228,9 +218,8 @@ class ReconsideringSearch(JudgingSearch):
             newer = self._refined_anew(finding)
             steps[:] = [replace(s, added=newer) if s.added is finding else s for s in steps]
             finding = newer
-            if all(
-                close_shapes(a, c.term.shape) for a, c in zip(shapes, newer.candidates, strict=True)
-            ):
+            again = [c.term.shape for c in newer.candidates]
+            if all(map(close_shapes, shapes, again)):
                 break
         return finding
 
@@ -239,11 +228,7 @@ class ReconsideringSearch(JudgingSearch):
         within = within_recordings(old)
         errors = [
             profile_error(
-                self.problem,
-                [*map(self.problem.term_rows, self.problem.terms), *(c.rows for c in some)],
-                self.sigma,
-                self.target,
-                within=within,
+                self.problem, self.blocks_with(some), self.sigma, self.target, within=within
             )
             for some in (without, self.chosen)
         ]

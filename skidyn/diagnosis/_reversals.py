@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from skidyn.diagnosis._hypothesis import SearchResult
+from skidyn.diagnosis._hypothesis import SearchResult, terms_on_rows
 from skidyn.diagnosis._rule import (
     REVERSAL_AWAY,
     REVERSAL_FEWEST_ROWS,
@@ -74,8 +74,8 @@ def look_at_reversals(
         return problem, result
     # What was found among the sliding samples has to be found again, by the same name.
     joints = sorted(new | before)
-    known = [c.term for h in others if h.torque is None for c in h.candidates]
-    wider = with_reversals(problem, (*problem.terms, *known), joints)
+    terms = (*problem.terms, *terms_on_rows(others))
+    wider = with_reversals(problem, terms, joints)
     wider.torque = problem.torque - result.ripple
     gates = replace(settings, least_share=REVERSAL_LEAST_SHARE, max_findings=room)
     second = search(wider, family, gates, nameless=False, joints=joints)

@@ -7,15 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from skidyn.diagnosis._hypothesis import (
-    SearchResult,
-    Step,
-)
+from skidyn.diagnosis._hypothesis import SearchResult, Step
 from skidyn.diagnosis._reconsideration import ReconsideringSearch
-from skidyn.diagnosis._rule import (
-    Settings,
-    variance_inflation,
-)
+from skidyn.diagnosis._rule import Settings, variance_inflation
 from skidyn.evidence import Problem
 
 
@@ -57,6 +51,8 @@ def search(
 
 
 class _Search(ReconsideringSearch):
+    """The loop: rank, accept, add, withdraw, reconsider."""
+
     def run(self) -> SearchResult:
         steps = []
         for _ in range(self.settings.max_findings):

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from operator import is_not
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,18 @@ from skidyn.diagnosis._rule import (
 from skidyn.evidence import Problem
 
 
+class Kept(NamedTuple):
+    """What is put back where something was only tried."""
+
+    chosen: list[Candidate]
+    findings: list[Hypothesis]
+    pool: list[Candidate]
+    ripple: Array
+    sigma: Array
+    left: Array
+    start: Array
+
+
 class SearchState:
     """The model so far, and what it leaves."""
 
@@ -44,7 +56,7 @@ class SearchState:
         self.chosen: list[Candidate] = []
         self.findings: list[Hypothesis] = []
         base = problem.fit_own()
-        self.fit = base
+        self.fit, self.sigma = base, base.noise
         self.pool = catalogue_candidates(problem, self.kinds)
         if nameless and settings.max_findings:
             self.pool += nameless_candidates(problem, problem.torque - problem.explained(base))
@@ -62,8 +74,13 @@ class SearchState:
 
     @property
     def blocks(self) -> list[dict[int, Array]]:
+        """Columns of the model so far."""
+        return self.blocks_with(self.chosen)
+
+    def blocks_with(self, candidates: Sequence[Candidate]) -> list[dict[int, Array]]:
+        """Columns of the model as given, and of some candidates."""
         own = [self.problem.term_rows(term) for term in self.problem.terms]
-        return own + [c.rows for c in self.chosen]
+        return own + [c.rows for c in candidates]
 
     def refit(self) -> None:
         problem = replace_torque(self.problem, self.problem.torque - self.ripple)
@@ -86,8 +103,8 @@ class SearchState:
     def _round(self) -> str:
         return f"Round {len(self.findings) + 1}"
 
-    def _state(self) -> tuple[Any, ...]:
-        return (
+    def _state(self) -> Kept:
+        return Kept(
             self.chosen,
             list(self.findings),
             self.pool,
@@ -97,10 +114,9 @@ class SearchState:
             self.start,
         )
 
-    def _restore(self, state: tuple[Any, ...]) -> None:
-        self.chosen, self.findings, self.pool, self.ripple, self.sigma, self.left, self.start = (
-            state
-        )
+    def _restore(self, kept: Kept) -> None:
+        for name, value in kept._asdict().items():
+            setattr(self, name, value)
         self.refit()
 
     def add(self, best: Hypothesis) -> None:
@@ -126,8 +142,7 @@ class SearchState:
 
     def tester(self, others: Sequence[Candidate]) -> Tester:
         """Tests beside the model and some candidates; the last one is kept for the next call."""
-        own = [self.problem.term_rows(term) for term in self.problem.terms]
-        blocks = [*own, *(c.rows for c in others)]
+        blocks = self.blocks_with(others)
         made_of = [self.sigma, self.ripple, *(b[j] for b in blocks for j in b)]
         kept, tester = self._kept_tester
         if tester is None or len(kept) != len(made_of) or any(map(is_not, kept, made_of)):

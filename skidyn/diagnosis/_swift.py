@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from skidyn.diagnosis._hypothesis import Hypothesis, SearchResult
+from skidyn.diagnosis._hypothesis import Hypothesis, SearchResult, terms_on_rows
 from skidyn.diagnosis._rule import SHORT_WINDOW, Settings
 from skidyn.diagnosis._search import search
 from skidyn.effects import TermSum, get_effect
@@ -50,19 +50,19 @@ def look_at_swift(
     clocked = problem.signals.time is not None and problem.robot is not None
     if not swift or not clocked or problem.motion.rate * SHORT_WINDOW < FEWEST_SAMPLES:
         return problem, result
+    # A link that swings in the long windows, too, does not fly.
+    swings = {j for h in result.findings if h.kind in family for j in h.joints}
+    swings -= {j for h in result.findings if h.kind in swift for j in h.joints}
     others = result
     for _ in range(2):
         slow = [h for h in others.findings if h.kind not in family]
         room = settings.max_findings - len(slow)
         if room < 1:
             return problem, result
-        known = [c.term for h in slow if h.torque is None for c in h.candidates]
-        short = with_short_windows(problem, (*problem.terms, *known), SHORT_WINDOW)
+        terms = (*problem.terms, *terms_on_rows(slow))
+        short = with_short_windows(problem, terms, SHORT_WINDOW)
         short.torque = problem.torque - others.ripple
         moved = search(short, family, replace(settings, max_findings=room), nameless=False)
-        # A link that swings in the long windows, too, does not fly.
-        swings = {j for h in result.findings if h.kind in family for j in h.joints}
-        swings -= {j for h in result.findings if h.kind in swift for j in h.joints}
         if (
             not moved.findings
             or any(h.kind not in swift for h in moved.findings)
@@ -70,13 +70,13 @@ def look_at_swift(
         ):
             return problem, result
         # What was found before may have been the trace of this.
-        found = [c.term for h in moved.findings for c in h.candidates]
-        beside = replace(problem, terms=TermSum((*problem.terms, *found)), _cache={}, _thinned={})
+        found = terms_on_rows(moved.findings)
+        beside = replace(problem, terms=TermSum((*problem.terms, *found)), _cache={})
         gates = replace(settings, max_findings=settings.max_findings - len(moved.findings))
         others = search(beside, [k for k in kinds if k not in family], gates)
         if _sites(others.findings) == _sites(slow):
             break
-    known = [c.term for h in others.findings if h.torque is None for c in h.candidates]
+    known = terms_on_rows(others.findings)
     fit = short.fit((*problem.terms, *known, *found), sigma=moved.fit.sigma)
     short = replace(short, terms=problem.terms, torque=problem.torque)
     return short, replace(
