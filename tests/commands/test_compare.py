@@ -81,3 +81,15 @@ def test_compare_knows_joints_trajectories_and_regimes(capsys, run, arguments):
     }
     assert cli.main(["compare", *arguments]) == cli.DONE
     assert "reversal" in capsys.readouterr().out
+
+
+def test_traces_hold_a_recording_that_is_in_the_log_twice_once(here, capsys, tmp_path):
+    pytest.importorskip("mcap_ros2", reason="needs skidyn[io]")
+    frame = pandas.read_csv("log.csv")
+    again = frame[frame["trajectory"] == frame["trajectory"].min()]
+    again = again.assign(trajectory=99, time=again["time"] + 1000.0)
+    pandas.concat([frame, again]).to_csv(tmp_path / "twice.csv", index=False)
+    file = tmp_path / "errors.mcap"
+    words = ["compare", str(tmp_path / "twice.csv"), *LOG[1:], "--traces", str(file)]
+    assert cli.main(words) == cli.DONE
+    assert "in the log twice" in capsys.readouterr().out and file.exists()
