@@ -15,9 +15,11 @@ other kind chosen is a false alarm.
 from __future__ import annotations
 
 import argparse
+import sys
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -31,6 +33,10 @@ from skidyn.diagnosis import catalogue_candidates, diagnose
 from skidyn.effects import list_effects, make_terms
 from skidyn.evidence import Problem, make_problem
 from skidyn.identification import RBDRegressor
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "suite"))
+sys.path.append(str(Path(__file__).resolve().parents[1] / "peers"))
+from stepwise_bic import forward_selection
 
 ROBOTS = {"planar arm": (load_planar_arm, 2), "ur5": (load_ur5, 3)}
 KINDS = (
@@ -106,22 +112,7 @@ def t_test(c: Columns) -> list[int]:
 
 def stepwise_bic(c: Columns) -> list[int]:
     """Forward selection by the Bayesian information criterion."""
-    n = len(c.torque)
-    chosen: list[int] = []
-    best = n * np.log(np.mean(c.torque**2))
-    while len(chosen) < 20:
-        fixed = c.train[:, chosen]
-        q = np.linalg.qr(fixed)[0] if chosen else np.zeros((n, 0))
-        left, rest = c.torque - q @ (q.T @ c.torque), c.train - q @ (q.T @ c.train)
-        size = np.maximum(np.sum(rest**2, axis=0), 1e-9)
-        drop = np.where(size > 1e-6 * n, (rest.T @ left) ** 2 / size, 0.0)
-        i = int(np.argmax(drop))
-        score = n * np.log((left @ left - drop[i]) / n) + (len(chosen) + 1) * np.log(n)
-        if score >= best:
-            break
-        chosen.append(i)
-        best = score
-    return chosen
+    return forward_selection(c.train, c.torque)
 
 
 def lasso(c: Columns) -> list[int]:

@@ -8,13 +8,24 @@ PACKAGE = "numpy"
 MOST = 20
 
 
-def choose(rows) -> dict[int, float]:
-    n, chosen = len(rows.torque), []
-    best = n * np.log(np.mean(rows.torque**2))
+def forward_selection(columns: np.ndarray, torque: np.ndarray) -> list[int]:
+    """Columns added one by one while the criterion falls.
+
+    Parameters
+    ----------
+    columns : ndarray of shape (n_rows, n_columns)
+    torque : ndarray of shape (n_rows,), N m or N
+
+    Returns
+    -------
+    list of int
+    """
+    n, chosen = len(torque), []
+    best = n * np.log(np.mean(torque**2))
     while len(chosen) < MOST:
-        basis = np.linalg.qr(rows.columns[:, chosen])[0] if chosen else np.zeros((n, 0))
-        left = rows.torque - basis @ (basis.T @ rows.torque)
-        rest = rows.columns - basis @ (basis.T @ rows.columns)
+        basis = np.linalg.qr(columns[:, chosen])[0] if chosen else np.zeros((n, 0))
+        left = torque - basis @ (basis.T @ torque)
+        rest = columns - basis @ (basis.T @ columns)
         size = np.maximum(np.sum(rest**2, axis=0), 1e-9)
         drop = np.where(size > 1e-6 * n, (rest.T @ left) ** 2 / size, 0.0)
         i = int(np.argmax(drop))
@@ -23,7 +34,11 @@ def choose(rows) -> dict[int, float]:
             break
         chosen.append(i)
         best = score
-    return refitted(rows, chosen)
+    return chosen
+
+
+def choose(rows) -> dict[int, float]:
+    return refitted(rows, forward_selection(rows.columns, rows.torque))
 
 
 def answer(log, robot) -> dict:
