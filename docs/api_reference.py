@@ -221,7 +221,7 @@ PAGES: tuple[Page, ...] = (
     ),
     Page(
         "skidyn.exceptions",
-        "Errors, all of them a ValueError that says how to mend the input, and warnings.",
+        "Errors, all of them a ValueError that says how to fix the input, and warnings.",
         (
             Section(
                 "Errors",

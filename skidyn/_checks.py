@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks that a table is a log at all: what would make every later result wrong is refused here."""
+"""Checks that a table is a log: what would make every later result wrong is refused here."""
 
 from __future__ import annotations
 
@@ -163,7 +163,7 @@ def as_numbers(frame: pd.DataFrame, names: Sequence[str], source: str = "the log
             except (TypeError, ValueError):
                 raise LogError(
                     f"{source}: column {name!r} holds {cell!r} in row {row} where a number is "
-                    "expected. Mend or remove that row, or leave the column out."
+                    "expected. Fix or remove that row, or leave the column out."
                 ) from None
         columns[name] = pd.Series(cells.astype(np.float64), index=frame.index)
     return pd.DataFrame(columns)
@@ -210,8 +210,8 @@ def handle_missing(
     )
     if missing == "error":
         raise LogError(
-            f"{message} Mend them, or pass missing='drop' to leave these rows out; derivatives "
-            "and filters then do not cross the holes."
+            f"{message} Fix them, or pass missing='drop' to leave these rows out; derivatives "
+            "and filters then do not cross the gaps."
         )
     if bad.all():
         raise LogError(f"{message} No row is left.")

@@ -41,9 +41,9 @@ class Keys:
         return find_segments(self.trajectories(X), time)
 
     def for_learner(self, X: Any, learner: Any) -> Any:
-        """What a learner gets to see: no key columns, unless it has parameters for them.
+        """The columns for a learner: no key columns, unless it has parameters for them.
 
-        A learner that does not know what a trajectory or a time is takes them for features, and
+        A learner that has no parameters for trajectory and time takes them for features, and
         learns the log by heart.
 
         Parameters

@@ -165,12 +165,12 @@ def _said(
     robot_joints: Sequence[str] | None,
     source: str,
 ) -> dict[str, str]:
-    """What the user's mapping says, as log name to source name."""
+    """The user's mapping, as log name to source name."""
     said: dict[str, str] = {}
     for target, value in columns.items():
         if re.sub(r"\d+$", "", target) not in SPELLINGS:
             raise LogError(
-                f"columns: {target!r} is no signal of a log; use "
+                f"columns: {target!r} is not a signal of a log; use "
                 f"{', '.join((*KEYS, *PER_JOINT))}, or one joint of them such as 'q1'."
             )
         if target in PER_JOINT:
@@ -248,7 +248,7 @@ def _guess(names: Sequence[str]) -> tuple[dict[str, _Found], dict[str, _Found]]:
 
 
 class _Found(dict[Any, str]):
-    """Column of every joint, and further ones that speak of the same."""
+    """Column of every joint, and further ones that name the same signal."""
 
     def __init__(self) -> None:
         self.others: dict[Any, list[str]] = {}
@@ -269,7 +269,7 @@ class _Found(dict[Any, str]):
 
 
 def _parse(name: str) -> tuple[str | None, int | None, str | None]:
-    """Quantity, number and joint that a column name speaks of.
+    """Quantity, number and joint that a column name states.
 
     >>> _parse("q1"), _parse("dq_elbow"), _parse("/joint_states/effort[0]")
     (('q', 1, None), ('dq', None, 'elbow'), ('tau', 0, None))

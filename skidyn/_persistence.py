@@ -289,4 +289,6 @@ def _check_class(name: str) -> None:
     except (ImportError, AttributeError, ValueError) as error:
         raise SkidynError(f"trusted names {name!r}, which cannot be imported: {error}") from error
     if not inspect.isclass(found):
-        raise SkidynError(f"trusted names {name!r}, which is no class; functions are never loaded")
+        raise SkidynError(
+            f"trusted names {name!r}, which is not a class; functions are never loaded"
+        )

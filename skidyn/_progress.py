@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How long work tells how far it is, without knowing who listens.
+"""Progress messages of long computations, for whatever listens to them.
 
 A function calls :func:`tell`; the command line listens and moves its bar. Nobody listens in a
 library, and then nothing happens.
@@ -20,7 +20,7 @@ _LISTENER: ContextVar[Listener | None] = ContextVar("skidyn_progress", default=N
 
 
 def tell(text: str, share: float | None = None) -> None:
-    """Tell who listens what is being done.
+    """Report what is being done.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def tell(text: str, share: float | None = None) -> None:
 
 
 def track(items: Iterable[Item], text: str) -> Iterator[Item]:
-    """Go through items and tell before each how many are done.
+    """Go through items and report before each how many are done.
 
     >>> with listening(lambda text, share: print(text, share)):
     ...     letters = list(track("ab", "Reading"))
@@ -52,7 +52,7 @@ def track(items: Iterable[Item], text: str) -> Iterator[Item]:
 
 @contextmanager
 def listening(listener: Listener) -> Iterator[None]:
-    """Let a function hear what is told inside the ``with`` block."""
+    """Pass what is reported inside the ``with`` block to a function."""
     token = _LISTENER.set(listener)
     try:
         yield

@@ -128,10 +128,10 @@ def convert_units(frame: pd.DataFrame, units: Mapping[str, str]) -> pd.DataFrame
     for target, unit in units.items():
         quantity = re.sub(r"\d+$", "", target)
         if quantity not in FACTORS:
-            raise LogError(f"units: {target!r} is no quantity; use one of {', '.join(FACTORS)}.")
+            raise LogError(f"units: {target!r} is not a quantity; use one of {', '.join(FACTORS)}.")
         if unit not in FACTORS[quantity]:
             raise LogError(
-                f"units: {unit!r} is no unit of {quantity}; use {', '.join(FACTORS[quantity])}."
+                f"units: {unit!r} is not a unit of {quantity}; use {', '.join(FACTORS[quantity])}."
             )
         chosen = [target] if target in frame.columns else _columns_of(target, frame, units)
         if not chosen:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The command line: ``skidyn COMMAND --help`` teaches each command."""
+"""The command line: ``skidyn COMMAND --help`` explains each command with examples."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def _keep_freed_memory() -> None:
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser whose complaints fit the terminal."""
+    """A parser whose error messages fit the terminal."""
 
     def error(self, message: str) -> NoReturn:
         self.print_usage(sys.stderr)
@@ -146,7 +146,7 @@ def make_parser() -> argparse.ArgumentParser:
 
 
 def _open_closed_streams() -> None:
-    """Print nowhere where the output is closed, and in ASCII where it holds nothing else."""
+    """Discard the output where it is closed, and print ASCII where it takes nothing else."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:

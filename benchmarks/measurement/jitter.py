@@ -5,8 +5,8 @@ Usage: python benchmarks/measurement/jitter.py [--diagnose]
 
 Three robots and six clocks each: stamps that are off by up to 0.1, 0.3 and 1 ms, evenly and
 normally, and seconds in single precision. Printed are what is told, and held-out errors with the
-recorded and the mended stamps over those with the true clock; ``--diagnose`` also says what a
-diagnosis of the log, mended where that is told, finds.
+recorded and the fixed stamps over those with the true clock; ``--diagnose`` also says what a
+diagnosis of the log, fixed where that is told, finds.
 """
 
 from __future__ import annotations
@@ -60,9 +60,9 @@ def main() -> None:
         for name, time in clocks(log.frame["time"].to_numpy(), rng).items():
             jittering = log.frame.assign(time=time)
             told = [c for c in check_log(jittering, log.robot).checks if c.certainty != "noted"]
-            mended = log.frame.assign(time=regular_clock(time, number))
-            used = mended if any(c.check == "clock_jitter" for c in told) else jittering
-            ratios = [held_out(frame, log.robot) / plain for frame in (jittering, mended)]
+            fixed = log.frame.assign(time=regular_clock(time, number))
+            used = fixed if any(c.check == "clock_jitter" for c in told) else jittering
+            ratios = [held_out(frame, log.robot) / plain for frame in (jittering, fixed)]
             words = [f"{c.check} {c.certainty}" for c in told]
             print(
                 f"{log.robot.name:12s} {name:17s} {ratios[0]:6.3f} {ratios[1]:6.3f} {words}", end=""

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How many mistakes in logs are named, how many are named that are none, and what mending gives.
+"""How many mistakes in logs are named, how many are named that are none, and what fixing gives.
 
 Usage: python benchmarks/measurement/mistakes.py [--cases FOLDER] [--seed 1] [--logs 5]
-       [--sample 5] [--only jitter,order] [--mend] [--verbose]
+       [--sample 5] [--only jitter,order] [--fix] [--verbose]
 
 Logs, half of them with a hidden effect, are spoiled in one way each (see ``spoils.py``,
 ``spoils_of_parts.py`` and ``spoils_of_clocks.py``). Printed are, by mistake, in how many logs it
 was named on the right joints with the right remedy, in how many of these it was certain, and in how
-many logs something else was suspected. ``--mend`` reads the spoiled log again with the remedy and
+many logs something else was suspected. ``--fix`` reads the spoiled log again with the remedy and
 prints in how many of the logs with one that gave back the recorded columns; ``--diagnose`` compares
-the diagnosis of the mended log with that of the clean one where it did not. ``--cases`` takes a
+the diagnosis of the fixed log with that of the clean one where it did not. ``--cases`` takes a
 folder of logs of another simulator (``*/log.parquet`` and ``robot.urdf``).
 """
 
@@ -47,7 +47,7 @@ EFFECTS = (None, "stribeck", None, "payload", "torque_ripple", None, "spring", N
 
 @dataclass
 class Case:
-    """A log that is what it claims to be."""
+    """A log without a mistake."""
 
     name: str
     frame: pd.DataFrame
@@ -78,7 +78,7 @@ def stored(folder: Path) -> list[Case]:
     return cases
 
 
-def mended(spoiled: Spoiled, told: list[Suspicion]) -> tuple[pd.DataFrame, Robot]:
+def fixed(spoiled: Spoiled, told: list[Suspicion]) -> tuple[pd.DataFrame, Robot]:
     """The spoiled log, read again as its remedies say."""
     options: dict[str, Any] = {}
     robot = spoiled.robot
@@ -140,7 +140,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, help="only so many logs")
     parser.add_argument("--sample", type=int, help="so many logs of each mistake, in turn")
     parser.add_argument("--only", help="mistakes, separated by commas")
-    parser.add_argument("--mend", action="store_true", help="read again with the remedies")
+    parser.add_argument("--fix", action="store_true", help="read again with the remedies")
     parser.add_argument("--diagnose", action="store_true", help="compare diagnoses, slow")
     parser.add_argument("--verbose", action="store_true", help="print every log that goes wrong")
     options = parser.parse_args()
@@ -149,9 +149,9 @@ def main() -> None:
     cases = cases[: options.first]
     known: dict[str, Any] = {}
     totals = np.zeros(6, dtype=int)
-    print(f"{'mistake':24s} {'named':>9s} {'certain':>9s} {'another':>9s} {'mended':>9s}")
+    print(f"{'mistake':24s} {'named':>9s} {'certain':>9s} {'another':>9s} {'fixed':>9s}")
     for turn, name in enumerate(options.only.split(",") if options.only else MISTAKES):
-        counts, n, mendable = np.zeros(4, dtype=int), 0, 0
+        counts, n, fixable = np.zeros(4, dtype=int), 0, 0
         taken = options.sample or len(cases)
         for i in sorted({(turn * taken + k) % len(cases) for k in range(taken)}):
             case = cases[i]
@@ -167,21 +167,21 @@ def main() -> None:
             certain = any(c.certainty == "certain" for c in right)
             counts[:3] += [bool(right), certain, bool(other)]
             good = None
-            if (options.mend or options.diagnose) and any(c.remedy for c in right):
-                mendable += 1
-                good = mend(case, spoiled, right, known, options.diagnose)
+            if (options.fix or options.diagnose) and any(c.remedy for c in right):
+                fixable += 1
+                good = fix(case, spoiled, right, known, options.diagnose)
                 counts[3] += good
             if options.verbose and (other or (spoiled.checks and not right) or good is False):
                 print("   ", case.name, spoiled.says, good, *map(short, checks), sep=" ; ")
-        print(row(name, counts, n, mendable), flush=True)
+        print(row(name, counts, n, fixable), flush=True)
         if name != "nothing":
-            totals += [*counts, n, mendable]
+            totals += [*counts, n, fixable]
     print(row("all", totals[:4], totals[4], totals[5]))
 
 
-def row(name: str, counts: np.ndarray, n: int, mendable: int) -> str:
-    """A row of the table; what was mended is counted among what was told with a remedy."""
-    of = (n, n, n, mendable)
+def row(name: str, counts: np.ndarray, n: int, fixable: int) -> str:
+    """A row of the table; what was fixed is counted among what was told with a remedy."""
+    of = (n, n, n, fixable)
     return f"{name:24s}" + "".join(f" {c:4d}/{m:<4d}" for c, m in zip(counts, of, strict=True))
 
 
@@ -191,11 +191,11 @@ def short(told: Suspicion) -> str:
     return f"{told.check}/{told.certainty}: {told.suspicion[:70]} | {told.evidence[:90]} | {option}"
 
 
-def mend(
+def fix(
     case: Case, spoiled: Spoiled, told: list[Suspicion], known: dict[str, Any], diagnosed: bool
 ) -> bool:
     """Whether the remedies give back the recorded columns, or at least the diagnosis of them."""
-    frame, robot = mended(spoiled, told)
+    frame, robot = fixed(spoiled, told)
     if gives_back(case, frame, robot) or not diagnosed:
         return gives_back(case, frame, robot)
     if case.name not in known:

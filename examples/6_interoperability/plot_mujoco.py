@@ -26,7 +26,7 @@ except ImportError:
     sys.exit(0)
 
 log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=4, duration=5.0)
-# only bodies that can exist: a simulator refuses negative masses
+# only physically possible bodies: a simulator refuses negative masses
 model = RBDRegressor(log.robot, consistent=True).fit(log.X, log.y)
 file = Path(tempfile.mkdtemp()) / "arm.xml"
 left_out = write_mjcf(model, file)

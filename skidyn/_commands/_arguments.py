@@ -129,47 +129,47 @@ def with_reading(parser: Any) -> None:
 
 
 def with_remedies(parser: Any) -> None:
-    """What mends a log that is not what its owner thought; skidyn check says which."""
-    mend = parser.add_argument_group("remedies", "skidyn check says which of them a log needs")
-    mend.add_argument(
+    """Remedies for a log whose signals are not what they seem; skidyn check says which."""
+    fix = parser.add_argument_group("remedies", "skidyn check says which of them a log needs")
+    fix.add_argument(
         "--gravity", metavar="X,Y,Z", help="gravity in the base frame, m/s^2 (robot on a wall)"
     )
-    mend.add_argument(
+    fix.add_argument(
         "--flip",
         metavar="JOINT,..",
         help="change the sign of a joint (its torque), q3 (its motion), or a column such as dq3",
     )
-    mend.add_argument(
+    fix.add_argument(
         "--order", metavar="2,1,3", help="for each joint the column that holds it, or tau=2,1,3"
     )
-    mend.add_argument(
+    fix.add_argument(
         "--gain", metavar="tau3=0.02", help="multiply columns or quantities by factors"
     )
-    mend.add_argument("--zero", metavar="q2=1.57", help="what positions read at the robot's zero")
-    mend.add_argument("--late", metavar="tau=0.008", help="delays in s, to be taken out")
-    mend.add_argument("--unwrap", action="store_true", help="remove jumps by whole turns")
-    mend.add_argument(
+    fix.add_argument("--zero", metavar="q2=1.57", help="what positions read at the robot's zero")
+    fix.add_argument("--late", metavar="tau=0.008", help="delays in s, to be taken out")
+    fix.add_argument("--unwrap", action="store_true", help="remove jumps by whole turns")
+    fix.add_argument(
         "--torque-sign",
         choices=("recorded", "command"),
         default="recorded",
         help="command: magnitudes get the sign of commanded minus measured position",
     )
-    mend.add_argument(
+    fix.add_argument(
         "--clock",
         choices=("recorded", "regular"),
         default="recorded",
         help="regular: samples were taken at even steps and only the time stamps jitter",
     )
-    mend.add_argument(
+    fix.add_argument(
         "--drop-repeated", action="store_true", help="leave out rows that repeat the one before"
     )
-    mend.add_argument(
+    fix.add_argument(
         "--split-leaps", action="store_true", help="begin a new trajectory where positions jump"
     )
-    mend.add_argument(
+    fix.add_argument(
         "--restore-gravity", action="store_true", help="add gravity that was taken off the torque"
     )
-    mend.add_argument(
+    fix.add_argument(
         "--resample", type=float, metavar="HZ", help="average over even steps at this rate"
     )
 

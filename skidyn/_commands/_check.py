@@ -13,10 +13,10 @@ from skidyn._commands._input import read_frame, read_robot
 from skidyn._commands._output import print_json, working
 
 DESCRIPTION = """\
-Check whether a log is what it claims to be. What would change the results most comes first, with
-its evidence and the option that mends it: units, clock, repeated rows, and with the robot also
-signs and order of joints, gravity, torque without sign, currents taken for torques, and delay. Then
-follow the rate, the resolution, and how far and how often each joint was moved.
+Check whether the signals of a log are what their names say. What would change the results most
+comes first, with its evidence and the option that fixes it: units, clock, repeated rows, and with
+the robot also signs and order of joints, gravity, torque without sign, currents taken for torques,
+and delay. Then follow the rate, the resolution, and how far and how often each joint was moved.
 
   skidyn check run1.csv run2.csv
   skidyn check run1.csv --urdf robot.urdf
@@ -47,21 +47,21 @@ def run(options: argparse.Namespace) -> None:
         print(quality)
         remedies = [c.remedy.option for c in quality.checks if c.remedy and c.certainty != "noted"]
         if remedies:
-            print("\nto mend all of it, and check again:")
+            print("\nto fix all of it, and check again:")
             print(f"  skidyn {shlex.join(_with_remedies(options.words, remedies))}")
 
 
 def _with_remedies(words: Sequence[str], remedies: Sequence[str]) -> list[str]:
-    """The words of a command with the options that mend its log.
+    """The words of a command with the options that fix its log.
 
     What belongs to an option that is there already joins its value: of two options of one name, the
     last alone counts.
     """
-    mended = list(words)
+    fixed = list(words)
     for remedy in remedies:
         flag, _, value = remedy.partition(" ")
-        if value and flag in mended[:-1]:
-            mended[mended.index(flag) + 1] += f",{value}"
+        if value and flag in fixed[:-1]:
+            fixed[fixed.index(flag) + 1] += f",{value}"
         else:
-            mended += [flag, value] if value else [flag]
-    return mended
+            fixed += [flag, value] if value else [flag]
+    return fixed

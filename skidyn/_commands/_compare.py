@@ -102,7 +102,9 @@ def _compare(options: argparse.Namespace) -> None:
         _compare_with_log(options)
         return
     if options.traces:
-        raise SkidynError("--traces are of one model and one log: leave out the other")
+        raise SkidynError(
+            "--traces writes one model on one log: leave out --against and --against-model"
+        )
     from skidyn.report import summarize_comparison, write_comparison
 
     if options.html:
@@ -155,7 +157,7 @@ def _pair(options: argparse.Namespace) -> list[argparse.Namespace] | None:
     reports = [name for name in options.logs if name.endswith(".json")]
     if reports:
         if len(options.logs) != 2 or len(reports) != 2:
-            raise SkidynError("two reports of skidyn diagnose can be compared, no more and no less")
+            raise SkidynError("exactly two reports of skidyn diagnose can be compared")
         both = [argparse.Namespace(report=n, json=options.json, urdf=options.urdf) for n in reports]
         return [recorded_options(side) for side in both]
     if not options.urdf:

@@ -39,12 +39,12 @@ def add_parser(commands: Any) -> None:
     parser.add_argument("--out", type=JsonFile, metavar="JSON", help="write the report as JSON")
     parser.add_argument("--html", type=Page, metavar="HTML", help="write the report as a page")
     parser.add_argument(
-        "--force", action="store_true", help="go on although the log is not what it claims"
+        "--force", action="store_true", help="continue although a check found the log to be wrong"
     )
     parser.add_argument(
         "--simulate",
         action="store_true",
-        help="judge findings by the simulated motion too; those that worsen it are told",
+        help="also judge findings by the simulated motion; those that worsen it are not added",
     )
     parser.add_argument("--effects", help="kinds to try, separated by commas (default: all)")
 

@@ -30,7 +30,7 @@ friction of one joint goes to a file of BAM's for the servo that you name:
   skidyn export run1.csv --urdf robot.urdf --format ros2 --out robot_dynamics
   skidyn export run1.csv --urdf robot.urdf --format bam --servo elbow --actuator xl330 --out m1.json
 
-C, Python and ONNX get a function of q, dq, ddq for feedforward, which needs nothing of skidyn.
+C, Python and ONNX get a function of q, dq, ddq for feedforward, which does not need skidyn.
 Several formats at once get the name of --out with their own suffix. What a format cannot hold (a
 URDF knows viscous and Coulomb friction only) is listed, and written to FILE.skidyn.json beside it.
 """
@@ -73,7 +73,7 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--motor", metavar="JSON", help='constants of the servo, for bam: \'{"kt": 0.4, "R": 3}\''
     )
-    parser.add_argument("--consistent", action="store_true", help="only bodies that can exist")
+    parser.add_argument("--consistent", action="store_true", help="only physically possible bodies")
 
 
 def run(options: argparse.Namespace) -> None:

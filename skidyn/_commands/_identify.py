@@ -18,7 +18,7 @@ autocorrelated residuals. Single masses can rarely be identified: what is printe
 combinations that can, how well the motion excites them, and which ones the data leaves open.
 
   skidyn identify run*.csv --urdf robot.urdf --out parameters.json
-  skidyn identify run*.csv --urdf robot.urdf --consistent     only bodies that can exist
+  skidyn identify run*.csv --urdf robot.urdf --consistent     only physically possible bodies
   skidyn identify run*.csv --urdf robot.urdf --estimator robust
 """
 
@@ -27,7 +27,7 @@ def add_parser(commands: Any) -> None:
     parser = command(commands, "identify", run, "identify parameters and print them", DESCRIPTION)
     with_log(parser)
     parser.add_argument("--out", type=JsonFile, metavar="JSON", help="write the parameters as JSON")
-    parser.add_argument("--consistent", action="store_true", help="only bodies that can exist")
+    parser.add_argument("--consistent", action="store_true", help="only physically possible bodies")
     parser.add_argument(
         "--estimator",
         default="weighted",

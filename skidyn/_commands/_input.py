@@ -91,7 +91,7 @@ def pairs(name: str, text: str | None, numbers: bool = False) -> Any:
     if text.lstrip().startswith(("{", "[")):
         content = json_option(name, text)
         if not isinstance(content, dict):
-            raise SkidynError(f"{name} is {text}; expected NAME=VALUE or an object of JSON")
+            raise SkidynError(f"{name} is {text}; expected NAME=VALUE or a JSON object")
         return content
     said: dict[str, Any] = {}
     for word in listed(text):
@@ -128,7 +128,7 @@ def number(name: str, text: str) -> float:
     try:
         return float(text)
     except ValueError:
-        raise SkidynError(f"--{name}: {text!r} is no number") from None
+        raise SkidynError(f"--{name}: {text!r} is not a number") from None
 
 
 def covered_joints(options: argparse.Namespace) -> list[str] | None:

@@ -392,8 +392,8 @@ def _episodic(
         else ""
     )
     sentence = (
-        f"A torque on {where} comes and goes: {times}{more}. It holds {np.mean(shares):.0%} of the "
-        f"squared error that is left there, and nothing that was logged predicts it.{push}"
+        f"A torque on {where} comes and goes: {times}{more}. It makes up {np.mean(shares):.0%} of "
+        f"the squared error that is left there, and nothing that was logged predicts it.{push}"
     )
     return Finding(
         UNKNOWN,

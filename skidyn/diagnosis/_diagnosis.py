@@ -88,7 +88,7 @@ def diagnose(
     settings : Settings, optional
         Thresholds of the search.
     force : bool, default=False
-        Go on although the log is certainly not what it claims
+        Continue although a check is certain that the log is wrong
         (:func:`skidyn.measurement.check_measurement`).
     sample_weight : array-like of shape (n_samples,), optional
         Weight of every sample in all fits; those of weight 0 are left out.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which signals a residual follows, whatever the form, judged on folds left out.
+"""Which signals a residual depends on, in whatever form, judged on folds left out.
 
 The functions that the diagnosis knows by form are tried anyway. This finds the signals of those it
 does not know, in two ways. Boosted trees need no form at all; how much worse they predict with one

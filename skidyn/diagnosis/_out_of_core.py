@@ -42,7 +42,7 @@ LEVEL = 0.01
 
 @dataclass(frozen=True)
 class Confirmation:
-    """What a finding of the sample is worth on all trajectories that the search did not see.
+    """What a finding of the sample removes on all trajectories that the search did not see.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ class Confirmation:
 
 @dataclass(frozen=True)
 class ParquetDiagnosis:
-    """A diagnosis of part of a recording, and what the rest says to it.
+    """A diagnosis of part of a recording, and its confirmation on the rest.
 
     Parameters
     ----------

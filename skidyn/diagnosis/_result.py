@@ -76,7 +76,7 @@ class Diagnosis:
     unknowns : list of UnknownTorque
         Tested variables, shape and formula of every nameless torque that was found.
     checks : list of Suspicion
-        What about the measurement is not what it claims, with evidence and remedy.
+        What the checks suspect about the measurement, with evidence and remedy.
     parts : Remainder
         What the completed model leaves, by what it is made of.
     opened : Opened or None

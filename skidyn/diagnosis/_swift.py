@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A second look in short windows, at what is over within hundredths of a second.
+"""A second search in short windows, for what lasts hundredths of a second.
 
 A link flies across its play within hundredths of a second, and an average over an eighth of a
 second holds little of that. Slow effects are found in the long windows, in which the noise of the

@@ -125,8 +125,8 @@ def _kind_and_joints(spec: Any) -> tuple[str, list[int]]:
     except (TypeError, ValueError):  # no pair, or no list of whole numbers
         pass
     raise EffectError(
-        f"{spec!r} is no effect; write 'viscous', or ('dahl', [1, 4]) with joints counted from 1, "
-        "or a Term"
+        f"{spec!r} is not an effect; write 'viscous', or ('dahl', [1, 4]) with joints counted from "
+        "1, or a Term"
     )
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A robot that does not stand as its URDF says."""
+"""A robot whose base is not mounted as in its URDF."""
 
 from __future__ import annotations
 

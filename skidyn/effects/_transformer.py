@@ -136,8 +136,8 @@ def _with_further_columns(keys: Keys) -> Columns:
     n = max(1, len(own) // 3)
     ddq = own[2 * n : 3 * n] or None
     warnings.warn(
-        f"X has {len(own)} columns without names, which is no multiple of 3: they are taken for q, "
-        f"dq{'' if ddq is None else ', ddq'} of {n} joint(s), and {max(0, len(own) - 3 * n)} "
+        f"X has {len(own)} columns without names, which is not a multiple of 3: they are taken for "
+        f"q, dq{'' if ddq is None else ', ddq'} of {n} joint(s), and {max(0, len(own) - 3 * n)} "
         "further column(s) handed on. Name the columns q1.., dq1.., ddq1.., or give n_joints.",
         UserWarning,
         stacklevel=6,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Excitation: motions from which the parameters of a robot can be told."""
+"""Excitation: motions from which the parameters of a robot can be identified."""
 
 from skidyn.excitation._design import design_excitation
 from skidyn.excitation._excitation import Excitation

@@ -59,7 +59,7 @@ def design_excitation(
     iterations: int = ITERATIONS,
     random_state: int = 0,
 ) -> Excitation:
-    """Design a motion from which base parameters and effects can be told.
+    """Design a motion from which base parameters and effects can be identified.
 
     Every joint follows a Fourier series that quintics blend from and to rest, or quintics between
     points. Positions, velocities and accelerations keep their limits by construction, those of

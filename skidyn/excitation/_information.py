@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How much a motion tells: the information matrix of base parameters and effects."""
+"""The information of a motion: the information matrix of base parameters and effects."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _CHUNK, _RATE = 2048, 100.0
 
 @dataclass(frozen=True)
 class Model:
-    """What the design knows of a robot.
+    """The model of a robot for which a motion is designed.
 
     Attributes
     ----------
@@ -131,8 +131,8 @@ def _effect_columns(term: Term, instant: Instant) -> dict[int, Array]:
         ) from None
     except Exception as error:
         raise SkidynError(
-            f"a motion cannot be designed for {term.kind}: it is no function of q, dq and ddq at "
-            f"one instant ({error})"
+            f"a motion cannot be designed for {term.kind}: it is not a function of q, dq and ddq "
+            f"at one instant ({error})"
         ) from None
 
 

@@ -95,7 +95,7 @@ class Explorer:
             "progress": self._progress,
         }
         if question not in known:
-            raise SkidynError(f"the explorer does not know {question!r}")
+            raise SkidynError(f"unknown question {question!r}")
         return known[question](**words)
 
     def _state(self) -> dict[str, Any]:
@@ -235,7 +235,7 @@ class _Worker:
 
 
 def _refuse_constant(name: str) -> float:
-    raise SkidynError(f"{name} is no number of JSON")
+    raise SkidynError(f"{name} is not a number in JSON")
 
 
 def make_app(explorer: Explorer, port: int) -> Any:

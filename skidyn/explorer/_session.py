@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the explorer knows and does, without a browser."""
+"""State and actions of the explorer, without a browser."""
 
 from __future__ import annotations
 

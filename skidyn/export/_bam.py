@@ -213,7 +213,7 @@ def read_bam(path: str | os.PathLike[str]) -> BamModel:
     try:
         content = json.loads(file.read_text("utf-8"))
     except ValueError as error:
-        raise SkidynError(f"{file} is no JSON: {error}") from None
+        raise SkidynError(f"{file} is not JSON: {error}") from None
     if not isinstance(content, dict) or not {"model", "actuator"} <= content.keys():
         raise SkidynError(f"{file} lacks 'model' and 'actuator', which BAM's parameters have")
     name, actuator = str(content.pop("model")), str(content.pop("actuator"))

@@ -134,7 +134,7 @@ def _motion(robot: Robot, X: Any) -> tuple[Any, Any, Any]:
     """Smoothed motion of a table."""
     names = column_names(X)
     if names is None:
-        raise SkidynError("X is no table; give a DataFrame with the columns time, q1.., dq1..")
+        raise SkidynError("X is not a table; give a DataFrame with the columns time, q1.., dq1..")
     columns = resolve_columns(names, len(names), robot.joint_names, require_acceleration=False)
     if columns.time is None:
         raise SkidynError("the log has no column 'time' (s)")

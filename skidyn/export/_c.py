@@ -42,7 +42,7 @@ def c_source(model: RBDRegressor | Robot, *, name: str = "skidyn_inverse_dynamic
     Returns
     -------
     str
-        C99 text; compile with ``-lm``. Effects that are no function of q, dq and ddq are not in it;
+        C99 text; compile with ``-lm``. Effects that are not a function of q, dq and ddq are left out;
         a comment at the top names them.
 
     Raises

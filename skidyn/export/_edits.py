@@ -84,7 +84,7 @@ class Edits:
         try:
             parser.Parse(self.data, True)
         except (expat.ExpatError, UnicodeDecodeError) as error:
-            raise SkidynError(f"{self.path} is no XML in UTF-8: {error}") from None
+            raise SkidynError(f"{self.path} is not XML in UTF-8: {error}") from None
         return top.children[0]
 
     def _end_of_tag(self, at: int) -> int:

@@ -50,8 +50,8 @@ def python_source(model: RBDRegressor | Robot, *, name: str = "inverse_dynamics"
     Returns
     -------
     str
-        Text of the module. Effects that are no function of q, dq and ddq are not in it; its first
-        line names them.
+        Text of the module. Its first line names the effects that are left out, since they are not
+        a function of q, dq and ddq.
 
     Raises
     ------

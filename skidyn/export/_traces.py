@@ -89,7 +89,9 @@ def write_traces(
     """
     path = Path(path)
     if path.suffix.lower() not in WRITERS:
-        raise SkidynError(f"{path.name!r} must end in {' or '.join(WRITERS)}, which says for whom")
+        raise SkidynError(
+            f"{path.name!r} must end in {' or '.join(WRITERS)}, which selects the viewer"
+        )
     signals, torque = read_signals(X, y, robot, rate=rate)
     told = np.asarray(y_pred, dtype=float).reshape(len(torque), -1)
     if told.shape != torque.shape:

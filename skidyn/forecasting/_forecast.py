@@ -95,7 +95,7 @@ class _Forecaster(RegressorMixin, BaseEstimator):
 
 
 class PersistenceRegressor(_Forecaster):
-    """Forecast that nothing changes: each sample is the one before.
+    """Forecast without change: each sample is the one before.
 
     Parameters
     ----------

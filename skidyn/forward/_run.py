@@ -79,7 +79,7 @@ def motion_of(model: Any, X: Any) -> Signals:
     """Signals of a log; smoothed where the model smooths or the log has no accelerations."""
     names = column_names(X)
     if names is None:
-        raise SkidynError("X is no table; give a DataFrame with the columns time, q1.., dq1..")
+        raise SkidynError("X is not a table; give a DataFrame with the columns time, q1.., dq1..")
     robot = model.robot_
     columns = resolve_columns(
         names,
@@ -109,7 +109,7 @@ def _refuse_gaps(values: Array, what: str) -> None:
     broken = np.flatnonzero(~np.isfinite(values).all(axis=1))
     if len(broken):
         raise SkidynError(
-            f"{what} of the log are no numbers in row {broken[0]} ({len(broken)} row(s)); leave "
+            f"{what} of the log are not numbers in row {broken[0]} ({len(broken)} row(s)); leave "
             "these rows out of X and y"
         )
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Physics plus a learner that knows when to add nothing."""
+"""Physics plus a learner, which is left out where it does not help."""
 
 from __future__ import annotations
 

@@ -243,7 +243,7 @@ def _body(name: str, names: Sequence[str]) -> int:
 def _odd(name: str, axis: str) -> tuple[int, ...]:
     if axis not in _ODD:
         raise ValueError(
-            f"symmetry of {name!r}: {axis!r} is no axis; expected some of 'x', 'y', 'z'"
+            f"symmetry of {name!r}: {axis!r} is not an axis; expected some of 'x', 'y', 'z'"
         )
     return _ODD[axis]
 

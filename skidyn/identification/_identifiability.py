@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a log says and does not say about the coefficients of a model.
+"""Which coefficients of a model a log determines, and which it leaves open.
 
 References
 ----------

@@ -103,7 +103,7 @@ def durbin_wu_hausman(difference: Array, left_out: Array) -> dict[str, Array]:
 
     Where the columns are free of noise that also sits in the residual, both are consistent and
     differ by chance only. How much chance can do is read from the differences without one fold
-    each, which autocorrelation inside a fold does not fool.
+    each, which are valid under autocorrelation inside a fold.
 
     Parameters
     ----------

@@ -759,8 +759,8 @@ def _warn_of_leakage() -> None:
 
     warnings.warn(
         "the rows of X are not in the order of time, as after train_test_split or "
-        "KFold(shuffle=True). They are sorted by trajectory and time and the fit is sound, but a "
-        "score on the rows between them promises too much. Hold out whole "
+        "KFold(shuffle=True). They are sorted by trajectory and time and the fit is valid, but a "
+        "score on the rows between them is too good. Hold out whole "
         "trajectories: TrajectoryKFold, GroupKFold, or GroupShuffleSplit",
         LeakageWarning,
         stacklevel=4,

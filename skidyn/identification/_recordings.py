@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Recordings are known by their motion, so that what was found in one stays with it.
+"""Recordings are recognised by their motion, so that an effect stays with its recording.
 
 An effect of single recordings (an offset of one run, a payload in some) names them by number. In
 another log the same numbers are other recordings. A model therefore remembers the positions of the
@@ -34,7 +34,7 @@ def named_recordings(terms: Iterable[Term]) -> set[int]:
 
 
 def remember(signals: Signals, terms: Iterable[Term]) -> Recordings:
-    """What to know the recordings again by that terms name.
+    """What identifies the recordings that terms name.
 
     Parameters
     ----------

@@ -121,8 +121,8 @@ def align_channels(
         unread = np.flatnonzero(~np.isfinite(table["time"].to_numpy()))
         if len(unread):
             raise LogError(
-                f"the clock of {name} is no number in row {unread[0]} ({len(unread)} such rows); "
-                "remove these rows before signals are interpolated."
+                f"the clock of {name} is not a number in row {unread[0]} ({len(unread)} such rows)"
+                "; remove these rows before signals are interpolated."
             )
     if len(tables) == 1:
         assert rate is not None

@@ -115,7 +115,7 @@ def _shape_of_rows(path: Path, separator: str | None, skip: int, max_bytes: int)
         if shape.n_rows and width != shape.width:
             raise LogError(
                 f"{path}: line {number} has {width} fields, the lines before {shape.width}. "
-                "Was the recording cut off, or does a field hold the separator? Mend or remove "
+                "Was the recording cut off, or does a field hold the separator? Fix or remove "
                 "the line."
             )
         shape.width = width

@@ -101,7 +101,7 @@ class LogQuality:
     joints : tuple of JointQuality
         One per joint.
     checks : tuple of Suspicion
-        What looks wrong, what matters most first, with its evidence and the option that mends it.
+        What looks wrong, what matters most first, with its evidence and the option that fixes it.
     faults : tuple of str
         Rows that this report leaves out.
     notes : tuple of str
@@ -176,7 +176,7 @@ class LogQuality:
             lines.append(f"{mark} {check.suspicion} ({check.certainty})")
             lines.append(f"   {check.evidence}")
             if check.remedy is not None:
-                lines.append(f"   mend it with: {check.remedy.option}")
+                lines.append(f"   fix it with: {check.remedy.option}")
         return [*lines, ""] if lines else []
 
 

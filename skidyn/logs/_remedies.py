@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What mends a log that is not what its owner thought: each is asked for, counted and noted."""
+"""Remedies for a log whose signals are not what they seem: each is asked for, counted and noted."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ REMEDIES = (
 
 @dataclass(frozen=True)
 class Remedies:
-    """What the caller of ``read_log`` asked to be mended; see there."""
+    """What the caller of ``read_log`` asked to be fixed; see there."""
 
     order: Sequence[int] | Mapping[str, Sequence[int]] | None = None
     flip: Sequence[str | int] = ()
@@ -105,7 +105,7 @@ def mend_columns(
         if not np.isfinite(value):
             raise LogError(f"zero: {name} is to read {value} at zero; expected a number.")
         if not re.fullmatch(r"q\d+", name):
-            raise LogError(f"zero: {name} is no position; expected q1 .. q{n}.")
+            raise LogError(f"zero: {name} is not a position; expected q1 .. q{n}.")
         for column in (name, name.replace("q", "cmd")):
             if column in table.columns:
                 table[column] = table[column] - value
@@ -222,8 +222,8 @@ def _reorder(
             raise LogError(f"order: {quantity!r} is none of {', '.join(QUANTITIES)}.")
         if sorted(numbers) != list(range(1, n + 1)):
             raise LogError(
-                f"order: {list(numbers)} is no order of {n} joints; expected every number from 1 "
-                f"to {n} once: for each joint of the robot the column that holds it."
+                f"order: {list(numbers)} is not an order of {n} joints; expected every number "
+                f"from 1 to {n} once: for each joint of the robot the column that holds it."
             )
         columns = [f"{quantity}{k}" for k in numbers]
         if not set(columns) <= set(table.columns):

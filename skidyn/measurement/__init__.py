@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Is a log what its owner thinks it is? Checks of a measurement before physics is blamed."""
+"""Checks of a measurement: whether its signals are what their names say."""
 
 from skidyn.measurement._check import Check
 from skidyn.measurement._checks import check_measurement, list_checks, refuse_certain

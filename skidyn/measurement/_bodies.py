@@ -180,7 +180,7 @@ def _unit_like(gain: float) -> float:
 
 
 def _confirmed(fits: Fits, k: int, gain: float) -> bool:
-    """Whether identified bodies, which all joints share, ask for the gain of one joint too."""
+    """Whether identified bodies, which all joints share, confirm the gain of one joint."""
     plain = fits.identified(Reading())
     other = fits.scaled({k: gain}).identified(Reading())
     # the density of a torque is that of the divided one over the gain

@@ -12,7 +12,7 @@ from skidyn.measurement._suspicion import Certainty, Remedy, Suspicion
 
 
 class Check(ABC):
-    """One thing that a measurement may be although its owner does not know.
+    """One mistake that a measurement may have without its owner knowing.
 
     A subclass says what it suspects and how it looks; :func:`skidyn.measurement.list_checks` has
     them in the order in which they change an answer.

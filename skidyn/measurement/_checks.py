@@ -159,7 +159,7 @@ def names_in_doubt(found: list[Suspicion]) -> list[str]:
 
 
 def refuse_certain(found: list[Suspicion]) -> None:
-    """Raise if a measurement is certainly not what it claims.
+    """Raise if a measurement is certainly not what its names and units say.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def refuse_certain(found: list[Suspicion]) -> None:
     Raises
     ------
     LogError
-        With the suspicions that are certain, and the option that mends each.
+        With the suspicions that are certain, and the option that fixes each.
 
     Examples
     --------
@@ -179,7 +179,8 @@ def refuse_certain(found: list[Suspicion]) -> None:
     certain = [s for s in found if s.certainty == "certain"]
     if certain:
         raise LogError(
-            "the log is not what it claims, so that any effect found in it would be wrong. "
+            "the log is not what its names and units say, so that any effect found "
+            "in it would be wrong. "
             + " ".join(map(str, certain))
             + " To go on all the same: --force (in Python: force=True)."
         )

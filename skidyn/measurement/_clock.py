@@ -215,7 +215,7 @@ class ClockJitter(Check):
 
 
 def _gained_by_torque(measurement: Measurement) -> float | None:
-    """Log-likelihood that the torque gains by even steps; None where no robot can say so.
+    """Log-likelihood that the torque gains by even steps; None without a robot.
 
     Accelerations jitter much where motion is slow, but there they hardly matter.
     """

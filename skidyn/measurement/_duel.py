@@ -62,7 +62,7 @@ class Duel:
 
 
 def fight(fits: Fits, before: Reading, reading: Reading, joints: Sequence[int]) -> Duel:
-    """Hold a reading against the effects that could look like it.
+    """Compare a reading with the effects that could look like it.
 
     Parameters
     ----------

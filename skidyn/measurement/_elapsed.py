@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks of the order of rows: what velocities say of the time between two rows."""
+"""Checks of the order of rows, by the time between two rows according to the velocities."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Elapsed:
 
 
 def elapsed_steps(measurement: Measurement) -> Elapsed | None:
-    """What velocities say of the time between rows; None where fewer than two joints move.
+    """Time between rows according to the velocities; None where fewer than two joints move.
 
     Parameters
     ----------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The measurement that is checked, with what several checks want to know about it."""
+"""The measurement that is checked, with quantities that several checks use."""
 
 from __future__ import annotations
 

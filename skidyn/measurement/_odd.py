@@ -73,7 +73,7 @@ class OddRecording(Check):
         for run, size in sizes.items():
             yield self.suspicion(
                 f"in trajectory {run} all torques are in another unit or scale than in the others",
-                f"they spread {size:.3g} times as far; mend that file, or leave it out",
+                f"they spread {size:.3g} times as far; fix that file, or leave it out",
                 "certain",
             )
         if sizes:
@@ -109,7 +109,7 @@ class OddRecording(Check):
                 f"in trajectory {run} the zero of {measurement.joint(joint)} is off by about "
                 f"{np.rad2deg(angle):.0f} deg against the others",
                 f"with it, the bodies of the others explain the torques of that trajectory better "
-                f"by {gain:.0f} (log-likelihood); mend that file, or leave it out",
+                f"by {gain:.0f} (log-likelihood); fix that file, or leave it out",
                 "suspected",
                 [joint],
             )
@@ -121,7 +121,7 @@ class OddRecording(Check):
                 f"in trajectory {run} the torque of {names} has another sign or scale than in the "
                 "others",
                 f"it is {multiples} times what the other trajectories predict, which gains up to "
-                f"{max(one.gain for one in own):.0f} (log-likelihood); mend that file, or leave it "
+                f"{max(one.gain for one in own):.0f} (log-likelihood); fix that file, or leave it "
                 "out",
                 "suspected",
                 [one.joint for one in own],

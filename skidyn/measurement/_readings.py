@@ -88,7 +88,7 @@ class Change:
 
 
 def find_changes(fits: Fits) -> list[Change]:
-    """Changes to the reading that the measurement asks for, the strongest first.
+    """Changes to the reading that explain the measurement better, the strongest first.
 
     One change is made at a time, the one that gains most; what is left decides on the next. At the
     end every change must still gain against the reading without it, and identified bodies must not
@@ -221,7 +221,7 @@ def _refined(fits: Fits, change: Change) -> Change:
 
 
 def _sharpened(fits: Fits, change: Change) -> Change:
-    """The zero that identified bodies ask for: those of the description are not the robot's."""
+    """The zero at which identified bodies fit best: those of the description are not exact."""
     if change.confirmed < NEEDED["zero"]:
         return change  # they follow any zero
 

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a check suspects about a measurement, and the option that mends it."""
+"""What a check suspects about a measurement, and the option that fixes it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any, Literal
 
-#: ``certain``: the measurement is not what it claims, and no diagnosis of it is true.
+#: ``certain``: the measurement is not what its names and units say, and no diagnosis of it is true.
 #: ``suspected``: it probably is not. ``noted``: it is, but there is something it cannot tell.
 Certainty = Literal["certain", "suspected", "noted"]
 CERTAINTIES: tuple[Certainty, ...] = ("certain", "suspected", "noted")
@@ -14,7 +14,7 @@ CERTAINTIES: tuple[Certainty, ...] = ("certain", "suspected", "noted")
 
 @dataclass(frozen=True)
 class Remedy:
-    """The option that mends what a check suspects.
+    """The option that fixes what a check suspects.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class Suspicion:
     joints : tuple of int
         Joints concerned, counted from 1; empty if it concerns the whole log.
     remedy : Remedy or None
-        The option that mends it; None where none can.
+        The option that fixes it; None where none can.
 
     Examples
     --------
@@ -71,8 +71,8 @@ class Suspicion:
     remedy: Remedy | None = None
 
     def __str__(self) -> str:
-        mend = "" if self.remedy is None else f" Mend it with {self.remedy}."
-        return f"{self.suspicion}: {self.evidence}.{mend}"
+        fix = "" if self.remedy is None else f" Fix it with {self.remedy}."
+        return f"{self.suspicion}: {self.evidence}.{fix}"
 
     def to_dict(self) -> dict[str, Any]:
         """As the reports hold it.

@@ -119,7 +119,7 @@ def _turns(measurement: Measurement, k: int) -> int:
 
 
 def unsigned_columns(measurement: Measurement) -> tuple[list[int], dict[int, float]]:
-    """Columns of the torque that hold magnitudes, and by how much a fit says so.
+    """Columns of the torque that hold magnitudes, and how much likelihood a fit gains by it.
 
     A single column is told by a fit of the magnitude of the robot's torque; where no column of
     three or more is ever negative although all joints reverse, none has a sign.
@@ -273,7 +273,7 @@ _RIVALS = {
 
 
 def _one_of_two(told: Suspicion, changes: Iterable[Change]) -> Suspicion:
-    """What is told of a reading, as one of two where something else explains the torque as well."""
+    """What is reported: one of two causes where something else explains the torque as well."""
     others = dict.fromkeys(change.other for change in changes if change.other)
     if not others:
         return told

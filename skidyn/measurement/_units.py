@@ -84,7 +84,7 @@ class ClockUnit(Check):
             yield self._rate(measurement, shared)
 
     def _rate(self, measurement: Measurement, shared: float) -> Suspicion:
-        """Clock, velocities or positions at another scale, whichever the robot's torque says."""
+        """Clock, velocities or positions at another scale, whichever explains the torque."""
         gains = {"time": 0.0, "dq": 0.0, "q": 0.0}
         fits = measurement.fits
         if fits is not None:

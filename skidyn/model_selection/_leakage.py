@@ -29,7 +29,7 @@ LOOKED_AT = 2000
 
 
 class LeakageWarning(UserWarning):
-    """Training and test rows of a fold are not independent; the score promises too much.
+    """Training and test rows of a fold are not independent; the score is too good.
 
     Examples
     --------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shuffled rows, which who reads the past of a row cannot use as they are."""
+"""Shuffled rows, which an estimator that reads earlier rows cannot use as they are."""
 
 from __future__ import annotations
 

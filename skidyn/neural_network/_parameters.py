@@ -16,7 +16,7 @@ PARAMETERS = """\
         Rows of history: each prediction has at least `window` and less than `window + stride` rows
         behind it. What the torque remembers for longer needs more.
     stride : int, default=4
-        Rows per piece. Neighbouring rows tell a network nearly the same, so shorter pieces learn
+        Rows per piece. Neighbouring rows carry nearly the same information, so shorter pieces learn
         more from an epoch, and cost more: ``1 + window / stride`` LSTM steps per row.
     hidden_size : int, default=32
         Cells of the LSTM.
@@ -33,7 +33,7 @@ PARAMETERS = """\
         Pieces per step.
     optimizer : type of torch.optim.Optimizer or None, default=None
         None is AdamW with a weight decay (0.3, of SDL 0.05), which keeps a network from learning
-        joints as functions of other joints, and ``betas=(0.8, 0.95)``, since torch's own want more
+        joints as functions of other joints, and ``betas=(0.8, 0.95)``, since torch's own need more
         steps than a log of minutes gives. ``optimizer__weight_decay=0.0`` makes it plain Adam:
         parameters named as in skorch are taken as well, ``optimizer__...``, ``callbacks__...`` and
         ``module__...`` (`hidden_size`, `dense_size` and `dropout` of the network).

@@ -209,7 +209,7 @@ class SmoothDerivatives(SignalTransformer):
             if segment.stop - segment.start < 6:
                 raise ValueError(
                     f"the segment at row {segment.start} has {segment.stop - segment.start} "
-                    "sample(s); smoothed derivatives need six. Remove it, or mend the trajectory "
+                    "sample(s); smoothed derivatives need six. Remove it, or fix the trajectory "
                     "and time columns."
                 )
             result = _smooth(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Features without key columns, which a learner that does not know them learns by heart."""
+"""Features without key columns, which a learner that does not know them would memorise."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Functions on whole logs: what changes rows or targets is no step of a Pipeline."""
+"""Functions on whole logs: what changes rows or targets is not a step of a Pipeline."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def _average_periods(frame: pd.DataFrame, period: float) -> pd.DataFrame:
         raise ValueError(f"the recording of {span:.4g} s holds no two periods of {period} s.")
     if span / period - n_periods > 0.5:
         raise ValueError(
-            f"the last {span - n_periods * period:.4g} s are no whole period; cut them."
+            f"the last {span - n_periods * period:.4g} s are not a whole period; cut them."
         )
     average: pd.DataFrame = frame[time < start + period].reset_index(drop=True).copy()
     own = average["time"].to_numpy(float)

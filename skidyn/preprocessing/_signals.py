@@ -224,7 +224,7 @@ class TimeDerivative(SignalTransformer):
             if len(values) < 2:
                 raise ValueError(
                     f"the segment at row {segment.start} has 1 sample; a derivative needs two. "
-                    "Remove it, or mend the trajectory and time columns."
+                    "Remove it, or fix the trajectory and time columns."
                 )
             if self.cutoff is not None:
                 values = _low_pass(values, self.cutoff, 4, self.rate_)

@@ -118,7 +118,7 @@ def _joint(
     ):
         if value:
             warnings.warn(
-                f"The {what} of joint {name!r} is no part of the rigid body and is left out; the "
+                f"The {what} of joint {name!r} is not part of the rigid body and is left out; the "
                 f"effect {'rotor_inertia' if what == 'armature' else 'spring'!r} stands for it.",
                 RobotDescriptionWarning,
                 stacklevel=2,

@@ -109,7 +109,7 @@ def _folds(X: Any, trajectory: Any) -> list[tuple[Rows, Rows]]:
     """Rows to fit and rows to simulate."""
     names = column_names(X)
     if names is None:
-        raise SkidynError("X is no table; give a DataFrame with the columns time, q1.., dq1..")
+        raise SkidynError("X is not a table; give a DataFrame with the columns time, q1.., dq1..")
     column = names[trajectory] if isinstance(trajectory, int) else trajectory or "trajectory"
     number = np.asarray(X[column]) if column in names else np.zeros(len(X))
     return held_out_folds(number, _FOLDS)

@@ -248,7 +248,7 @@ def _read(robot: Robot, log: Any, gain: Any, volts: Any, step: float) -> _Bench:
     broken = [k for k, v in table.items() if not np.isfinite(v).all()]
     if broken:
         raise SkidynError(
-            f"the column {broken[0]!r} has entries that are no numbers; leave them out"
+            f"the column {broken[0]!r} has entries that are not numbers; leave them out"
         )
     number = table.get("trajectory", np.zeros(n))
     rows, parts = [], []

@@ -145,8 +145,8 @@ def _read(reference: Any, columns: Columns) -> tuple[Array, Array, Array, Array]
         broken = np.flatnonzero(~np.isfinite(values).all(axis=1))
         if len(broken):
             raise SkidynError(
-                f"{what} of the reference are no numbers in row {broken[0]} ({len(broken)} row(s));"
-                " leave these rows out of the reference and of the log"
+                f"{what} of the reference are not numbers in row {broken[0]} "
+                f"({len(broken)} row(s)); leave these rows out of the reference and of the log"
             )
     return q, dq, time, number.astype(int)
 

@@ -27,7 +27,7 @@ def run_mujoco(model: RBDRegressor, task: Any, step: float) -> tuple[Array, Arra
         left = write_mjcf(model, path)
         if left:
             raise SkidynError(
-                f"MuJoCo's elements do not hold {', '.join(left)}; simulate with engine='own'"
+                f"MuJoCo has no elements for {', '.join(left)}; simulate with engine='own'"
             )
         world = mujoco.MjModel.from_xml_path(str(path))
     own = [model_joint(mujoco, world, name) for name in model.robot_.joint_names]

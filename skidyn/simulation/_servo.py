@@ -187,7 +187,9 @@ def _read(log: Any, robot: Robot | None) -> tuple[Signals, Array]:
     """Signals, smoothed where a robot needs accelerations, and the command."""
     names = column_names(log)
     if names is None:
-        raise SkidynError("the log is no table; give a DataFrame with time, q1.., dq1.., q_ref1..")
+        raise SkidynError(
+            "the log is not a table; give a DataFrame with time, q1.., dq1.., q_ref1.."
+        )
     joints: list[str] = [] if robot is None else list(robot.joint_names)
     if robot is None:
         while f"q{len(joints) + 1}" in names:

@@ -89,7 +89,7 @@ def test_no_semidefinite_program_finds_a_smaller_error(noise):
         ({"mass": {"link1": (2, 1)}}, "mass of 'link1'"),
         ({"mass": {"link1": (1, 2), "link2": (1, 2)}, "total_mass": 9.0}, "total_mass=9"),
         ({"centre_of_mass": {"link1": ((0, 0, 1), (1, 1, 0))}}, "z between 1 and 0 m is empty"),
-        ({"symmetry": {"link1": "w"}}, "'w' is no axis"),
+        ({"symmetry": {"link1": "w"}}, "'w' is not an axis"),
         (
             {"centre_of_mass": {"link1": ((0.1,) * 3, (0.2,) * 3)}, "symmetry": {"link1": "y"}},
             "mirror image at y = 0",

@@ -216,7 +216,7 @@ def test_intervals_cover_the_truth(exact):
         ({"estimator": ["ridge"]}, "expected one of 'weighted'"),
         ({"effects": "viscous"}, r"effects=\['viscous'\]"),
         ({"effects": None}, "expected a list"),
-        ({"effects": [3]}, "3 is no effect"),
+        ({"effects": [3]}, "3 is not an effect"),
         ({"effects": [("viscous", 1)]}, "joints counted from 1"),
         ({"effects": [("viscous", ["a"])]}, "joints counted from 1"),
         ({"effects": [("viscous", [0])]}, "no joint 0; the robot has joints 1 to"),

@@ -102,7 +102,7 @@ def test_channels_whose_clock_starts_anew_cannot_be_brought_together():
     with pytest.raises(LogError, match="the clock of a goes back in row 5.*file of its own"):
         align_channels([fast, slow], ["a", "b"], None, [])
     unread = fast.assign(time=np.r_[np.nan, np.arange(9)])
-    with pytest.raises(LogError, match="the clock of a is no number in row 0"):
+    with pytest.raises(LogError, match="the clock of a is not a number in row 0"):
         align_channels([unread], ["a"], 10.0, [])
 
 

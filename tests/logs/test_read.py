@@ -240,7 +240,7 @@ def test_units_are_converted_on_request(tmp_path):
     degrees.to_csv(tmp_path / "log.csv", index=False)
     units = {"q": "deg", "time": "ms", "tau2": "mNm"}
     assert_same(quiet_read(tmp_path / "log.csv", units=units), source)
-    with pytest.raises(LogError, match="'grad' is no unit of q"):
+    with pytest.raises(LogError, match="'grad' is not a unit of q"):
         read_log(tmp_path / "log.csv", units={"q": "grad"})
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What mends a log is asked for, counted, and refused by name where it cannot be done."""
+"""What fixes a log is asked for, counted, and refused by name where it cannot be done."""
 
 import numpy as np
 import pytest
@@ -109,12 +109,12 @@ def test_sign_from_the_command(read):
     [
         ({"flip": ["elbow"]}, "flip: 'elbow' is neither a joint .joint1, joint2. nor a column"),
         ({"flip": ["tau7"]}, "flip: 'tau7'"),
-        ({"order": [1, 1]}, r"order: \[1, 1\] is no order of 2 joints"),
+        ({"order": [1, 1]}, r"order: \[1, 1\] is not an order of 2 joints"),
         ({"order": {"volts": [2, 1]}}, "order: 'volts' is none of"),
         ({"order": {"temp": [2, 1]}}, "order: the log has no temp1"),
         ({"gain": {"tau1": 0.0}}, "gain: tau1 is to be multiplied by 0.0"),
         ({"gain": {"volts": 2.0}}, "gain: the log has no volts"),
-        ({"zero": {"tau1": 2.0}}, "zero: tau1 is no position"),
+        ({"zero": {"tau1": 2.0}}, "zero: tau1 is not a position"),
         ({"zero": {"q1": float("nan")}}, "zero: q1 is to read nan"),
         ({"late": {"volts": 0.1}}, "late: the log has no volts"),
         ({"clock": "even"}, "clock is 'even'"),
@@ -123,7 +123,7 @@ def test_sign_from_the_command(read):
     ],
 )
 @pytest.mark.filterwarnings("ignore::UserWarning")
-def test_what_cannot_be_mended_is_refused_by_name(read, options, words):
+def test_what_cannot_be_fixed_is_refused_by_name(read, options, words):
     with pytest.raises(LogError, match=words):
         read(LOG, robot=ROBOT, **options)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One list of checks: what it suspects, how sure, and the option that mends it."""
+"""One list of checks: what it suspects, how sure, and the option that fixes it."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The commands say first what matters, with the option that mends it, and take that option."""
+"""The commands say first what matters, with the option that fixes it, and take that option."""
 
 import json
 from pathlib import Path
@@ -21,7 +21,7 @@ def flipped(tmp_path):
     return str(path)
 
 
-def test_check_says_first_what_matters_with_the_command_that_mends_it(flipped, capsys):
+def test_check_says_first_what_matters_with_the_command_that_fixes_it(flipped, capsys):
     assert main(["check", flipped]) == 0
     told = capsys.readouterr().out
     assert told.startswith("!! the velocity of") and "--flip dq2" in told
@@ -30,7 +30,7 @@ def test_check_says_first_what_matters_with_the_command_that_mends_it(flipped, c
     assert json.loads(capsys.readouterr().out)["checks"] == []
 
 
-def test_the_command_that_mends_a_log_keeps_its_options(tmp_path, capsys):
+def test_the_command_that_fixes_a_log_keeps_its_options(tmp_path, capsys):
     path = tmp_path / "log.csv"
     motion = {name: 57.29578 * LOG[name] for name in ("q1", "q2", "dq1", "dq2")}
     LOG.assign(**motion, time=1e3 * LOG["time"]).to_csv(path, index=False)
@@ -44,8 +44,8 @@ def test_the_command_that_mends_a_log_keeps_its_options(tmp_path, capsys):
     [
         (["--flip", "elbow"], "flip: 'elbow' is neither"),
         (["--zero", "q1"], "'q1' is not NAME=VALUE"),
-        (["--gain", "tau1=much"], "'much' is no number"),
-        (["--order", "tau=1"], "is no order of 2 joints"),
+        (["--gain", "tau1=much"], "'much' is not a number"),
+        (["--order", "tau=1"], "is not an order of 2 joints"),
     ],
 )
 def test_an_option_that_cannot_be_met_is_refused(flipped, capsys, option, words):

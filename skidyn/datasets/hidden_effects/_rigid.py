@@ -31,7 +31,7 @@ def payload(world: World, joints: Sequence[int], size: float) -> Outcome:
 
 
 def base_tilt(world: World, joints: Sequence[int], size: float) -> Outcome:
-    """Gravity that does not point where the URDF says."""
+    """Gravity in another direction than in the URDF."""
     tilt = np.deg2rad(float(np.clip(20 * size, 0.0, 60.0)))
     heading = world.rng.uniform(-np.pi, np.pi)
     nominal = np.asarray(world.robot.gravity, dtype=float)

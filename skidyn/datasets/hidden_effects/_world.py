@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The simulated robot: its true parameters, its motion and the torques it takes without effects."""
+"""The simulated robot: its true parameters, its motion, and its torques without effects."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ LOADED_SHARE = 0.05
 
 @dataclass
 class World:
-    """A robot in motion, as the simulator knows it.
+    """A robot in motion, with its true parameters.
 
     Signals have the shape (n_trajectories, n_samples, n_joints) on the clock of the log; those
     with ``fine`` in their name are on the finer clock of the integration.

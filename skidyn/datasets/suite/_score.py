@@ -74,7 +74,7 @@ def score_answers(
     for answer in answers:
         name = str(answer.get("case"))
         if name not in by_case:
-            raise SkidynError(f"an answer to {name!r}, which is no case of this suite.")
+            raise SkidynError(f"an answer to {name!r}, which is not a case of this suite.")
         if name in given:
             raise SkidynError(f"{name} is answered twice.")
         given[name] = _checked(answer)

@@ -34,7 +34,7 @@
       say("no answer: is skidyn explore still running?");
       throw new Error("no answer");
     }
-    const content = await answer.json().catch(() => ({ error: "skidyn explore failed; its terminal says why" }));
+    const content = await answer.json().catch(() => ({ error: "skidyn explore failed; see its terminal for the reason" }));
     if (!answer.ok) { say(content.error); throw new Error(content.error); }
     return content;
   }

@@ -17,7 +17,7 @@ FAINT, DEEPEST = 2.0, 6.0
 class Where(Picture):
     """A map of robots and coefficients; robots that deviate first."""
 
-    place, title = 10, "Who deviates, and where"
+    place, title = 10, "Which robots deviate, and where"
 
     def read(self, subject: Fleet) -> dict[str, Any]:
         """Deviations in units of the scatter between robots."""
