@@ -13,9 +13,5 @@ def bundled(name: str) -> str:
     ----------
     name : {"uPlot.js", "uPlot.css", "uPlot.LICENSE.txt"}
         File in ``skidyn/static``.
-
-    Returns
-    -------
-    str
     """
     return files("skidyn").joinpath("static", name).read_text("utf-8")

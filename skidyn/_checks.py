@@ -39,10 +39,6 @@ def count_joints(frame: pd.DataFrame, source: str = "the log") -> int:
     source : str, default="the log"
         Name for messages.
 
-    Returns
-    -------
-    int
-
     Raises
     ------
     LogError
@@ -133,10 +129,6 @@ def as_numbers(frame: pd.DataFrame, names: Sequence[str], source: str = "the log
     source : str, default="the log"
         Name for messages.
 
-    Returns
-    -------
-    DataFrame
-
     Raises
     ------
     LogError
@@ -187,10 +179,6 @@ def handle_missing(
         What to do with rows that are not.
     source : str, default="the log"
         Name for messages.
-
-    Returns
-    -------
-    DataFrame
 
     Raises
     ------

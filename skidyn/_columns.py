@@ -86,10 +86,6 @@ def resolve_columns(
     require_acceleration : bool, default=True
         Whether accelerations must be there; without names they always must.
 
-    Returns
-    -------
-    Columns
-
     Raises
     ------
     ColumnError
@@ -185,6 +181,20 @@ def column_names(X: Any) -> list[str] | None:
     """Column names of a pandas or polars table, None for anything else."""
     columns = getattr(X, "columns", None)
     return None if columns is None or callable(columns) else [str(name) for name in columns]
+
+
+def names_of_table(X: Any, columns: str = "time, q1.., dq1..") -> list[str]:
+    """Column names of a table.
+
+    Raises
+    ------
+    ColumnError
+        X has no column names; the message says which ``columns`` it should have.
+    """
+    names = column_names(X)
+    if names is None:
+        raise ColumnError(f"X is not a table; give a DataFrame with the columns {columns}")
+    return names
 
 
 def with_columns(X: Any, columns: dict[str, np.ndarray]) -> Any:

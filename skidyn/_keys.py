@@ -91,10 +91,6 @@ def resolve_keys(
     trajectory, time : int, str or None, default="auto"
         ``"auto"`` takes the column of that name if there is one.
 
-    Returns
-    -------
-    Keys
-
     Examples
     --------
     >>> resolve_keys(["time", "q1", "dq1"], 3)
@@ -121,10 +117,6 @@ def fitted_keys(estimator: Any) -> Keys:
     ----------
     estimator : estimator
         Fitted, at least as far as ``n_features_in_``.
-
-    Returns
-    -------
-    Keys
     """
     names = getattr(estimator, "feature_names_in_", None)
     return resolve_keys(

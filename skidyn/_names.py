@@ -90,10 +90,6 @@ def match_names(
     source : str
         Name of the file for messages.
 
-    Returns
-    -------
-    NameMatch
-
     Raises
     ------
     LogError

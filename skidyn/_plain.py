@@ -19,10 +19,6 @@ def plain(value: Any) -> Any:
     value : object
         Mappings, sequences, NumPy arrays and scalars, strings, numbers.
 
-    Returns
-    -------
-    object
-
     Examples
     --------
     >>> import numpy as np

@@ -207,10 +207,6 @@ def signals_from(
     to_derive : bool, default=False
         Whether accelerations may be missing, to be derived from the positions; they are zero until
         then.
-
-    Returns
-    -------
-    Signals
     """
     if columns.ddq is None and not to_derive:
         raise ValueError("the columns hold no accelerations; derive them first")

@@ -26,10 +26,6 @@ def fall(before: float, after: float, noise: float, unit: str, added: bool = Tru
     added : bool, default=True
         False leaves the second error out.
 
-    Returns
-    -------
-    str
-
     Examples
     --------
     >>> fall(0.6346, 0.1620, 0.1617, "N m")
@@ -108,10 +104,6 @@ def measure(name: str, value: object, unit: str = "") -> str:
         What is known of it.
     unit : str, default=""
         Unit; ``"1"`` for none.
-
-    Returns
-    -------
-    str
 
     Examples
     --------

@@ -115,10 +115,6 @@ def bar(ratios: Sequence[float], largest: float, width: int = BAR) -> str:
     width : int, default=24
         Columns.
 
-    Returns
-    -------
-    str
-
     Examples
     --------
     >>> len(bar([4.0, 1.0], 4.0))

@@ -93,10 +93,6 @@ class JudgingSearch(RankingSearch):
             Squared error that the function removes.
         joints : sequence of int
             Joints, from 0, on which they are compared, each in units of what is left there.
-
-        Returns
-        -------
-        bool
         """
         own = list(joints)
         weight = 1 / np.maximum(least[own], 1e-300)

@@ -80,10 +80,6 @@ def catalogue_candidates(problem: Problem, kinds: Iterable[str]) -> list[Candida
         With the load and model torque of the current fit.
     kinds : iterable of str
         Kinds of the catalogue.
-
-    Returns
-    -------
-    list of Candidate
     """
     present = {(term.kind, term.places) for term in problem.terms}
     terms: list[Term] = []

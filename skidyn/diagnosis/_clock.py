@@ -65,10 +65,6 @@ def clock_line(
         Sampling rate.
     band : (float, float), Hz
         Lowest and highest frequency.
-
-    Returns
-    -------
-    ClockLine or None
     """
     clean = np.where(use, residual, 0.0)
     segments = [rows for rows in signals.segments if _length(signals, rows, rate) >= SHORTEST]

@@ -79,10 +79,6 @@ def conclude(
         The model as given.
     data : tuple
         X and torque as given.
-
-    Returns
-    -------
-    Diagnosis
     """
     robot = problem.robot
     assert robot is not None

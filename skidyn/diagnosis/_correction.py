@@ -58,10 +58,6 @@ class CorrectedRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         ----------
         effects : iterable of str, (str, joints) or Term
             Effects to add.
-
-        Returns
-        -------
-        CorrectedRegressor
         """
         return CorrectedRegressor(self.regressor, self.robot, [*self.effects, *effects])
 
@@ -81,10 +77,6 @@ class CorrectedRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             Torque, N m or N.
         sample_weight : array-like of shape (n_samples,), default=None
             Weight of every sample.
-
-        Returns
-        -------
-        CorrectedRegressor
         """
         if not hasattr(self.regressor, "fit"):
             return self.fit_effects(X, y, sample_weight)
@@ -103,10 +95,6 @@ class CorrectedRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             Torque, N m or N.
         sample_weight : array-like of shape (n_samples,), default=None
             Weight of every sample.
-
-        Returns
-        -------
-        CorrectedRegressor
         """
         self.regressor_ = self.regressor
         return self._fit_effects(X, y, sample_weight)

@@ -165,10 +165,6 @@ def make_finding(
         Parameters of every term with their intervals.
     unknowns : sequence of UnknownTorque, default=()
         What is known about nameless terms.
-
-    Returns
-    -------
-    Finding
     """
     term = candidate.term
     effect, unknown = term.effect, hypothesis.kind == UNKNOWN

@@ -44,10 +44,6 @@ def held_out_residual(
         Noise of one row.
     keep : sequence of Term, default=()
         Terms whose own contribution is wanted.
-
-    Returns
-    -------
-    HeldOut
     """
     design = problem.design([problem.term_rows(t) for t in terms])
     whole, left = left_out_coefficients(

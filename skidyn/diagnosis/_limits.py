@@ -105,10 +105,6 @@ class Gates:
             Coefficients and shape parameters of the effect.
         inflation : float
             Variance inflation of the residual.
-
-        Returns
-        -------
-        float
         """
         s = self.settings
         chance = s.level / self.n_tests / 2
@@ -144,10 +140,6 @@ def find_limits(
         Noise of one row and its variance inflation.
     gates : Gates
         What an effect must remove to be a finding.
-
-    Returns
-    -------
-    list of Limit
     """
     design = [a / s for a, s in zip(problem.design(blocks), sigma, strict=True)]
     gram = np.asarray(sum(a.T @ a for a in design))

@@ -129,10 +129,6 @@ def refine(
         Noise of one row.
     target : sequence of ndarray
         Averaged torque.
-
-    Returns
-    -------
-    list of Candidate
     """
     refined = list(candidates)
     for i, candidate in enumerate(refined):

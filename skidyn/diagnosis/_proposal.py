@@ -69,10 +69,6 @@ def grammar(variables: Sequence[str], joint: int) -> list[str]:
         Signals such as ``"q1"`` and ``"dq3"``.
     joint : int
         Joint on which the torque acts, from 0.
-
-    Returns
-    -------
-    list of str
     """
     positions = [v for v in variables if v.startswith("q")]
     velocities = [v for v in variables if v.startswith("dq")]

@@ -53,10 +53,6 @@ def recording_candidates(problem: Problem, kinds: Iterable[str]) -> list[Candida
         Rows.
     kinds : iterable of str
         Kinds that may be named.
-
-    Returns
-    -------
-    list of Candidate
     """
     candidates = []
     for kind in kinds:
@@ -94,10 +90,6 @@ def choose(
         Gives the tester of the model with some candidates.
     significant : callable
         Whether a chance is small enough.
-
-    Returns
-    -------
-    list of Candidate
     """
     chosen = _zeroed_anew(candidates, tester_beside([]), significant)
     left = [c for c in candidates if not any(c is other for other in chosen)]

@@ -110,10 +110,6 @@ def find_remainder(
         Held-out error on the samples judged.
     share : ndarray of shape (n_joints,)
         Share of the squared error of averaged rows that is predictable.
-
-    Returns
-    -------
-    Remainder
     """
     sensor = sensor_noise(problem.signals, residual)
     position = position_noise(problem)

@@ -260,10 +260,6 @@ class Tester:
         zeros : ndarray of shape (n_coefficients,) of bool, optional
             Coefficients that only say where the effect is zero. The others must be more than
             chance beside them, too: the constant beside a spring is no spring.
-
-        Returns
-        -------
-        Test
         """
         new = self._swept(rows)
         test = self._test(rows, new, self.residual)
@@ -343,10 +339,6 @@ def chance_of_score(score: Array, sums: Array) -> float:
         Of the model without the candidate, over all blocks.
     sums : ndarray of shape (n_blocks, n_coefficients)
         Of every block, with the residual that is left after the candidate.
-
-    Returns
-    -------
-    float
     """
     count, k = sums.shape
     free = count - 1

@@ -38,10 +38,6 @@ def search(
         Joints, from 0, on which effects are tried; all by default.
     vibration : bool, default=True
         Whether waves in time are looked for, which a wrong clock makes by itself.
-
-    Returns
-    -------
-    SearchResult
     """
     searcher = _Search(problem, kinds, settings, nameless)
     searcher.vibration = vibration and nameless

@@ -61,10 +61,6 @@ def find_lines(problem: Problem, residual: Array) -> list[Line]:
         Motion and the samples that slide.
     residual : ndarray of shape (n_samples, n_joints), N m
         Measured torque less the model.
-
-    Returns
-    -------
-    list of Line
     """
     fold = problem.sample_folds(int(np.argmax(problem.rows.counts)))
     lines = []
@@ -94,10 +90,6 @@ def find_vibrations(problem: Problem, residual: Array) -> list[Line]:
         Motion and the samples that slide.
     residual : ndarray of shape (n_samples, n_joints), N m or N
         Measured torque less the model.
-
-    Returns
-    -------
-    list of Line
     """
     signals, lines = problem.signals, []
     if signals.time is None:

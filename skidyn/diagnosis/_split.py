@@ -61,10 +61,6 @@ def split_effects(
         Noise of one row.
     target : sequence of ndarray
         Averaged torque.
-
-    Returns
-    -------
-    list of Split
     """
     names = np.unique(np.concatenate(problem.rows.trajectory))
     if problem.robot is None or len(names) < 2:

@@ -102,10 +102,6 @@ def describe_unknowns(
         The nameless ones among them.
     sigma : ndarray of shape (n_joints,)
         Noise of one row.
-
-    Returns
-    -------
-    list of UnknownTorque
     """
     terms = list(terms)
     design = problem.design([problem.term_rows(t) for t in terms])

@@ -50,10 +50,6 @@ class NamelessEffect(Effect):
             Joint on which it acts, from 0.
         shape : dict
             Shape parameters of the term.
-
-        Returns
-        -------
-        tuple of str
         """
         other = int(shape.get("other", joint))
         names = []
@@ -232,10 +228,6 @@ class FunctionOfSignals(NamelessEffect):
         signals : Signals
         names : sequence of str
             Signals, joints counted from 1, such as ``"q2"``.
-
-        Returns
-        -------
-        dict
         """
         low, high = zip(
             *(_supported_range(signals, signals.named(name)) for name in names), strict=True

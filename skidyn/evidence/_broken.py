@@ -104,10 +104,6 @@ def without_broken(motion: SmoothedMotion, logged: Signals, torque: Array) -> Sm
         Motion before smoothing.
     torque : ndarray of shape (n_samples, n_joints)
         Logged torque.
-
-    Returns
-    -------
-    SmoothedMotion
     """
     wrong = leaps(torque, logged, TORQUE_SHARE, reversals(logged))
     # The torque of every joint depends on all positions.

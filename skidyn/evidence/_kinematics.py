@@ -67,10 +67,6 @@ def smooth_motion(signals: Signals, cutoff: float | None = None) -> SmoothedMoti
         Logged motion; dq and ddq are not used.
     cutoff : float, Hz, optional
         Cut-off; by default 24 % of the sampling rate, at most 27 Hz.
-
-    Returns
-    -------
-    SmoothedMotion
     """
     rate = sampling_rate(signals)
     half, used = _half_width(rate, cutoff)

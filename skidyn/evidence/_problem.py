@@ -191,10 +191,6 @@ class Problem:
             Noise of one row of every joint; found from a fit of each joint by itself if None.
         passes : int, default=1
             Times the noise is estimated anew from the residual and the fit repeated.
-
-        Returns
-        -------
-        Fit
         """
         terms = TermSum(terms)
         design = self.design([self.term_rows(t) for t in terms])
@@ -232,10 +228,6 @@ class Problem:
         ----------
         passes : int, default=3
             As in :meth:`fit`.
-
-        Returns
-        -------
-        Fit
         """
         free = [t for t in self.terms if not t.effect.follows_fit]
         if len(free) < len(self.terms):  # the others begin with the load of a model without them
@@ -348,10 +340,6 @@ def make_problem(
         friction does there, one of the family ``"hysteresis"``, can be held to them.
     weight : ndarray of shape (n_samples,), optional
         Weight of every sample; those of weight 0 enter no row.
-
-    Returns
-    -------
-    Problem
     """
     motion = read_motion(signals, smooth, torque)
     if weight is not None:
@@ -390,10 +378,6 @@ def with_reversals(problem: Problem, terms: Iterable[Term], joints: Sequence[int
         Effects of the model.
     joints : sequence of int
         Joints, from 0, whose rows reach up to the reversals.
-
-    Returns
-    -------
-    Problem
     """
     return _with_rows(problem, terms, _rows_and_folds(problem.motion, joints))
 
@@ -409,10 +393,6 @@ def with_short_windows(problem: Problem, terms: Iterable[Term], window: float) -
         Effects of the model.
     window : float, s
         Width of the windows.
-
-    Returns
-    -------
-    Problem
     """
     return _with_rows(problem, terms, _rows_and_folds(problem.motion, (), window=window))
 

@@ -160,10 +160,6 @@ def every_sample(signals: Signals) -> Rows:
     ----------
     signals : Signals
         Motion.
-
-    Returns
-    -------
-    Rows
     """
     n, joints = signals.n_samples, range(signals.n_joints)
     order = np.arange(n)
@@ -220,10 +216,6 @@ def window_rows(signals: Signals, use: NDArray[np.bool_], window: float = WINDOW
         Samples that may enter.
     window : float, s, default=1/8
         Width of the window; widened to hold six samples of each trajectory.
-
-    Returns
-    -------
-    Rows
     """
     spans = [_windows(signals.clock[rows], rows.start, window) for rows in signals.segments]
     weights, trajectory, time, quarter = [], [], [], []

@@ -81,10 +81,6 @@ def refine_term(problem: Problem, term: Term, gain: Gain) -> Term:
         Where to start.
     gain : Gain
         Of the model without this term.
-
-    Returns
-    -------
-    Term
     """
     effect = term.effect
     shapes = [s for s in effect.shapes if s.name in term.shape]

@@ -74,10 +74,6 @@ def fit_ripple(problem: Problem, term: Term, residual: Array, fold: NDArray[np.i
         What the model leaves.
     fold : ndarray of shape (n_samples,)
         Fold of every sample.
-
-    Returns
-    -------
-    Ripple
     """
     (joint,) = term.places
     columns = term.torque_columns(problem.signals)[joint]
@@ -107,10 +103,6 @@ def ripples(problem: Problem, residual: Array, fold: NDArray[np.int64]) -> list[
         What the model leaves, held out.
     fold : ndarray of shape (n_samples,)
         Fold of every sample.
-
-    Returns
-    -------
-    list of Offer
     """
     best: dict[int, Offer] = {}
     for line in find_lines(problem, residual):

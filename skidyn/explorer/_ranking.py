@@ -128,10 +128,6 @@ class Ranking:
             Noise of one row of every joint.
         own : ndarray of shape (p,) of bool, optional
             Coefficients that one recording alone can tell; none by default.
-
-        Returns
-        -------
-        FoldedModel
         """
         design = self.problem.design(blocks)
         weight = 1 / np.asarray(sigma) ** 2
@@ -166,10 +162,6 @@ class Ranking:
             The model as it is.
         joint : int
             Joint, counted from 0.
-
-        Returns
-        -------
-        HeldOutRows
         """
         index = np.array([i for i, c in enumerate(self.candidates) if joint in c.rows], dtype=int)
         columns = self._columns_of(index)
@@ -182,7 +174,7 @@ class Ranking:
         for f, (fit, rows) in enumerate(zip(model.fits, self._folds[joint], strict=True)):
             left = cross.sum(0) - cross[f], target.sum(0) - target[f]
             gain, change = self._gain(fit, *left, index, f, model.weight)
-            explained = self._explained(joint, rows, index, gain)
+            explained = self._explained(joint, rows, gain)
             then[rows] = (now[rows, None] - explained + model.design[joint][rows] @ change) ** 2
         gain, _ = self._gain(model.whole, cross.sum(0), target.sum(0), index, None, model.weight)
         allowed = np.array(
@@ -269,9 +261,7 @@ class Ranking:
                 gains[n] = g
         return gains, change
 
-    def _explained(
-        self, joint: int, rows: slice, index: NDArray[np.int64], gain: list[Array]
-    ) -> Array:
+    def _explained(self, joint: int, rows: slice, gain: list[Array]) -> Array:
         """What each candidate explains of some rows of a joint by itself."""
         block = self._blocks[joint][rows]
         scaled = block * np.concatenate([np.zeros(0), *gain])

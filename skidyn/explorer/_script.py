@@ -37,10 +37,6 @@ def script(
         Joints the log covers.
     reading : mapping
         Further arguments of :func:`skidyn.logs.read_log`; None where not given.
-
-    Returns
-    -------
-    str
     """
     effects = ", ".join(_source(e) for e in model.effects)
     only = "" if joints is None else f", joints={list(joints)!r}"

@@ -247,10 +247,6 @@ def make_app(explorer: Explorer, port: int) -> Any:
         What answers.
     port : int
         Port of this machine; requests for any other host are refused.
-
-    Returns
-    -------
-    starlette.applications.Starlette
     """
     import_optional("starlette", extra="explore")
     from starlette.applications import Starlette

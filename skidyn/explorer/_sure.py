@@ -52,10 +52,6 @@ def margin(kind: str, ranked: Sequence[Ranked]) -> Margin:
         Effect that is added.
     ranked : sequence of RankedEffect
         Effects that would have helped the same joint, before it was added.
-
-    Returns
-    -------
-    Margin
     """
     gains = {e.kind: -np.log1p(-min(e.drop, 1 - 1e-12)) for e in ranked}
     titles = {e.kind: e.title for e in ranked}
@@ -82,10 +78,6 @@ def sure_told(
         Over the best other effect.
     inflation, removed, whole_recordings, some_recordings
         As :func:`skidyn.diagnosis.confidence` takes them.
-
-    Returns
-    -------
-    str
 
     Examples
     --------

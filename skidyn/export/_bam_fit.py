@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import least_squares
 
-from skidyn._columns import column_names, resolve_columns
+from skidyn._columns import names_of_table, resolve_columns
 from skidyn._exceptions import SkidynError
 from skidyn._signals import signals_from
 from skidyn.evidence import smooth_motion
@@ -132,9 +132,7 @@ def fit_bam(
 
 def _motion(robot: Robot, X: Any) -> tuple[Any, Any, Any]:
     """Smoothed motion of a table."""
-    names = column_names(X)
-    if names is None:
-        raise SkidynError("X is not a table; give a DataFrame with the columns time, q1.., dq1..")
+    names = names_of_table(X)
     columns = resolve_columns(names, len(names), robot.joint_names, require_acceleration=False)
     if columns.time is None:
         raise SkidynError("the log has no column 'time' (s)")

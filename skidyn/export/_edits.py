@@ -133,11 +133,6 @@ class Edits:
         before = self.data[line : element.start]
         return before if not before.strip() else b""
 
-    @property
-    def n_changes(self) -> int:
-        """Places that are changed."""
-        return len(self._changes)
-
     def text(self) -> bytes:
         """The file with all changes."""
         result, at = [], 0

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn._columns import column_names, resolve_columns
+from skidyn._columns import column_names, names_of_table, resolve_columns
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Array, Signals, signals_from
 from skidyn.evidence import smooth_motion
@@ -77,9 +77,7 @@ def read_task(
 
 def motion_of(model: Any, X: Any) -> Signals:
     """Signals of a log; smoothed where the model smooths or the log has no accelerations."""
-    names = column_names(X)
-    if names is None:
-        raise SkidynError("X is not a table; give a DataFrame with the columns time, q1.., dq1..")
+    names = names_of_table(X)
     robot = model.robot_
     columns = resolve_columns(
         names,
@@ -155,7 +153,7 @@ def run(
     drive, feed = _drive(forward, task, rows, time)
     stepper = Stepper(forward, drive, feed, conditions, theta)
     state = _start(forward, signals, rows[:, 0], stepper)
-    _check_inertia(stepper, state, time[:, 0])
+    _check_inertia(stepper, state)
     n_samples = rows.shape[1]
     q, dq = (np.full((len(rows), n_samples, n), np.nan) for _ in range(2))
     q[:, 0], dq[:, 0] = state.q[:, :n], state.dq[:, :n]
@@ -240,7 +238,7 @@ def _drive(forward: ForwardModel, task: Task, rows: Rows, time: Array) -> Any:
     return (None, logged) if task.controller is None else (controlled, None)
 
 
-def _check_inertia(stepper: Stepper, state: State, time: Array) -> None:
+def _check_inertia(stepper: Stepper, state: State) -> None:
     """Refuse a model whose inertia is not positive definite: it would run away at once."""
     n, rows = stepper.n, len(state.q)
     shape = (n + 1, rows, n)

@@ -85,10 +85,6 @@ def body_constraints(known: BodyConstraints, names: Sequence[str], signs: Array)
     signs : ndarray of shape (n_coefficients,)
         1 for coefficients that must not be negative.
 
-    Returns
-    -------
-    Linear
-
     Raises
     ------
     ValueError

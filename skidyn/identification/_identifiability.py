@@ -35,10 +35,6 @@ def condition_number(rows: Array) -> float:
     ----------
     rows : ndarray of shape (n_rows, n_columns)
         Weighted rows, or their triangular factor.
-
-    Returns
-    -------
-    float
     """
     if rows.shape[1] == 0:
         return 1.0

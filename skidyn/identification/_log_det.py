@@ -121,10 +121,6 @@ def divergence(parameters: Array, nominal: Array) -> float:
     ----------
     parameters, nominal : ndarray of shape (n_bodies, 10)
         Inertial parameters.
-
-    Returns
-    -------
-    float
     """
     try:
         own, other = (np.linalg.cholesky(pseudo_inertia(x)) for x in (parameters, nominal))

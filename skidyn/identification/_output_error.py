@@ -63,10 +63,6 @@ def refine_by_simulation(
     horizon : float, s, or None
         Length of the pieces; None for whole trajectories.
 
-    Returns
-    -------
-    Solution
-
     Raises
     ------
     SkidynError

@@ -99,10 +99,6 @@ def decode(path: Path, topics: Sequence[str] | None, max_bytes: int) -> list[Cha
     max_bytes : int
         Largest file once unpacked.
 
-    Returns
-    -------
-    list of Channel
-
     Raises
     ------
     LogError

@@ -72,10 +72,6 @@ def mend_columns(
     notes : list of str
         What was done is appended here.
 
-    Returns
-    -------
-    DataFrame
-
     Raises
     ------
     LogError
@@ -125,10 +121,6 @@ def restore_gravity(table: pd.DataFrame, robot: Robot | None, notes: list[str]) 
     notes : list of str
         What was done is appended here.
 
-    Returns
-    -------
-    DataFrame
-
     Raises
     ------
     LogError
@@ -162,10 +154,6 @@ def mend_rows(table: pd.DataFrame, n: int, remedies: Remedies, notes: list[str])
         What was asked for.
     notes : list of str
         What was done is appended here.
-
-    Returns
-    -------
-    DataFrame
 
     Raises
     ------

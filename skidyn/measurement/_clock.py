@@ -114,10 +114,6 @@ def find_jitter(time: Array, q: Array, trajectory: NDArray[np.int64]) -> Jitter:
         Recorded positions.
     trajectory : ndarray of shape (n_samples,)
         Trajectory of every row.
-
-    Returns
-    -------
-    Jitter
     """
     regular = regular_clock(time, trajectory)
     segments = find_segments(trajectory, time)

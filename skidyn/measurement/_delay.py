@@ -65,10 +65,6 @@ def find_delay(fits: Fits) -> Delay:
     ----------
     fits : Fits
         Rows.
-
-    Returns
-    -------
-    Delay
     """
     n = fits.n_joints
     own_errors, own_gains, halves = np.full(n, np.nan), np.zeros(n), np.full((n, 2), np.nan)

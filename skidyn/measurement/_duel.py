@@ -72,10 +72,6 @@ def fight(fits: Fits, before: Reading, reading: Reading, joints: Sequence[int]) 
         As the log is read, and as it is suspected to have to be read.
     joints : sequence of int
         Joints, from 0, on which effects are tried.
-
-    Returns
-    -------
-    Duel
     """
     # both have the scale of the torque that the reading asks for
     gains = np.nan_to_num(fits.nominal(reading).gain)

@@ -65,10 +65,6 @@ def elapsed_steps(measurement: Measurement) -> Elapsed | None:
     ----------
     measurement : Measurement
         What was recorded.
-
-    Returns
-    -------
-    Elapsed or None
     """
     s = measurement.signals
     spread = s.q.std(axis=0)

@@ -451,10 +451,6 @@ def make_fits(signals: Signals, torque: Array, robot: Robot) -> Fits | None:
         Recorded torque.
     robot : Robot
         As described.
-
-    Returns
-    -------
-    Fits or None
     """
     motion = smooth_motion(signals)
     rate, smooth = motion.rate, motion.signals
@@ -528,10 +524,6 @@ def fit_at_once(columns: Array, y: Array, use: NDArray[np.bool_]) -> list[Robust
     y : ndarray of shape (n_fits, n_rows), N m or N
     use : ndarray of shape (n_fits, n_rows) of bool
         Rows that count.
-
-    Returns
-    -------
-    list of RobustFit
     """
     weight = use.astype(float)
     total = weight.sum(1)
@@ -588,10 +580,6 @@ def fit_together(
     places : sequence of ndarray of shape (n_columns_k,)
         Their places among all coefficients.
     targets : sequence of ndarray of shape (n_rows_k,), N m or N
-
-    Returns
-    -------
-    list of RobustFit
     """
     if not designs:
         return []

@@ -98,10 +98,6 @@ def find_changes(fits: Fits) -> list[Change]:
     ----------
     fits : Fits
         Rows.
-
-    Returns
-    -------
-    list of Change
     """
     found: list[Change] = []
     reading = Reading()

@@ -271,10 +271,6 @@ def train(
         Settings.
     progress : FitProgress or None
         Told about every epoch.
-
-    Returns
-    -------
-    Training
     """
     device = torch.device(plan.settings["device"])
 

@@ -126,10 +126,6 @@ def directions(given: Any, names: Any, n_features: int) -> list[int]:
         Names of the columns.
     n_features : int
         Number of columns.
-
-    Returns
-    -------
-    list of int
     """
     columns = None if names is None else [str(name) for name in names]
     if given is None:

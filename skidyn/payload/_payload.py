@@ -345,7 +345,7 @@ def _estimate(runs: Runs, link: str, notes: list[str], com: Array | None = None)
     body = free @ solution[:width]
     first_moment = np.where(is_open[1:4], np.nan, body[1:4])
     moments = first_moment[:, None] + wide * std[1:4, None] * [-1.0, 1.0]
-    shares, share_std = _by_joint(designs, runs, body)
+    shares, share_std = _by_joint(runs, body)
     notes = notes + _disagreement(shares, share_std)
     before, after = _loaded_errors(designs, runs, solution, width)
     robot = runs.problem.robot
@@ -412,7 +412,7 @@ def _sphere(mass: float, com: Array) -> Array:
     return np.asarray(np.r_[mass, mass * com, inertia[np.triu_indices(3)]])
 
 
-def _by_joint(designs: list[Array], runs: Runs, body: Array) -> tuple[Array, Array]:
+def _by_joint(runs: Runs, body: Array) -> tuple[Array, Array]:
     """Size of the payload by every joint alone, over the common one, with its standard error."""
     shares, errors = [], []
     for own, rest, target, fold in zip(runs.body, runs.rest, runs.target, runs.fold, strict=True):
@@ -442,8 +442,8 @@ def _disagreement(shares: Array, errors: Array) -> list[str]:
         return []
     j = felt[worst]
     return [
-        f"Joint {j + 1} by itself weighs {100 * shares[j]:.0f} % of it, {distance[worst]:.1f} "
-        "standard errors from what all joints say: check its drive gain before the mass is used."
+        f"Joint {j + 1} alone gives {100 * shares[j]:.0f} % of this mass, {distance[worst]:.1f} "
+        "standard errors from all joints together: check its drive gain before the mass is used."
     ]
 
 

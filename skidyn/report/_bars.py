@@ -58,10 +58,6 @@ def scale_of(ratios: Iterable[float | None]) -> Scale:
     ----------
     ratios : iterable of float or None
         Errors over noise.
-
-    Returns
-    -------
-    Scale
     """
     known = [r for r in ratios if r is not None and isfinite(r)]
     return Scale(max([1.5, *known]) * 1.02)

@@ -54,9 +54,5 @@ def meaning(word: str) -> str:
     ----------
     word : str
         A key of ``MEANINGS`` or ``FLEET_MEANINGS``; its first letter may be a capital.
-
-    Returns
-    -------
-    str
     """
     return {**MEANINGS, **FLEET_MEANINGS}[word[:1].lower() + word[1:]]

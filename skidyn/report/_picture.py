@@ -41,10 +41,6 @@ class Canvas:
         ----------
         figure : dict
             ``type`` is a drawing of ``static/figures.js``; the rest is what that draws.
-
-        Returns
-        -------
-        int
         """
         figures: list[dict[str, Any]] = self.numbers["figures"]
         if figure not in figures:
@@ -118,10 +114,6 @@ def pictures(page: str) -> dict[str, Picture]:
     ----------
     page : {"comparison", "diagnosis", "fleet"}
         Folder of ``skidyn/report/_pages``.
-
-    Returns
-    -------
-    dict of str to Picture
     """
     package = import_module(f"skidyn.report._pages.{page}")
     found = {}

@@ -18,10 +18,6 @@ def coefficient_told(column: str) -> str:
     column : str
         Name of a coefficient, such as ``"viscous.Fv[1]"``.
 
-    Returns
-    -------
-    str
-
     Examples
     --------
     >>> coefficient_told("viscous.Fv[1]")

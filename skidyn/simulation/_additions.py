@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.base import clone
 
-from skidyn._columns import column_names
+from skidyn._columns import names_of_table
 from skidyn._exceptions import SkidynError
 from skidyn.forward import Controller
 from skidyn.identification import RBDRegressor
@@ -107,9 +107,7 @@ def judge_additions(
 
 def _folds(X: Any, trajectory: Any) -> list[tuple[Rows, Rows]]:
     """Rows to fit and rows to simulate."""
-    names = column_names(X)
-    if names is None:
-        raise SkidynError("X is not a table; give a DataFrame with the columns time, q1.., dq1..")
+    names = names_of_table(X)
     column = names[trajectory] if isinstance(trajectory, int) else trajectory or "trajectory"
     number = np.asarray(X[column]) if column in names else np.zeros(len(X))
     return held_out_folds(number, _FOLDS)

@@ -45,13 +45,13 @@ def run_mujoco(model: RBDRegressor, task: Any, step: float) -> tuple[Array, Arra
         q[k, 0], dq[k, 0] = data.qpos[own], data.qvel[own]
         last = int(windows.valid[k].sum())
         for i in range(last - 1):
-            start, span = windows.time[k, i], windows.time[k, i + 1] - windows.time[k, i]
+            span = windows.time[k, i + 1] - windows.time[k, i]
             parts = max(1, int(np.ceil(span / step - 1e-9)))
             world.opt.timestep = span / parts
             for part in range(parts):
                 share = (part + 0.5) / parts
                 ends = rows[i], rows[i + 1]
-                data.qfrc_applied[own] = _force(task, ends, share, data, own, start + share * span)
+                data.qfrc_applied[own] = _force(task, ends, share, data, own)
                 mujoco.mj_step(world, data)
             q[k, i + 1], dq[k, i + 1] = data.qpos[own], data.qvel[own]
             if not np.isfinite(data.qpos).all():
@@ -65,7 +65,7 @@ def model_joint(mujoco: Any, world: Any, name: str) -> int:
     return int(world.jnt_dofadr[index])
 
 
-def _force(task: Any, ends: Any, share: float, data: Any, own: list[int], moment: float) -> Array:
+def _force(task: Any, ends: Any, share: float, data: Any, own: list[int]) -> Array:
     """Torque of the drive in the middle of a step."""
     a, b = ends
     if task.controller is None:

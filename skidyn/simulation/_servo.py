@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn._columns import column_names, resolve_columns, trajectory_numbers
+from skidyn._columns import names_of_table, resolve_columns, trajectory_numbers
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Array, Signals, signals_from
 from skidyn.evidence import smooth_motion
@@ -185,11 +185,7 @@ def _inverse_gains(
 
 def _read(log: Any, robot: Robot | None) -> tuple[Signals, Array]:
     """Signals, smoothed where a robot needs accelerations, and the command."""
-    names = column_names(log)
-    if names is None:
-        raise SkidynError(
-            "the log is not a table; give a DataFrame with time, q1.., dq1.., q_ref1.."
-        )
+    names = names_of_table(log, "time, q1.., dq1.., q_ref1..")
     joints: list[str] = [] if robot is None else list(robot.joint_names)
     if robot is None:
         while f"q{len(joints) + 1}" in names:

@@ -63,10 +63,6 @@ def motion_ranges(robot: Robot) -> Ranges:
     ----------
     robot : Robot
         Its limits are kept; joints without limits turn by up to 1.3 rad, slide by up to 0.1 m.
-
-    Returns
-    -------
-    Ranges
     """
     sliding = np.array([kind == "prismatic" for kind in robot.joint_types])
     low, high = np.asarray(robot.position_limits, dtype=float).T
@@ -96,10 +92,6 @@ def plan_motion(
         Rows per trajectory.
     rng : Generator
         Source of chance.
-
-    Returns
-    -------
-    Motion
     """
     ranges = motion_ranges(robot)
     time = step * np.arange(n_steps, dtype=np.float64)
