@@ -151,7 +151,7 @@ def test_wrong_files_and_arguments_are_refused_by_name(fit, load, tmp_path):
         with pytest.raises(SkidynError, match=message):
             read_bam(tmp_path / "bad.json")
 
-    refused("{", "no JSON")
+    refused("{", "not JSON")
     refused('{"kt": 1}', "lacks 'model'")
     refused('{"model": "m7", "actuator": "x"}', "models m1, m2")
     refused('{"model": "m1", "actuator": "x", "friction_base": 1}', "'friction_viscous'")

@@ -168,7 +168,7 @@ def test_wrong_files_are_refused(model, own, tmp_path):
         "axis": (MJCF.replace('"elbow" axis="1 0 0"', '"elbow" axis="0 1 0"'), "does not move"),
         "geom": (MJCF.replace('angle="degree"', 'inertiafromgeom="true"'), "inertiafromgeom"),
         "doctype": ("<!DOCTYPE mujoco>" + MJCF, "document type"),
-        "broken": (MJCF.replace("</mujoco>", ""), "no XML"),
+        "broken": (MJCF.replace("</mujoco>", ""), "not XML"),
     }
     for name, (text, message) in cases.items():
         path = tmp_path / f"{name}.xml"

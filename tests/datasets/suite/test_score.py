@@ -119,7 +119,7 @@ def test_what_drowns_in_noise_counts_for_false_claims_only():
 
 def test_answers_that_cannot_be_read_are_refused():
     hidden = truth(DAHL)
-    with pytest.raises(SkidynError, match="no case of this suite"):
+    with pytest.raises(SkidynError, match="not a case of this suite"):
         score_answers([hidden], [answer(name="case_099")])
     with pytest.raises(SkidynError, match="answered twice"):
         score_answers([hidden], [answer(), answer()])
