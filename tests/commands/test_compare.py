@@ -70,7 +70,7 @@ def test_traces_of_one_log(here, capsys, tmp_path):
     assert file.read_bytes().startswith(b"\x89MCAP0")
     words = ["compare", *LOG, "--against", "log.csv", "--traces", str(file)]
     assert cli.main(words) == cli.BAD_INPUT
-    assert "--traces are of one model" in capsys.readouterr().err
+    assert "--traces writes one model" in capsys.readouterr().err
 
 
 def test_compare_knows_joints_trajectories_and_regimes(capsys, run, arguments):
