@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
-from skidyn._columns import Columns
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.effects import unregister_effect
 from skidyn.identification import ESTIMATORS, RBDRegressor
@@ -23,14 +22,14 @@ def smallest_estimator():
     specification = importlib.util.spec_from_file_location("skidyn_smallest_estimator", path)
     module = importlib.util.module_from_spec(specification)
     specification.loader.exec_module(module)
-    return module.DragRegressor
+    return module
 
 
-class AnyColumns(smallest_estimator()):
+class AnyColumns(smallest_estimator().DragRegressor):
     """Takes whatever columns scikit-learn's checks bring."""
 
     def _resolve(self, n_features):
-        return Columns((0,), (1 % n_features,), (2 % n_features,))
+        return smallest_estimator().Columns((0,), (1 % n_features,), (2 % n_features,))
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
@@ -49,7 +48,7 @@ def log():
 
 
 def test_smallest_estimator_reads_a_log(log):
-    drag = smallest_estimator()(log.robot).fit(log.X, 2.0 * log.X[["dq1", "dq2"]])
+    drag = smallest_estimator().DragRegressor(log.robot).fit(log.X, 2.0 * log.X[["dq1", "dq2"]])
     assert drag.Fv_ == pytest.approx([2.0, 2.0])
 
 

@@ -4,9 +4,8 @@
 import numpy as np
 import pytest
 
-from skidyn._signals import Signals
 from skidyn.datasets import load_planar_arm
-from skidyn.effects import get_effect
+from skidyn.effects import Signals, get_effect
 
 
 @pytest.fixture(scope="session")

@@ -4,9 +4,9 @@
 import numpy as np
 import pytest
 
-from skidyn._signals import Signals
 from skidyn.datasets import load_scara
 from skidyn.effects import (
+    Signals,
     get_effect,
     list_effects,
 )

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from skidyn._signals import Signals
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
-from skidyn.effects import formula, get_effect, list_effects
+from skidyn.effects import Signals, formula, get_effect, list_effects
 from skidyn.exceptions import EffectError
 from skidyn.identification import RBDRegressor
 

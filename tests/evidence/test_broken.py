@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from skidyn._signals import Signals
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.effects import Signals
 from skidyn.evidence import broken_notes
 from skidyn.evidence._broken import TORQUE_SHARE, leaps, reversals
 from skidyn.exceptions import LogWarning

@@ -2,9 +2,9 @@
 import numpy as np
 import pytest
 
-from skidyn._signals import Signals, read_signals
+from skidyn._signals import read_signals
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
-from skidyn.effects import Term, get_effect, make_terms
+from skidyn.effects import Signals, Term, get_effect, make_terms
 from skidyn.evidence import make_problem
 
 

@@ -2,7 +2,7 @@
 import numpy as np
 import pytest
 
-from skidyn._signals import Signals
+from skidyn.effects import Signals
 from skidyn.evidence import sliding_samples, window_rows
 from skidyn.evidence._rows import every_sample
 

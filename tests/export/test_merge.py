@@ -104,7 +104,7 @@ def fast_motion(n=30):
 
 
 def model_torque(model, q, dq, ddq):
-    from skidyn._signals import Signals
+    from skidyn.effects import Signals
 
     signals = Signals(q, dq, ddq, np.zeros(len(q), dtype=int), robot=model.robot_)
     return model._torque(signals)

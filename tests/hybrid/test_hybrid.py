@@ -2,7 +2,6 @@
 import pickle
 
 import numpy as np
-import pandas as pd
 import pytest
 from sklearn.base import clone
 from sklearn.ensemble import ExtraTreesRegressor
@@ -12,7 +11,6 @@ from sklearn.model_selection import (
     GroupKFold,
     KFold,
     LeaveOneGroupOut,
-    ShuffleSplit,
     cross_val_predict,
 )
 from sklearn.neighbors import KNeighborsRegressor
@@ -23,10 +21,9 @@ from sklearn.utils.estimator_checks import parametrize_with_checks
 from skidyn._compat import CallbackSupportMixin, FitProgress
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.hybrid import HybridRegressor, OwnJointRegressor
-from skidyn.hybrid._gate import learned_weights
 from skidyn.hybrid._hybrid import _honest_residuals
 from skidyn.identification import RBDRegressor
-from skidyn.model_selection import PhaseKFold, TrajectoryKFold
+from skidyn.model_selection import TrajectoryKFold
 from skidyn.neural_network import LSTMRegressor
 
 QUIET = FitProgress(None, None)
@@ -44,28 +41,11 @@ def test_scikit_learn_contract(estimator, check):
     check(estimator)
 
 
-def make_log(n_trajectories=10, n_rows=100, seed=0, hidden=(1.0, 0.0), noise=0.1):
-    """Two joints; a linear model misses a wave of the first joint's position."""
-    rng = np.random.default_rng(seed)
-    t = np.arange(n_rows) * 0.02
-    frames, torques = [], []
-    for k in range(n_trajectories):
-        speed, phase = rng.uniform(1, 4, 2), rng.uniform(0, 6, 2)
-        q, dq = np.sin(speed * t[:, None] + phase), speed * np.cos(speed * t[:, None] + phase)
-        torque = 3 * dq + np.sin(5 * q) * hidden
-        # noise that is coloured, as residuals of real logs are
-        coloured = np.apply_along_axis(np.convolve, 0, rng.normal(size=q.shape), np.ones(20) / 4.5)
-        torques.append(torque + noise * coloured[:n_rows])
-        frames.append(pd.DataFrame(np.c_[q, dq], columns=["q1", "q2", "dq1", "dq2"]))
-        frames[-1] = frames[-1].assign(trajectory=k, time=t)
-    return pd.concat(frames, ignore_index=True), np.concatenate(torques)
-
-
 def rmse(y, prediction):
     return np.sqrt(((y - prediction) ** 2).mean(axis=0))
 
 
-def test_learns_the_joint_that_hides_something_and_leaves_the_other_alone():
+def test_learns_the_joint_that_hides_something_and_leaves_the_other_alone(make_log):
     X, y = make_log()
     hybrid = HybridRegressor(LinearRegression(), TREES).fit(X, y)
     assert hybrid.learned_weight_[0] > 0.8 and hybrid.learned_weight_[1] == 0
@@ -80,60 +60,13 @@ def test_learns_the_joint_that_hides_something_and_leaves_the_other_alone():
     )
 
 
-def test_adds_nothing_to_complete_physics():
+def test_adds_nothing_to_complete_physics(make_log):
     kept = 0
     for seed in range(10):
         X, y = make_log(6, 60, seed=seed, hidden=(0.0, 0.0))
         hybrid = HybridRegressor(LinearRegression(), KNeighborsRegressor(5), cv=3).fit(X, y)
         kept += (hybrid.learned_weight_ > 0).any()
     assert kept <= 1  # of 10 robots, at a level of 5 % for all joints of a robot
-
-
-def test_p_values_are_corrected_for_the_number_of_joints():
-    rng = np.random.default_rng(0)
-    learned = rng.normal(size=(600, 1))
-    residual = 0.5 * learned + rng.normal(size=(600, 1))
-    unit = np.repeat(np.arange(6), 100)
-    weight, gain, alone = learned_weights(residual, learned, unit, 0.05)
-    noise = rng.normal(size=(600, 3))
-    together = learned_weights(
-        np.c_[residual, rng.normal(size=(600, 3))], np.c_[learned, noise], unit, 0.05
-    )
-    assert alone[0] < together[2][0] <= 4 * alone[0]
-    assert 0 < weight[0] < (residual * learned).sum() / (learned**2).sum()  # less its error
-    assert together[0][0] == weight[0] and not together[0][1:].any() and 0.05 < gain[0] < 0.2
-
-
-def test_small_gains_on_many_joints_are_seen_together():
-    rng = np.random.default_rng(1)
-    learned = rng.normal(size=(600, 6))
-    residual = 0.1 * learned + rng.normal(size=(600, 6))
-    unit = np.repeat(np.arange(6), 100)
-    alone = [learned_weights(residual[:, [j]], learned[:, [j]], unit, 0.05)[2] for j in range(6)]
-    assert 6 * min(alone) > 0.05  # none would pass after correction
-    assert (learned_weights(residual, learned, unit, 0.05)[0] > 0).sum() >= 3
-
-
-def test_fades_out_of_range_and_says_so():
-    X, y = make_log()
-    hybrid = HybridRegressor(LinearRegression(), TREES).fit(X, y)
-    assert hybrid.outside_range(X).mean() < 0.05
-    far = X.copy()
-    far[["q1", "q2"]] += 10.0
-    assert hybrid.outside_range(far).all()
-    np.testing.assert_array_equal(hybrid.predict(far), hybrid.physics_.predict(far[FEATURES]))
-
-
-def test_one_recording_proves_nothing():
-    X, y = make_log(1, 1000)
-    hybrid = HybridRegressor(LinearRegression(), TREES, cv=PhaseKFold(5, period=20.0))
-    with pytest.warns(UserWarning, match="fewer than three trajectories"):
-        hybrid.fit(X, y)
-    assert not hybrid.learned_weight_.any() and (hybrid.p_value_ == 1).all()
-    np.testing.assert_array_equal(hybrid.predict(X), hybrid.physics_.predict(X[FEATURES]))
-    assert hybrid.set_params(alpha=1.0).fit(X, y).learned_weight_[0] > 0.5  # as the user asks
-    with pytest.raises(ValueError, match="exactly once"):
-        hybrid.set_params(cv=ShuffleSplit(2)).fit(X, y)
 
 
 class RowsSeen(LinearRegression):
@@ -159,18 +92,7 @@ def test_no_residual_betrays_the_fold_that_is_held_out():
     np.testing.assert_array_equal(residuals, [[10.0] * 6, [1.0] * 6])
 
 
-def test_drift_between_recordings_is_not_taken_for_something_learned():
-    kept = 0
-    for seed in range(10):
-        X, y = make_log(8, 60, seed=seed, hidden=(0.0, 0.0))
-        level = np.random.default_rng(seed).normal(size=(8, 2))
-        y += level[X["trajectory"].to_numpy()]
-        hybrid = HybridRegressor(LinearRegression(), KNeighborsRegressor(5), cv=4).fit(X, y)
-        kept += (hybrid.learned_weight_ > 0).any()
-    assert kept <= 1
-
-
-def test_tables_searches_and_storage():
+def test_tables_searches_and_storage(make_log):
     X, y = make_log(12, 60)
     hybrid = HybridRegressor(LinearRegression(), TREES, cv=3)
     expected = hybrid.fit(X, y).predict(X)
@@ -217,7 +139,7 @@ def test_joints_are_known_by_the_names_of_the_robot():
 @pytest.mark.skipif(
     not hasattr(CallbackSupportMixin, "set_callbacks"), reason="scikit-learn has no callbacks"
 )
-def test_progress_counts_every_fit():
+def test_progress_counts_every_fit(make_log):
     class Count:
         def __init__(self):
             self.ended, self.most = 0, 0
@@ -241,7 +163,7 @@ def test_progress_counts_every_fit():
     assert count.ended == count.most - (hybrid.learner_ is None)
 
 
-def test_weights_need_learners_that_take_them():
+def test_weights_need_learners_that_take_them(make_log):
     X, y = make_log(4, 30)
     hybrid = HybridRegressor(LinearRegression(), KNeighborsRegressor(), cv=2)
     with pytest.raises(ValueError, match="KNeighborsRegressor takes no sample_weight"):
@@ -256,7 +178,7 @@ class Reads(Ridge):
         return super().fit(X, y, sample_weight)
 
 
-def test_learners_do_not_see_key_columns():
+def test_learners_do_not_see_key_columns(make_log):
     X, y = make_log(6, 60)
     hybrid = HybridRegressor(Reads(), Reads(), alpha=1).fit(X, y)
     assert hybrid.physics_.shown_ == 4
@@ -266,7 +188,7 @@ def test_learners_do_not_see_key_columns():
     np.testing.assert_allclose(by_position.predict(array), hybrid.predict(X))
 
 
-def test_groups_and_lists_of_splits_make_the_folds():
+def test_groups_and_lists_of_splits_make_the_folds(make_log):
     X, y = make_log(6, 60)
     groups = X["trajectory"].to_numpy()
     by_group = HybridRegressor(Ridge(), Ridge(), cv=GroupKFold(3), alpha=1)

@@ -2,15 +2,12 @@
 """What each estimator is for: broken rows, poor logs, noisy motion, data in parts."""
 
 import numpy as np
-import pandas as pd
-import polars
 import pytest
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.effects import Term
 from skidyn.exceptions import SkidynError
-from skidyn.identification import ESTIMATORS, RBDRegressor, is_consistent, repetition_instruments
-from skidyn.robots import find_base_parameters
+from skidyn.identification import ESTIMATORS, RBDRegressor
 
 ROBOT = load_planar_arm()
 #: They need more than motion and torque without a clock: instruments, time.
@@ -137,116 +134,3 @@ def test_parameters_without_meaning_are_refused():
         RBDRegressor(ROBOT).fit(X, y, instruments=X)
     with pytest.raises(AttributeError):
         RBDRegressor(ROBOT, estimator="robust").partial_fit(X, y)
-
-
-def poor_log(seed):
-    """Few samples of slow motion, much noise."""
-    X = motion(40, seed, speed=0.3)
-    truth = ROBOT.inertial_parameters * np.random.default_rng(seed).uniform(0.8, 1.2, (2, 1))
-    noise = np.random.default_rng(seed + 1).normal(0, 1.0, (40, 2))
-    return X, torque(X, truth) + noise, truth
-
-
-def least_squares(X, y):
-    """Changes of the base parameters and friction by plain least squares, and the model's."""
-    model = RBDRegressor(ROBOT).fit(X, y)
-    noise = dict(enumerate(model.noise_std_))
-    change = model.evidence_.solve(noise=noise)
-    base = find_base_parameters(ROBOT)
-    change[: len(base.index)] += base.values(ROBOT.inertial_parameters)
-    return change
-
-
-@pytest.mark.parametrize("estimator", ["weighted", "ridge", "entropic"])
-def test_the_urdf_helps_where_the_log_is_poor(estimator):
-    gains = []
-    base = find_base_parameters(ROBOT)
-    for seed in range(5):
-        X, y, truth = poor_log(seed)
-        new = motion(300, seed=9)
-        wanted = torque(new, truth)
-        plain = least_squares(X, y)
-        regressor = np.asarray(ROBOT.torque_regressor(new[:, :2], new[:, 2:4], new[:, 4:]))
-        rigid = regressor[:, :, base.index] @ plain[: len(base.index)]
-        rest = new[:, 2:4] * plain[-4:-2] + np.tanh(new[:, 2:4] / 0.003) * plain[-2:]
-        model = RBDRegressor(ROBOT, estimator=estimator).fit(X, y)
-        errors = (np.linalg.norm(p - wanted) for p in (rigid + rest, model.predict(new)))
-        before, after = errors
-        gains.append(after / before)
-    assert np.median(gains) < 0.8
-
-
-def test_entropic_bodies_always_exist():
-    for seed in range(10):
-        X = motion(60, seed)
-        y = np.random.default_rng(seed).normal(0, 10.0 ** (seed / 2 - 2), (60, 2))
-        model = RBDRegressor(ROBOT, estimator="entropic").fit(X, y)
-        assert is_consistent(model.inertial_parameters_)
-
-
-def test_strong_priors_keep_the_urdf_and_weak_ones_least_squares():
-    X, y, _ = poor_log(0)
-    for estimator in ("ridge", "entropic"):
-        strong = RBDRegressor(ROBOT, estimator=estimator, prior_std=1e-6).fit(X, y)
-        nominal = ROBOT.inertial_parameters
-        np.testing.assert_allclose(strong.inertial_parameters_, nominal, atol=1e-6)
-    weak = RBDRegressor(ROBOT, estimator="ridge", prior_std=1e5).fit(X, y)
-    np.testing.assert_allclose(weak.coef_, least_squares(X, y), rtol=1e-3, atol=1e-3)
-
-
-def noisy_motion(seed, noise):
-    """Torque of a reference motion, and the motion as noisy sensors see it."""
-    rng = np.random.default_rng(seed)
-    reference = rng.uniform(-2, 2, (2000, 6))
-    X = reference + rng.normal(0, noise, reference.shape) * [0, 0, 1, 1, 1, 1]
-    y = ROBOT.inverse_dynamics(reference[:, :2], reference[:, 2:4], reference[:, 4:])
-    return X, y + 0.5 * reference[:, 2:4] + rng.normal(0, 0.1, y.shape), reference
-
-
-def test_instruments_undo_the_bias_of_noisy_motion():
-    X, y, reference = noisy_motion(0, 0.5)
-    plain = RBDRegressor(ROBOT, ("viscous",)).fit(X, y)
-    model = RBDRegressor(ROBOT, ("viscous",), estimator="instrumental")
-    model.fit(X, y, instruments=reference)
-    at = model.coef_names_.index("viscous.Fv[1]")
-    assert plain.coef_[at] < 0.95 * 0.5
-    assert abs(model.coef_[at] - 0.5) < 3 * model.coef_std_[at] < 0.1
-    table = model.durbin_wu_hausman()
-    assert min(row["p_value"] for row in table) * len(table) < 0.01
-
-
-def test_clean_motion_needs_no_instruments():
-    least = []
-    for seed in range(6):
-        X, y, reference = noisy_motion(seed, 0.0)
-        other = reference + np.random.default_rng(seed + 50).normal(0, 0.3, X.shape)
-        model = RBDRegressor(ROBOT, ("viscous",), estimator="instrumental")
-        table = model.fit(X, y, instruments=other).durbin_wu_hausman()
-        least.append(min(row["p_value"] for row in table) * len(table))
-    assert np.median(least) > 0.05
-
-
-def test_runs_of_one_motion_are_instruments_of_each_other():
-    truth = np.random.default_rng(0).uniform(-2, 2, (400, 6))
-    y = ROBOT.inverse_dynamics(truth[:, :2], truth[:, 2:4], truth[:, 4:]) + 0.5 * truth[:, 2:4]
-    names = [f"{s}{j}" for s in ("q", "dq", "ddq") for j in (1, 2)]
-    rng = np.random.default_rng(1)
-    runs = [pd.DataFrame(truth + rng.normal(0, 0.4, truth.shape), columns=names) for _ in range(8)]
-    X = pd.concat([run.assign(trajectory=k) for k, run in enumerate(runs)], ignore_index=True)
-    torque = np.vstack([y] * 8)
-    torque += rng.normal(0, 0.1, torque.shape)
-    model = RBDRegressor(ROBOT, ("viscous",), estimator="instrumental")
-    model.fit(X, torque, instruments=repetition_instruments(X))
-    plain = RBDRegressor(ROBOT, ("viscous",)).fit(X, torque)
-    at = model.coef_names_.index("viscous.Fv[1]")
-    assert abs(model.coef_[at] - 0.5) < 0.02 < 0.04 < abs(plain.coef_[at] - 0.5)
-    same = repetition_instruments(polars.DataFrame(dict(X.items())))
-    np.testing.assert_allclose(same["dq2"].to_numpy(), repetition_instruments(X)["dq2"])
-    with pytest.raises(SkidynError, match="400 and 399 rows|399 and 400 rows"):
-        repetition_instruments(X.iloc[:-1])
-
-
-def test_instruments_of_other_rows_are_refused():
-    X, y, reference = noisy_motion(0, 0.1)
-    with pytest.raises(ValueError, match="rows of X"):
-        RBDRegressor(ROBOT, estimator="instrumental").fit(X, y, instruments=reference[:-1])

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from skidyn._signals import Signals
+from skidyn.effects import Signals
 from skidyn.exceptions import ColumnError
 from skidyn.inspection import ErrorMapDisplay
 

@@ -4,9 +4,9 @@
 import numpy as np
 import pytest
 
-from skidyn._signals import Signals
 from skidyn.datasets import load_planar_arm, load_scara, make_hidden_effect_log
 from skidyn.diagnosis import Settings, diagnose
+from skidyn.effects import Signals
 from skidyn.exceptions import LogError
 from skidyn.identification import RBDRegressor
 from skidyn.logs import check_log

@@ -3,6 +3,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from skidyn.datasets import load_planar_arm
+
 N_JOINTS = 2
 
 
@@ -36,3 +38,21 @@ def log():
 @pytest.fixture(scope="session")
 def make_log():
     return make_hysteretic_log
+
+
+@pytest.fixture(scope="module")
+def arm_log():
+    """The arm has other inertial parameters than its description, and friction."""
+    robot = load_planar_arm()
+    rng = np.random.default_rng(0)
+    t = np.arange(150) * 0.02
+    frames, torques = [], []
+    for k in range(8):
+        speed, phase = rng.uniform(1, 4, 2), rng.uniform(0, 6, 2)
+        angle = speed * t[:, None] + phase
+        q, dq, ddq = np.sin(angle), speed * np.cos(angle), -(speed**2) * np.sin(angle)
+        torque = robot.inverse_dynamics(q, dq, ddq, parameters=1.3 * robot.inertial_parameters)
+        torques.append(torque + 0.5 * np.tanh(dq / 0.1))
+        names = [f"{s}{j}" for s in ("q", "dq", "ddq") for j in (1, 2)]
+        frames.append(pd.DataFrame(np.c_[q, dq, ddq], columns=names).assign(trajectory=k))
+    return robot, pd.concat(frames, ignore_index=True), np.concatenate(torques)

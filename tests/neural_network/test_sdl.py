@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import pickle
-from importlib.resources import files
 
 import numpy as np
-import pandas as pd
 import pytest
 from sklearn.base import clone
 from sklearn.model_selection import GroupKFold
@@ -12,7 +10,6 @@ from skorch.callbacks import Checkpoint, EarlyStopping
 
 from skidyn._columns import Columns
 from skidyn._keys import Keys
-from skidyn.datasets import load_planar_arm
 from skidyn.identification import RBDRegressor
 from skidyn.model_selection import LeakageWarning
 from skidyn.neural_network import SDLRegressor
@@ -74,24 +71,6 @@ def test_scikit_learn_contract(estimator, check):
     check(estimator)
 
 
-@pytest.fixture(scope="module")
-def arm_log():
-    """The arm has other inertial parameters than its description, and friction."""
-    robot = load_planar_arm()
-    rng = np.random.default_rng(0)
-    t = np.arange(150) * 0.02
-    frames, torques = [], []
-    for k in range(8):
-        speed, phase = rng.uniform(1, 4, 2), rng.uniform(0, 6, 2)
-        angle = speed * t[:, None] + phase
-        q, dq, ddq = np.sin(angle), speed * np.cos(angle), -(speed**2) * np.sin(angle)
-        torque = robot.inverse_dynamics(q, dq, ddq, parameters=1.3 * robot.inertial_parameters)
-        torques.append(torque + 0.5 * np.tanh(dq / 0.1))
-        names = [f"{s}{j}" for s in ("q", "dq", "ddq") for j in (1, 2)]
-        frames.append(pd.DataFrame(np.c_[q, dq, ddq], columns=names).assign(trajectory=k))
-    return robot, pd.concat(frames, ignore_index=True), np.concatenate(torques)
-
-
 def fitted(arm_log, physics=None, **parameters):
     robot, X, y = arm_log
     settings = {"window": 8, "hidden_size": 12, "max_epochs": 10, "random_state": 0} | parameters
@@ -111,21 +90,6 @@ def test_rigid_body_and_network_are_optimised_together(arm_log):
     # identified parameters, not the description's, although friction disturbs them
     nominal = robot.inverse_dynamics(*(X[[f"{s}1", f"{s}2"]] for s in ("q", "dq", "ddq")))
     assert np.abs(frozen.rigid_body_torque(X) - y).mean() < 0.6 * np.abs(nominal - y).mean()
-
-
-def test_physics_with_effects(arm_log):
-    """The network has less to learn where the physics has the friction."""
-    robot, X, y = arm_log
-    physics = RBDRegressor(robot, ("viscous", "coulomb"), trajectory="trajectory")
-    bare, complete = fitted(arm_log, max_epochs=3), fitted(arm_log, physics, max_epochs=3)
-    errors = [np.abs(model.rigid_body_torque(X) - y).mean() for model in (bare, complete)]
-    assert errors[1] < 0.5 * errors[0]
-    assert len(complete.coef_) == robot.inertial_parameters.size + 2 * 2
-    assert np.abs(complete.coef_[-4:]).max() > 0  # friction is optimised as well
-    assert complete.score(X, y) > bare.score(X, y) - 0.01
-    assert "effect_coefficients_" not in vars(physics)  # the one given stays as it is
-    far = X.assign(q1=X["q1"] + 50.0)
-    np.testing.assert_allclose(complete.predict(far), complete.rigid_body_torque(far))
 
 
 def least_squares_torque(robot, X, y):
@@ -195,13 +159,6 @@ def test_not_worse_than_its_physics_on_new_trajectories(arm_log):
     assert np.square(gated.predict(X[last]) - clean).mean() <= (
         np.square(free.predict(X[last]) - clean).mean()
     )
-
-
-def test_physics_may_be_a_file(arm_log, tmp_path):
-    path = tmp_path / "arm.urdf"
-    path.write_text((files("skidyn.datasets") / "robots" / "planar_arm.urdf").read_text())
-    _, X, y = arm_log
-    assert fitted((None, X, y), str(path), max_epochs=1, cv=None).predict(X).shape == y.shape
 
 
 def test_groups_and_lists_of_splits(arm_log):

@@ -6,10 +6,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from skidyn._signals import Signals
 from skidyn.diagnosis import REGIMES, Comparison, Diagnosis, Finding, Limit, error_map
 from skidyn.diagnosis._failures import find_failures, find_rest_errors
-from skidyn.effects import Term
+from skidyn.effects import Signals, Term
 
 HOSTILE = "<img src=x onerror=alert(1)>"
 

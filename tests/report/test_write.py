@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import pytest
 
-from skidyn._writing import write_text
 from skidyn.report import summarize, write_html, write_json
 
 
@@ -14,7 +13,7 @@ def test_an_interrupted_write_leaves_the_old_file(tmp_path, monkeypatch):
 
     monkeypatch.setattr("skidyn._writing.os.replace", interrupt)
     with pytest.raises(KeyboardInterrupt):
-        write_text(target, "new")
+        write_json(target, {"new": 1})
     assert target.read_text() == "old"
     assert list(tmp_path.iterdir()) == [target]
 

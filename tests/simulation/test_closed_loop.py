@@ -7,8 +7,8 @@ import polars
 import pytest
 from scipy.signal import butter, filtfilt
 
-from skidyn._signals import SIGN_BLUR
 from skidyn.datasets import load_planar_arm
+from skidyn.effects import Signals
 from skidyn.exceptions import ColumnError, SkidynError
 from skidyn.identification import RBDRegressor
 from skidyn.simulation import simulate_closed_loop
@@ -33,7 +33,11 @@ def make_reference(duration=10.0, rate=500.0, seed=1):
 
 def torque(table, viscous=0.5):
     q, dq, ddq = table[MOTION].to_numpy().reshape(-1, 3, 2).transpose(1, 0, 2)
-    return ROBOT.inverse_dynamics(q, dq, ddq) + viscous * dq + np.tanh(dq / SIGN_BLUR)
+    return (
+        ROBOT.inverse_dynamics(q, dq, ddq)
+        + viscous * dq
+        + Signals(q, dq, ddq, np.zeros(len(q)), robot=ROBOT).sign
+    )
 
 
 def fit_truth(viscous=0.5):

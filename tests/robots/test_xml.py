@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Descriptions are read as text, bytes or files, whatever else they hold."""
+
+import pytest
+
+from skidyn.robots import Robot
+
+GOOD_INERTIA = '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>'
+LIMIT = '<limit lower="-1" upper="1" velocity="2" effort="3"/>'
+
+
+def link(name, mass=None, inertia=GOOD_INERTIA):
+    if mass is None:
+        return f'<link name="{name}"/>'
+    return f'<link name="{name}"><inertial><mass value="{mass}"/>{inertia}</inertial></link>'
+
+
+def joint(name, parent, child, kind="revolute", inside=LIMIT):
+    ends = f'<parent link="{parent}"/><child link="{child}"/>'
+    return f'<joint name="{name}" type="{kind}">{ends}{inside}</joint>'
+
+
+def robot(*parts):
+    return '<robot name="r">' + "".join(parts) + "</robot>"
+
+
+TWO = link("a") + link("b", 1)
+
+
+def test_missing_file(tmp_path):
+    with pytest.raises(FileNotFoundError):
+        Robot.from_urdf(tmp_path / "absent.urdf")
+
+
+def test_path_text_and_bytes_are_read_alike(tmp_path):
+    text = '<?xml version="1.0" encoding="utf-8"?>' + robot(TWO, joint("jé", "a", "b"))
+    path = tmp_path / "robot.urdf"
+    path.write_text(text, encoding="utf-8")
+    for source in (path, str(path), text, text.encode(), "\ufeff" + text):
+        assert Robot.from_urdf(source).joint_names == ("jé",)
+
+
+def test_pictures_and_drivers_are_ignored():
+    extra = (
+        '<material name="m"/><transmission name="t"/><gazebo><plugin/></gazebo>'
+        '<ros2_control name="x"/>'
+    )
+    body = (
+        '<link name="b"><visual><geometry><nothing/></geometry></visual><collision/><inertial>'
+        f'<mass value="1"/>{GOOD_INERTIA}</inertial></link>'
+    )
+    text = robot(extra, link("a"), body, joint("j", "a", "b", inside=LIMIT + "<calibration/>"))
+    assert Robot.from_urdf(text).inertial_parameters[0, 0] == 1.0
+
+
+def test_attributes_that_nobody_knows_are_passed_over_in_silence(capfd):
+    more = " ".join(f'x{k}="{k}"' for k in range(500))
+    text = robot(TWO, joint("j", "a", "b")).replace("<robot ", f"<robot {more} ", 1)
+    assert Robot.from_urdf(text).chain.n_joints == 1
+    assert capfd.readouterr() == ("", "")
