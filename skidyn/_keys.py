@@ -44,7 +44,7 @@ class Keys:
         """The columns for a learner: no key columns, unless it has parameters for them.
 
         A learner that has no parameters for trajectory and time takes them for features, and
-        learns the log by heart.
+        memorises the log.
 
         Parameters
         ----------

@@ -190,7 +190,7 @@ def load_model(path: str | os.PathLike[str], *, trusted: Iterable[str] = ()) -> 
     ------
     SkidynError
         The file is a pickle or damaged, unpacks to more than 4 GiB, or holds anything else than
-        data and the classes of the list; ``trusted`` names something that is no class.
+        data and the classes of the list; ``trusted`` names something that is not a class.
 
     Examples
     --------

@@ -57,7 +57,7 @@ print(files[0].read_text()[:200])
 
 # %%
 # **Read.** Names are matched to the joints of the URDF where they are alike; velocities that are
-# not recorded are derived. What was decided is said.
+# not recorded are derived. What was decided is reported.
 robot = Robot.from_urdf(folder / "arm.urdf")
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # the notes are printed instead
@@ -67,7 +67,7 @@ for note in log.attrs["notes"]:
 print(log.head(3).round(3))
 
 # %%
-# **Look at the log before any model.** Had the units been forgotten, it would be said here.
+# **Look at the log before any model.** Had the units been forgotten, this report would show it.
 print(check_log(log, robot))
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # the notes have been read above

@@ -92,7 +92,7 @@ axes[1].set_xticks(cases[1][1], [str(value) for value in cases[1][1]], minor=Fal
 axes[1].minorticks_off()
 
 # %%
-# Whether instruments were needed is a question the log itself answers. With noise of 0.4, least
+# The log itself shows whether instruments were needed. With noise of 0.4, least
 # squares is off by more than chance in the coefficients with small p-values:
 X, y, reference = noisy(0.4, np.random.default_rng(0))
 model = RBDRegressor(robot, ("viscous",), estimator="instrumental")

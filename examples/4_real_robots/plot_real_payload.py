@@ -46,7 +46,7 @@ print(PAYLOAD.sentence)
 
 # %%
 # **Panda.** The parameters of the URDF are kept (``parameters="nominal"``): otherwise the
-# identification would quietly take the hand away.
+# identification would remove the hand without a word.
 HAND = """
 <link name="hand"><inertial><origin xyz="-0.01 0 0.03"/><mass value="0.73"/>
   <inertia ixx="0.001" ixy="0" ixz="0" iyy="0.0025" iyz="0" izz="0.0017"/></inertial></link>

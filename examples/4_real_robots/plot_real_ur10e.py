@@ -90,8 +90,8 @@ for name, frame in judge.items():
 
 # %%
 # Joints 5 and 6 stand still during most of the point-to-point run, and friction at rest is whatever
-# the controller last left there. No model of sliding friction can know it, so an error inside the
-# dry friction is no failure.
+# the controller last left there. No model of sliding friction can predict it, so an error inside
+# the dry friction is no failure.
 ptp = judge["point to point"]
 where = diagnose(model, ptp, ptp[TAU], settings=Settings(max_findings=0))
 REST = [error for error in where.rest_errors if error.joint in (5, 6)]

@@ -6,7 +6,7 @@ NDL and SDL: what the rigid body brings
 The SDL paper lets a network read the rigid-body torque, and trains both together. Far from the
 training data the prediction should rely on the rigid body. Here the same network is trained
 without the rigid body (NDL), as in the paper (SDL), and with the rigid-body torque added to its
-output; then all of them are asked for motions faster than those they were trained on.
+output; then all of them predict motions faster than those they were trained on.
 """
 
 # %%

@@ -3,9 +3,9 @@
 The model in ONNX Runtime
 =========================
 
-A controller that knows neither Python nor robots can run a model in ONNX Runtime: rigid bodies,
-friction and every other effect that is a function of q, dq and ddq, in double precision, for any
-number of samples.
+A controller without Python and without a robot library can run a model in ONNX Runtime: rigid
+bodies, friction and every other effect that is a function of q, dq and ddq, in double precision,
+for any number of samples.
 """
 
 # %%

@@ -4,7 +4,7 @@ Is the motion right too?
 ========================
 
 A model is often identified to be simulated. Here a robot has a spring that its first model lacks:
-the motion of both models is held against a recording that neither has seen.
+the motion of both models is compared with a recording that neither has seen.
 """
 
 import matplotlib.pyplot as plt

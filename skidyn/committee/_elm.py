@@ -59,7 +59,7 @@ class ELMCommittee(RegressorMixin, BaseEstimator):
     n_jobs : int, default=None
         Members computed at the same time (threads).
     trajectory, time : int, str or None, default="auto"
-        Key columns of X, which are no features.
+        Key columns of X, which are not features.
     random_state : int, RandomState or None, default=None
         Draws the hidden layers.
 

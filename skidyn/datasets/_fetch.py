@@ -89,7 +89,7 @@ def fetch_emps(
         Folder to keep the file in; that of scikit-learn's data sets if None.
     sha256 : str, optional
         Checksum that the file must have. If None, that of the first download is kept beside the
-        file and must hold ever after.
+        file and must match from then on.
     url : str, default=""
         Another place to download from; the repository named above if empty.
 
@@ -138,7 +138,7 @@ def fetch_panda_exciting(
         Folder to keep the file in; that of scikit-learn's data sets if None.
     sha256 : str, optional
         Checksum that the file must have. If None, that of the first download is kept beside the
-        file and must hold ever after.
+        file and must match from then on.
     url : str, default=""
         Another place to download from; the repository named above if empty.
 
@@ -247,7 +247,7 @@ def fetch_xl330(
     Raises
     ------
     LogError
-        A file's checksum is not that of its first download, or it is no recording of this kind.
+        A file's checksum is not that of its first download, or it is not a recording of this kind.
     ImportError
         pooch is not installed (``pip install skidyn[fetch]``).
 
@@ -360,7 +360,7 @@ def fetch_screw_drive(
     Raises
     ------
     LogError
-        A file's checksum is not that of its first download, or it is no recording of this kind.
+        A file's checksum is not that of its first download, or it is not a recording of this kind.
     ImportError
         pooch is not installed (``pip install skidyn[fetch]``).
 

@@ -71,7 +71,7 @@ def diagnose(
         its residual is diagnosed. A model of the first kind is taken out of a search or a
         ``TransformedTargetRegressor``; out of a ``Pipeline`` too, which the better model is.
     X : DataFrame or array of shape (n_samples, n_features)
-        Motion, following the X contract; ``time`` and ``trajectory`` columns are wanted.
+        Motion, following the X contract, with ``time`` and ``trajectory`` where they are known.
     tau : array-like of shape (n_samples, n_joints)
         Measured torque, N m (N for sliders).
     robot : Robot, optional
@@ -103,8 +103,8 @@ def diagnose(
     ColumnError
         X does not follow the contract, or holds no time and no ``rate`` is given.
     LogError
-        X or the torque hold values that are not finite, or too few samples; or the log is not what
-        it claims, and ``force`` is False.
+        X or the torque hold values that are not finite, or too few samples; or a check is certain
+        that the log is wrong, and ``force`` is False.
     EffectError
         The catalogue has no such effect.
     ValueError

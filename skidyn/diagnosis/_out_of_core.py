@@ -57,9 +57,8 @@ class Confirmation:
         Probability of such a drop by chance, from the spread of its logarithm over groups of
         trajectories.
     confirmed : bool or None
-        Whether it is less than 1 %; None, with a drop of 0, for effects whose columns need a fit
-        of the model first, such as friction that grows with the load: the sample alone speaks for
-        these.
+        Whether it is less than 1 %; None, with a drop of 0, for effects whose columns need a fit of
+        the model first, such as friction that grows with the load: these rest on the sample alone.
 
     Examples
     --------
@@ -157,7 +156,8 @@ def diagnose_parquet(
     Returns
     -------
     ParquetDiagnosis
-        The diagnosis of the sample, what the rest says to its findings, and the better model.
+        The diagnosis of the sample, the confirmation of its findings on the rest, and the better
+        model.
 
     Raises
     ------

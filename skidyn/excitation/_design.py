@@ -88,8 +88,8 @@ def design_excitation(
         regressor with columns of equal length (and a small share of the determinant, so that the
         motion stays large).
     effects : iterable, default=None
-        Effects that are to be told too, as for :class:`~skidyn.identification.RBDRegressor`. None:
-        those of a fitted model, else viscous and Coulomb friction.
+        Effects that are to be identified too, as for :class:`~skidyn.identification.RBDRegressor`.
+        None: those of a fitted model, else viscous and Coulomb friction.
     limits : MotionLimits, optional
         Limits; those of the URDF by default.
     recorded : DataFrame, Excitation or list of them, default=()

@@ -322,7 +322,7 @@ class Session:
         Raises
         ------
         EffectError
-            The joint does not slide in this trajectory: no effect can be told there.
+            The joint does not slide in this trajectory: no effect can be judged there.
         """
         j = self._joint(joint)
         rows = self.problem.rows

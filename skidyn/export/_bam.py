@@ -68,7 +68,7 @@ class BamModel:
     Raises
     ------
     SkidynError
-        A parameter of the model's friction is missing, negative or no number.
+        A parameter of the model's friction is missing, negative or not a number.
 
     References
     ----------

@@ -35,10 +35,10 @@ class OwnJointRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     """One regressor per joint on that joint's own motion and pre-sliding states.
 
     What a good physical model leaves over is mostly friction inside single joints. A learner that
-    sees only the joint it speaks of cannot fit accidental relations between joints, needs less
-    data and transfers better to new motions. Friction remembers the path: around rest and reversal
-    it depends on how far the joint has gone since. States of Dahl's model [1]_ of several widths
-    stand for this memory, so that a learner without one can use it.
+    sees only the joint it predicts cannot fit accidental relations between joints, needs less data
+    and transfers better to new motions. Friction depends on the path: around rest and reversal it
+    depends on how far the joint has gone since. States of Dahl's model [1]_ of several widths stand
+    for this memory, so that a learner without one can use it.
 
     Parameters
     ----------

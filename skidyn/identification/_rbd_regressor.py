@@ -107,9 +107,9 @@ class RBDRegressor(Results, RegressorMixin, BaseEstimator):
     coef_names_ : list of str
         Their names.
     coef_std_ : ndarray of shape (n_coefficients,)
-        Standard errors by the jackknife over trajectories (or blocks of time), which
-        autocorrelation within a trajectory does not fool; where the data says nothing, how far the
-        URDF may be off.
+        Standard errors by the jackknife over trajectories (or blocks of time), which are valid
+        under autocorrelation within a trajectory; where the data says nothing, how far the URDF may
+        be off.
     base_parameters_ : dict of str to float
         Base parameters by the combination of inertial parameters they stand for.
     inertial_parameters_ : ndarray of shape (n_bodies, 10)
@@ -126,7 +126,7 @@ class RBDRegressor(Results, RegressorMixin, BaseEstimator):
     row_weights_ : list of ndarray of shape (n_rows_j,)
         Weight of every averaged row by joint, 1.25 at most; the robust estimator only.
     bands_ : PredictionBands
-        What :meth:`predict_interval` knows about the errors of left-out folds.
+        Errors of left-out folds, from which :meth:`predict_interval` makes its bands.
     condition_number_ : float
         Condition number of the weighted columns that the data shows at all, scaled to equal length:
         how well the motion excites the model. Below 100 is good, beyond 1,000 a part of the

@@ -48,9 +48,9 @@ class Measurement:
         Whether bodies are going to be identified, so that those of the description may be wrong; by
         default it is not known.
     unsigned, delay, late_position, readable, stale, lost, odd, scaled : optional
-        What checks found that others want to know; filled in by them.
+        What checks found that other checks use; filled in by them.
     computed, frictionless : bool, optional
-        What checks found that others want to know; filled in by them.
+        What checks found that other checks use; filled in by them.
 
     Examples
     --------

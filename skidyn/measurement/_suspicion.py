@@ -50,7 +50,7 @@ class Suspicion:
     evidence : str
         What it saw.
     certainty : {"certain", "suspected", "noted"}
-        Certain ones stop a diagnosis; noted ones are no mistake but limit what the log can tell.
+        Certain ones stop a diagnosis; noted ones are not mistakes, but limit what the log can tell.
     joints : tuple of int
         Joints concerned, counted from 1; empty if it concerns the whole log.
     remedy : Remedy or None

@@ -30,8 +30,8 @@ class LSTMRegressor(SequenceRegressor):
     at once.
 
     Weights decay (``optimizer__weight_decay=0.3``), since trajectories of minutes are few and a
-    network learns them by heart. Training is that of skorch: its callbacks, optimisers and nets are
-    those of this regressor.
+    network memorises them. Training is that of skorch: its callbacks, optimisers and nets are those
+    of this regressor.
 
     Without physics it has its place only where no model of the robot exists: with a URDF, a rigid
     body with friction predicts far better on most logs (:doc:`/user_guide/learners`).

@@ -100,8 +100,8 @@ class SDLRegressor(SequenceRegressor):
         missing. False is the paper's architecture, which only reads it.
     cv : int, cross-validator, iterable of splits or None, default=3
         Folds, by trajectory (or by blocks of a single one) where it is a number, on which copies of
-        the model are held out to find ``learned_weight_``. None trusts the network wholly and
-        trains once, as does ``residual=False``.
+        the model are held out to find ``learned_weight_``. None keeps all that the network learned
+        and trains once, as does ``residual=False``.
     fade_out : bool, default=True
         Fade into the physical torque far from the training samples.
     dense_size : int, default=32

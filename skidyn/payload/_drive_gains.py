@@ -52,7 +52,7 @@ class DriveGainEstimate:
     relative_error : ndarray of shape (n_joints,)
         Root mean square of the residual over that of the current, averaged rows.
     notes : tuple of str
-        What cannot be told apart or was left open, in words.
+        What cannot be separated or was left open, in words.
 
     Examples
     --------
@@ -153,7 +153,7 @@ def estimate_drive_gains(
     Returns
     -------
     DriveGainEstimate
-        Gains with intervals, and what cannot be told in words.
+        Gains with intervals, and notes on what the runs leave open.
 
     Raises
     ------

@@ -67,15 +67,15 @@ class PayloadEstimate:
     rmse_before, rmse_after : ndarray of shape (n_joints,)
         Root mean square of the averaged loaded rows without and with the payload, N m or N.
     notes : tuple of str
-        What cannot be told apart or was left open, in words.
+        What cannot be separated or was left open, in words.
     first_moment : ndarray of shape (3,)
         Mass times centre of mass, kg m; NaN where the motion does not show it.
     first_moment_interval : ndarray of shape (3, 2)
         95 % intervals, kg m.
     by_joint, by_joint_std : ndarray of shape (n_joints,)
-        The payload's size as every joint by itself weighs it, as a share of the common one, and
-        its standard error; NaN for joints that do not feel it. Shares that differ beyond their
-        errors tell of drive gains, not of the payload.
+        The payload's size from every joint alone, as a share of the common one, and its standard
+        error; NaN for joints that do not feel it. Shares that differ beyond their errors point to
+        wrong drive gains, not to the payload.
     joint_names : tuple of str
         Names of the joints.
     units : tuple of str
@@ -207,8 +207,8 @@ def identify_payload(
     """Identify what a robot carries in some runs and not in others.
 
     With unloaded runs, rigid body, friction and payload are fitted together [1]_, so that the
-    interval of the payload knows how well the robot itself is known. Without them a fitted model
-    stands for the robot, and its errors are not part of the intervals.
+    interval of the payload includes the uncertainty of the robot itself. Without them a fitted
+    model stands for the robot, and its errors are not part of the intervals.
 
     Parameters
     ----------
@@ -235,7 +235,7 @@ def identify_payload(
     Returns
     -------
     PayloadEstimate
-        With intervals, and what cannot be told in words.
+        With intervals, and notes on what the runs leave open.
 
     Raises
     ------

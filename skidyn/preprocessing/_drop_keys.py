@@ -20,8 +20,8 @@ Array = NDArray[np.float64]
 class DropKeys(SignalTransformer):
     """Take the key columns out of a table, before a learner that does not know them.
 
-    A learner takes the number of a trajectory and the time for features, and learns the log by
-    heart. ``HybridRegressor`` and ``BLLRegressor`` keep them from learners by themselves.
+    A learner takes the number of a trajectory and the time for features, and memorises the log.
+    ``HybridRegressor`` and ``BLLRegressor`` keep them from learners by themselves.
 
     Parameters
     ----------
