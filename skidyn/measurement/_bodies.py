@@ -17,12 +17,14 @@ from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import readable_fits
 
-#: Log-likelihood that another scale must gain.
-LEAST = 15.0
+#: Log-likelihood that another scale must gain, and where the stated bodies do not say so as well.
+LEAST, SURE = 15.0, 40.0
 #: Share of a torque's spread that the robot must explain for its multiple to be told.
 EXPLAINED = 0.5
 #: Multiples of the robot's own torque that wrong masses may well make.
 USUAL = (0.4, 2.5)
+#: Multiples that are those of wrong masses unless the other joints deny it.
+CLEARLY = (0.62, 1.6)
 #: Factors of units of torque.
 UNITS = {1e3: "Nmm", 1e2: "Ncm", 1e-3: "kNm"}
 #: Error with stated bodies, as a share of the spread, and in errors with identified ones, from
@@ -120,18 +122,19 @@ class TorqueScale(Check):
             return
         known = _known_gains(fits)
         odd = [k for k, gain in known.items() if not USUAL[0] <= gain <= USUAL[1]]
-        if not odd:
-            return
         here = fits.nominal(Reading()).gain
         gains = {k: float(g) for k, g in enumerate(here) if np.isfinite(g) and g > 0}
         values = np.array(list(gains.values()))
         sure = np.array(list(known.values()))
-        every = _one_sided(values) or (len(sure) > 1 and _one_sided(sure))
+        every = bool(odd) and (_one_sided(values) or (len(sure) > 1 and _one_sided(sure)))
+        if not every:
+            yield from self._of_joints(measurement, fits, gains, known)
+            return
         typical = float(np.median(sure if len(sure) > 1 else values))
         gains = gains if _one_sided(values) else known
         told = ", ".join(f"{measurement.joint_names[k]} {gain:.3g}" for k, gain in gains.items())
         unit = next((u for f, u in UNITS.items() if abs(np.log(typical / f)) < 0.3), None)
-        if every and unit is not None:
+        if unit is not None:
             yield self.suspicion(
                 f"torque looks like {unit}",
                 f"it is the robot's own torque times {told}",
@@ -139,27 +142,46 @@ class TorqueScale(Check):
                 sorted(gains),
                 (f"--units tau={unit}", f"units={{'tau': '{unit}'}}"),
             )
-        elif every:
+            return
+        yield self.suspicion(
+            "torques look like motor currents, motor torques or another unit",
+            f"they follow the robot's rigid-body torque at another scale ({told}). Better than "
+            "the gains below, which hold the bodies of the description, are the torques per "
+            "ampere of the drives (--drive-gains with i columns)",
+            "suspected",
+            sorted(gains),
+            _gain_remedy(gains),
+        )
+
+    def _of_joints(
+        self,
+        measurement: Measurement,
+        fits: Fits,
+        gains: dict[int, float],
+        known: dict[int, float],
+    ) -> Iterator[Suspicion]:
+        """Single joints at another scale than the others."""
+        found = {}
+        for k, gain in gains.items():
+            low, high = CLEARLY if k in known else USUAL
+            if low <= gain <= high:
+                continue
+            own, gained, apart = joint_gain(fits, k, gain)
+            wrong = not USUAL[0] <= gain <= USUAL[1] and k in known
+            if gained > (LEAST if wrong else SURE) and apart > LEAST and not low <= own <= high:
+                found[k] = own
+        if found:
+            names = ", ".join(measurement.joint(k) for k in found)
+            told = ", ".join(f"{gains[k]:.3g}" for k in found)
+            fitted = ", ".join(f"{gain:.3g}" for gain in found.values())
             yield self.suspicion(
-                "torques look like motor currents, motor torques or another unit",
-                f"they follow the robot's rigid-body torque at another scale ({told}). Better than "
-                "the gains below, which hold the bodies of the description, are the torques per "
-                "ampere of the drives (--drive-gains with i columns)",
+                f"the torque of {names} is at another scale than that of the other joints",
+                f"it is {told} times that of the stated bodies, and {fitted} times that of bodies "
+                "that explain the other joints",
                 "suspected",
-                sorted(gains),
-                _gain_remedy(gains),
+                sorted(found),
+                _gain_remedy(found),
             )
-        else:
-            odd = [k for k in odd if _confirmed(fits, k, known[k])]
-            if odd:
-                names = ", ".join(measurement.joint(k) for k in odd)
-                yield self.suspicion(
-                    f"the torque of {names} is at another scale than that of the other joints",
-                    f"torques are the robot's own times {told}",
-                    "suspected",
-                    odd,
-                    _gain_remedy({k: known[k] for k in odd}),
-                )
 
 
 def _one_sided(gains: Array) -> bool:
@@ -179,14 +201,43 @@ def _unit_like(gain: float) -> float:
     return next((f for f in UNITS if abs(np.log(gain / f)) < 0.3), gain)
 
 
-def _confirmed(fits: Fits, k: int, gain: float) -> bool:
-    """Whether identified bodies, which all joints share, confirm the gain of one joint."""
+def joint_gain(fits: Fits, k: int, gain: float) -> tuple[float, float, float]:
+    """Scale of one torque at which identified bodies, which all joints share, explain it best.
+
+    Parameters
+    ----------
+    fits : Fits
+        Rows.
+    k : int
+        Joint, from 0.
+    gain : float
+        What its torque is of that of the stated bodies.
+
+    Returns
+    -------
+    gain, gained, apart : float
+        Scale, log-likelihood that it gains over none, and over one four times as far or as near.
+    """
     plain = fits.identified(Reading())
-    other = fits.scaled({k: gain}).identified(Reading())
-    # the density of a torque is that of the divided one over the gain
-    change = other.margin(plain)
-    change[k] -= float(fits.moving[:, k].sum()) * np.log(gain) / max(other.inflation[k], 1.0)
-    return float(change.sum()) > LEAST
+    rows = float(fits.moving[:, k].sum())
+
+    def gained(log: float) -> float:
+        other = fits.scaled({k: float(np.exp(log))}).identified(Reading())
+        # the density of a torque is that of the divided one over the gain
+        change = other.margin(plain)
+        change[k] -= rows * log / max(other.inflation[k], 1.0)
+        return float(change.sum())
+
+    log, step = np.log(gain), 0.2
+    best = gained(log)
+    while step > 0.005:
+        near, other = max((gained(x), x) for x in (log - step, log + step))
+        if near > best:
+            best, log = near, other
+        else:
+            step /= 2
+    far = max(gained(log + x) for x in (-np.log(4), np.log(4)))
+    return float(np.exp(log)), best, best - far
 
 
 def _known_gains(fits: Fits) -> dict[int, float]:

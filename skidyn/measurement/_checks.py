@@ -30,6 +30,7 @@ from skidyn.measurement._clock import (
 )
 from skidyn.measurement._copies import CopiedTorque, RepeatedRecordings
 from skidyn.measurement._elapsed import LostRows
+from skidyn.measurement._lengths import Lengths
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._odd import OddRecording
 from skidyn.measurement._suspicion import CERTAINTIES, Suspicion
@@ -56,6 +57,7 @@ CHECKS: tuple[Check, ...] = (
     NoFriction(),
     UnexplainedTorque(),
     Bodies(),
+    Lengths(),
     VelocityDelay(),
     HeldTorque(),
     ComputedTorque(),

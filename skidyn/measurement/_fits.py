@@ -158,6 +158,10 @@ class Fits:
             return self  # with all that was fitted so far
         return Fits(self.robot, self.signals, self.torque, self.moving, self.recorded, left_out)
 
+    def of(self, robot: Robot) -> Fits:
+        """The same rows, for another robot with the same joints."""
+        return Fits(robot, self.signals, self.torque, self.moving, self.recorded, self.left_out)
+
     def thinned(self, count: int) -> Fits:
         """Some of the rows, evenly over the log: enough to see what may be wrong."""
         step = self.n_rows // count
@@ -234,9 +238,9 @@ class Fits:
     def _mean_torque(self) -> Array:
         return self.average(self.torque)
 
-    def usable(self, column: int) -> bool:
+    def usable(self, column: int, fewest: int = FEWEST) -> bool:
         """Whether the torque of a column is used, and its joint moves."""
-        return column not in self.left_out and int(self.moving[:, column].sum()) >= FEWEST
+        return column not in self.left_out and int(self.moving[:, column].sum()) >= fewest
 
     def nominal(self, reading: Reading, rounds: int = ROUNDS) -> Outcome:
         """Fit with the bodies that the robot's description states."""
@@ -368,14 +372,14 @@ class Fits:
 
     def residuals(self, bodies: Array, reading: Reading) -> dict[int, Array]:
         """What identified coefficients leave of the torque of every joint, read in some way."""
-        joints, designs, places, targets = self._designs(reading)
+        joints, designs, places, targets = self._designs(reading, 1)
         return {
             k: y - d @ bodies[place]
             for k, d, place, y in zip(joints, designs, places, targets, strict=True)
         }
 
     def _designs(
-        self, reading: Reading
+        self, reading: Reading, fewest: int = FEWEST
     ) -> tuple[list[int], list[Array], list[NDArray[np.int64]], list[Array]]:
         """Columns of the torque, and designs, places of coefficients and targets of their fit."""
         s = self.motion(reading)
@@ -385,7 +389,7 @@ class Fits:
         base = base_parameter_index(robot)
         regressor = self.mean_regressor(robot, s, base)
         read = [self.torque_column(reading, j) for j in range(self.n_joints)]
-        joints = [j for j, (column, _) in enumerate(read) if self.usable(column)]
+        joints = [j for j, (column, _) in enumerate(read) if self.usable(column, fewest)]
         p = len(base)
         designs, places, targets = [], [], []
         for j in joints:

@@ -22,6 +22,7 @@ from skidyn.measurement._measures import (
 if TYPE_CHECKING:
     from skidyn.measurement._delay import Delay
     from skidyn.measurement._fits import Fits
+    from skidyn.measurement._readings import Change
     from skidyn.robots import Robot
 
 
@@ -47,7 +48,7 @@ class Measurement:
     identified : bool, optional
         Whether bodies are going to be identified, so that those of the description may be wrong; by
         default it is not known.
-    unsigned, delay, late_position, readable, stale, lost, odd, scaled : optional
+    unsigned, changes, delay, late_position, readable, stale, lost, odd, scaled : optional
         What checks found that other checks use; filled in by them.
     computed, frictionless : bool, optional
         What checks found that other checks use; filled in by them.
@@ -68,6 +69,7 @@ class Measurement:
     joint_names: Sequence[str]
     identified: bool | None = None
     unsigned: tuple[list[int], dict[int, float]] | None = field(default=None, repr=False)
+    changes: list[Change] | None = field(default=None, repr=False)
     delay: Delay | None = field(default=None, repr=False)
     late_position: float = field(default=0.0, repr=False)
     readable: bool = field(default=True, repr=False)

@@ -13,10 +13,13 @@ from skidyn._signals import Array
 from skidyn.measurement._bodies import USUAL, Explained, explained
 from skidyn.measurement._check import Check
 from skidyn.measurement._duel import left_by_effects
-from skidyn.measurement._fits import FEWEST, SAMPLES, Fits, Reading, student
+from skidyn.measurement._fits import SAMPLES, Fits, Reading, student
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._suspicion import Suspicion
+from skidyn.measurement._torque import asked_changes
 
+#: Fewest rows of a recording for a word on it.
+FEWEST = 12
 #: Log-likelihood that another multiple must gain in a recording.
 LEAST = 15.0
 #: Least spread of what the other recordings predict, in residuals, for its multiple to be told.
@@ -103,6 +106,10 @@ class OddRecording(Check):
             if zero is not None:
                 shifted[worst.run] = zero
                 unlike = [one for one in unlike if one.run != worst.run]
+        if shifted:
+            # what is read wrongly in all recordings may be felt most in one
+            asked = sum(c.gain for c in asked_changes(measurement, seen.fits) if not c.other)
+            shifted = {run: zero for run, zero in shifted.items() if zero[2] > asked}
         measurement.odd = bool(scaled or unlike or shifted)
         for run, (joint, angle, gain) in shifted.items():
             yield self.suspicion(

@@ -194,8 +194,7 @@ class Columns(Check):
         fits = measurement.fits
         if fits is None or measurement.odd:
             return  # recordings that contradict each other have no reading
-        unsigned, _ = unsigned_columns(measurement)
-        changes = find_changes(fits.without([*unsigned, *cut_columns(measurement)]))
+        changes = asked_changes(measurement, fits)
         for kind in dict.fromkeys(change.kind for change in changes):
             alike = [change for change in changes if change.kind == kind]
             yield _one_of_two(self._told(measurement, kind, alike, changes[-1].reading), alike)
@@ -284,6 +283,15 @@ def _one_of_two(told: Suspicion, changes: Iterable[Change]) -> Suspicion:
         evidence=f"{told.evidence}; the other, on the same joints, explains it as well",
         certainty="noted",
     )
+
+
+def asked_changes(measurement: Measurement, fits: Fits) -> list[Change]:
+    """Changes to the reading of all recordings that a measurement asks for."""
+    if measurement.changes is None:
+        unsigned, _ = unsigned_columns(measurement)
+        lost = [*unsigned, *cut_columns(measurement)]
+        measurement.changes = find_changes(fits.without(lost))
+    return measurement.changes
 
 
 def _sure(changes: Iterable[Change]) -> bool:

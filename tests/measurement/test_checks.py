@@ -332,3 +332,11 @@ def test_rows_that_run_backwards(signals, torque):
     assert told[0].suspicion == "rows run backwards in time" and told[0].certainty == "certain"
     flipped = found(signals.with_(dq=-signals.dq), torque)
     assert flipped[0].remedy.option == "--flip dq1,dq2"
+
+
+@pytest.mark.parametrize("factor", [0.25, 4.0])
+def test_the_torque_of_one_joint_at_another_scale(factor):
+    told = told_of(LOG.frame.assign(tau2=factor * LOG.frame["tau2"]))["torque_scale"]
+    name, _, size = told.remedy.option.partition("=")
+    assert told.joints == (2,) and name == "--gain tau2"
+    assert float(size) == pytest.approx(1 / factor, rel=0.1)

@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Check of the lengths of links: those at which bodies near the stated ones explain the torque.
+
+Bodies cannot make up for all of a wrong length: the inertia that joints feel of each other depends
+on it. So the factor of every length is found step by step, together with the bodies, and both pay
+for how far they are from the description. A length that no torque depends on, such as that before
+the last joints of a wrist, stays as it is and nothing is said of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from skidyn._signals import Array
+from skidyn.measurement._check import Check
+from skidyn.measurement._duel import duel_of
+from skidyn.measurement._fits import Fits, Reading
+from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._near_bodies import ExtraColumns, Factored, NearBodies
+from skidyn.measurement._suspicion import Suspicion
+from skidyn.measurement._torque import readable_fits
+from skidyn.robots import Robot
+
+#: Factor, as a logarithm, to which the lengths of a description may be known (one standard
+#: deviation), the largest step of it, and how many steps are made.
+KNOWN_TO, STEP, ROUNDS = 0.2, 0.3, 3
+#: Log-likelihood below which a step is not worth making.
+LITTLE = 4.0
+#: Least length, m, and the change of a factor for a slope.
+LEAST_LENGTH, SLOPE = 1e-3, 1e-3
+#: Log-likelihood that other lengths must gain with bodies near the stated ones, also where the
+#: effect is there that takes most of their place, and with any bodies.
+LEAST, CONFIRMED = 10.0, 3.0
+#: Standard errors, and share, by which a length must be off to be named.
+ERRORS, SHARE = 3.0, 0.03
+
+
+@dataclass(frozen=True)
+class Stretched:
+    """Lengths that explain the torque better than those of the description.
+
+    Attributes
+    ----------
+    bodies : list of int
+        Bodies whose distance from their parent is found.
+    factors, errors : ndarray of shape (n_bodies,)
+        Logarithms of their factors, and standard errors.
+    gain : float
+        Log-likelihood gained, less what the lengths cost.
+    here, there : NearBodies
+        Fits with the lengths of the description and with these.
+    """
+
+    bodies: list[int]
+    factors: Array
+    errors: Array
+    gain: float
+    here: NearBodies
+    there: NearBodies
+
+
+class Lengths(Check):
+    """Links that are longer or shorter than in the description."""
+
+    name = "lengths"
+    suspects = "lengths of links in the description that are not those of the robot"
+    stage = 2
+    misnames = True
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        fits = readable_fits(measurement)
+        if fits is None or measurement.stale or measurement.scaled or measurement.lost:
+            return
+        found = find_lengths(fits)
+        if found is None or found.gain < LEAST:
+            return
+        plain = fits.identified(Reading())
+        confirmed = float(found.there.fits.identified(Reading()).margin(plain).sum())
+        if confirmed < CONFIRMED:
+            return
+        # any bodies are those with any payload
+        duel = duel_of(
+            found.here,
+            found.there,
+            range(fits.n_joints),
+            but=("payload",) if confirmed >= LEAST else (),
+        )
+        if duel.beside < LEAST:
+            return
+        robot = fits.robot
+        off = {
+            body: f"from {_before(robot, body)} to {robot.body_joints[body]} by "
+            f"{100 * np.expm1(factor):+.0f} % (standard error {100 * error:.0f} %)"
+            for body, factor, error in zip(found.bodies, found.factors, found.errors, strict=True)
+            if abs(factor) > max(ERRORS * error, SHARE)
+        }
+        shares = ", ".join(off.values()) or "none of which can be told by itself"
+        yield self.suspicion(
+            "lengths of links are not those of the robot's description",
+            f"other lengths, {shares}, explain the torque better by {found.gain:.0f} "
+            "(log-likelihood); take the description of this very robot, or measure the distances "
+            "between its joints",
+            "suspected",
+            sorted({int(robot.tree.coordinates[body]) for body in off}),
+        )
+
+
+def _before(robot: Robot, body: int) -> str:
+    """Name of the joint before a body's own."""
+    return robot.body_joints[int(robot.tree.parents[body])]
+
+
+def find_lengths(fits: Fits) -> Stretched | None:
+    """Lengths at which bodies near those of the description explain the torque best.
+
+    Parameters
+    ----------
+    fits : Fits
+        Rows.
+
+    Returns
+    -------
+    Stretched or None
+        None where no link has a length.
+    """
+    tree = fits.robot.tree
+    long = np.linalg.norm(tree.translations, axis=1) > LEAST_LENGTH
+    bodies = np.flatnonzero(long & (tree.parents >= 0)).tolist()
+    if not bodies or not np.any(fits.robot.inertial_parameters):
+        return None
+    inflation = np.maximum(fits.identified(Reading()).inflation, 1.0)
+    gains = np.ones(fits.n_joints)
+    here = there = NearBodies(fits, Reading(), gains, inflation)
+    factors: Array = np.zeros(len(bodies))
+    covariance: Array = np.eye(len(bodies)) * KNOWN_TO**2
+    for _ in range(ROUNDS):
+        slopes = _slopes(fits.robot, bodies, factors, there)
+        left, right = there.without_bodies(slopes, Factored(there.plain.gram))
+        covariance = np.asarray(np.linalg.inv(left + np.eye(len(bodies)) / KNOWN_TO**2))
+        right = right - factors / KNOWN_TO**2
+        if 0.5 * right @ covariance @ right < LITTLE:
+            break
+        factors = factors + np.clip(covariance @ right, -STEP, STEP)
+        longer = fits.of(stretched(fits.robot, bodies, factors))
+        there = NearBodies(longer, Reading(), gains, inflation)
+    # lengths are integrated out: those that are known well have less to choose from
+    cost = 0.5 * float(np.sum((factors / KNOWN_TO) ** 2))
+    cost -= 0.5 * float(np.linalg.slogdet(covariance / KNOWN_TO**2)[1])
+    gain = there.plain.posterior - here.plain.posterior - cost
+    return Stretched(bodies, factors, np.sqrt(np.diag(covariance)), gain, here, there)
+
+
+def stretched(robot: Robot, bodies: list[int], factors: Array) -> Robot:
+    """A robot whose bodies are farther from, or nearer to, those that carry them.
+
+    Parameters
+    ----------
+    robot : Robot
+        As described.
+    bodies : list of int
+        Bodies that are moved.
+    factors : ndarray of shape (n_bodies,)
+        Logarithms of the factors of their distances.
+
+    Returns
+    -------
+    Robot
+    """
+    translations = robot.tree.translations.copy()
+    translations[bodies] *= np.exp(factors)[:, None]
+    return replace(robot, tree=replace(robot.tree, translations=translations))
+
+
+def _slopes(robot: Robot, bodies: list[int], factors: Array, near: NearBodies) -> ExtraColumns:
+    """Change of the torque with every factor, for the bodies that explain most."""
+    s, parameters = near.signals, near.parameters
+
+    def torque(factors: Array) -> Array:
+        own = stretched(robot, bodies, factors)
+        return near.fits.average(own.inverse_dynamics(s.q, s.dq, s.ddq, parameters=parameters))
+
+    here, steps = torque(factors), SLOPE * np.eye(len(bodies))
+    slopes = np.stack([(torque(factors + step) - here) / SLOPE for step in steps], axis=2)
+    by_joint = {j: near.gains[j] * slopes[:, j] for j in near.joints}
+    return ExtraColumns(by_joint, (), np.full(len(bodies), KNOWN_TO**-2))

@@ -1,0 +1,236 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Robust fits of a reading with bodies near those of the description."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from skidyn._signals import Array
+from skidyn.measurement._fits import FREEDOM, Fits, Reading, friction, student
+from skidyn.robots import Robot
+
+#: Shares of a body's mass, times its length and its square for first and second moments, to which a
+#: description may be known (one standard deviation); the one that explains most is taken.
+KNOWN_TO = (0.03, 0.1, 0.3)
+#: Rounds of the robust fit.
+ROUNDS = 7
+#: Powers of a length in the ten parameters of a body.
+POWERS = np.array([0, 1, 1, 1, 2, 2, 2, 2, 2, 2])
+#: Precision of coefficients that nothing is known of, over their scale.
+LOOSE = 1e-8
+
+
+@dataclass(frozen=True)
+class ExtraColumns:
+    """Columns of an effect, by joint.
+
+    Attributes
+    ----------
+    by_joint : mapping of int to ndarray of shape (n_rows, n_columns)
+    positive : tuple of int
+        Coefficients that cannot be negative.
+    precision : ndarray of shape (n_columns,)
+        Of what is known of the coefficients.
+    """
+
+    by_joint: Mapping[int, Array]
+    positive: tuple[int, ...]
+    precision: Array
+
+    @property
+    def count(self) -> int:
+        return int(next(iter(self.by_joint.values())).shape[1])
+
+
+@dataclass(frozen=True)
+class NearFit:
+    """A robust fit: what it is worth, its coefficients, normal equations, weights and residuals."""
+
+    posterior: float
+    coefficients: Array
+    gram: Array
+    weights: list[Array]
+    residuals: list[Array]
+    scales: list[float]
+
+
+class NearBodies:
+    """Fits of one reading with bodies near those of the description.
+
+    Parameters
+    ----------
+    fits : Fits
+        Rows.
+    reading : Reading
+        How they are read.
+    gains : ndarray of shape (n_joints,)
+        Scale of every column of the torque.
+    inflation : ndarray of shape (n_joints,)
+        By how much rows of a column look surer than they are.
+    """
+
+    def __init__(self, fits: Fits, reading: Reading, gains: Array, inflation: Array) -> None:
+        robot = fits.robot
+        if reading.gravity is not None:
+            robot = replace(robot, gravity=np.asarray(reading.gravity))
+        self.fits, self.signals = fits, fits.motion(reading).with_(robot=robot)
+        self.gains = gains
+        stated = np.asarray(robot.inertial_parameters, dtype=float).ravel()
+        every = np.arange(stated.size)
+        regressor = fits.mean_regressor(robot, self.signals, every)
+        size = sizes(robot)
+        read = [fits.torque_column(reading, j) for j in range(fits.n_joints)]
+        self.joints = [j for j, (column, _) in enumerate(read) if fits.usable(column)]
+        self.inflation = [float(inflation[read[j][0]]) for j in self.joints]
+        self.n_bodies, self.size = stated.size, stated.size + 4 * len(self.joints)
+        self.rows: list[NDArray[np.bool_]] = []
+        self.designs: list[Array] = []
+        self.places: list[NDArray[np.int64]] = []
+        self.targets: list[Array] = []
+        self.positive: list[int] = []
+        for first, j in zip(range(stated.size, self.size, 4), self.joints, strict=True):
+            column, sign = read[j]
+            torque, use = fits.mean_torque(column)
+            y, own = torque[use], gains[column] * regressor[use, j]
+            rubs = fits.average(friction(self.signals, j))[use]
+            rubs = np.column_stack([rubs / (np.abs(rubs).max(axis=0) + 1e-12), np.ones(len(y))])
+            moved = np.flatnonzero(own.any(axis=0))  # not by bodies before the joint
+            self.rows.append(use)
+            self.designs.append(np.hstack([(own * size)[:, moved], (np.std(y) + 1e-12) * rubs]))
+            self.places.append(np.append(moved, first + np.arange(4)))
+            self.positive += range(first, first + 3)  # negative friction would feed energy
+            self.targets.append(sign * y - own @ stated)
+
+    @cached_property
+    def plain(self) -> NearFit:
+        """Fit without any effect."""
+        return self.fit()
+
+    def fit(self, extra: ExtraColumns | None = None) -> NearFit:
+        """Fit, with the columns of an effect where there are some."""
+        return max((self._fit(share, extra) for share in KNOWN_TO), key=lambda fit: fit.posterior)
+
+    def _fit(self, share: float, extra: ExtraColumns | None) -> NearFit:
+        designs, places, positive, size = self.designs, self.places, self.positive, self.size
+        if extra is not None:
+            new, size = size + np.arange(extra.count), size + extra.count
+            positive = [*positive, *(int(new[k]) for k in extra.positive)]
+            designs, places = list(designs), list(places)
+            for k, (j, use) in enumerate(zip(self.joints, self.rows, strict=True)):
+                if j in extra.by_joint:
+                    designs[k] = np.hstack([designs[k], extra.by_joint[j][use]])
+                    places[k] = np.append(places[k], new)
+        precision = np.full(size, LOOSE)
+        precision[: self.n_bodies] = share**-2
+        if extra is not None:
+            precision[-extra.count :] = extra.precision
+        scales = [float(np.std(y)) + 1e-12 for y in self.targets]
+        trust = [np.ones(len(y)) for y in self.targets]
+        for _ in range(ROUNDS):
+            gram, right = np.diag(precision), np.zeros(size)
+            weights = [
+                w / (s**2 * i) for w, s, i in zip(trust, scales, self.inflation, strict=True)
+            ]
+            for d, place, y, w in zip(designs, places, self.targets, weights, strict=True):
+                weighted = d * w[:, None]
+                gram[np.ix_(place, place)] += weighted.T @ d
+                right[place] += weighted.T @ y
+            found = solved(gram, right, positive)
+            residuals = [
+                y - d @ found[p] for d, p, y in zip(designs, places, self.targets, strict=True)
+            ]
+            scales = [
+                float(np.sqrt(np.mean(w * r**2))) + 1e-12
+                for w, r in zip(trust, residuals, strict=True)
+            ]
+            trust = [
+                (FREEDOM + 1) / (FREEDOM + (r / s) ** 2)
+                for r, s in zip(residuals, scales, strict=True)
+            ]
+        alike = [
+            student(r, s) / i for r, s, i in zip(residuals, scales, self.inflation, strict=True)
+        ]
+        bodies = slice(self.n_bodies)
+        departure = 0.5 * float(np.sum((found[bodies] / share) ** 2))
+        if extra is not None:
+            departure += 0.5 * float(np.sum(extra.precision * found[-extra.count :] ** 2))
+        # bodies are integrated out: a description that is known well has less to choose from
+        narrowed = 0.5 * float(np.linalg.slogdet(gram[bodies, bodies] * share**2)[1])
+        return NearFit(sum(alike) - departure - narrowed, found, gram, weights, residuals, scales)
+
+    @property
+    def parameters(self) -> Array:
+        """Inertial parameters that explain most, shape (n_bodies, 10)."""
+        robot = self.signals.robot
+        assert robot is not None
+        found = self.plain.coefficients[: self.n_bodies] * sizes(robot)
+        return np.asarray(robot.inertial_parameters + found.reshape(-1, 10))
+
+    def promise(self, extra: ExtraColumns, factor: Factored) -> float:
+        """About what columns gain: with the weights of the fit without them."""
+        left, right = self.without_bodies(extra, factor)
+        return 0.5 * float(right @ np.linalg.solve(left, right))
+
+    def without_bodies(self, extra: ExtraColumns, factor: Factored) -> tuple[Array, Array]:
+        """Normal equations of columns from which what bodies and friction explain is taken off."""
+        m, plain = extra.count, self.plain
+        own, right, cross = np.zeros((m, m)), np.zeros(m), np.zeros((self.size, m))
+        for k, j in enumerate(self.joints):
+            if j in extra.by_joint:
+                columns = extra.by_joint[j][self.rows[k]]
+                weighted = columns * plain.weights[k][:, None]
+                own += weighted.T @ columns
+                right += weighted.T @ plain.residuals[k]
+                cross[self.places[k]] += self.designs[k].T @ weighted
+        left = own - cross.T @ factor.solve(cross)
+        left[np.diag_indices(m)] += 1e-6 * np.trace(own) / m + 1e-300
+        return left, right
+
+
+def sizes(robot: Robot) -> Array:
+    """Mass of every body, times its length for first moments and its square for second ones."""
+    mass, *_, xx, _, _, yy, _, zz = np.abs(
+        np.asarray(robot.inertial_parameters, dtype=float).reshape(-1, 10).T
+    )
+    mass = np.maximum(mass, 1e-4)
+    length = np.sqrt(np.maximum(xx + yy + zz, 1e-9) / 2 / mass) + 1e-3
+    return np.asarray(mass[:, None] * length[:, None] ** POWERS).ravel()
+
+
+#: Added to the diagonal of normal equations of unit size: a hundred times what rounding takes.
+ROUNDING = 1e-10
+
+
+class Factored:
+    """Normal equations, solved in units in which every column has size one."""
+
+    def __init__(self, gram: Array) -> None:
+        self.scale = 1 / np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
+        even = gram * self.scale * self.scale[:, None]
+        even[np.diag_indices(len(even))] += ROUNDING
+        self.factor = cho_factor(even)
+
+    def solve(self, right: Array) -> Array:
+        scale = self.scale if right.ndim == 1 else self.scale[:, None]
+        return np.asarray(scale * cho_solve(self.factor, scale * right))
+
+
+def solved(gram: Array, right: Array, positive: Sequence[int]) -> Array:
+    """Least squares in which coefficients that would be negative and must not are left out."""
+    free = np.ones(len(right), dtype=bool)
+    found = np.zeros(len(right))
+    for _ in range(len(positive) + 1):
+        use = np.flatnonzero(free)
+        found = np.zeros(len(right))
+        found[use] = Factored(gram[np.ix_(use, use)]).solve(right[use])
+        negative = [k for k in positive if found[k] < 0]
+        if not negative:
+            break
+        free[negative] = False
+    return found
