@@ -14,6 +14,7 @@ References
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -36,6 +37,8 @@ LEAST_SHARE, CHANCE = 0.03, 0.005
 COUNTS = 0.1
 #: A further product must bring this share of the squared residual.
 WORTH = 0.05
+#: Joints nearest to one among which sums of positions are formed, and their waves per rad.
+MOST_NEAR, WAVES = 8, (0.5, 1.0, 2.0)
 #: A product that varies by a smaller share of its squares counts as constant.
 CONSTANT = 1e-10
 
@@ -67,6 +70,83 @@ def followed_signals(problem: Problem, joint: int, residual: Array) -> list[tupl
         return []
     found = [*_by_trees(signals, y, fold), *_by_products(signals, y, fold)]
     return list(dict.fromkeys(found))
+
+
+def followed_sums(
+    problem: Problem, joint: int, residual: Array
+) -> list[tuple[tuple[str, ...], tuple[float, ...]]]:
+    """Sums of positions that the residual of a joint may be a function of.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows and folds.
+    joint : int
+        Joint, from 0.
+    residual : ndarray of shape (n_samples,)
+        Torque that the model leaves, N m or N.
+
+    Returns
+    -------
+    list of (names, weights)
+        The best sum of two positions and that of three, each added or subtracted; empty where none
+        predicts anything.
+    """
+    y = average_at_rows(problem, joint, residual)
+    step = max(1, -(-len(y) // MOST_ROWS))
+    signals = averaged_signals(problem, joint)
+    y = y[::step]
+    fold = np.unique(problem.fold[joint][::step], return_inverse=True)[1]
+    if fold.max(initial=0) < 3:
+        return []
+    turning = [k for k in range(problem.n_joints) if not problem.signals.prismatic[k]]
+    near = sorted(sorted(turning, key=lambda k: abs(k - joint))[:MOST_NEAR])
+    found = []
+    for count in (2, 3):
+        sums = [
+            (places, (1.0, *weights))
+            for places in itertools.combinations(near, count)
+            for weights in itertools.product((1.0, -1.0), repeat=count - 1)
+        ]
+        if not sums:
+            continue
+        columns = []
+        for places, weights in sums:
+            total = np.asarray(
+                sum(w * signals[f"q{k + 1}"][::step] for k, w in zip(places, weights, strict=True))
+            )
+            waves = [wave(m * total) for m in WAVES for wave in (np.sin, np.cos)]
+            columns.append(np.column_stack(waves))
+        best = _best_block(columns, y, fold)
+        if best is not None:
+            places, weights = sums[best]
+            found.append((tuple(f"q{k + 1}" for k in places), weights))
+    return found
+
+
+def _best_block(blocks: Sequence[Array], y: Array, fold: NDArray[np.int64]) -> int | None:
+    """The block of columns whose fit predicts the folds left out best, if any does."""
+    n_folds = int(fold.max()) + 1
+    parts = [np.flatnonzero(fold == f) for f in range(n_folds)]
+    x = np.stack([b - b.mean(0) for b in blocks])  # (n_blocks, n_rows, k)
+    y = y - y.mean()
+    own = np.array([np.einsum("bnk,bnl->bkl", x[:, p], x[:, p]) for p in parts])
+    right = np.array([np.einsum("bnk,n->bk", x[:, p], y[p]) for p in parts])
+    energy = np.array([y[p] @ y[p] for p in parts])
+    ridge = 1e-3 * len(y) * np.eye(x.shape[2])
+    left = np.zeros((n_folds, len(blocks)))
+    for f in range(n_folds):
+        weights = np.linalg.solve(
+            own.sum(0) - own[f] + ridge, (right.sum(0) - right[f])[..., None]
+        )[..., 0]
+        left[f] = energy[f] - 2 * np.einsum("bk,bk->b", weights, right[f])
+        left[f] += np.einsum("bk,bkl,bl->b", weights, own[f], weights)
+    best = int(np.argmin(left.sum(0)))
+    gain = (energy - left[:, best]) / np.maximum(np.maximum(energy, left[:, best]), 1e-300)
+    enough = left[:, best].sum() < (1 - LEAST_SHARE) * energy.sum()
+    if not enough or float(ttest_1samp(gain, 0.0, alternative="greater").pvalue) >= CHANCE:
+        return None
+    return best
 
 
 def _predictable(y: Array, left: Array, fold: NDArray[np.int64]) -> bool:

@@ -9,12 +9,19 @@ from numpy.typing import NDArray
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._clock import LOWEST, clock_line
-from skidyn.diagnosis._followed_signals import followed_signals
+from skidyn.diagnosis._followed_signals import followed_signals, followed_sums
 from skidyn.diagnosis._hypothesis import (
     UNKNOWN,
 )
 from skidyn.diagnosis._spectrum import SLOWEST
-from skidyn.effects import FunctionOfSignals, NamelessEffect, Term, get_effect, nameless_kinds
+from skidyn.effects import (
+    FunctionOfSignals,
+    FunctionOfSum,
+    NamelessEffect,
+    Term,
+    get_effect,
+    nameless_kinds,
+)
 from skidyn.evidence import Problem
 
 Mask = NDArray[np.bool_]
@@ -23,6 +30,7 @@ Mask = NDArray[np.bool_]
 def nameless_candidates(problem: Problem, residual: Array) -> list[Candidate]:
     """Nameless functions of the signals for every joint."""
     followed = [followed_signals(problem, j, residual[:, j]) for j in range(problem.n_joints)]
+    sums = [followed_sums(problem, j, residual[:, j]) for j in range(problem.n_joints)]
     candidates = []
     for kind in nameless_kinds():
         effect = get_effect(kind)
@@ -35,6 +43,8 @@ def nameless_candidates(problem: Problem, residual: Array) -> list[Candidate]:
             if isinstance(effect, FunctionOfSignals):
                 sets = [names for names in followed[joint] if len(names) == effect.n_signals]
                 shapes = [effect.shape_of(problem.signals, names) for names in sets]
+            if isinstance(effect, FunctionOfSum):
+                shapes = [effect.shape_of(problem.signals, *of) for of in sums[joint]]
             if effect.search == "clock":
                 line = clock_line(
                     problem.signals,
@@ -47,5 +57,6 @@ def nameless_candidates(problem: Problem, residual: Array) -> list[Candidate]:
             for shape in shapes:
                 term = Term.at(kind, joints, shape)
                 names = effect.variables(joint, shape)
-                candidates.append(Candidate(UNKNOWN, term, problem.screening_rows(term), names))
+                rows = problem.screening_rows(term)
+                candidates.append(Candidate(UNKNOWN, term, rows, names, len(effect.shapes)))
     return candidates

@@ -40,6 +40,7 @@ from skidyn._signals import Signals as Signals
 from skidyn.effects._hysteresis import Law as Law, PathMemory as PathMemory
 from skidyn.effects._nameless import (
     FunctionOfSignals as FunctionOfSignals,
+    FunctionOfSum as FunctionOfSum,
     NamelessEffect as NamelessEffect,
 )
 from skidyn.effects._registry import nameless_kinds as nameless_kinds

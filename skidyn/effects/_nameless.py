@@ -7,14 +7,14 @@ They are terms like any other, so a model that adopts one fits, predicts and is 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
 from skidyn._signals import Array, Signals
-from skidyn.effects._base import Coefficient, Effect
+from skidyn.effects._base import Coefficient, Effect, Shape
 
 #: Share of the samples of a trajectory left out at either end of its range.
 _OUTSIDE = 0.002
@@ -29,7 +29,7 @@ _SECANT = 0.15
 _ORDER = 12
 
 
-def _coefficients(count: int) -> tuple[Coefficient, ...]:
+def unnamed_coefficients(count: int) -> tuple[Coefficient, ...]:
     return tuple(Coefficient(f"c{i + 1}", "N m") for i in range(count))
 
 
@@ -70,24 +70,12 @@ class _Spline(NamelessEffect):
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
         x = getattr(signals, self.signal)[:, joints[0]]
-        low, high = _supported_range(signals, x)
+        low, high = supported_range(signals, x)
         return [{"low": low, "high": high}] if high > low else []
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        from scipy.interpolate import BSpline  # not paid for by who only checks a log
-
         x = getattr(signals, self.signal)[:, joint]
-        low, high = shape["low"], shape["high"]
-        degree = 3
-        inner = np.linspace(low, high, self.n_splines - degree + 1)
-        knots = np.r_[[low] * degree, inner, [high] * degree]
-
-        def splines(inside: Array) -> Array:
-            # Together they add up to a constant, which the model may lack.
-            inside = np.clip(inside, low, high - 1e-9 * (high - low))
-            return np.asarray(BSpline.design_matrix(inside, knots, degree).toarray())
-
-        return _continued(splines, x, low, high)
+        return splines(x, shape["low"], shape["high"], self.n_splines)
 
 
 class FunctionOfPosition(_Spline):
@@ -96,7 +84,7 @@ class FunctionOfPosition(_Spline):
     kind = "function_of_position"
     title = "Function of position"
     formula = r"f(q_j)"
-    coefficients = _coefficients(30)
+    coefficients = unnamed_coefficients(30)
     depends_on = ("q_own",)
     signal, n_splines = "q", 30
 
@@ -108,7 +96,7 @@ class FunctionOfVelocity(_Spline):
     drawn_against = "dq"
     title = "Function of velocity"
     formula = r"f(\dot q_j)"
-    coefficients = _coefficients(24)
+    coefficients = unnamed_coefficients(24)
     depends_on = ("dq_own",)
     signal, n_splines = "dq", 24
 
@@ -120,7 +108,7 @@ class FrictionOverPosition(NamelessEffect):
     drawn_against = "q"
     title = "Friction that varies with position"
     formula = r"f(q_j)\,\dot q_j + g(q_j)\,\mathrm{sign}\,\dot q_j"
-    coefficients = _coefficients(6)
+    coefficients = unnamed_coefficients(6)
     depends_on = ("q_own", "dq_own")
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
@@ -141,7 +129,7 @@ class FunctionOfTwoPositions(_WithOther):
     kind = "function_of_two_positions"
     title = "Function of two positions"
     formula = r"f(q_j, q_k)"
-    coefficients = _coefficients(7)
+    coefficients = unnamed_coefficients(7)
     depends_on = ("q_own", "q_other")
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
@@ -167,7 +155,7 @@ class FrictionOverOtherPosition(_WithOther):
     drawn_against = "dq"
     title = "Friction that varies with another joint's position"
     formula = r"f(q_k)\,\mathrm{sign}\,\dot q_j + g(q_k)\,\dot q_j"
-    coefficients = _coefficients(4)
+    coefficients = unnamed_coefficients(4)
     depends_on = ("dq_own", "q_other")
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
@@ -184,7 +172,7 @@ class FunctionOfTwoVelocities(_WithOther):
     drawn_against = "dq"
     title = "Function of two velocities"
     formula = r"f(\dot q_j, \dot q_k)"
-    coefficients = _coefficients(6)
+    coefficients = unnamed_coefficients(6)
     depends_on = ("dq_own", "dq_other")
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
@@ -230,7 +218,7 @@ class FunctionOfSignals(NamelessEffect):
             Signals, joints counted from 1, such as ``"q2"``.
         """
         low, high = zip(
-            *(_supported_range(signals, signals.named(name)) for name in names), strict=True
+            *(supported_range(signals, signals.named(name)) for name in names), strict=True
         )
         return {"of": tuple(names), "low": low, "high": high}
 
@@ -250,7 +238,25 @@ class FunctionOfSignals(NamelessEffect):
         )
 
 
-def _supported_range(signals: Signals, x: Array) -> tuple[float, float]:
+def splines(x: Array, low: float, high: float, count: int) -> Array:
+    """Cubic B-splines on a range, continued beyond it, shape (n_samples, count).
+
+    Together they add up to a constant, which the model may lack.
+    """
+    from scipy.interpolate import BSpline  # not paid for by who only checks a log
+
+    degree = 3
+    inner = np.linspace(low, high, count - degree + 1)
+    knots = np.r_[[low] * degree, inner, [high] * degree]
+
+    def functions(inside: Array) -> Array:
+        inside = np.clip(inside, low, high - 1e-9 * (high - low))
+        return np.asarray(BSpline.design_matrix(inside, knots, degree).toarray())
+
+    return continued(functions, x, low, high)
+
+
+def supported_range(signals: Signals, x: Array) -> tuple[float, float]:
     """Range of a signal that several trajectories cover: elsewhere one of them would decide."""
     numbers = np.unique(signals.trajectory)
     ends = np.array(
@@ -262,7 +268,7 @@ def _supported_range(signals: Signals, x: Array) -> tuple[float, float]:
     return (low, high) if high > low else (float(ends[0, 0]), float(ends[-1, 1]))
 
 
-def _continued(functions: Callable[[Array], Array], x: Array, low: float, high: float) -> Array:
+def continued(functions: Callable[[Array], Array], x: Array, low: float, high: float) -> Array:
     """Functions on a range, continued beyond it along their secants over its outer parts."""
     values = functions(np.clip(x, low, high))
     reach = _SECANT * (high - low)
@@ -280,7 +286,7 @@ def _ordered_functions(x: Array, sign: Array | None, low: float, high: float) ->
     """Functions of one signal by rising order, the constant first."""
     if sign is None:
         inside = (2 * x - low - high) / max(high - low, 1e-300)
-        return _continued(lambda t: np.asarray(legvander(t, _ORDER)), inside, -1.0, 1.0)
+        return continued(lambda t: np.asarray(legvander(t, _ORDER)), inside, -1.0, 1.0)
     v = np.clip(x / max(-low, high, 1e-300), -1.0, 1.0)
     size = np.abs(v)
     powers = [np.ones_like(v), v, sign, size, v * v, v * size, v**3, size**3]
@@ -294,7 +300,7 @@ class FunctionOfSignal(FunctionOfSignals):
     kind = "function_of_signal"
     title = "Function of one signal"
     formula = r"f(s)"
-    coefficients = _coefficients(_ORDER + 1)
+    coefficients = unnamed_coefficients(_ORDER + 1)
     n_signals = 1
 
 
@@ -304,7 +310,7 @@ class FunctionOfTwoSignals(FunctionOfSignals):
     kind = "function_of_two_signals"
     title = "Function of two signals"
     formula = r"f(s_1, s_2)"
-    coefficients = _coefficients(28)
+    coefficients = unnamed_coefficients(28)
     n_signals = 2
 
 
@@ -314,8 +320,104 @@ class FunctionOfThreeSignals(FunctionOfSignals):
     kind = "function_of_three_signals"
     title = "Function of three signals"
     formula = r"f(s_1, s_2, s_3)"
-    coefficients = _coefficients(35)
+    coefficients = unnamed_coefficients(35)
     n_signals = 3
+
+
+class FunctionOfSum(NamelessEffect):
+    """A function of a sum of positions: of how a link is turned about axes that are parallel."""
+
+    kind = "function_of_sum"
+    title = "Function of a sum of positions"
+    formula = r"f(\pm q_i \pm q_k \pm \ldots)"
+    coefficients = unnamed_coefficients(16)
+    search = "screened"
+    softness = 2e-3
+
+    def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
+        return tuple(sorted(shape["of"]))
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        return []
+
+    def shape_of(
+        self, signals: Signals, names: Sequence[str], weights: Sequence[float]
+    ) -> dict[str, Any]:
+        """Shape of a function of a weighted sum, over the range that it covers.
+
+        Parameters
+        ----------
+        signals : Signals
+        names : sequence of str
+            Positions, joints counted from 1, such as ``"q2"``.
+        weights : sequence of float
+            Factor of each.
+
+        Returns
+        -------
+        dict
+        """
+        total = weighted_sum(signals, names, weights)
+        low, high = supported_range(signals, total)
+        return {"of": tuple(names), "weights": tuple(weights), "low": low, "high": high}
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        total = weighted_sum(signals, shape["of"], shape["weights"])
+        return splines(total, shape["low"], shape["high"], len(self.coefficients))
+
+
+def weighted_sum(signals: Signals, names: Sequence[str], weights: Sequence[float]) -> Array:
+    """Sum of signals, each times its factor, shape (n_samples,)."""
+    return np.asarray(sum(w * signals.named(n) for n, w in zip(names, weights, strict=True)))
+
+
+class TorqueBetweenTwoJoints(NamelessEffect):
+    """A torque between two joints that depends on a sum of their positions.
+
+    The second joint feels what the first one feels, times the ratio: so it is where what lies
+    between them stores energy, as a cable that tightens or links that touch each other.
+    """
+
+    kind = "torque_between_two_joints"
+    title = "Torque between two joints"
+    formula = r"f(x),\quad x = q_i + r\,q_j"
+    coefficients = unnamed_coefficients(10)
+    shapes = (
+        Shape(
+            "ratio",
+            "1",
+            (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0),
+            -np.inf,
+            np.inf,
+            spacing="linear",
+            scales=False,
+            has_interval=False,
+        ),
+    )
+    scope = "pair"
+    softness = 2e-3
+
+    def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
+        return (f"q{joint + 1}", f"q{int(shape['other']) + 1}")
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        unit = self.travel(signals, joints, {})
+        return [
+            s | {"ratio": s["ratio"] * unit, "other": joints[1]}
+            for s in super().grid(signals, joints)
+        ]
+
+    def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
+        i, j = joints
+        return float(signals.unit[i] / signals.unit[j])
+
+    def torque_columns(
+        self, signals: Signals, joints: Sequence[int], **shape: Any
+    ) -> dict[int, Array]:
+        i, j = joints
+        total = signals.q[:, i] + shape["ratio"] * signals.q[:, j]
+        block = splines(total, *supported_range(signals, total), len(self.coefficients))
+        return {i: block, j: shape["ratio"] * block}
 
 
 class ClockPeriodic(NamelessEffect):
@@ -325,7 +427,7 @@ class ClockPeriodic(NamelessEffect):
     drawn_against = "time"
     title = "Periodic in time"
     formula = r"\sum_h a_h\sin(2\pi h f t) + b_h\cos(2\pi h f t)"
-    coefficients = _coefficients(8)
+    coefficients = unnamed_coefficients(8)
     depends_on = ("time",)
     needs = ("time",)
     search = "clock"
@@ -352,7 +454,7 @@ class Vibration(NamelessEffect):
     drawn_against = "time"
     title = "Vibration"
     formula = r"a\sin(2\pi f t) + b\cos(2\pi f t)"
-    coefficients = _coefficients(2)
+    coefficients = unnamed_coefficients(2)
     depends_on = ("time",)
     needs = ("time",)
     # As with torque ripple: averaging over windows of time would remove it.
@@ -373,6 +475,8 @@ NAMELESS: tuple[type[NamelessEffect], ...] = (
     FunctionOfSignal,
     FunctionOfTwoSignals,
     FunctionOfThreeSignals,
+    FunctionOfSum,
+    TorqueBetweenTwoJoints,
     ClockPeriodic,
     Vibration,
 )

@@ -11,12 +11,19 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 
 from skidyn._signals import Array, Signals
-from skidyn.effects._hysteresis import dahl_state
-from skidyn.effects._nameless import NamelessEffect, _coefficients
+from skidyn.effects._hysteresis import cut_strokes, dahl_state, stop_state
+from skidyn.effects._nameless import (
+    NamelessEffect,
+    splines,
+    supported_range,
+    unnamed_coefficients,
+)
 from skidyn.effects._tool import tool_jacobian, tool_position
 
 #: Ways since the last reversal, rad or tenths of m, over which a torque may fade.
 _WAYS = (0.01, 0.03, 0.1, 0.3)
+#: Plays, as shares of the range of a position, and splines of a function of what lags.
+_PLAYS, _LAGGING = (0.03, 0.06, 0.1, 0.15, 0.22), 16
 #: Times since the start of a recording over which a torque may fade, as shares of its length.
 _FADING = (0.05, 0.15, 0.5)
 
@@ -32,7 +39,7 @@ class FunctionOfTimeSinceStart(NamelessEffect):
     drawn_against = "time"
     title = "Function of the time since the start of a recording"
     formula = r"f(t - t_\mathrm{start})"
-    coefficients = _coefficients(len(_FADING) + 2)
+    coefficients = unnamed_coefficients(len(_FADING) + 2)
     depends_on = ("time",)
     needs = ("time",)
 
@@ -51,7 +58,7 @@ class FrictionSinceReversal(NamelessEffect):
     kind = "friction_since_reversal"
     title = "Friction that depends on the way since the last reversal"
     formula = r"f(|q - q_\mathrm{turn}|)\,\mathrm{sign}\,\dot q"
-    coefficients = _coefficients(len(_WAYS))
+    coefficients = unnamed_coefficients(len(_WAYS))
     depends_on = ("q_own", "dq_own")
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
@@ -62,6 +69,51 @@ class FrictionSinceReversal(NamelessEffect):
         )
 
 
+class FunctionOfWaySinceReversal(NamelessEffect):
+    """A torque that fades or grows with the way since the joint turned back."""
+
+    kind = "function_of_way_since_reversal"
+    title = "Function of the way since the last reversal"
+    formula = r"f(|q - q_\mathrm{turn}|)"
+    coefficients = unnamed_coefficients(2 * len(_WAYS))
+    depends_on = ("q_own", "dq_own")
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        strokes = cut_strokes(signals.q[:, joint], signals.segments)
+        way = np.zeros(signals.n_samples)
+        way[strokes.rows] = strokes.way / signals.unit[joint]
+        fading = np.column_stack([np.exp(-way / w) for w in _WAYS])
+        return np.hstack([fading, fading * signals.sign[:, [joint]]])
+
+
+class FunctionOfLaggingPosition(NamelessEffect):
+    """A torque that snaps over: a function of the position that lags behind by some play.
+
+    Whatever switches at one angle on the way there and at another one on the way back, as a latch,
+    a magnet or a hose that flips over, is a function of the output of a play [1]_.
+
+    References
+    ----------
+    .. [1] A. Visintin (1994), Differential models of hysteresis, Springer, chapter III.
+    """
+
+    kind = "function_of_lagging_position"
+    title = "Function of the position with play"
+    formula = r"f(\mathcal{P}_r[q])"
+    coefficients = unnamed_coefficients(_LAGGING)
+    depends_on = ("q_own",)
+    softness = 2e-3
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        low, high = supported_range(signals, signals.q[:, joints[0]])
+        return [{"play": share * (high - low), "low": low, "high": high} for share in _PLAYS]
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        q, play = signals.q[:, joint], shape["play"]
+        lagging = q - play * stop_state(q, signals.segments, play)
+        return splines(lagging, shape["low"], shape["high"], _LAGGING)
+
+
 class FrictionOverOtherLoad(NamelessEffect):
     """Friction of one joint that grows with the load of another."""
 
@@ -69,7 +121,7 @@ class FrictionOverOtherLoad(NamelessEffect):
     drawn_against = "dq"
     title = "Friction that follows another joint's load"
     formula = r"f(|\tau_k|)\,\mathrm{sign}\,\dot q_j"
-    coefficients = _coefficients(2)
+    coefficients = unnamed_coefficients(2)
     needs = ("load",)
 
     def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
@@ -94,7 +146,7 @@ class ForceOverToolPosition(NamelessEffect):
     kind = "force_over_tool_position"
     title = "Force that depends on the position of the tool"
     formula = r"-J_n(q)^\top f(p(q))"
-    coefficients = _coefficients(30)
+    coefficients = unnamed_coefficients(30)
     scope = "robot"
     needs = ("robot",)
 
@@ -133,7 +185,7 @@ class ForceNearPoint(NamelessEffect):
     kind = "force_near_point"
     title = "Force near a point"
     formula = r"-J_n(q)^\top (f + c\,(p - p_0) / w) \exp(-|p - p_0|^2 / 2 w^2)"
-    coefficients = _coefficients(4)
+    coefficients = unnamed_coefficients(4)
     scope = "robot"
     needs = ("robot",)
 
@@ -189,6 +241,8 @@ def _since_start(signals: Signals) -> Array:
 HISTORY: tuple[type[NamelessEffect], ...] = (
     FunctionOfTimeSinceStart,
     FrictionSinceReversal,
+    FunctionOfWaySinceReversal,
+    FunctionOfLaggingPosition,
     FrictionOverOtherLoad,
     ForceOverToolPosition,
     ForceNearPoint,
