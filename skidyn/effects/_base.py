@@ -114,6 +114,9 @@ class Effect:
         What is fitted linearly, one per column.
     shapes : tuple of Shape
         What enters nonlinearly.
+    forms : tuple of dict
+        Other forms of the formula that are tried beside the plain one, as further entries of the
+        shape that no search refines: ``{"power": 2.0}``.
     scope : {"joint", "pair", "robot"}
         Where it acts.
     search : {"grid", "spectrum", "trajectories", "clock", "screened", "given"}
@@ -181,6 +184,7 @@ class Effect:
     formula: ClassVar[str] = ""
     coefficients: ClassVar[tuple[Coefficient, ...]] = ()
     shapes: ClassVar[tuple[Shape, ...]] = ()
+    forms: ClassVar[tuple[Mapping[str, float], ...]] = ()
     scope: ClassVar[Scope] = "joint"
     search: ClassVar[Literal["grid", "spectrum", "trajectories", "clock", "screened", "given"]] = (
         "grid"
@@ -327,7 +331,8 @@ class Effect:
             unit = signals.unit[joints[0]] if shape.scales else 1.0
             axes.append([value * unit for value in shape.grid])
         names = [shape.name for shape in self.shapes]
-        return [dict(zip(names, values, strict=True)) for values in itertools.product(*axes)]
+        shapes = [dict(zip(names, values, strict=True)) for values in itertools.product(*axes)]
+        return [shape | dict(form) for form in ({}, *self.forms) for shape in shapes]
 
     def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
         """Whether shape parameters lie where this data can tell them from a simpler effect.

@@ -75,20 +75,26 @@ class Stribeck(Effect):
 
 
 class AsymmetricFriction(Effect):
-    """The part of friction that has another size in each direction."""
+    """The part of friction that has another size in each direction.
+
+    It grows with the speed, or with another ``power`` of it (1 where the shape has none); speeds
+    are in units of 1 rad/s or 1 m/s, so that the unit of the coefficient stays.
+    """
 
     kind = "asymmetric_friction"
     drawn_against = "dq"
     title = "Direction-dependent friction"
-    formula = r"\Delta F_v\,|\dot q| + \Delta F_c"
+    formula = r"\Delta F_v\,|\dot q|^p + \Delta F_c"
     coefficients = (Coefficient("dFv", "N m s/rad"), Coefficient("dFc", "N m"))
+    forms = ({"power": 2.0}, {"power": 0.5})
     simplicity = 11
     rivals = ("offset", "viscous")
     separating_motion = "equal sweeps in both directions at two speeds or more"
     reference = "Janot, Gautier, Brunot (2019), Nonlinear System Identification Benchmarks (EMPS)."
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        return np.column_stack([np.abs(signals.dq[:, joint]), np.ones(signals.n_samples)])
+        speed = np.abs(signals.dq[:, joint]) ** shape.get("power", 1.0)
+        return np.column_stack([speed, np.ones(signals.n_samples)])
 
 
 class NonlinearViscous(Effect):

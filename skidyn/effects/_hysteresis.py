@@ -150,7 +150,15 @@ def dahl_state(position: Array, segments: list[slice], presliding: float) -> Arr
     return _run(cut_strokes(position, segments), len(position), _dahl_law(presliding))
 
 
-def _dahl_law(presliding: float) -> Law:
+def _dahl_law(presliding: float, exponent: float = 1.0) -> Law:
+    if exponent == 2.0:  # the same equation, its right side squared
+
+        def slower(start: Any, direction: Any, way: Any) -> Any:
+            short = 1.0 - direction * start
+            return direction * (1.0 - short / (1.0 + short * way))
+
+        return Law(lambda way: way / presliding, slower)
+
     def change(start: Any, direction: Any, fading: Any) -> Any:
         return direction - (direction - start) * fading
 
@@ -225,13 +233,18 @@ class PathMemory(Effect):
 
 
 class Dahl(PathMemory):
-    """Friction that builds up over a short way after each reversal."""
+    """Friction that builds up over a short way after each reversal.
+
+    Dahl's exponent i is 1 for ductile materials, which the plain form has, and 2 where ``exponent``
+    says so in the shape.
+    """
 
     kind = "dahl"
     drawn_against = "dq"
     title = "Dahl friction (pre-sliding)"
-    formula = r"F\,h,\quad \tfrac{dh}{dq} = \tfrac{1}{\delta}\,(1 - h\,\mathrm{sign}\,\dot q)"
+    formula = r"F\,h,\quad \tfrac{dh}{dq} = \tfrac{1}{\delta}\,(1 - h\,\mathrm{sign}\,\dot q)^i"
     coefficients = (Coefficient("F", "N m", sign=1),)
+    forms = ({"exponent": 2.0},)
     shapes = (
         Shape(
             "presliding",
@@ -249,7 +262,7 @@ class Dahl(PathMemory):
     reference = "Dahl (1968), A solid friction model, Aerospace Corporation TOR-0158."
 
     def laws(self, **shape: Any) -> tuple[Law, ...]:
-        return (_dahl_law(shape["presliding"]),)
+        return (_dahl_law(shape["presliding"], shape.get("exponent", 1.0)),)
 
 
 class LuGre(PathMemory):

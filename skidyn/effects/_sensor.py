@@ -14,13 +14,18 @@ from skidyn.effects._derivatives import smooth_derivatives
 
 
 class TorqueGain(Effect):
-    """The logged torque is too large or too small by a factor."""
+    """The logged torque is too large or too small by a factor.
+
+    With a ``sign`` in its shape it is so for positive (1) or negative torque (-1) alone, as where
+    one half of a bridge or of an amplifier is off.
+    """
 
     kind = "torque_gain"
     drawn_against = "load"
     title = "Torque gain"
     formula = r"\varepsilon\,\tau_\mathrm{model}"
     coefficients = (Coefficient("epsilon", "1"),)
+    forms = ({"sign": 1.0}, {"sign": -1.0})
     needs = ("model_torque",)
     simplicity = 5
     rivals = ("payload", "load_dependent_friction")
@@ -29,7 +34,9 @@ class TorqueGain(Effect):
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         assert signals.model_torque is not None
-        return signals.model_torque[:, [joint]]
+        torque = signals.model_torque[:, [joint]]
+        sign = shape.get("sign")
+        return torque if sign is None else sign * np.maximum(0.0, sign * torque)
 
 
 class TimeDelay(Effect):

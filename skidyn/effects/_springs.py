@@ -119,13 +119,18 @@ FEWEST_TOUCHING, MOST_TOUCHING = 0.001, 0.6
 
 
 class EndStop(Effect):
-    """One-sided elastic contact beyond a position: bumper, hose, cable pulled tight."""
+    """One-sided elastic contact beyond a position: bumper, hose, cable pulled tight.
+
+    A soft bumper stiffens: then the torque grows with the second ``power`` of the way (1 where the
+    shape has none), in units of 1 rad or 1 m, so that the unit of the stiffness stays.
+    """
 
     kind = "end_stop"
     title = "End stop"
-    formula = r"s\,k\,\max(0,\ s\,(q - q_\mathrm{lim})),\quad s = \pm 1"
+    formula = r"s\,k\,\max(0,\ s\,(q - q_\mathrm{lim}))^p,\quad s = \pm 1"
     coefficients = (Coefficient("k", "N m/rad", sign=1),)
     shapes = (Shape("q_lim", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),)
+    forms = ({"power": 2.0},)
     simplicity = 10
     rivals = ("spring", "nonlinear_spring")
     separating_motion = "slow approach to both ends of the travel"
@@ -135,7 +140,8 @@ class EndStop(Effect):
         q = signals.q[:, joints[0]]
         shares = (0.80, 0.84, 0.88, 0.92, 0.95)
         return [
-            {"q_lim": float(side * np.quantile(side * q, share)), "side": side}
+            {"q_lim": float(side * np.quantile(side * q, share)), "side": side} | stiffening
+            for stiffening in ({}, *map(dict, self.forms))
             for share in shares
             for side in (1.0, -1.0)
         ]
@@ -146,5 +152,5 @@ class EndStop(Effect):
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         beyond = shape["side"] * (signals.q[:, joint] - shape["q_lim"])
-        depth: Array = shape["side"] * np.maximum(0.0, beyond)
-        return depth[:, None]
+        depth: Array = np.maximum(0.0, beyond) ** shape.get("power", 1.0)
+        return shape["side"] * depth[:, None]

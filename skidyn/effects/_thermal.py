@@ -60,8 +60,12 @@ class TemperatureOffset(Effect):
     kind = "temperature_offset"
     drawn_against = "temperature"
     title = "Temperature-dependent offset"
-    formula = r"\tfrac{d\tau}{dT}\,(T - T_0) + \tau_0"
-    coefficients = (Coefficient("dtau_dT", "N m/K"), Coefficient("tau0", "N m", is_zero=True))
+    formula = r"\tfrac{d\tau}{dT}\,(T - T_0) + \tfrac{d^2\tau}{dT^2}\,(T - T_0)^2 + \tau_0"
+    coefficients = (
+        Coefficient("dtau_dT", "N m/K"),
+        Coefficient("d2tau_dT2", "N m/K^2"),
+        Coefficient("tau0", "N m", is_zero=True),
+    )
     needs = ("temperature",)
     simplicity = 13
     rivals = ("offset", "temperature_friction")
@@ -69,7 +73,8 @@ class TemperatureOffset(Effect):
     reference = _BITTENCOURT
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        return np.column_stack([_warmth(signals, joint), np.ones(signals.n_samples)])
+        warm = _warmth(signals, joint)
+        return np.column_stack([warm, warm**2, np.ones(signals.n_samples)])
 
     def not_shown(self, signals: Signals, joint: int) -> str | None:
         return super().not_shown(signals, joint) or _constant_temperature(signals, joint)
