@@ -18,6 +18,7 @@ from skidyn.diagnosis._hypothesis import (
     grouped_by_joints,
     says_little,
     some_recordings,
+    within_recordings,
 )
 from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
 from skidyn.diagnosis._recordings import choose
@@ -44,7 +45,20 @@ class RankingSearch(SearchState):
         ranking += [self._against_functions(h, ranking) for h in self._lines()]
         ranking += self._recordings()
         # What says least comes last: differences between recordings, and vibration.
-        return sorted(ranking, key=lambda h: (says_little(h), -h.score))
+        return sorted(
+            ranking, key=lambda h: (says_little(h) or self._holds_in_all(h, ranking), -h.score)
+        )
+
+    def _holds_in_all(self, own: Hypothesis, ranking: Sequence[Hypothesis]) -> bool:
+        """Whether what differs between many recordings is nearly had by what is alike in all."""
+        recordings = {k for c in own.candidates for k in c.term.trajectories or ()}
+        if len(recordings) <= self.settings.most_recordings or not within_recordings(own):
+            return False
+        return any(
+            h.score > self.settings.recordings_share * own.score
+            for h in ranking
+            if not within_recordings(h) and set(own.joints) <= set(h.joints)
+        )
 
     def _greedy_by_kind(self, nameless: bool = True) -> list[tuple[list[Candidate], float]]:
         """For each kind, terms added joint by joint while each lowers the held-out error."""

@@ -143,6 +143,9 @@ class Settings:
         Chance at which one of several recordings differs, once all together are more than chance.
     most_recordings : int
         Recordings of a joint that may have an effect of a size of their own under its name.
+    recordings_share : float
+        What differs between more recordings than these comes last if something that is alike in
+        all of them does more than this share of it.
     white : float
         Inflation of the variance by autocorrelation up to which what remains is white.
     nameless_price : int
@@ -182,6 +185,7 @@ class Settings:
     resolved: float = 2.0
     member: float = 0.05
     most_recordings: int = 2
+    recordings_share: float = 0.8
     white: float = 2.0
     nameless_price: int = 6
     nameless_tried: int = 20

@@ -128,7 +128,9 @@ def describe_unknowns(
         explained = rows @ whole[span]
         residual = target[joint] - design[joint] @ whole + explained
         tests = depends_on(problem, joint, residual, guessed, rows, without)
-        needed = {t.variable for t in tests if t.needed} or set(guessed)
+        needed = {t.variable for t in tests if t.needed}
+        if effect.is_of_one_number or not needed:
+            needed = set(guessed)
         variables = tuple(sorted(needed, key=lambda v: (v not in guessed, v)))
         shape = _shape(problem, term, joint, whole[span], left[:, span], variables)
         proposal = propose(problem, joint, residual, explained, variables, _waves(term), without)

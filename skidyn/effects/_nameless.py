@@ -38,6 +38,8 @@ class NamelessEffect(Effect):
 
     nameless = True
     softness = 1e-5
+    #: Whether its signals enter as one number, so that none of them can be tested by itself.
+    is_of_one_number: ClassVar[bool] = False
     #: Signals it depends on: ``own`` joint, the ``other`` joint or time.
     depends_on: ClassVar[tuple[str, ...]] = ()
 
@@ -333,6 +335,7 @@ class FunctionOfSum(NamelessEffect):
     coefficients = unnamed_coefficients(16)
     search = "screened"
     softness = 2e-3
+    is_of_one_number = True
 
     def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
         return tuple(sorted(shape["of"]))

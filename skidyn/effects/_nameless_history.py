@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
 from skidyn._signals import Array, Signals
+from skidyn.effects._base import Shape
 from skidyn.effects._hysteresis import cut_strokes, dahl_state, stop_state
 from skidyn.effects._nameless import (
     NamelessEffect,
@@ -186,6 +187,10 @@ class ForceNearPoint(NamelessEffect):
     title = "Force near a point"
     formula = r"-J_n(q)^\top (f + c\,(p - p_0) / w) \exp(-|p - p_0|^2 / 2 w^2)"
     coefficients = unnamed_coefficients(4)
+    shapes = (
+        *(Shape(axis, "m", (), -np.inf, np.inf, spacing="linear", scales=False) for axis in "xyz"),
+        Shape("width", "m", (), 1e-3, 1e2, scales=False),
+    )
     scope = "robot"
     needs = ("robot",)
 
@@ -197,18 +202,22 @@ class ForceNearPoint(NamelessEffect):
             return []
         position = tool_position(signals)
         places = _spread_out(position, _PLACES)
-        reach = float(np.max(np.ptp(position, axis=0)))
+        reach = self.travel(signals, joints, {})
         return [
-            {"point": tuple(map(float, place)), "width": share * reach}
+            dict(zip("xyz", map(float, place), strict=True)) | {"width": share * reach}
             for place in places
             for share in _WIDTHS
         ]
+
+    def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
+        return float(np.max(np.ptp(tool_position(signals), axis=0)))
 
     def torque_columns(
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
         position = tool_position(signals)
-        away = (position - np.array(shape["point"])) / max(shape["width"], 1e-9)
+        point = np.array([shape[axis] for axis in "xyz"])
+        away = (position - point) / max(shape["width"], 1e-9)
         near = np.exp(-0.5 * np.sum(away**2, axis=1))[:, None]
         jacobian = tool_jacobian(signals)
         columns = {}
