@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from skidyn._progress import track
 from skidyn._signals import Array
-from skidyn.effects import Effect, Term, get_effect
+from skidyn.effects import Term, get_effect
 from skidyn.evidence import Problem
 
 
@@ -103,9 +103,11 @@ def catalogue_candidates(problem: Problem, kinds: Iterable[str]) -> list[Candida
     ordered = sorted(terms, key=lambda term: (term.effect.needs, term.places))
     for term in track(ordered, "Preparing effects"):
         problem.term_rows(term)
-    return [Candidate(t.kind, t, problem.term_rows(t), n_shapes=_refined(t.effect)) for t in terms]
+    return [Candidate(t.kind, t, problem.term_rows(t), n_shapes=_refined(t)) for t in terms]
 
 
-def _refined(effect: Effect) -> int:
+def _refined(term: Term) -> int:
     """Shape parameters that are refined."""
-    return 0 if effect.search == "trajectories" else len(effect.shapes)
+    if term.effect.search == "trajectories":
+        return 0
+    return sum(shape.name in term.shape for shape in term.effect.shapes)

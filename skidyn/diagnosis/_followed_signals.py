@@ -42,6 +42,9 @@ MOST_NEAR, WAVES = 8, (0.5, 1.0, 2.0)
 #: A product that varies by a smaller share of its squares counts as constant.
 CONSTANT = 1e-10
 
+#: Joints, from 0, and the factor of the position of each.
+Sum = tuple[tuple[int, ...], tuple[float, ...]]
+
 
 def followed_signals(problem: Problem, joint: int, residual: Array) -> list[tuple[str, ...]]:
     """Sets of signals that the residual of a joint may be a function of.
@@ -72,9 +75,7 @@ def followed_signals(problem: Problem, joint: int, residual: Array) -> list[tupl
     return list(dict.fromkeys(found))
 
 
-def followed_sums(
-    problem: Problem, joint: int, residual: Array
-) -> list[tuple[tuple[str, ...], tuple[float, ...]]]:
+def followed_sums(problem: Problem, joint: int, residual: Array) -> list[Sum]:
     """Sums of positions that the residual of a joint may be a function of.
 
     Parameters
@@ -88,9 +89,9 @@ def followed_sums(
 
     Returns
     -------
-    list of (names, weights)
-        The best sum of two positions and that of three, each added or subtracted; empty where none
-        predicts anything.
+    list of (joints, weights)
+        The best sum of two positions and that of three, each added or subtracted; those that
+        predict something.
     """
     y = average_at_rows(problem, joint, residual)
     step = max(1, -(-len(y) // MOST_ROWS))
@@ -101,15 +102,16 @@ def followed_sums(
         return []
     turning = [k for k in range(problem.n_joints) if not problem.signals.prismatic[k]]
     near = sorted(sorted(turning, key=lambda k: abs(k - joint))[:MOST_NEAR])
-    found = []
-    for count in (2, 3):
-        sums = [
+    groups: list[list[Sum]] = [
+        [
             (places, (1.0, *weights))
             for places in itertools.combinations(near, count)
             for weights in itertools.product((1.0, -1.0), repeat=count - 1)
         ]
-        if not sums:
-            continue
+        for count in (2, 3)
+    ]
+    found = []
+    for sums in filter(None, groups):
         columns = []
         for places, weights in sums:
             total = np.asarray(
@@ -119,8 +121,7 @@ def followed_sums(
             columns.append(np.column_stack(waves))
         best = _best_block(columns, y, fold)
         if best is not None:
-            places, weights = sums[best]
-            found.append((tuple(f"q{k + 1}" for k in places), weights))
+            found.append(sums[best])
     return found
 
 

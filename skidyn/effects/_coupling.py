@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -24,7 +24,7 @@ class _PairEffect(Effect):
     """Acts through x = x_i + r x_j: the column on joint i, r times it on joint j."""
 
     scope = "pair"
-    shapes = (_RATIO,)
+    shapes: ClassVar[tuple[Shape, ...]] = (_RATIO,)
 
     def coupled_columns(self, signals: Signals, i: int, j: int, ratio: float) -> Array:
         """Columns as functions of the coupled coordinate, shape (n_samples, n_coefficients)."""
@@ -94,17 +94,40 @@ class CoupledInertia(_PairEffect):
 
 
 class CouplingSpring(_PairEffect):
-    """Spring or hose between two joints."""
+    """Spring or hose between two joints.
+
+    One that stiffens has ``power`` 3 in its shape, and the coupled coordinate ``x0`` at which it is
+    slack; coordinates are in units of 1 rad or 1 m then, so that the unit of the stiffness stays.
+    """
 
     kind = "coupling_spring"
     title = "Coupling spring"
-    formula = r"k\,(q_i + r\,q_j - x_0)"
+    formula = r"k\,(q_i + r\,q_j - x_0)^p"
     coefficients = (Coefficient("k", "N m/rad"), Coefficient("tau0", "N m", is_zero=True))
+    shapes = (
+        _RATIO,
+        Shape("x0", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
+    )
     simplicity = 16
     rivals = ("spring",)
     separating_motion = "slow motion of the two joints together, then against each other"
     reference = "Tsai (1999), Robot Analysis, Wiley, chapter 7."
 
-    def coupled_columns(self, signals: Signals, i: int, j: int, ratio: float) -> Array:
-        x = signals.q[:, i] + ratio * signals.q[:, j]
-        return np.column_stack([x, np.ones_like(x)])
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        i, j = joints
+        plain = super().grid(signals, joints)
+        stiffening = []
+        for shape in plain:
+            x = signals.q[:, i] + shape["ratio"] * signals.q[:, j]
+            middle = float(x.min() + x.max()) / 2
+            stiffening.append(shape | {"power": 3.0, "x0": middle})
+        return plain + stiffening
+
+    def torque_columns(
+        self, signals: Signals, joints: Sequence[int], **shape: Any
+    ) -> dict[int, Array]:
+        ratio, power = shape["ratio"], shape.get("power", 1.0)
+        i, j = joints
+        x = signals.q[:, i] + ratio * signals.q[:, j] - shape.get("x0", 0.0)
+        block = np.column_stack([np.sign(x) * np.abs(x) ** power, np.ones_like(x)])
+        return {i: block, j: ratio * block}

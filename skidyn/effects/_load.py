@@ -12,13 +12,17 @@ from skidyn.effects._base import Array, Coefficient, Effect
 
 
 class LoadDependentFriction(Effect):
-    """Gear friction proportional to the transmitted torque."""
+    """Gear friction that grows with the transmitted torque, or with another ``power`` of it.
+
+    The power is 1 where the shape has none; the torque is in units of 1 N m then.
+    """
 
     kind = "load_dependent_friction"
     drawn_against = "load"
     title = "Load-dependent friction"
-    formula = r"\mu\,|\tau_\mathrm{load}|\,\mathrm{sign}(\dot q)"
+    formula = r"\mu\,|\tau_\mathrm{load}|^p\,\mathrm{sign}(\dot q)"
     coefficients = (Coefficient("mu", "1", sign=1),)
+    forms = ({"power": 0.5},)
     needs = ("load",)
     simplicity = 7
     rivals = ("coulomb", "position_dependent_friction", "torque_gain")
@@ -30,4 +34,6 @@ class LoadDependentFriction(Effect):
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         assert signals.load is not None
-        return (np.abs(signals.load[:, joint]) * signals.sign[:, joint])[:, None]
+        load = np.abs(signals.load[:, joint]) ** shape.get("power", 1.0)
+        friction: Array = load * signals.sign[:, joint]
+        return friction[:, None]

@@ -28,6 +28,9 @@ _SECANT = 0.15
 #: Highest order of a function of one signal.
 _ORDER = 12
 
+#: Pairs of joints, those nearest to each other first, between which a torque is tried.
+_PAIRS = 28
+
 
 def unnamed_coefficients(count: int) -> tuple[Coefficient, ...]:
     return tuple(Coefficient(f"c{i + 1}", "N m") for i in range(count))
@@ -344,33 +347,32 @@ class FunctionOfSum(NamelessEffect):
         return []
 
     def shape_of(
-        self, signals: Signals, names: Sequence[str], weights: Sequence[float]
+        self, signals: Signals, joints: Sequence[int], weights: Sequence[float]
     ) -> dict[str, Any]:
-        """Shape of a function of a weighted sum, over the range that it covers.
+        """Shape of a function of a weighted sum of positions, over the range that it covers.
 
         Parameters
         ----------
         signals : Signals
-        names : sequence of str
-            Positions, joints counted from 1, such as ``"q2"``.
+        joints : sequence of int
+            Joints, from 0.
         weights : sequence of float
-            Factor of each.
+            Factor of the position of each.
 
         Returns
         -------
         dict
         """
-        total = weighted_sum(signals, names, weights)
-        low, high = supported_range(signals, total)
-        return {"of": tuple(names), "weights": tuple(weights), "low": low, "high": high}
+        names = tuple(f"q{k + 1}" for k in joints)
+        low, high = supported_range(signals, _weighted_sum(signals, names, weights))
+        return {"of": names, "weights": tuple(weights), "low": low, "high": high}
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        total = weighted_sum(signals, shape["of"], shape["weights"])
+        total = _weighted_sum(signals, shape["of"], shape["weights"])
         return splines(total, shape["low"], shape["high"], len(self.coefficients))
 
 
-def weighted_sum(signals: Signals, names: Sequence[str], weights: Sequence[float]) -> Array:
-    """Sum of signals, each times its factor, shape (n_samples,)."""
+def _weighted_sum(signals: Signals, names: Sequence[str], weights: Sequence[float]) -> Array:
     return np.asarray(sum(w * signals.named(n) for n, w in zip(names, weights, strict=True)))
 
 
@@ -384,7 +386,7 @@ class TorqueBetweenTwoJoints(NamelessEffect):
     kind = "torque_between_two_joints"
     title = "Torque between two joints"
     formula = r"f(x),\quad x = q_i + r\,q_j"
-    coefficients = unnamed_coefficients(10)
+    coefficients = unnamed_coefficients(12)
     shapes = (
         Shape(
             "ratio",
@@ -403,11 +405,19 @@ class TorqueBetweenTwoJoints(NamelessEffect):
     def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
         return (f"q{joint + 1}", f"q{int(shape['other']) + 1}")
 
+    def sites(self, signals: Signals) -> list[tuple[int, ...]]:
+        near = sorted(super().sites(signals), key=lambda pair: pair[1] - pair[0])
+        return sorted(near[:_PAIRS])
+
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
         unit = self.travel(signals, joints, {})
+        ranges = [supported_range(signals, signals.q[:, j]) for j in joints]
+        middle = tuple((low + high) / 2 for low, high in ranges)
+        half = tuple((high - low) / 2 for low, high in ranges)
+        (shape,) = self.shapes
         return [
-            s | {"ratio": s["ratio"] * unit, "other": joints[1]}
-            for s in super().grid(signals, joints)
+            {"ratio": ratio * unit, "other": joints[1], "middle": middle, "half": half}
+            for ratio in shape.grid
         ]
 
     def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
@@ -417,10 +427,12 @@ class TorqueBetweenTwoJoints(NamelessEffect):
     def torque_columns(
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
-        i, j = joints
-        total = signals.q[:, i] + shape["ratio"] * signals.q[:, j]
-        block = splines(total, *supported_range(signals, total), len(self.coefficients))
-        return {i: block, j: shape["ratio"] * block}
+        (i, j), ratio = joints, shape["ratio"]
+        middle = shape["middle"][0] + ratio * shape["middle"][1]
+        half = shape["half"][0] + abs(ratio) * shape["half"][1]
+        total = signals.q[:, i] + ratio * signals.q[:, j]
+        block = splines(total, middle - half, middle + half, len(self.coefficients))
+        return {i: block, j: ratio * block}
 
 
 class ClockPeriodic(NamelessEffect):

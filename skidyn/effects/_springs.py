@@ -152,5 +152,5 @@ class EndStop(Effect):
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         beyond = shape["side"] * (signals.q[:, joint] - shape["q_lim"])
-        depth: Array = np.maximum(0.0, beyond) ** shape.get("power", 1.0)
-        return shape["side"] * depth[:, None]
+        depth: Array = shape["side"] * np.maximum(0.0, beyond) ** shape.get("power", 1.0)
+        return depth[:, None]
