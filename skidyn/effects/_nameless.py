@@ -386,7 +386,7 @@ class TorqueBetweenTwoJoints(NamelessEffect):
     kind = "torque_between_two_joints"
     title = "Torque between two joints"
     formula = r"f(x),\quad x = q_i + r\,q_j"
-    coefficients = unnamed_coefficients(12)
+    coefficients = unnamed_coefficients(10)
     shapes = (
         Shape(
             "ratio",
@@ -414,11 +414,17 @@ class TorqueBetweenTwoJoints(NamelessEffect):
         ranges = [supported_range(signals, signals.q[:, j]) for j in joints]
         middle = tuple((low + high) / 2 for low, high in ranges)
         half = tuple((high - low) / 2 for low, high in ranges)
-        (shape,) = self.shapes
-        return [
-            {"ratio": ratio * unit, "other": joints[1], "middle": middle, "half": half}
-            for ratio in shape.grid
-        ]
+        found = []
+        for ratio in (unit * value for value in self.shapes[0].grid):
+            # What the sum itself covers, kept in terms that stay when the ratio is refined.
+            low, high = supported_range(
+                signals, signals.q[:, joints[0]] + ratio * signals.q[:, joints[1]]
+            )
+            share = (high - low) / 2 / max(half[0] + abs(ratio) * half[1], 1e-300)
+            shift = (low + high) / 2 - (middle[0] + ratio * middle[1])
+            shape = {"middle": middle, "half": half, "share": share, "shift": shift}
+            found.append({"ratio": ratio, "other": joints[1]} | shape)
+        return found
 
     def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
         i, j = joints
@@ -428,8 +434,8 @@ class TorqueBetweenTwoJoints(NamelessEffect):
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
         (i, j), ratio = joints, shape["ratio"]
-        middle = shape["middle"][0] + ratio * shape["middle"][1]
-        half = shape["half"][0] + abs(ratio) * shape["half"][1]
+        middle = shape["middle"][0] + ratio * shape["middle"][1] + shape["shift"]
+        half = shape["share"] * (shape["half"][0] + abs(ratio) * shape["half"][1])
         total = signals.q[:, i] + ratio * signals.q[:, j]
         block = splines(total, middle - half, middle + half, len(self.coefficients))
         return {i: block, j: ratio * block}
