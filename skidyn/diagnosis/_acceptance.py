@@ -117,7 +117,7 @@ class JudgingSearch(RankingSearch):
         """The hypothesis with those of its terms that are more than chance beside the others."""
         if hypothesis.torque is not None:  # judged on single samples, by its line
             chance = hypothesis.chances[0]
-            tried = self.tried(hypothesis.kind)
+            tried = self.tried()
             return replace(hypothesis, tried=tried) if self.significant(chance) else None
         candidates = list(hypothesis.candidates)
         if len(candidates) > 2 and within_recordings(hypothesis):
@@ -128,7 +128,7 @@ class JudgingSearch(RankingSearch):
                 for c in candidates
             ]
             worst = int(np.argmax(chances))
-            if self.significant(chances[worst], hypothesis.kind):
+            if self.significant(chances[worst], candidates[worst]):
                 kept = [j for c in candidates for j in c.rows]
                 gain = np.where(np.isin(np.arange(len(hypothesis.gain)), kept), hypothesis.gain, 0)
                 gain = hypothesis.gain if len(candidates) == len(hypothesis.candidates) else gain
@@ -136,7 +136,7 @@ class JudgingSearch(RankingSearch):
                     hypothesis,
                     candidates=tuple(candidates),
                     chances=tuple(chances),
-                    tried=self.tried(hypothesis.kind),
+                    tried=self.tried(candidates[worst]),
                     gain=gain,
                 )
             del candidates[worst]
@@ -163,10 +163,10 @@ class JudgingSearch(RankingSearch):
             for j in reached
         }
         chance = self.tester(self.chosen).test(rows).chance
-        if not self.significant(chance, hypothesis.kind):
+        if not self.significant(chance, kept[0]):
             return None
         chances = (chance,) * len(kept)
-        tried = self.tried(hypothesis.kind)
+        tried = self.tried(kept[0])
         return replace(hypothesis, candidates=tuple(kept), chances=chances, tried=tried)
 
     def shadow(self, hypothesis: Hypothesis) -> bool:

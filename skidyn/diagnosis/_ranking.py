@@ -109,9 +109,7 @@ class RankingSearch(SearchState):
             n_rows = int(self.problem.rows.counts[list(candidate.joints)].sum())
             if not drops[i] > self.settings.least_share * n_rows:
                 continue
-            if self.significant(
-                tester.test(candidate.rows, candidate.zeros).chance, candidate.kind
-            ):
+            if self.significant(tester.test(candidate.rows, candidate.zeros).chance, candidate):
                 return int(i)
         return None
 

@@ -188,7 +188,7 @@ class ReconsideringSearch(JudgingSearch):
                 for c in old.candidates
                 if (chance := self.chance(c, [o for o in self.chosen if o is not c]))
                 <= self.settings.member
-                and (together or self.significant(chance, c.kind))
+                and (together or self.significant(chance, c))
             )
             if kept and newest is not None and self._needless(old, without):
                 kept = ()

@@ -153,7 +153,7 @@ class Settings:
         for them once already.
     nameless_tried : int
         Functions of the signals among which a nameless candidate was chosen, for each that is
-        tried.
+        tried; and formulas among which a further form of a known effect was.
     shapes_tested : int
         Candidates of a kind, joints and shapes, that are tested before the kind is given up.
     max_findings : int

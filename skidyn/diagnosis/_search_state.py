@@ -128,13 +128,20 @@ class SearchState:
         taken = {c.site for c in best.candidates}
         self.pool = [c for c in self.pool if c.site not in taken]
 
-    def significant(self, chance: float, kind: str = "") -> bool:
+    def significant(self, chance: float, candidate: Candidate | None = None) -> bool:
         """Whether a candidate is more than chance among all that were tried."""
-        return false_discovery_rate(chance, self.tried(kind)) <= self.settings.level
+        return false_discovery_rate(chance, self.tried(candidate)) <= self.settings.level
 
-    def tried(self, kind: str) -> int:
-        """Candidates tried; nameless ones were chosen among products of functions as well."""
-        return self.n_tests * (self.settings.nameless_tried if kind == UNKNOWN else 1)
+    def tried(self, candidate: Candidate | None = None) -> int:
+        """Candidates tried.
+
+        Nameless ones were chosen among products of functions as well, and a further form of an
+        effect stands for all that could have been declared.
+        """
+        one_of_many = candidate is not None and (
+            candidate.kind == UNKNOWN or candidate.term.is_further_form
+        )
+        return self.n_tests * (self.settings.nameless_tried if one_of_many else 1)
 
     def chance(self, candidate: Candidate, others: Sequence[Candidate]) -> float:
         """Chance of a candidate's coefficients beside the model and other candidates."""

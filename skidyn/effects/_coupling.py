@@ -108,6 +108,7 @@ class CouplingSpring(_PairEffect):
         _RATIO,
         Shape("x0", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
     )
+    forms = ({"power": 3.0},)
     simplicity = 16
     rivals = ("spring",)
     separating_motion = "slow motion of the two joints together, then against each other"
@@ -120,7 +121,7 @@ class CouplingSpring(_PairEffect):
         for shape in plain:
             x = signals.q[:, i] + shape["ratio"] * signals.q[:, j]
             middle = float(x.min() + x.max()) / 2
-            stiffening.append(shape | {"power": 3.0, "x0": middle})
+            stiffening += [shape | {**form, "x0": middle} for form in self.forms]
         return plain + stiffening
 
     def torque_columns(

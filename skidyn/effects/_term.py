@@ -104,6 +104,15 @@ class Term:
         return {k: v for k, v in self.shape.items() if k != "trajectories"}
 
     @property
+    def is_further_form(self) -> bool:
+        """Whether the formula is another one than the plain one of its kind."""
+        shape = self.shape
+        return any(
+            all(shape.get(name) == value for name, value in form.items())
+            for form in self.effect.forms
+        )
+
+    @property
     def effect(self) -> Effect:
         """The effect of this kind in the catalogue."""
         return get_effect(self.kind)
