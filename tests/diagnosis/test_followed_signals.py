@@ -19,8 +19,42 @@ FORMS = {
         "dq1 * dq2",
     ),
     "step": (1, 0.5, lambda x: np.sign(x["q3"] - x["q3"].median()), {"q3"}, None),
+    "wave over the sum of three positions": (
+        3,
+        1.5,
+        lambda x: np.sin(1.5 * (x["q2"] + x["q4"] - x["q5"])),
+        {"q2", "q4", "q5"},
+        None,
+    ),
+    "fades after a reversal": (1, 3.0, lambda x: _since_reversal(x, "q1"), {"q1", "dq1"}, None),
+    "snaps over": (3, 2.0, lambda x: _snapped(x, "q3", 0.15), {"q3"}, None),
     "bump": (2, 4.0, lambda x: np.exp(-((x["q2"] / 0.15) ** 2)), {"q2"}, None),
 }
+
+
+def _since_reversal(x, name):
+    """A hump along the way since the joint turned back, alike in both directions."""
+    way = np.zeros(len(x))
+    for _, rows in x.groupby("trajectory").indices.items():
+        q = x[name].to_numpy()[rows]
+        step = np.diff(q, prepend=q[0])
+        turns = np.flatnonzero(np.diff(np.sign(step), prepend=0) != 0)
+        turn = turns[np.maximum(np.searchsorted(turns, np.arange(len(q)), "right") - 1, 0)]
+        way[rows] = np.abs(q - q[turn]) / 0.2
+    return way * np.exp(1 - way)
+
+
+def _snapped(x, name, play):
+    """1 or -1, switched where the position passes the middle by some play."""
+    state = np.zeros(len(x))
+    middle = x[name].median()
+    for _, rows in x.groupby("trajectory").indices.items():
+        q = x[name].to_numpy()[rows] - middle
+        at = 1.0 if q[0] > 0 else -1.0
+        for row, here in zip(rows, q, strict=True):
+            at = np.sign(here) if abs(here) > play else at
+            state[row] = at
+    return state
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -68,3 +102,19 @@ def test_a_product_of_signals_that_do_nothing_alone_is_followed():
     (finding,) = diagnosis.findings
     assert finding.joints == (6,)
     assert set(finding.variables) == {"dq4", "dq5"}
+
+
+def test_what_lies_between_two_joints_is_one_finding_on_both():
+    log = make_hidden_effect_log(load_ur5(), None, noise="low", random_state=11)
+    x = log.X["q3"] + 0.6 * log.X["q4"]
+    tight = 8 * np.maximum(0.0, x - np.quantile(x, 0.7))
+    y = np.array(log.y, dtype=float)
+    y[:, 2] += tight
+    y[:, 3] += 0.6 * tight
+
+    diagnosis = diagnose(RBDRegressor(log.robot, ("viscous", "coulomb")), log.X, y)
+
+    assert diagnosis.verdict == "unknown"
+    (finding,) = diagnosis.findings
+    assert finding.joints == (3, 4)
+    assert set(finding.variables) == {"q3", "q4"}

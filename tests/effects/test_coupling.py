@@ -28,3 +28,11 @@ def test_a_slider_and_a_rotary_joint_can_be_coupled():
     for pair, expected in (((2, 3), (0.01, 0.1, 1.0)), ((0, 1), (1.0,))):
         ratios = sorted({abs(shape["ratio"]) for shape in spring.grid(scara, pair)})
         assert ratios == pytest.approx(expected)
+
+
+def test_a_spring_between_two_joints_that_stiffens(signals):
+    shape = {"ratio": -1.0, "power": 3.0, "x0": 0.2}
+    blocks = get_effect("coupling_spring").torque_columns(signals, (0, 1), **shape)
+    x = signals.q[:, 0] - signals.q[:, 1] - 0.2
+    np.testing.assert_allclose(blocks[0], np.column_stack([x**3, np.ones_like(x)]))
+    np.testing.assert_allclose(blocks[1], -blocks[0])

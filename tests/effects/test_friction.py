@@ -23,3 +23,11 @@ def test_friction(signals, columns_of):
     state = dahl_state(signals.q[:, 0], signals.segments, 0.02)
     expected = np.column_stack([state, state * np.exp(-((v / 0.1) ** 2))])
     np.testing.assert_allclose(lugre, expected)
+
+
+def test_further_forms_have_other_powers(signals, columns_of):
+    v, sign, load = signals.dq[:, 0], signals.sign[:, 0], np.abs(signals.load[:, 0])
+    squared = columns_of("asymmetric_friction", signals, power=2.0)
+    np.testing.assert_allclose(squared, np.column_stack([v**2, np.ones_like(v)]))
+    root = columns_of("load_dependent_friction", signals, power=0.5)[:, 0]
+    np.testing.assert_allclose(root, np.sqrt(load) * sign)

@@ -40,3 +40,17 @@ def test_a_rest_does_not_break_a_stroke():
     np.testing.assert_allclose(
         stop_state(q, [slice(0, 7)], 0.4), [0, 0, 0.25, 0.25, 0.75, 0.75, 0.5]
     )
+
+
+def test_dahl_with_exponent_two_by_small_steps(signals, columns_of):
+    q, way = signals.q[:, 0], 0.05
+    expected = np.zeros(len(q))
+    for rows in signals.segments:
+        state = 0.0
+        for i in range(rows.start + 1, rows.stop):
+            step = (q[i] - q[i - 1]) / 200
+            for _ in range(200):
+                state += step / way * (1 - state * np.sign(step)) ** 2
+            expected[i] = state
+    found = columns_of("dahl", signals, presliding=way, exponent=2.0)[:, 0]
+    np.testing.assert_allclose(found, expected, atol=5e-3)

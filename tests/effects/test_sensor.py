@@ -23,3 +23,7 @@ def test_saturation_and_gain(signals, columns_of):
     cut = torque + columns_of("saturation", signals, limit=0.6)[:, 0]
     np.testing.assert_allclose(cut, np.clip(torque, -0.6, 0.6))
     np.testing.assert_array_equal(columns_of("torque_gain", signals)[:, 0], torque)
+    positive = columns_of("torque_gain", signals, sign=1.0)[:, 0]
+    np.testing.assert_array_equal(positive, np.maximum(torque, 0))
+    negative = columns_of("torque_gain", signals, sign=-1.0)[:, 0]
+    np.testing.assert_array_equal(negative, np.minimum(torque, 0))

@@ -25,3 +25,9 @@ def test_springs(signals, columns_of):
     np.testing.assert_allclose(cubic, x + 2 * x**2 + 3 * x**3 + 4)
     one = Term("offset", (1,), {"trajectories": (1,)}).torque_columns(signals)[0][:, 0]
     np.testing.assert_array_equal(one, signals.trajectory == 1)
+
+
+def test_a_bumper_that_stiffens(signals, columns_of):
+    q = signals.q[:, 0]
+    low = columns_of("end_stop", signals, q_lim=-0.4, side=-1.0, power=2.0)[:, 0]
+    np.testing.assert_allclose(low, -(np.minimum(0, q + 0.4) ** 2))

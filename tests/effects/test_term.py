@@ -146,3 +146,9 @@ def test_a_users_own_dry_friction_does_not_spike_in_a_delay(own_effects):
     without = own.predict(log.X)
     own.effect_coefficients_[delay][:] = 1.0
     assert np.allclose((own.predict(log.X) - without)[:, 0], late, atol=1e-6)
+
+
+def test_a_term_knows_whether_it_has_the_plain_form_of_its_kind():
+    assert not Term("asymmetric_friction", (1,)).is_further_form
+    assert Term("asymmetric_friction", (1,), {"power": 2.0}).is_further_form
+    assert not Term("end_stop", (1,), {"q_lim": 0.3, "side": 1.0}).is_further_form

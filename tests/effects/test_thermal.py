@@ -13,6 +13,7 @@ def test_temperature(signals, columns_of):
     block = columns_of("temperature_friction", signals, 1)
     expected = np.column_stack([warm * v, warm * signals.sign[:, 1], warm**2 * v])
     np.testing.assert_allclose(block, expected)
-    np.testing.assert_allclose(columns_of("temperature_offset", signals, 1)[:, 0], warm)
+    offset = columns_of("temperature_offset", signals, 1)
+    np.testing.assert_allclose(offset, np.column_stack([warm, warm**2, np.ones_like(warm)]))
     cold = signals.with_(temperature=None)
     assert "no temperature" in get_effect("temperature_friction").not_shown(cold, 0)
