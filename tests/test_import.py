@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 
 import skidyn
-from skidyn._optional import import_optional
 
 HEAVY = ("matplotlib", "pandas", "pytorch_kinematics", "sklearn", "skorch", "torch")
 
@@ -71,26 +70,3 @@ def test_what_is_imported_without_an_extra_is_declared():
 def test_unknown_attribute_is_an_attribute_error():
     with pytest.raises(AttributeError, match="no attribute 'robotics'"):
         skidyn.robotics  # noqa: B018
-
-
-def test_version_is_that_of_the_installed_package():
-    assert skidyn.__version__[0].isdigit()
-
-
-def test_show_versions_prints_what_a_bug_report_needs(capsys):
-    skidyn.show_versions()
-    printed = capsys.readouterr().out
-    for package in ("python", "skidyn", "scikit-learn", "torch", "numpy"):
-        assert f"{package}: " in printed
-
-
-def test_missing_optional_package_names_the_extra():
-    with pytest.raises(ImportError, match=r"pip install 'skidyn\[plot\]'"):
-        import_optional("no_such_package_of_skidyn.pyplot", extra="plot")
-
-
-def test_broken_optional_package_is_not_called_missing(tmp_path, monkeypatch):
-    (tmp_path / "broken_optional.py").write_text("import no_such_dependency\n")
-    monkeypatch.syspath_prepend(tmp_path)
-    with pytest.raises(ModuleNotFoundError, match="no_such_dependency"):
-        import_optional("broken_optional", extra="plot")

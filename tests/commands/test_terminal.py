@@ -18,10 +18,7 @@ import pytest
 
 from skidyn import cli
 from skidyn._commands._terminal import fit
-from skidyn._progress import listening
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
-from skidyn.diagnosis import diagnose
-from skidyn.identification import RBDRegressor
 
 pandas = pytest.importorskip("pandas")
 pty = pytest.importorskip("pty", reason="no terminals here")
@@ -145,19 +142,6 @@ def test_a_program_gets_json_alone_and_nothing_beside(short):
     assert json.loads(done.stdout)["table"]
     assert "\x1b" not in done.stdout + done.stderr
     assert all(line.startswith("warning: ") for line in done.stderr.splitlines())
-
-
-def test_steps_of_a_diagnosis_are_known_while_it_runs():
-    log = make_hidden_effect_log(load_planar_arm(), "stribeck", joints=[2], n_trajectories=3)
-    told = []
-    with listening(lambda text, share: told.append((text, share))):
-        diagnose(RBDRegressor(log.robot), log.X, log.y)
-
-    assert all(share is not None and 0 <= share <= 1 for _, share in told)
-    stages = list(dict.fromkeys(text for text, _ in told))
-    assert stages[:3] == ["Computing the rigid body", "Fitting", "Preparing effects"]
-    assert {"Round 1: screening effects", "Round 2: refining the best"} <= set(stages)
-    assert stages[-1] == "Judging what was found"
 
 
 def test_help_keeps_examples_that_can_be_copied(monkeypatch, capsys):

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """An exported URDF, read again, is the fitted model."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -59,16 +57,3 @@ def test_a_payload_that_is_always_there_is_part_of_the_last_body(fit, states, tm
     motion = states(robot)
     expected = model.predict(np.hstack(motion))
     np.testing.assert_allclose(again.inverse_dynamics(*motion), expected, atol=1e-9)
-
-
-def test_impossible_bodies_are_refused_by_name(tmp_path):
-    robot = load_scara()
-    for body, column, message in (
-        (1, 0, "'link2' has a mass of -1"),
-        (2, 4, "'quill' has the principal moments"),
-    ):
-        parameters = robot.inertial_parameters.copy()
-        parameters[body, column] = -1.0
-        with pytest.raises(ValueError, match=message):
-            write_urdf(replace(robot, inertial_parameters=parameters), tmp_path / "x")
-    assert not (tmp_path / "x").exists()

@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import numpy as np
-import pytest
 
 from skidyn.datasets import load_panda
-from skidyn.identification._interior_point import minimise_with_divergence
 from skidyn.identification._log_det import divergence, existing_bodies, local_units
 
 NOMINAL = load_panda().inertial_parameters
@@ -25,23 +23,6 @@ def test_local_units_are_those_of_the_divergence():
     np.testing.assert_allclose((ahead - back) / (2 * step), np.sum(gradient * direction), rtol=1e-5)
     curvature = (ahead - 2 * here + back) / step**2
     np.testing.assert_allclose(curvature, np.sum(direction**2), rtol=1e-4)
-
-
-@pytest.mark.parametrize("weight", [1e-2, 0.5, 1e4])
-def test_minimum_with_divergence_is_one(weight):
-    rng = np.random.default_rng(1)
-    units, _ = local_units(NOMINAL, NOMINAL)
-    factor = rng.normal(size=(20, 70)) * 3
-    target = factor @ NOMINAL.ravel() + rng.normal(size=20)
-
-    best = minimise_with_divergence(factor, target, NOMINAL.ravel(), NOMINAL, weight)
-    gradient = factor.T @ (factor @ best - target)
-    local, slope = local_units(best.reshape(-1, 10), NOMINAL)
-    rise = np.einsum("nij,ni->nj", local, gradient.reshape(-1, 10)) + weight * slope
-    start = np.einsum(
-        "nij,ni->nj", units, (factor.T @ (factor @ NOMINAL.ravel() - target)).reshape(-1, 10)
-    )
-    assert np.abs(rise).max() < 1e-6 * np.abs(start).max()
 
 
 def test_links_without_mass_become_small_bodies():

@@ -15,8 +15,7 @@ from sklearn.model_selection import (
 )
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
-from skidyn.effects import Term
-from skidyn.exceptions import ColumnError, LogWarning
+from skidyn.exceptions import LogWarning
 from skidyn.identification import RBDRegressor
 from skidyn.model_selection import LeakageWarning, TrajectoryKFold
 
@@ -91,20 +90,6 @@ def test_forty_rows_give_a_model_or_say_why_not():
     assert rmse(model, FULL, LOG.y) < 0.5 * LOG.y.std()
 
 
-def test_recordings_on_top_of_each_other():
-    """Without their number nothing tells rows of recordings with the same clock apart."""
-    start = FULL.groupby("trajectory")["time"].transform("min")
-    same = FULL.assign(time=(FULL["time"] - start).round(6)).drop(columns="trajectory")
-    mixed = np.random.default_rng(0).permutation(len(FULL))
-    X, y = same.iloc[mixed], LOG.y[mixed]
-    with pytest.warns(LeakageWarning):
-        model = RBDRegressor(ROBOT, smooth=False).fit(X, y)
-    assert rmse(model, same, LOG.y) < 0.5 * LOG.y.std()
-    bare = X.drop(columns=["ddq1", "ddq2"])
-    with pytest.warns(LeakageWarning), pytest.raises(ColumnError, match="number the recordings"):
-        RBDRegressor(ROBOT).fit(bare, y)
-
-
 def test_weights_are_repetitions_where_there_is_no_clock():
     X = np.random.default_rng(0).uniform(-2, 2, (200, 6))
     y = ROBOT.inverse_dynamics(X[:, :2], X[:, 2:4], X[:, 4:]) + 0.3 * X[:, 2:4]
@@ -130,30 +115,6 @@ def test_rows_of_weight_zero_do_not_count_but_are_neighbours():
     assert rmse(model, LOG.X[rest], LOG.y[rest]) < 1.1 * rmse(clean, LOG.X[rest], LOG.y[rest])
     with pytest.raises(ValueError, match="zero"):
         RBDRegressor(ROBOT).fit(LOG.X, LOG.y, sample_weight=np.zeros(len(y)))
-
-
-@pytest.fixture(scope="module")
-def with_an_offset_in_one_run():
-    y = LOG.y + 2.0 * (LOG.X["trajectory"].to_numpy() == 1)[:, None] * np.array([1.0, 0.0])
-    terms = ["viscous", "coulomb", Term("offset", (1,), {"trajectories": (1,)})]
-    return RBDRegressor(ROBOT, terms).fit(LOG.X, y), y
-
-
-def test_what_is_found_in_one_recording_stays_with_it(with_an_offset_in_one_run):
-    model, y = with_an_offset_in_one_run
-    assert rmse(model, LOG.X, y) < 1.05 * rmse(RBDRegressor(ROBOT).fit(LOG.X, LOG.y), LOG.X, LOG.y)
-    other = make_hidden_effect_log(ROBOT, None, n_trajectories=3, duration=4.0, random_state=7)
-    plain = RBDRegressor(ROBOT).fit(LOG.X, LOG.y)
-    assert rmse(model, other.X, other.y) < 1.05 * rmse(plain, other.X, other.y)
-
-
-def test_a_recording_is_known_again_by_its_motion(with_an_offset_in_one_run):
-    model, y = with_an_offset_in_one_run
-    one = LOG.X[LOG.X["trajectory"] == 1]
-    expected = model.predict(LOG.X)[(LOG.X["trajectory"] == 1).to_numpy()]
-    np.testing.assert_allclose(model.predict(one.assign(trajectory=9)), expected, atol=1e-9)
-    part = one.iloc[100:300].astype("float32")
-    assert np.abs(model.predict(part)[30:-30] - expected[130:270]).max() < 0.3
 
 
 def test_folds_of_trajectories_are_no_shuffled_rows():

@@ -45,13 +45,6 @@ def test_bands_hold_their_share_of_new_measurements(log, new, model, level):
         assert inside[resting].mean() > 0.85
 
 
-def test_standard_deviation_is_that_of_the_errors(log, new, model):
-    torque, std = model.predict(log.X[new], return_std=True)
-    np.testing.assert_array_equal(torque, model.predict(log.X[new]))
-    rms = np.sqrt(np.mean((torque - np.asarray(log.y)[new]) ** 2, axis=0))
-    np.testing.assert_allclose(np.sqrt(np.mean(std**2, axis=0)), rms, rtol=0.35)
-
-
 def test_bands_widen_outside_the_motion_of_the_log(log, model):
     states = log.X.iloc[:400].copy()
     fast = states.copy()

@@ -54,19 +54,6 @@ def test_uneven_steps_take_the_kalman_smoother():
     assert error(smooth.transform(log), log) < 0.01
 
 
-@pytest.mark.parametrize("method", sorted(SMOOTHERS))
-def test_left_out_error_is_that_of_leaving_a_sample_out(method):
-    """The shortcut by the sample's own weight is exact for the Kalman smoother, near for others."""
-    log = record(1e-2, seconds=2.0)
-    t, q = log["time"].to_numpy(), log[["q1"]].to_numpy()
-    shortcut = SMOOTHERS[method](t, q, 6.0).left_out_error(q)[200, 0]
-    for _ in range(60):  # the value at which a sample agrees with its own prediction
-        q = q.copy()
-        q[200] = SMOOTHERS[method](t, q, 6.0).value[200]
-    measured = log["q1"][200] - q[200, 0]
-    assert shortcut == pytest.approx(measured, rel=1e-6)
-
-
 def test_velocities_are_differentiated_once_and_columns_named():
     log = record(1e-4).assign(dq1=lambda f: motion(f["time"].to_numpy(), 1), trajectory=0)
     table = SmoothDerivatives(cutoff=5.0).set_output(transform="pandas").fit_transform(log)

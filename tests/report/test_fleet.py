@@ -2,7 +2,6 @@
 import json
 
 import numpy as np
-import pytest
 
 from skidyn.fleet import DriftReport, FleetComparison
 from skidyn.report import render_fleet, summarize_fleet, write_fleet
@@ -65,11 +64,3 @@ def test_page_of_a_fleet_draws(browser, tmp_path):
     assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
     assert said == []
     page.close()
-
-
-@pytest.mark.parametrize("date, told", [(41, "at trajectory 41"), ("3 May", "on 3 May")])
-def test_a_number_is_that_of_a_trajectory(date, told):
-    report = DriftReport(
-        ("coulomb.Fc[2]",), (date,), np.array([[9.0]]), np.array([[4.0]]), np.array([[6.0]])
-    )
-    assert f"left its band {told}" in render_fleet(summarize_fleet(compared(), drift={"a": report}))

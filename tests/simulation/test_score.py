@@ -13,8 +13,6 @@ from skidyn.exceptions import SkidynError
 from skidyn.identification import RBDRegressor
 from skidyn.model_selection import TrajectoryKFold
 from skidyn.simulation import (
-    Controller,
-    fit_controller,
     judge_by_simulation,
     neg_simulation_error,
     simulation_errors,
@@ -86,18 +84,3 @@ def test_scorer_prefers_the_model_that_moves_like_the_robot(log):
         for effects in (["viscous", "coulomb"], ["viscous", "coulomb", ("spring", [1])])
     ]
     assert scores[1] > scores[0]
-
-
-def test_controller_is_found_from_a_log_and_closes_the_loop(log, models):
-    frame = log.X[log.frame["trajectory"] == 4].reset_index(drop=True)
-    late = frame[["q1", "q2"]].shift(3).bfill()
-    torque = 80 * (late.to_numpy() - frame[["q1", "q2"]]) - 5 * frame[["dq1", "dq2"]].to_numpy()
-    frame = frame.assign(q_ref1=frame["q1"], q_ref2=frame["q2"])
-    found = fit_controller(frame, torque)
-    np.testing.assert_allclose(found.stiffness, 80, rtol=1e-3)
-    np.testing.assert_allclose(found.damping, 5, rtol=1e-2)
-    np.testing.assert_allclose(found.delay, 0.03, atol=1e-9)
-    assert not found.follows_velocity
-    gains = Controller(stiffness=2000.0, damping=100.0)
-    errors = simulation_errors(models[1], frame, controller=gains)
-    assert errors.position.max() < 0.05
