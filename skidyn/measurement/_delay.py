@@ -3,17 +3,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import SIGN_BLUR, Array, Signals
-from skidyn.measurement._fits import FEWEST, SAMPLES, Fits, Reading, friction
+from skidyn.measurement._fits import FEWEST, SAMPLES, Fits, Reading, fit_together, friction
+from skidyn.robots import base_parameter_index
 
 #: Lags that are tried, s, and groups of rows that are left out in turn.
 LAGS = np.linspace(-0.06, 0.06, 13)
 GROUPS = 8
+#: Distance of the lags between which a parabola is laid, s, and how often at most.
+NEAR, STEPS = 2e-3, 6
 #: Least velocity of rows that count, in rad/s (a tenth of it in m/s).
 SLIDING = 0.05
 #: Largest share of the torque's spread that the fit of a joint may leave for its lag to count.
@@ -130,6 +134,60 @@ def find_delay(fits: Fits) -> Delay:
     gain = float(whole[len(LAGS) // 2] - whole.min())
     early, late = lag(firsts), lag(seconds)
     return Delay(common, error, lags, own_errors, gain, own_gains, halves, early, late, drift)
+
+
+def refined_lag(fits: Fits, start: float, late: Sequence[int]) -> float:
+    """Lag of some torques at which all joints together are explained best.
+
+    Bodies are the same for all joints here, and residuals Student's t, so that it is known better
+    than from joints one by one, and costs more.
+
+    Parameters
+    ----------
+    fits : Fits
+        Rows.
+    start : float, s
+        About how late they are.
+    late : sequence of int
+        Joints, from 0, whose torque is late; that of others is not.
+
+    Returns
+    -------
+    float, s
+    """
+    s = fits.motion(Reading())
+    base = base_parameter_index(fits.robot)
+    regressor = fits.mean_regressor(fits.robot, s, base)
+    joints, designs, places, rows = [], [], [], []
+    first = len(base)
+    for j in range(fits.n_joints):
+        use = _sliding(fits, s, j)
+        if not fits.usable(j) or use.sum() < FEWEST:
+            continue
+        own = np.column_stack([friction(s, j), _bent_friction(s, j), np.ones(len(s.q))])
+        felt = np.flatnonzero(regressor[:, j].any(axis=0))
+        joints.append(j)
+        rows.append(use)
+        designs.append(np.hstack([regressor[use, j][:, felt], fits.average(own)[use]]))
+        places.append(np.append(felt, first + np.arange(own.shape[1])))
+        first += own.shape[1]
+    now = fits.average(fits.torque)
+
+    def likelihood(lag: float) -> float:
+        torque = now.copy()
+        torque[:, late] = fits.average(fits.torque_at(lag))[:, late]
+        targets = [torque[use, j] for j, use in zip(joints, rows, strict=True)]
+        return sum(fit.likelihood for fit in fit_together(designs, places, targets))
+
+    lag = start
+    for _ in range(STEPS):
+        left, middle, right = (likelihood(lag + step) for step in (-NEAR, 0.0, NEAR))
+        bend = 2 * middle - left - right
+        step = NEAR * (0.5 * (right - left) / bend if bend > 0 else np.sign(right - left))
+        lag += float(np.clip(step, -2 * NEAR, 2 * NEAR))
+        if abs(step) < NEAR / 20:
+            break
+    return lag
 
 
 def _first_half(fits: Fits) -> NDArray[np.bool_]:

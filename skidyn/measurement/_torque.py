@@ -10,7 +10,7 @@ import numpy as np
 
 from skidyn._signals import Array
 from skidyn.measurement._check import Check
-from skidyn.measurement._delay import Delay, find_delay
+from skidyn.measurement._delay import Delay, find_delay, refined_lag
 from skidyn.measurement._fits import Fits, Reading, fit_admissible, friction
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import reversals
@@ -41,6 +41,10 @@ AGREEING = 0.75
 #: How far the lag of one joint must be from those of others, s, and how nearly it must be the same
 #: in its slower and its faster rows, as a share of it.
 APART, SAME = 0.008, 0.3
+
+
+#: How near a lag is to a whole number of samples that is one, s, and in samples.
+WHOLE, MOST_WHOLE = 4e-4, 0.1
 
 
 class UnsignedTorque(Check):
@@ -323,8 +327,8 @@ class TorqueDelay(Check):
     stage = 2
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
-        found = measured_delay(measurement)
-        if found is None or not np.isfinite(found.common):
+        found, fits = measured_delay(measurement), readable_fits(measurement)
+        if found is None or fits is None or not np.isfinite(found.common):
             return
         if measurement.stale or measurement.computed:
             return  # held and interpolated values are late, or early, by themselves
@@ -354,8 +358,9 @@ class TorqueDelay(Check):
             and alike.sum() > measurement.n_joints / 2
             and (alike.mean() >= AGREEING or weight[alike].sum() >= AGREEING)
         ):
-            ms = 1e3 * found.common
-            late = float(f"{found.common + early:.4f}")
+            lag = _whole(measurement, refined_lag(fits, found.common, range(fits.n_joints)))
+            ms = 1e3 * lag
+            late = float(f"{lag + early:.5f}")
             yield self.suspicion(
                 f"torque is {'late' if ms > 0 else 'early'} against motion by about "
                 f"{abs(ms):.1f} ms",
@@ -367,7 +372,8 @@ class TorqueDelay(Check):
             )
             return
         for k in late_joints(found):
-            lag = float(f"{found.joints[k]:.4f}")
+            lag = _whole(measurement, refined_lag(fits, float(found.joints[k]), [k]))
+            lag = float(f"{lag:.5f}")
             slow, fast = 1e3 * found.halves[k]
             yield self.suspicion(
                 f"the torque of {measurement.joint(k)} is {'late' if lag > 0 else 'early'} by "
@@ -378,6 +384,17 @@ class TorqueDelay(Check):
                 [k],
                 (f"--late tau{k + 1}={lag:g}", f"late={{'tau{k + 1}': {lag:g}}}"),
             )
+
+
+def _whole(measurement: Measurement, lag: float) -> float:
+    """A lag, as a whole number of samples where it is near one: buffers delay by whole samples."""
+    samples = lag * measurement.rate
+    near = min(WHOLE * measurement.rate, MOST_WHOLE)
+    return (
+        float(np.round(samples)) / measurement.rate
+        if abs(samples - np.round(samples)) < near
+        else lag
+    )
 
 
 def late_joints(found: Delay) -> list[int]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import signal
+from scipy.interpolate import Akima1DInterpolator
 
 from skidyn._signals import find_segments
 
@@ -192,7 +193,7 @@ def advance_channels(frame: pd.DataFrame, delays: Mapping[str, float]) -> pd.Dat
     Returns
     -------
     DataFrame
-        The log with those columns read ``delay`` later, by linear interpolation. The rows at the
+        The log with those columns read ``delay`` later, by Akima's interpolation. The rows at the
         ends of each segment for which there is no later (or earlier) sample are left out.
 
     Raises
@@ -221,6 +222,14 @@ def advance_channels(frame: pd.DataFrame, delays: Mapping[str, float]) -> pd.Dat
     for rows in find_segments(runs, time):
         own = time[rows]
         for name, delay in shifts.items():
-            columns[name][rows] = np.interp(own + delay, own, columns[name][rows])
+            columns[name][rows] = _read_at(own, columns[name][rows], own + delay)
             keep[rows] &= (own + delay >= own[0]) & (own + delay <= own[-1])
     return frame.assign(**columns)[keep].reset_index(drop=True)
+
+
+def _read_at(time: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Values at other times: straight lines would flatten what is swift."""
+    if len(time) < 3 or np.any(np.diff(time) <= 0):
+        return np.interp(wanted, time, values)
+    inside = np.clip(wanted, time[0], time[-1])
+    return np.asarray(Akima1DInterpolator(time, values, method="makima")(inside))

@@ -30,7 +30,12 @@ def test_torque_on_the_clock_of_the_motion():
 def test_torque_that_is_late():
     (told,) = late(lambda since: np.full_like(since, 0.02))
     name, value = told.remedy.option.split("=")
-    assert name == "--late tau" and float(value) == pytest.approx(0.02, abs=0.003)
+    assert name == "--late tau" and float(value) == 0.02  # a whole number of samples
+
+
+def test_a_delay_of_a_fraction_of_a_sample():
+    (told,) = late(lambda since: np.full_like(since, 0.0237))
+    assert float(told.remedy.option.split("=")[1]) == pytest.approx(0.0237, abs=5e-4)
 
 
 def test_clocks_of_other_rates():
