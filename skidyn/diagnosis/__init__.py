@@ -48,6 +48,7 @@ from skidyn.diagnosis._comparison import (
 )
 from skidyn.diagnosis._confidence import confidence as confidence
 from skidyn.diagnosis._diagnosis import own_terms as own_terms
+from skidyn.diagnosis._findings import notes as notes
 from skidyn.diagnosis._intervals import parameter_intervals as parameter_intervals
 from skidyn.diagnosis._profile import refine as refine
 from skidyn.diagnosis._remainder import noise_level as noise_level

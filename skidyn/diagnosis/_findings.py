@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -194,10 +194,7 @@ def make_finding(
     for u in formulas:
         assert u.proposal is not None
         sentence += f" A formula that does the same on joint {u.joint}: {u.proposal.text}."
-    if effect.caveat:
-        sentence += f" Note that {effect.caveat}."
-    if parameters.get("mass", {}).get("value", 0.0) < 0:
-        sentence += " The mass is negative: the description has a load that the robot lacks."
+    sentence = " ".join([sentence, *notes(hypothesis.kind, parameters)])
     return Finding(
         hypothesis.kind,
         title,
@@ -222,6 +219,16 @@ def _joints(problem: Problem, hypothesis: Hypothesis, candidate: Candidate) -> t
     if hypothesis.kind == "payload":
         return (problem.n_joints,)
     return tuple(sorted(j + 1 for j in candidate.joints))
+
+
+def notes(kind: str, parameters: Mapping[str, dict[str, Any]]) -> list[str]:
+    """What there is to say of a finding beside its name, size and rivals."""
+    caveat = "" if kind == UNKNOWN else get_effect(kind).caveat
+    sentences = [f"Note that {caveat}."] if caveat else []
+    mass = parameters.get("mass", {}).get("value", 0.0)
+    if isinstance(mass, float) and mass < 0:
+        sentences.append("The mass is negative: the description has a load that the robot lacks.")
+    return sentences
 
 
 def rival_title(kind: str) -> str:

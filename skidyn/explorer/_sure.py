@@ -5,26 +5,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from skidyn._text import inside
 from skidyn.diagnosis import confidence
 
+if TYPE_CHECKING:
+    from skidyn.explorer._session import RankedEffect
+
 #: A rival takes nearly as much where it falls short of the gain by less than this share.
 NEAR = 0.1
-
-
-class Ranked(Protocol):
-    """An effect with the share of the squared residual that it takes."""
-
-    @property
-    def kind(self) -> str: ...
-    @property
-    def title(self) -> str: ...
-    @property
-    def drop(self) -> float: ...
 
 
 @dataclass(frozen=True)
@@ -43,7 +35,7 @@ class Margin:
     rival: str = ""
 
 
-def margin(kind: str, ranked: Sequence[Ranked]) -> Margin:
+def margin(kind: str, ranked: Sequence[RankedEffect]) -> Margin:
     """Margin of an effect among those that were ranked beside it.
 
     Parameters

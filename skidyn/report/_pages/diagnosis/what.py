@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from skidyn.diagnosis import notes
 from skidyn.effects import get_effect
 from skidyn.report._figures import finding_charts
 from skidyn.report._maps import residual_maps
@@ -12,7 +13,7 @@ from skidyn.report._parameters import parameter_rows
 from skidyn.report._picture import Canvas, Picture, Summary
 
 if TYPE_CHECKING:
-    from skidyn.diagnosis import Diagnosis, Finding
+    from skidyn.diagnosis import Diagnosis
 
 
 class What(Picture):
@@ -28,7 +29,7 @@ class What(Picture):
                 "title": finding.title,
                 "code": finding.code,
                 "formula": "" if finding.kind == "unknown" else get_effect(finding.kind).formula,
-                "notes": _notes(finding),
+                "notes": notes(finding.kind, finding.parameters),
                 "curves": finding.curves,
                 "maps": residual_maps(subject, finding),
             }
@@ -46,15 +47,3 @@ class What(Picture):
             rows = parameter_rows(finding)
             cards.append({**finding, "line": line, "charts": charts, "rows": rows})
         return {"cards": cards} if cards else None
-
-
-def _notes(finding: Finding) -> list[str]:
-    """What there is to say of a finding beside its name, size and rivals."""
-    sentences = []
-    caveat = "" if finding.kind == "unknown" else get_effect(finding.kind).caveat
-    if caveat:
-        sentences.append(f"Note that {caveat}.")
-    mass = finding.parameters.get("mass", {}).get("value", 0.0)
-    if isinstance(mass, float) and mass < 0:
-        sentences.append("The mass is negative: the description has a load that the robot lacks.")
-    return sentences
