@@ -233,7 +233,7 @@ _LOADERS = frozenset(_DATA) | _FROM_ARGUMENTS | {_FROM_STATE}
 
 
 def _is_known(loader: str, name: str, trusted: frozenset[str]) -> bool:
-    """Whether a node may be created; what skops thinks of scikit-learn's classes is asked later."""
+    """Whether a node may be created; skops is asked about scikit-learn's classes later."""
     if loader in _DATA:
         return name in _DATA[loader] or (loader == "TypeNode" and name in CLASSES | trusted)
     if loader == _FROM_STATE:

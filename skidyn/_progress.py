@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Progress messages of long computations, for whatever listens to them.
 
-A function calls :func:`tell`; the command line listens and moves its bar. Nobody listens in a
+A function calls :func:`tell`; the command line shows them in its bar. Nothing receives them in a
 library, and then nothing happens.
 """
 

@@ -57,7 +57,7 @@ def give_or_take(value: float, half: float) -> str:
     if not 1e-4 <= largest < 1e5:
         return f"{value:.3g} ± {half:.2g}"
     decimals = max(0, 1 - math.floor(math.log10(float(f"{half:.1e}"))))
-    # An interval that is far narrower than anybody needs leaves five digits of the value.
+    # An interval may be far narrower than needed: five digits of the value are kept at most.
     decimals = min(decimals, max(0, 4 - math.floor(math.log10(largest))))
     half_text = f"{half:.{decimals}f}" if round(half, decimals) > 0 else f"{half:.1g}"
     return f"{value:.{decimals}f} ± {half_text}"

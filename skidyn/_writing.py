@@ -19,7 +19,7 @@ from skidyn._plain import plain
 
 PathLike = str | os.PathLike[str]
 
-#: Files that the running command reads; None outside a command, where nobody can know.
+#: Files that the running command reads; None outside a command, where they are not known.
 _INPUTS: ContextVar[set[tuple[int, int]] | None] = ContextVar("inputs", default=None)
 
 

@@ -203,8 +203,8 @@ def _useless(
 ) -> tuple[Hypothesis, list[Candidate]] | None:
     """The last finding with terms that leave the error of samples as large, and these terms.
 
-    They helped averaged rows. The squared error, which few samples may rule, and the mean absolute
-    one count alike; a squared error that does not fall at all is promised to nobody.
+    They helped averaged rows. The squared error, which few samples may dominate, and the mean
+    absolute one count alike; terms that do not lower the squared error at all are among them.
     """
     for k in reversed(range(len(findings))):
         errors = [(_mean_error(step.comparison), step.entry["rmse"]) for step in steps[k : k + 2]]

@@ -57,7 +57,7 @@ def evaluate_torch(program: Program, inputs: dict[str, torch.Tensor]) -> torch.T
         elif node[0] in _ORDERED and isinstance(values[node[1]], float):
             values[index] = _ORDERED[node[0]](values[node[1]], values[node[2]])
         else:
-            # torch's functions want their tensor first; what is left is commutative.
+            # torch's functions take their tensor first; what is left is commutative.
             arguments = [values[i] for i in operands(node)]
             if isinstance(arguments[0], float):
                 arguments.reverse()

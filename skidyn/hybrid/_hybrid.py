@@ -79,7 +79,8 @@ class HybridRegressor(CallbackSupportMixin, MetaEstimatorMixin, RegressorMixin, 
     physics_ : estimator
         Physics fitted to all rows.
     learner_ : estimator or None
-        Learner fitted to all honest residuals; None where no joint kept it.
+        Learner fitted to the residuals on rows left out of the physics; None where no joint kept
+        it.
     learned_weight_ : ndarray of shape (n_joints,)
         Factor of the learned part: its least-squares factor on held-out trajectories less one
         standard error, between 0 and 1; 0 where it is off.

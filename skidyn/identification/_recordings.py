@@ -2,7 +2,7 @@
 """Recordings are recognised by their motion, so that an effect stays with its recording.
 
 An effect of single recordings (an offset of one run, a payload in some) names them by number. In
-another log the same numbers are other recordings. A model therefore remembers the positions of the
+another log the same numbers are other recordings. A model therefore stores the positions of the
 recordings that its effects name, as one number a row, and knows them again under any number.
 """
 

@@ -137,7 +137,7 @@ class Results:
         """Whether least squares would have been biased by noise in the motion.
 
         Compares the instrumental-variable estimate with least squares, coefficient by coefficient
-        (Durbin-Wu-Hausman). A small ``p_value`` speaks against least squares; with many
+        (Durbin-Wu-Hausman). A small ``p_value`` means that least squares is biased; with many
         coefficients, compare it with the level divided by their number.
 
         Returns

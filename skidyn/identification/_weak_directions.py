@@ -90,7 +90,7 @@ def keep_weak_directions(
     noise = np.maximum(solution.noise, LEAST_NOISE * max(torque) or 1.0)
     grams, cross = whole.products(noise)
     total = grams.sum(0)
-    # Effects follow the rigid body as the data wants it.
+    # Effects are refitted beside the rigid body.
     size = np.sqrt(np.diag(total)[n:])
     size[size == 0] = 1.0
     inner = total[n:, n:] / size[:, None] / size

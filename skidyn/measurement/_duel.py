@@ -4,9 +4,9 @@
 A contact moves the torque of a joint as another zero of its position does, and a spring between two
 joints as another sign. So a reading is held against every effect of the catalogue that needs
 nothing but motion, on the joints it is about. In both fits bodies may differ from those of the
-description: what only wrong bodies speak for gains nothing, and bodies of negative mass cannot take
+description: what only wrong bodies support gains nothing, and bodies of negative mass cannot take
 the place of a sign. How far they may differ is what explains most, so that a description that fits
-to 3 % in one reading and to 30 % in another speaks for the first.
+to 3 % in one reading and to 30 % in another supports the first.
 """
 
 from __future__ import annotations

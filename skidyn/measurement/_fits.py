@@ -4,7 +4,7 @@
 The torque of each joint is fitted as a multiple of the robot's own torque and its friction, rotor
 inertia and offset, all but the offset not negative: a negative friction would feed energy. Rows
 that no reading explains weigh little, because residuals are Student's t. Identified bodies are the
-second opinion: what only wrong masses in the description speak for, they do not confirm.
+second opinion: what only wrong masses in the description support, they do not confirm.
 
 References
 ----------

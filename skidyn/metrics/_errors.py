@@ -118,7 +118,7 @@ def max_absolute_error(
 def min_absolute_error(
     y_true: ArrayLike, y_pred: ArrayLike, *, multioutput: str = "uniform_average"
 ) -> Any:
-    """Smallest absolute error; values near 1e-12 betray test rows among the training rows.
+    """Smallest absolute error; values near 1e-12 show test rows among the training rows.
 
     Parameters
     ----------

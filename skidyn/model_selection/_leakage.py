@@ -161,7 +161,7 @@ def leakage_report(
     time: ColumnSpec = "auto",
     scoring: Any = None,
 ) -> Bunch:
-    """Score an estimator with leaking folds and with honest ones, side by side.
+    """Score an estimator with leaking folds and with sound ones, side by side.
 
     Parameters
     ----------

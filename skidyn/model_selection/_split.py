@@ -32,7 +32,7 @@ def column_of(X: Any, column: int | str, what: str) -> NDArray[Any]:
 class TrajectoryKFold(BaseCrossValidator):
     """K folds by trajectory: no trajectory is in training and test rows at once.
 
-    The trajectory is read from a column of X, so the folds stay honest inside ``GridSearchCV``,
+    The trajectory is read from a column of X, so the folds stay whole inside ``GridSearchCV``,
     stacking and nested cross-validation, where ``groups`` does not arrive. The folds are those of
     :class:`sklearn.model_selection.GroupKFold` with these groups.
 

@@ -76,16 +76,16 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         Members.
     resample : {"window", "trajectory"}, default="window"
         Draw single target rows or whole trajectories with replacement. Rows that are not drawn
-        still serve as history. Trajectories give a more honest spread; but every member then
+        still serve as history. Trajectories give a more realistic spread; but every member then
         misses a third of them, which costs accuracy.
     cv : int, cross-validator or None, default=None
-        How the meta-regressor gets honest inputs. None takes each trajectory's mean over the
-        members that have not seen it, which costs no training: with ``resample="trajectory"``
-        those whose bootstrap left it out; with ``"window"`` every member leaves out one of
-        twenty folds of the trajectories in turn. A number (or a cross-validator) trains the members
-        again without each fold; so does None with fewer than three trajectories or members that
-        are no networks of this package (3 folds, by trajectory or, of a single one, by blocks of
-        rows).
+        How the meta-regressor gets inputs from rows that members have not seen. None takes each
+        trajectory's mean over the members that have not seen it, which costs no training: with
+        ``resample="trajectory"`` those whose bootstrap left it out; with ``"window"`` every member
+        leaves out one of twenty folds of the trajectories in turn. A number (or a cross-validator)
+        trains the members again without each fold; so does None with fewer than three trajectories
+        or members that are no networks of this package (3 folds, by trajectory or, of a single one,
+        by blocks of rows).
     n_jobs : int, default=None
         Processes. Ten networks are trained side by side in each, since most of a small network's
         step is overhead that they can share; so more processes serve more than ten members.
@@ -103,7 +103,8 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     final_estimator_ : estimator
         The meta-regressor.
     n_stacked_ : int
-        Rows that had an honest prediction and trained the meta-regressor.
+        Rows that had a prediction by members that had not seen them, and trained the
+        meta-regressor.
     n_features_in_ : int
         Columns of X.
     feature_names_in_ : ndarray of str

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 class TorqueStream:
-    """Predicts new rows of a log; remembers no more of the past than the network reads.
+    """Predicts new rows of a log; keeps no more of the past than the network reads.
 
     Parameters
     ----------

@@ -246,7 +246,7 @@ def identify_payload(
     See Also
     --------
     estimate_drive_gains : The calibration on which the mass depends.
-    skidyn.diagnosis.diagnose : Finds a payload that nobody told it of.
+    skidyn.diagnosis.diagnose : Finds a payload that was not stated.
 
     References
     ----------

@@ -248,7 +248,7 @@ def _table(diagnosis: Diagnosis) -> dict[str, dict[str, float]]:
 
 
 def _rows(both: Sequence[Diagnosis], report: dict[str, Any]) -> list[dict[str, Any]]:
-    """One row per joint with the errors of both as given; those that differ or fail speak."""
+    """One row per joint with the errors of both as given; those that differ or fail are shown."""
     rows = []
     for row, other, change in zip(
         *(d.story()["joints"] for d in both), report["ratios"], strict=True

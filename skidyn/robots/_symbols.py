@@ -55,7 +55,7 @@ _OWN: dict[str, Callable[..., Any]] = {
 
 
 class Instant(Signals):
-    """One sample of symbols; whoever asks for its past or its clock is refused."""
+    """One sample of symbols; a question for its past or its clock is refused."""
 
     @property
     def segments(self) -> Any:

@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 @dataclass
 class Setting:
-    """A robot, its motions and their usual sizes, for whoever chooses an effect's parameters.
+    """A robot, its motions and their usual sizes, from which an effect's parameters are chosen.
 
     Arrays have one value per joint; ``positions`` and ``tool`` are rows of planned motion.
     """

@@ -117,5 +117,5 @@ DRIVES: dict[str, Drives] = {
 
 @cache
 def urdf_of(name: str) -> str:
-    """Text of the embedded URDF: the robot as its user believes it to be."""
+    """Text of the embedded URDF: the robot as its user knows it."""
     return resources.files("skidyn.datasets").joinpath("robots", f"{name}.urdf").read_text("utf-8")
