@@ -62,7 +62,11 @@ def look_at_swift(
         terms = (*problem.terms, *terms_on_rows(slow))
         short = with_short_windows(problem, terms, SHORT_WINDOW)
         short.torque = problem.torque - others.ripple
-        moved = search(short, family, replace(settings, max_findings=room), nameless=False)
+        gates = replace(settings, max_findings=room)
+        unopposed = search(replace(short, _cache={}), swift, gates, nameless=False)
+        if not unopposed.findings:
+            return problem, result
+        moved = search(short, family, gates, nameless=False)
         if (
             not moved.findings
             or any(h.kind not in swift for h in moved.findings)
@@ -72,8 +76,9 @@ def look_at_swift(
         # What was found before may have been the trace of this.
         found = terms_on_rows(moved.findings)
         beside = replace(problem, terms=TermSum((*problem.terms, *found)), _cache={})
-        gates = replace(settings, max_findings=settings.max_findings - len(moved.findings))
-        others = search(beside, [k for k in kinds if k not in family], gates)
+        room = settings.max_findings - len(moved.findings)
+        slower = [k for k in kinds if k not in family]
+        others = search(beside, slower, replace(settings, max_findings=room))
         if _sites(others.findings) == _sites(slow):
             break
     known = terms_on_rows(others.findings)
