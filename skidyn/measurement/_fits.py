@@ -37,6 +37,8 @@ FREEDOM, ROUNDS = 4.0, 5
 #: Largest likeness of neighbouring rows: what bodies that are a little wrong leave is alike over
 #: seconds, and would make any log too short.
 MOST_ALIKE = 0.875
+#: Columns of a joint beside those of the bodies: friction, rotor inertia and a constant.
+OWN = 4
 #: Fewest rows of a joint for a fit.
 FEWEST = 25
 #: Samples of a robot of one joint whose regressor is held at a time.
@@ -372,32 +374,47 @@ class Fits:
 
     def residuals(self, bodies: Array, reading: Reading) -> dict[int, Array]:
         """What identified coefficients leave of the torque of every joint, read in some way."""
-        joints, designs, places, targets = self._designs(reading, 1)
-        return {
-            k: y - d @ bodies[place]
-            for k, d, place, y in zip(joints, designs, places, targets, strict=True)
-        }
+        robot, s = self._robot(reading), self.motion(reading)
+        base = base_parameter_index(robot)
+        parameters, own = np.zeros((robot.n_bodies, 10)), np.zeros((self.n_joints, OWN))
+        parameters.flat[base] = bodies[: len(base)]
+        own.flat[: len(bodies) - len(base)] = bodies[len(base) :]
+        # Torque itself, not the columns of all bodies, of which these coefficients are the sum.
+        rigid = self.average(robot.inverse_dynamics(s.q, s.dq, s.ddq, parameters=parameters))
+        left = {}
+        for j, (column, sign) in enumerate(self.torque_column(reading, j) for j in range(len(own))):
+            if self.usable(column, 1):
+                y, use = self.mean_torque(column)
+                predicted = rigid[:, j] + self._own_columns(s, j) @ own[j]
+                left[column] = sign * y[use] - predicted[use]
+        return left
+
+    def _robot(self, reading: Reading) -> Robot:
+        """The robot, with the gravity of a reading."""
+        if reading.gravity is None:
+            return self.robot
+        return replace(self.robot, gravity=np.asarray(reading.gravity))
+
+    def _own_columns(self, s: Signals, joint: int) -> Array:
+        """Mean columns of what a joint has beside the bodies, shape (n_rows, OWN)."""
+        return self.average(np.column_stack([friction(s, joint), np.ones(len(s.q))]))
 
     def _designs(
-        self, reading: Reading, fewest: int = FEWEST
+        self, reading: Reading
     ) -> tuple[list[int], list[Array], list[NDArray[np.int64]], list[Array]]:
         """Columns of the torque, and designs, places of coefficients and targets of their fit."""
-        s = self.motion(reading)
-        robot = self.robot
-        if reading.gravity is not None:
-            robot = replace(robot, gravity=np.asarray(reading.gravity))
+        robot, s = self._robot(reading), self.motion(reading)
         base = base_parameter_index(robot)
         regressor = self.mean_regressor(robot, s, base)
         read = [self.torque_column(reading, j) for j in range(self.n_joints)]
-        joints = [j for j, (column, _) in enumerate(read) if self.usable(column, fewest)]
+        joints = [j for j, (column, _) in enumerate(read) if self.usable(column)]
         p = len(base)
         designs, places, targets = [], [], []
         for j in joints:
             y, use = self.mean_torque(read[j][0])
-            own = np.column_stack([friction(s, j), np.ones(len(s.q))])
             felt = np.flatnonzero(regressor[:, j].any(axis=0))  # bodies that the joint moves
-            designs.append(np.hstack([regressor[use, j][:, felt], self.average(own)[use]]))
-            places.append(np.append(felt, p + 4 * j + np.arange(4)))
+            designs.append(np.hstack([regressor[use, j][:, felt], self._own_columns(s, j)[use]]))
+            places.append(np.append(felt, p + OWN * j + np.arange(OWN)))
             targets.append(read[j][1] * y[use])
         return [read[j][0] for j in joints], designs, places, targets
 
