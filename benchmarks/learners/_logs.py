@@ -198,11 +198,19 @@ def ur10e_elastic() -> Log:
 
 
 def lwr4() -> Log:
-    """A KUKA LWR4+: three runs, of which the third is faster; halves of runs are held out."""
+    """A KUKA LWR4+: a motion recorded twice, which is one fold, and a faster one."""
     X, y = table(runs_of(recordings("kuka_lwr4", "kuka_lwr4.npz")), 200.0, 8.0, 8)
-    block = np.arange(len(X)) * 12 // len(X)
+    fast = (X["trajectory"] == 2).to_numpy(int)
+    quarters = X.assign(trajectory=np.arange(len(X)) * 12 // len(X))
     robot = urdf("kuka_lwr4", "kuka_lwr4_min.urdf")
-    return Log("KUKA LWR4+, blocks", robot, X.assign(trajectory=block), y, block % 3)
+    return Log("KUKA LWR4+, motions", robot, quarters, y, fast)
+
+
+def lwr4_repeated() -> Log:
+    """The same with blocks held out that another run repeats: how well is it learned by heart."""
+    log = lwr4()
+    block = log.X["trajectory"].to_numpy(int)
+    return Log("KUKA LWR4+, blocks that are repeated", log.robot, log.X, log.y, block % 3)
 
 
 def iiwa() -> Log:
@@ -248,5 +256,5 @@ LOGS: dict[str, Callable[[], Log]] = {
     f.__name__: f for f in (ur10e, panda, emps, ur5_dahl, scara_ripple)
 }
 UNSEEN: dict[str, Callable[[], Log]] = {
-    f.__name__: f for f in (lwr4, iiwa, tx40, mtm, panda_unknown, ur10e_elastic)
+    f.__name__: f for f in (lwr4, lwr4_repeated, iiwa, tx40, mtm, panda_unknown, ur10e_elastic)
 }

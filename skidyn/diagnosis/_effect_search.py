@@ -33,7 +33,12 @@ def _refits(search: EffectSearchCV) -> bool:
 
 
 class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
-    """Find the effects a rigid-body model lacks, add them, and predict with the better model.
+    """Find the effects a rigid-body model lacks, add them, and predict with the best model.
+
+    The diagnosis adds one finding after the other. Models with the first k of them are scored on
+    held-out folds, and findings are kept as far as they raise the score by more than its standard
+    error: what stands out where effects are judged may bring nothing in a score that counts every
+    sample. ``diagnosis_`` has all findings.
 
     Parameters
     ----------
@@ -51,7 +56,7 @@ class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     cv : int, cross-validator or iterable, default=5
         Folds of these scores: by trajectory where it is a number.
     refit : bool, default=True
-        Fit the better model to all rows.
+        Fit the best model to all rows.
     n_jobs : int or None, default=None
         Processes for the scores.
 
@@ -60,13 +65,14 @@ class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     diagnosis_ : Diagnosis
         Everything that was found.
     best_estimator_ : estimator
-        The given model with the findings added, fitted to all data; with ``refit=True``.
+        The given model with ``best_effects_`` added, fitted to all data; with ``refit=True``.
     best_params_ : dict
-        The parameter ``effects`` of the better model, by its name in ``estimator``.
+        The parameter ``effects`` of the best model, by its name in ``estimator``.
     best_effects_ : list of Term
-        What was added.
+        What was added: the findings up to the last that raised the score.
     best_index_ : int
-        Row of ``cv_results_`` of the better model: the last one.
+        Row of ``cv_results_`` of the best model: the last that scores higher than the best before
+        it, by more than one standard error of the difference over the folds [1]_.
     best_score_ : float
         Its mean score on held-out folds.
     cv_results_ : dict of str to ndarray
@@ -85,6 +91,11 @@ class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     See Also
     --------
     diagnose : The same with everything to look at.
+
+    References
+    ----------
+    .. [1] L. Breiman, J. Friedman, C. Stone, R. Olshen, "Classification and Regression Trees",
+       Wadsworth, 1984, section 3.4.3 (the rule of one standard error).
 
     Examples
     --------
@@ -125,7 +136,7 @@ class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         return tags
 
     def fit(self, X: Any, y: Any, sample_weight: Any = None, groups: Any = None) -> EffectSearchCV:
-        """Search for missing effects and fit the better model.
+        """Search for missing effects and fit the best model.
 
         Parameters
         ----------
@@ -168,13 +179,14 @@ class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             settings=self.settings,
             sample_weight=sample_weight,
         )
-        findings = self.diagnosis_.findings
-        self.best_effects_ = [t for f in findings for t in f.terms]
         prefix = "".join(f"{pipeline.steps[-1][0]}__" for pipeline in opened.outer)
         weights = {} if sample_weight is None else {f"{prefix}sample_weight": sample_weight}
         self._score_steps(X, y, groups, weights, f"{prefix}effects", list(opened.model.effects))
         if self.refit:
             self.best_estimator_ = self.diagnosis_.model
+            if self.best_index_ < len(self.cv_results_["params"]) - 1:
+                best = clone(self.estimator).set_params(**self.best_params_)
+                self.best_estimator_ = best.fit(X, y, **weights)
         return self
 
     def _score_steps(
@@ -214,9 +226,7 @@ class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         )
         rmse = np.array([step["rmse"] for step in history])
         mean = scores.mean(axis=1)
-        order = np.argsort(-mean, kind="stable")
-        rank = np.empty(len(mean), dtype=np.int32)
-        rank[order] = np.arange(1, len(mean) + 1)
+        rank = np.array([1 + np.sum(mean > own) for own in mean], dtype=np.int32)
         self.n_splits_ = len(folds)
         self.cv_results_ = {
             "params": params,
@@ -228,13 +238,14 @@ class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             "rmse": rmse,
             "mean_rmse": rmse.mean(1),
         }
-        self.best_index_ = len(params) - 1
-        self.best_params_ = params[-1]
-        self.best_score_ = float(mean[-1])
+        self.best_index_ = _best_step(scores)
+        self.best_effects_ = steps[self.best_index_]
+        self.best_params_ = params[self.best_index_]
+        self.best_score_ = float(mean[self.best_index_])
 
     @available_if(_refits)
     def predict(self, X: Any) -> Array:
-        """Torque of the better model.
+        """Torque of the best model.
 
         Parameters
         ----------
@@ -259,3 +270,13 @@ class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     def _log(self, X: Any, torque: Array, weight: Array | None) -> tuple[Any, Array, Array | None]:
         """The log that is searched."""
         return X, torque, weight
+
+
+def _best_step(scores: Array) -> int:
+    """Last step that beats the best before it by more than a standard error over the folds."""
+    best, n_folds = 0, scores.shape[1]
+    for k in range(1, len(scores)):
+        gain = scores[k] - scores[best]
+        if gain.mean() > gain.std(ddof=min(n_folds - 1, 1)) / np.sqrt(n_folds):
+            best = k
+    return best

@@ -68,6 +68,28 @@ def test_finds_adds_and_predicts_better():
     assert not hasattr(search.estimator, "coef_")
 
 
+def test_keeps_findings_only_as_far_as_they_raise_the_score():
+    log = make_hidden_effect_log(
+        load_planar_arm(), "spring", joints=[2], n_trajectories=6, duration=6.0
+    )
+    search = EffectSearchCV(RBDRegressor(log.robot), effects=("spring",), cv=3)
+
+    def against(estimator, X, y):
+        return -float(len(estimator.effects))
+
+    kept = clone(search).fit(log.X, log.y)
+    assert kept.best_index_ == 1 and kept.best_estimator_ is kept.diagnosis_.model
+    search.set_params(scoring=against).fit(log.X, log.y)
+    assert len(search.diagnosis_.findings) == 1
+    assert search.best_index_ == 0 and search.best_effects_ == []
+    results = search.cv_results_
+    assert results["rank_test_score"].tolist() == [1, 2]
+    assert search.best_score_ == results["mean_test_score"][0] == -2.0
+    assert search.best_params_ == results["params"][0]
+    alone = RBDRegressor(log.robot).fit(log.X, log.y)
+    np.testing.assert_allclose(search.predict(log.X), alone.predict(log.X), rtol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
