@@ -97,7 +97,7 @@ class Lengths(Check):
             for body, factor, error in zip(found.bodies, found.factors, found.errors, strict=True)
             if abs(factor) > max(ERRORS * error, SHARE)
         }
-        shares = ", ".join(off.values()) or "none of which can be told by itself"
+        shares = ", ".join(off.values()) or "none of which can be determined alone"
         yield self.suspicion(
             "lengths of links are not those of the robot's description",
             f"other lengths, {shares}, explain the torque better by {found.gain:.0f} "

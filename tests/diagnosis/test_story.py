@@ -75,25 +75,6 @@ def test_a_joint_that_gets_worse_is_flagged(missing):
     assert rows[0]["state"] == "worse" and rows[0]["speaks"]
 
 
-def test_a_notebook_shows_it_escaped(missing):
-    hostile = dataclasses.replace(missing, joint_names=("<script>", "elbow"))
-    html = hostile._repr_html_()
-    assert "Missing: spring" in html and "<script>" not in html
-    assert "nan" not in html.lower()
-
-
-def test_a_finding_shows_itself_in_a_notebook(missing):
-    finding = dataclasses.replace(missing.findings[0], title="<b>Spring")
-    html = finding._repr_html_()
-    assert "&lt;b&gt;Spring" in html and "on joint 2" in html
-    assert "k = " in html and "diagnosis.add(" in html
-
-
-def test_the_completed_model_shows_its_effects_in_a_notebook(missing):
-    html = missing.model._repr_mimebundle_()["text/html"]
-    assert "RBDRegressor" in html and "N m/rad" in html and "joint2 (2)" in html
-
-
 def test_unknown_noise_leaves_numbers_out(missing):
     story = dataclasses.replace(missing, noise_floor=np.full(2, np.nan)).story()
     assert "noise –" in story["joints"][1]["text"]

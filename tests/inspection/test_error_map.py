@@ -4,10 +4,8 @@
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
 
 from skidyn.effects import Signals
-from skidyn.exceptions import ColumnError
 from skidyn.inspection import ErrorMapDisplay
 
 
@@ -43,8 +41,3 @@ def test_draws_a_diagnosis_before_and_after():
     )  # fmt: skip
     assert ErrorMapDisplay.from_diagnosis(diagnosis).errors[0, 0] == 2.0
     assert ErrorMapDisplay.from_diagnosis(diagnosis, after=True).errors[0, 0] == 1.0
-
-
-def test_a_regressor_without_robot_needs_one(log):
-    with pytest.raises(ColumnError, match="pass robot="):
-        ErrorMapDisplay.from_estimator(SimpleNamespace(), log.X, log.y)

@@ -231,32 +231,6 @@ def test_rests_can_be_cut(tmp_path):
     assert 140 < int(np.argmax(frame["trajectory"] == 2)) < 160
 
 
-def test_units_are_converted_on_request(tmp_path):
-    source = table()
-    degrees = source.copy()
-    degrees[["q1", "q2"]] = np.rad2deg(source[["q1", "q2"]])
-    degrees["time"] *= 1000
-    degrees["tau2"] *= 1000
-    degrees.to_csv(tmp_path / "log.csv", index=False)
-    units = {"q": "deg", "time": "ms", "tau2": "mNm"}
-    assert_same(quiet_read(tmp_path / "log.csv", units=units), source)
-    with pytest.raises(LogError, match="'grad' is not a unit of q"):
-        read_log(tmp_path / "log.csv", units={"q": "grad"})
-
-
-def test_units_that_a_header_states_must_be_asked_for(tmp_path):
-    source = table()
-    stated = source.rename(columns={"time": "Time [ms]", "q1": "q1 (deg)", "q2": "q2 (deg)"})
-    stated["Time [ms]"] *= 1000
-    stated[["q1 (deg)", "q2 (deg)"]] = np.rad2deg(source[["q1", "q2"]])
-    stated.to_csv(tmp_path / "log.csv", index=False)
-    wanted = r"'Time \[ms\]' states ms.* pass units={'time': 'ms', 'q': 'deg'}"
-    with pytest.raises(LogError, match=wanted):
-        read_log(tmp_path / "log.csv")
-    frame = quiet_read(tmp_path / "log.csv", units={"time": "ms", "q": "deg"})
-    assert_same(frame, source)
-
-
 @pytest.mark.parametrize(
     "names",
     [

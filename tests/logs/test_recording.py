@@ -6,7 +6,6 @@ import json
 import numpy as np
 import pytest
 
-from skidyn.datasets import load_demo_log
 from skidyn.exceptions import LogError, LogWarning
 from skidyn.logs import load_recording
 
@@ -90,9 +89,3 @@ def test_payload_run_of_the_ur10e(data_dir):
     recording = load_recording(path, loaded, drive_gains=gains)
     (label,) = recording.labels.values()
     assert label["payload_kg"] == pytest.approx(2.805)
-
-
-def test_demo_log_is_always_the_same():
-    first, second = load_demo_log(), load_demo_log()
-    assert first.frame.equals(second.frame)
-    assert [effect["joints"] for effect in first.truth] == [(4,), (2,)]

@@ -39,13 +39,3 @@ def test_each_network_can_be_taken_out_again(networks):
         ):
             from_arrays(network, weights)
             np.testing.assert_allclose(network(own), output, atol=1e-6)
-
-
-def test_members_drop_units_of_their_own():
-    members = [LSTMNetwork(3, 2, 1, 5, 8, 0.5, seed=7) for _ in range(2)]
-    members[1].dropout.seed = 8
-    stacked = StackedNetwork(members)
-    x = torch.ones(2, 4, 3, 3)
-    assert not torch.equal(*stacked(x))
-    stacked.eval()
-    assert torch.equal(*stacked(x))

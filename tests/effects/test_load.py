@@ -1,0 +1,12 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Friction that grows with the torque the transmission carries."""
+
+import numpy as np
+
+
+def test_it_is_the_size_of_the_load_against_the_motion(signals, columns_of):
+    column = columns_of("load_dependent_friction", signals)[:, 0]
+    moving = np.abs(signals.dq[:, 0]) > 0.05
+    expected = np.abs(signals.load[:, 0]) * np.sign(signals.dq[:, 0])
+    np.testing.assert_allclose(column[moving], expected[moving])
+    assert np.all(np.abs(column) <= np.abs(signals.load[:, 0]))

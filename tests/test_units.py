@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Units are converted when that is asked for, and refused where a header states others."""
+
+import warnings
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from skidyn.exceptions import LogError, LogWarning
+from skidyn.logs import read_log
+
+TIME = np.arange(50) / 100
+SOURCE = pd.DataFrame(
+    {"time": TIME, "q1": np.sin(TIME), "q2": np.cos(TIME), "dq1": np.cos(TIME)}
+    | {"dq2": -np.sin(TIME), "tau1": 1 + TIME, "tau2": 2 - TIME}
+)
+
+
+def quiet_read(*args, **options):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", LogWarning)
+        return read_log(*args, **options)
+
+
+def assert_same(frame):
+    for name in SOURCE:
+        np.testing.assert_allclose(frame[name], SOURCE[name], rtol=0, atol=1e-9, err_msg=name)
+
+
+def test_units_are_converted_on_request(tmp_path):
+    degrees = SOURCE.copy()
+    degrees[["q1", "q2"]] = np.rad2deg(SOURCE[["q1", "q2"]])
+    degrees["time"] *= 1000
+    degrees["tau2"] *= 1000
+    degrees.to_csv(tmp_path / "log.csv", index=False)
+    assert_same(quiet_read(tmp_path / "log.csv", units={"q": "deg", "time": "ms", "tau2": "mNm"}))
+    with pytest.raises(LogError, match="'grad' is not a unit of q"):
+        read_log(tmp_path / "log.csv", units={"q": "grad"})
+
+
+def test_units_that_a_header_states_must_be_asked_for(tmp_path):
+    stated = SOURCE.rename(columns={"time": "Time [ms]", "q1": "q1 (deg)", "q2": "q2 (deg)"})
+    stated["Time [ms]"] *= 1000
+    stated[["q1 (deg)", "q2 (deg)"]] = np.rad2deg(SOURCE[["q1", "q2"]])
+    stated.to_csv(tmp_path / "log.csv", index=False)
+    wanted = r"'Time \[ms\]' states ms.* pass units={'time': 'ms', 'q': 'deg'}"
+    with pytest.raises(LogError, match=wanted):
+        read_log(tmp_path / "log.csv")
+    assert_same(quiet_read(tmp_path / "log.csv", units={"time": "ms", "q": "deg"}))
