@@ -230,6 +230,6 @@ def advance_channels(frame: pd.DataFrame, delays: Mapping[str, float]) -> pd.Dat
 def _read_at(time: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     """Values at other times: straight lines would flatten what is swift."""
     if len(time) < 3 or np.any(np.diff(time) <= 0):
-        return np.interp(wanted, time, values)
+        return np.asarray(np.interp(wanted, time, values))
     inside = np.clip(wanted, time[0], time[-1])
     return np.asarray(Akima1DInterpolator(time, values, method="makima")(inside))
