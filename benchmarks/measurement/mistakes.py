@@ -4,8 +4,8 @@
 Usage: python benchmarks/measurement/mistakes.py [--cases FOLDER] [--seed 1] [--logs 5]
        [--sample 5] [--only jitter,order] [--fix] [--verbose]
 
-Logs, half of them with a hidden effect, are spoiled in one way each (see ``spoils.py``,
-``spoils_of_parts.py`` and ``spoils_of_clocks.py``). Printed are, by mistake, in how many logs it
+Logs, half of them with a hidden effect, are spoiled in one way each (see ``spoils.py`` and
+``spoils_of_*.py`` beside it). Printed are, by mistake, in how many logs it
 was named on the right joints with the right remedy, in how many of these it was certain, and in how
 many logs something else was suspected. ``--fix`` reads the spoiled log again with the remedy and
 prints in how many of the logs with one that gave back the recorded columns; ``--diagnose`` compares
@@ -27,6 +27,7 @@ import numpy as np
 import pandas as pd
 from spoils import SPOILS, Spoiled
 from spoils_of_clocks import CLOCKS
+from spoils_of_joints import JOINTS
 from spoils_of_parts import PARTS
 
 from skidyn.datasets import (
@@ -41,7 +42,7 @@ from skidyn.measurement import Suspicion
 from skidyn.robots import Robot
 
 ROBOTS = (load_panda, load_ur5, load_scara, load_planar_arm)
-MISTAKES = SPOILS | PARTS | CLOCKS
+MISTAKES = SPOILS | PARTS | CLOCKS | JOINTS
 EFFECTS = (None, "stribeck", None, "payload", "torque_ripple", None, "spring", None)
 
 

@@ -25,6 +25,8 @@ EXPLAINED = 0.5
 USUAL = (0.4, 2.5)
 #: Multiples that are those of wrong masses unless the other joints deny it.
 CLEARLY = (0.62, 1.6)
+#: Multiples of an effort limit that only another unit reaches.
+FAR = 20.0
 #: Factors of units of torque.
 UNITS = {1e3: "Nmm", 1e2: "Ncm", 1e-3: "kNm"}
 #: Error with stated bodies, as a share of the spread, and in errors with identified ones, from
@@ -170,18 +172,41 @@ class TorqueScale(Check):
             wrong = not USUAL[0] <= gain <= USUAL[1] and k in known
             if gained > (LEAST if wrong else SURE) and apart > LEAST and not low <= own <= high:
                 found[k] = own
+        told, evidence = ", ".join(f"{gains[k]:.3g}" for k in found), []
         if found:
-            names = ", ".join(measurement.joint(k) for k in found)
-            told = ", ".join(f"{gains[k]:.3g}" for k in found)
             fitted = ", ".join(f"{gain:.3g}" for gain in found.values())
-            yield self.suspicion(
-                f"the torque of {names} is at another scale than that of the other joints",
+            evidence.append(
                 f"it is {told} times that of the stated bodies, and {fitted} times that of bodies "
-                "that explain the other joints",
+                "that explain the other joints"
+            )
+        beyond = {k: times for k, times in _beyond_limits(measurement).items() if k not in found}
+        if beyond:
+            names = ", ".join(measurement.joint(k) for k in beyond)
+            times = ", ".join(f"{size:.3g}" for size in beyond.values())
+            evidence.append(f"it reaches {times} times the effort limit of {names}")
+            found |= dict.fromkeys(beyond, 1e3)
+        if found:
+            yield self.suspicion(
+                f"the torque of {', '.join(measurement.joint(k) for k in sorted(found))} is at "
+                "another scale than that of the other joints",
+                "; ".join(evidence),
                 "suspected",
                 sorted(found),
-                _gain_remedy(found),
+                _gain_remedy(dict(sorted(found.items()))),
             )
+
+
+def _beyond_limits(measurement: Measurement) -> dict[int, float]:
+    """Torques far beyond what the description says a joint can hold, while others are within."""
+    robot = measurement.robot
+    if robot is None:
+        return {}
+    limits = np.where(robot.effort_limits > 0, robot.effort_limits, np.inf)
+    reached = np.quantile(np.abs(measurement.torque), 0.95, axis=0) / limits
+    far = np.flatnonzero(reached > FAR)
+    if np.mean(reached < 1) < 0.5:
+        return {}  # the limits, or all torques, are in another unit
+    return {int(k): float(reached[k]) for k in far}
 
 
 def _one_sided(gains: Array) -> bool:

@@ -28,6 +28,8 @@ from skidyn.measurement._units import (
 
 #: Range of a position, rad or m, and spread of a velocity, that are those of a joint that moves.
 LEAST_MOTION, LEAST_SPEED = 0.02, 0.02
+#: Way that a velocity makes of a recording whose position is stuck, rad or m.
+LEAST_SWEPT = 0.1
 #: Windows over which velocities are compared with positions, at most.
 WINDOWS = 3000
 #: Lags of the velocity that are tried, s; the least that is told, s and in time steps; the share
@@ -77,12 +79,24 @@ class Velocity(Check):
                 constant,
             )
             return [told]
+        stuck = _stuck(measurement)
+        if stuck:
+            return [self._held(measurement, k, runs) for k, runs in stuck.items()]
         groups: dict[str, list[int]] = {}
         for k, (slope, correlation) in enumerate(measurement.velocities):
             if not np.isfinite(slope) or not measurement.excited[k] or abs(slope - 1) < NEAR:
                 continue
             groups.setdefault(_cause(slope, correlation), []).append(k)
         return [self._told(measurement, cause, joints) for cause, joints in groups.items()]
+
+    def _held(self, measurement: Measurement, k: int, runs: list[int]) -> Suspicion:
+        return self.suspicion(
+            f"the position of {measurement.joint(k)} does not change in some trajectories, "
+            "although its velocity says that it moves",
+            f"in {', '.join(map(str, runs[:8]))}; leave these trajectories out",
+            "suspected",
+            [k],
+        )
 
     def _told(self, measurement: Measurement, cause: str, joints: list[int]) -> Suspicion:
         names = ", ".join(measurement.joint(k) for k in joints)
@@ -147,6 +161,22 @@ def _constant(measurement: Measurement) -> list[int]:
     return [int(k) for k in np.flatnonzero((still & turns) | (stands & moves))]
 
 
+def _stuck(measurement: Measurement) -> dict[int, list[int]]:
+    """Trajectories in which a position never changes although its velocity does, by joint."""
+    s = measurement.signals
+    runs = np.unique(s.trajectory)
+    if len(runs) < 2 or len(measurement.leaps):
+        return {}  # parts between leaps have no numbers of their own
+    found: dict[int, list[int]] = {}
+    for run in runs:
+        rows = s.trajectory == run
+        for k in np.flatnonzero(np.ptp(s.q[rows], axis=0) == 0):
+            swept = np.abs(s.dq[rows, k][1:]) @ np.abs(np.diff(s.clock[rows]))
+            if swept > LEAST_SWEPT and s.dq[rows, k].std() > LEAST_SPEED:
+                found.setdefault(int(k), []).append(int(run))
+    return found
+
+
 def _of_units(slope: float) -> bool:
     """Whether a slope that all joints share is told as a unit of the clock or of positions."""
     return any(is_near(slope, factor) for factor in (*CLOCKS, *POSITIONS))
@@ -199,12 +229,12 @@ class VelocityDelay(Check):
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         if measurement.stale:
             return  # what is held or interpolated is late by itself
-        lags = [
-            _lag(measurement.signals, k)
+        lags = {
+            k: _lag(measurement.signals, k)
             for k, (slope, likeness) in enumerate(measurement.velocities)
             if measurement.excited[k] and likeness > 0.5 and slope > 0.5
-        ]
-        told = np.array([lag for lag in lags if np.isfinite(lag)])
+        }
+        told = np.array([lag for lag in lags.values() if np.isfinite(lag)])
         if not len(told) or len(told) < AGREEING * sum(measurement.excited):
             return
         common = float(np.median(told))
@@ -214,6 +244,7 @@ class VelocityDelay(Check):
             or alike.mean() < AGREEING
             or alike.sum() < min(2, measurement.n_joints)
         ):
+            yield from self._single(measurement, lags)
             return
         late, early = ("velocity", "position") if common > 0 else ("position", "velocity")
         column = "dq" if common > 0 else "q"
@@ -226,6 +257,26 @@ class VelocityDelay(Check):
             "suspected",
             remedy=(f"--late {column}={value:g}", f"late={{'{column}': {value:g}}}"),
         )
+
+    def _single(self, measurement: Measurement, lags: dict[int, float]) -> Iterator[Suspicion]:
+        """Joints whose velocity is late or early by itself."""
+        least = max(SMALLEST, STEPS / measurement.rate)
+        odd = [k for k, lag in lags.items() if abs(lag) > least]
+        right = sum(abs(lag) < SMALLEST / 2 for lag in lags.values())
+        if right < len(lags) / 2 or len(odd) > max(1, len(lags) / 3):
+            return
+        for k in odd:
+            value = float(f"{abs(lags[k]):.2g}")
+            late, early = ("velocity", "position") if lags[k] > 0 else ("position", "velocity")
+            column = f"dq{k + 1}" if lags[k] > 0 else f"q{k + 1}"
+            yield self.suspicion(
+                f"the {late} of {measurement.joint(k)} is late against its {early} by about "
+                f"{1e3 * value:g} ms, and that of other joints is not",
+                "at that lag it is the rate of the position: it was filtered, or has another clock",
+                "suspected",
+                [k],
+                (f"--late {column}={value:g}", f"late={{'{column}': {value:g}}}"),
+            )
 
 
 def _lag(signals: Signals, k: int) -> float:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """One list of checks: what it suspects, how sure, and the option that fixes it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -340,3 +342,29 @@ def test_the_torque_of_one_joint_at_another_scale(factor):
     name, _, size = told.remedy.option.partition("=")
     assert told.joints == (2,) and name == "--gain tau2"
     assert float(size) == pytest.approx(1 / factor, rel=0.1)
+
+
+def test_the_velocity_of_one_joint_is_late():
+    frame = LOG.frame.copy()
+    for rows in frame.groupby("trajectory").groups.values():
+        time, values = frame.loc[rows, "time"], frame.loc[rows, "dq2"]
+        frame.loc[rows, "dq2"] = np.interp(time - 0.03, time, values)
+    told = told_of(frame)["velocity_delay"]
+    name, _, lag = told.remedy.option.partition("=")
+    assert told.joints == (2,) and name == "--late dq2"
+    assert float(lag) == pytest.approx(0.03, abs=0.004)
+
+
+def test_an_encoder_that_is_stuck_in_one_recording():
+    frame = LOG.frame.copy()
+    run = frame["trajectory"].unique()[1]
+    frame.loc[frame["trajectory"] == run, "q2"] = 0.4
+    told = told_of(frame)["velocity"]
+    assert told.joints == (2,) and told.evidence.startswith(f"in {run};")
+
+
+def test_a_torque_far_beyond_the_effort_limit():
+    robot = replace(ROBOT, effort_limits=2 * LOG.frame[["tau1", "tau2"]].abs().max().to_numpy())
+    assert "torque_scale" not in told_of(LOG.frame, robot)
+    told = told_of(LOG.frame.assign(tau2=1e3 * LOG.frame["tau2"]), robot)["torque_scale"]
+    assert told.joints == (2,) and told.remedy.option == "--gain tau2=0.001"
