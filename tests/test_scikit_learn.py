@@ -344,6 +344,7 @@ class Spy(RegressorMixin, BaseEstimator):
     [
         (Spy(), 3),
         (make_pipeline(StandardScaler(), Spy()), 3),
+        (make_pipeline(DropKeys(), StandardScaler(), Spy()), 3),
         (make_pipeline(FrictionTransformer(), Spy()), 5),
         (make_pipeline(SignalScaler(), StandardScaler(), Spy()), 3),
         (VotingRegressor([("own", OwnJointRegressor(Ridge())), ("spy", Spy())]), 3),

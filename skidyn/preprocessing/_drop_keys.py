@@ -64,8 +64,8 @@ def without_keys_inside(learner: Any, keys: Keys) -> Any:
     """A learner whose parts that do not know key columns do not see them either.
 
     Steps of a ``Pipeline`` after the last that knows key columns, and members of stackings and
-    votings that do not know them, get a :class:`DropKeys`. (A learner without any part that knows
-    key columns never sees them: ``Keys.for_learner``.)
+    votings that do not know them, get a :class:`DropKeys`, unless there is one already. (A learner
+    without any part that knows key columns never sees them: ``Keys.for_learner``.)
 
     Parameters
     ----------
@@ -82,6 +82,8 @@ def without_keys_inside(learner: Any, keys: Keys) -> Any:
     if (keys.trajectory is None and keys.time is None) or not knows_keys(learner):
         return learner
     drop = DropKeys(trajectory=keys.trajectory, time=keys.time)
+    if _drops_keys(learner):
+        return learner
     if isinstance(learner, Pipeline):
         knowing = [k for k, (_, step) in enumerate(learner.steps) if knows_keys(step)]
         last = knowing[-1]
@@ -99,3 +101,10 @@ def without_keys_inside(learner: Any, keys: Keys) -> Any:
         ]
         return clone(learner).set_params(estimators=members)
     return learner
+
+
+def _drops_keys(learner: Any) -> bool:
+    """Whether a step of a Pipeline takes the key columns out already."""
+    if isinstance(learner, Pipeline):
+        return any(_drops_keys(step) for _, step in learner.steps)
+    return isinstance(learner, DropKeys)
