@@ -7,7 +7,6 @@ from sklearn.pipeline import make_pipeline
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.identification import RBDRegressor
 from skidyn.preprocessing import SmoothDerivatives, TimeDerivative
-from skidyn.preprocessing._smoothers import SMOOTHERS
 
 W = 2 * np.pi * np.array([0.3, 0.7, 1.1])
 
@@ -29,7 +28,7 @@ def error(table, log):
     return np.sqrt(np.mean((table[:, -1] - exact)[100:-100] ** 2)) / exact.std()
 
 
-@pytest.mark.parametrize("method", sorted(SMOOTHERS))
+@pytest.mark.parametrize("method", ["butterworth", "kalman", "savitzky_golay"])
 @pytest.mark.parametrize("noise", [1e-4, 2e-3])
 def test_chosen_cutoff_is_close_to_the_best(method, noise):
     log = record(noise)
