@@ -71,6 +71,8 @@ class JudgingSearch(RankingSearch):
             )
             if not joints or not enough:
                 continue
+            if not single and best.score - rival.score < self.settings.least_gain:
+                return rival  # the function does not say enough more to be a finding beside it
             errors = rival.errors
             if errors.shape != best.errors.shape:
                 errors = self._errors(rival, within=single)
