@@ -131,8 +131,9 @@ def _best_block(blocks: Sequence[Array], y: Array, fold: NDArray[np.int64]) -> i
     parts = [np.flatnonzero(fold == f) for f in range(n_folds)]
     x = np.stack([b - b.mean(0) for b in blocks])  # (n_blocks, n_rows, k)
     y = y - y.mean()
-    own = np.array([np.einsum("bnk,bnl->bkl", x[:, p], x[:, p]) for p in parts])
-    right = np.array([np.einsum("bnk,n->bk", x[:, p], y[p]) for p in parts])
+    inside = [x[:, p] for p in parts]
+    own = np.array([a.transpose(0, 2, 1) @ a for a in inside])
+    right = np.array([y[p] @ a for a, p in zip(inside, parts, strict=True)])
     energy = np.array([y[p] @ y[p] for p in parts])
     ridge = 1e-3 * len(y) * np.eye(x.shape[2])
     left = np.zeros((n_folds, len(blocks)))

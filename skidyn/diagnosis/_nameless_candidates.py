@@ -27,8 +27,24 @@ from skidyn.evidence import Problem
 Mask = NDArray[np.bool_]
 
 
-def nameless_candidates(problem: Problem, residual: Array) -> list[Candidate]:
-    """Nameless functions of the signals for every joint."""
+def nameless_candidates(
+    problem: Problem, residual: Array, *, followed_only: bool = False
+) -> list[Candidate]:
+    """Nameless functions of the signals for every joint.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows and folds.
+    residual : ndarray of shape (n_samples, n_joints)
+        Torque that the model leaves, N m or N.
+    followed_only : bool, default=False
+        Only those whose signals are chosen by what the residual follows.
+
+    Returns
+    -------
+    list of Candidate
+    """
     followed = [followed_signals(problem, j, residual[:, j]) for j in range(problem.n_joints)]
     sums = [followed_sums(problem, j, residual[:, j]) for j in range(problem.n_joints)]
     candidates = []
@@ -38,6 +54,8 @@ def nameless_candidates(problem: Problem, residual: Array) -> list[Candidate]:
         for joints in effect.sites(problem.signals):
             joint = joints[0]
             if effect.search == "spectrum" or effect.not_shown(problem.signals, joint):
+                continue
+            if followed_only and effect.search != "screened":
                 continue
             shapes = effect.grid(problem.signals, joints)
             if isinstance(effect, FunctionOfSignals):

@@ -176,8 +176,7 @@ class RankingSearch(SearchState):
     def _lines(self) -> list[Hypothesis]:
         """Torque ripple and vibration, judged on the residual at the full rate."""
         problem = self.problem
-        fit = replace(self.fit, terms=problem.terms + (c.term for c in self.chosen))
-        residual = problem.torque - self.ripple - problem.explained(fit)
+        residual = self.residual
         found = []
         least = self.settings.least_share
         if "torque_ripple" in self.kinds:

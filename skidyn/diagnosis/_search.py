@@ -43,6 +43,7 @@ def search(
     searcher.vibration = vibration and nameless
     if joints is not None:
         searcher.pool = [c for c in searcher.pool if set(c.joints) <= set(joints)]
+        searcher.nameless = False
     return searcher.run()
 
 
@@ -55,6 +56,8 @@ class _Search(ReconsideringSearch):
             self.sigma = self.fit.noise
             self.left = self._left()
             self.start = np.maximum(self.start, self.left)
+            if self.findings:
+                self.follow_again()
             ranking = self.rank()
             best = self.accepted(ranking)
             if best is None:

@@ -58,7 +58,8 @@ class SearchState:
         base = problem.fit_own()
         self.fit, self.sigma = base, base.noise
         self.pool = catalogue_candidates(problem, self.kinds)
-        if nameless and settings.max_findings:
+        self.nameless = nameless and bool(settings.max_findings)
+        if self.nameless:
             self.pool += nameless_candidates(problem, problem.torque - problem.explained(base))
         self.by_recording = recording_candidates(problem, self.kinds)
         self.n_tests = max(1, len(self.pool) + len(self.by_recording))
@@ -127,6 +128,22 @@ class SearchState:
         self.findings.append(best)
         taken = {c.site for c in best.candidates}
         self.pool = [c for c in self.pool if c.site not in taken]
+
+    @property
+    def residual(self) -> Array:
+        """Torque that the model so far leaves at every sample, shape (n_samples, n_joints)."""
+        fit = replace(self.fit, terms=self.problem.terms + (c.term for c in self.chosen))
+        return self.problem.torque - self.ripple - self.problem.explained(fit)
+
+    def follow_again(self) -> None:
+        """Add functions of the signals that what is left follows now, which others had covered."""
+        if not self.nameless:
+            return
+        known = {c.term for c in self.whole_pool}
+        found = nameless_candidates(self.problem, self.residual, followed_only=True)
+        new = [c for c in found if c.term not in known]
+        self.pool, self.whole_pool = [*self.pool, *new], [*self.whole_pool, *new]
+        self.n_tests += len(new)
 
     def significant(self, chance: float, candidate: Candidate | None = None) -> bool:
         """Whether a candidate is more than chance among all that were tried."""

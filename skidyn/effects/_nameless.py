@@ -41,7 +41,8 @@ class NamelessEffect(Effect):
 
     nameless = True
     softness = 1e-5
-    #: Whether its signals enter as one number, so that none of them can be tested by itself.
+    #: Whether its signals enter as one number, such as a sum or the way since a reversal, so that
+    #: none of them can be tested by itself.
     is_of_one_number: ClassVar[bool] = False
     #: Signals it depends on: ``own`` joint, the ``other`` joint or time.
     depends_on: ClassVar[tuple[str, ...]] = ()

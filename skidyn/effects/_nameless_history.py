@@ -56,6 +56,7 @@ class FunctionOfTimeSinceStart(NamelessEffect):
 class FrictionSinceReversal(NamelessEffect):
     """Friction that fades or grows with the way since the joint turned back."""
 
+    is_of_one_number = True
     kind = "friction_since_reversal"
     title = "Friction that depends on the way since the last reversal"
     formula = r"f(|q - q_\mathrm{turn}|)\,\mathrm{sign}\,\dot q"
@@ -73,6 +74,7 @@ class FrictionSinceReversal(NamelessEffect):
 class FunctionOfWaySinceReversal(NamelessEffect):
     """A torque that fades or grows with the way since the joint turned back."""
 
+    is_of_one_number = True
     kind = "function_of_way_since_reversal"
     title = "Function of the way since the last reversal"
     formula = r"f(|q - q_\mathrm{turn}|)"
@@ -98,6 +100,7 @@ class FunctionOfLaggingPosition(NamelessEffect):
     .. [1] A. Visintin (1994), Differential models of hysteresis, Springer, chapter III.
     """
 
+    is_of_one_number = True
     kind = "function_of_lagging_position"
     title = "Function of the position with play"
     formula = r"f(\mathcal{P}_r[q])"
