@@ -60,7 +60,6 @@ def names(truth: Path, reports: Path) -> list[tuple[float, bool, list[float]]]:
                 np.log(max(slow / COLOURED, 1.0)),
                 np.log10(min(max(drop, LEAST), ENOUGH) / ENOUGH),
                 float(bool(nameless & joints)),
-                float(effect["trajectories"] is not None),
             ]
             rows.append((effect["confidence"], right(effect, table[file.stem]), tells))
     return rows
@@ -86,8 +85,8 @@ def main() -> None:
         fit = LogisticRegression(C=3.0).fit(np.array([t for _, _, t in rows]), good)
         weights = ", ".join(f"{w:.2f}" for w in (*fit.intercept_, *fit.coef_[0]))
         print(
-            "weights (constant, margin, correlated, removed, nameless beside it, "
-            f"some recordings) of these: {weights}"
+            "weights (constant, margin, correlated, removed, nameless beside it) of these: "
+            f"{weights}"
         )
 
 

@@ -360,7 +360,6 @@ def _sure(finding: Finding, findings: Sequence[Finding], parts: Remainder, whole
         max(f.error_drop for f in findings if f.kind == finding.kind),
         nameless=finding.kind != UNKNOWN and (beside or bool(parts.material[joints].any())),
         whole_recordings=whole,
-        some_recordings=finding.trajectories is not None,
         alike=finding.alike,
     )
     return replace(finding, confidence=probability)

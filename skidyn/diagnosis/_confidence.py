@@ -15,11 +15,10 @@ import numpy as np
 
 #: Weights of the constant, of the margin, of the logarithm of the inflation of the variance by
 #: autocorrelation, of the decimal logarithm of the share of the error that is removed.
-CONSTANT, MARGIN, CORRELATED, REMOVED = 2.4, 1.2, -1.5, 2.2
+CONSTANT, MARGIN, CORRELATED, REMOVED = 2.4, 1.8, -1.1, 1.8
 #: Weights of something without a name on the same joints, of folds that are blocks of time and not
-#: recordings, of an effect of some recordings only, and of a kind on other joints that explains as
-#: much: one of the two.
-NAMELESS, BLOCKS, SOME, ALIKE = -1.5, -0.5, -1.0, -2.4
+#: recordings, and of a kind on other joints that explains as much: one of the two.
+NAMELESS, BLOCKS, ALIKE = -1.3, -0.5, -2.4
 #: Coloured noise inflates the variance so much; shares of the error between these count.
 COLOURED, LEAST, ENOUGH = 1.7, 0.003, 0.3
 #: No name is surer than the number of logs on which the weights were found allows.
@@ -33,7 +32,6 @@ def confidence(
     *,
     nameless: bool = False,
     whole_recordings: bool = True,
-    some_recordings: bool = False,
     alike: bool = False,
 ) -> float:
     """Probability that a name is right.
@@ -50,8 +48,6 @@ def confidence(
         Whether something without a name is left, or was found, on its joints.
     whole_recordings : bool, default=True
         Whether it was judged on whole recordings left out.
-    some_recordings : bool, default=False
-        Whether it acts in some of the recordings only.
     alike : bool, default=False
         Whether a kind that acts on other joints explains as much.
 
@@ -64,5 +60,5 @@ def confidence(
     logit += CORRELATED * float(np.log(max(inflation / COLOURED, 1.0)))
     logit += REMOVED * float(np.log10(min(max(removed, LEAST), ENOUGH) / ENOUGH))
     logit += NAMELESS * nameless + BLOCKS * (not whole_recordings)
-    logit += SOME * some_recordings + ALIKE * alike
+    logit += ALIKE * alike
     return min(MOST, float(1 / (1 + np.exp(-logit))))
