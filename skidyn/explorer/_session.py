@@ -208,7 +208,6 @@ class Session:
                     float(inflation[joints].max()),
                     float(drop[joints].max()),
                     self.problem.whole_trajectories,
-                    any(term.trajectories is not None for term in step.terms),
                 )
             )
         return told

@@ -60,7 +60,6 @@ def sure_told(
     inflation: float,
     removed: float,
     whole_recordings: bool,
-    some_recordings: bool,
 ) -> str:
     """How sure a name is in a few words.
 
@@ -68,14 +67,14 @@ def sure_told(
     ----------
     margin : Margin
         Over the best other effect.
-    inflation, removed, whole_recordings, some_recordings
+    inflation, removed, whole_recordings
         As :func:`skidyn.diagnosis.confidence` takes them.
 
     Examples
     --------
-    >>> sure_told(Margin(0.8, "Offset"), 1.0, 0.5, True, False)
-    '97% sure of the name'
-    >>> sure_told(Margin(-0.3, "Spring"), 1.0, 0.5, True, False)
+    >>> sure_told(Margin(0.8, "Offset"), 1.0, 0.5, True)
+    '98% sure of the name'
+    >>> sure_told(Margin(-0.3, "Spring"), 1.0, 0.5, True)
     'not sure of the name: spring takes more of the error'
     """
     if margin.share < 0:
@@ -85,7 +84,6 @@ def sure_told(
         inflation,
         removed,
         whole_recordings=whole_recordings,
-        some_recordings=some_recordings,
     )
     near = margin.share < NEAR and margin.rival
     also = f"; {inside(margin.rival)} takes nearly as much of the error" if near else ""
