@@ -45,7 +45,7 @@ class ExtraColumns:
 
     @property
     def count(self) -> int:
-        return int(next(iter(self.by_joint.values())).shape[1])
+        return len(self.precision)
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,9 @@ import warnings
 
 import numpy as np
 import pandas as pd
+import pytest
 
-from skidyn.datasets import load_planar_arm
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
 from skidyn.identification import RBDRegressor
 
@@ -39,3 +40,14 @@ def test_an_effect_is_found_beside_a_joint_that_rests():
     assert [(f.kind, f.joints) for f in diagnosis.findings] == [("spring", (2,))]
     assert np.isfinite(diagnosis.rmse_after).all()
     assert 0 <= diagnosis.findings[0].q_value < 1e-6
+
+
+def test_a_robot_that_rests_is_refused_by_a_sentence():
+    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=4, duration=4.0)
+    X = log.X.copy()
+    moving = [c for c in X.columns if c[0] in "dq" and c[-1].isdigit()]
+    X[moving] = 0.0
+    y = 0.3 + 0.01 * np.random.default_rng(2).normal(size=np.shape(log.y))
+
+    with pytest.raises(ValueError, match="no joint slides long enough"):
+        diagnose(RBDRegressor(log.robot), X, y)
