@@ -96,7 +96,7 @@ def recording(world, servo, kind, j, rng):
     world.dof_armature[:] = servo.armature
     if own:  # armature and friction are those of the motor
         world.dof_frictionloss[j] = world.dof_damping[j] = world.dof_armature[j] = 0.0
-    motor, speed = 0.0, 0.0
+    motor, speed, carried = 0.0, 0.0, 0.0
     positions = np.zeros((len(t), n))
     for k in range(len(t)):
         q, dq = data.qpos.copy(), data.qvel.copy()
@@ -108,8 +108,7 @@ def recording(world, servo, kind, j, rng):
             slow = np.exp(-((dq[j] / 0.08) ** 2))
             world.dof_frictionloss[j] = servo.friction[j] + 0.15 * size[j] * slow
         elif kind == "load friction":
-            load = data.qfrc_bias[j]
-            world.dof_frictionloss[j] = servo.friction[j] + 0.2 * abs(load)
+            world.dof_frictionloss[j] = servo.friction[j] + 0.2 * abs(carried)
         data.qfrc_applied[:] = torque
         if own:
             turn, rate = motor - data.qpos[j], speed - data.qvel[j]
@@ -125,6 +124,9 @@ def recording(world, servo, kind, j, rng):
             speed = np.sign(free) * max(abs(free) - held, 0.0) / mass
             motor += STEP * speed
         mujoco.mj_step(world, data)
+        # what moves and carries the links: all torques on the joint but what the rotor takes
+        torques = data.qfrc_applied[j] + data.qfrc_passive[j] + data.qfrc_constraint[j]
+        carried = torques - world.dof_armature[j] * data.qacc[j]
     every = round(1 / RATE / STEP)
     return t[::every], wanted[::every], positions[::every]
 
