@@ -8,11 +8,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Array
 from skidyn.evidence import jackknife, linear_terms, without_each
+from skidyn.payload._by_recording import Shares, compare_recordings, differing
 from skidyn.payload._runs import (
     FRICTION,
     Runs,
@@ -45,6 +47,10 @@ class DriveGainEstimate:
         95 % intervals.
     factors : ndarray of shape (n_joints,)
         Gains over those by which the runs had been read.
+    by_recording : Shares
+        Gains that every recording shows by itself, the rest known from all others: ``names`` of
+        the recordings, ``values`` and ``std`` of shape (n_recordings, n_joints), N m/A or N/A. NaN
+        for the only recording with the load, or without it.
     mass : float
         The known mass on which all gains rest, kg.
     com : ndarray of shape (3,)
@@ -65,6 +71,7 @@ class DriveGainEstimate:
     std: Array
     interval: Array
     factors: Array
+    by_recording: Shares
     mass: float
     com: Array
     relative_error: Array
@@ -81,6 +88,10 @@ class DriveGainEstimate:
         if not np.allclose(self.factors, self.gains, equal_nan=True):
             shown = ", ".join(f"{factor:.3f}" for factor in self.factors)
             lines.append(f"over the gains by which the runs were read: {shown}")
+        for name, own in zip(self.by_recording.names, self.by_recording.values, strict=True):
+            if np.isfinite(own).any():
+                shown = ", ".join(f"{gain:.4g}" for gain in own)
+                lines.append(f"by {name} alone: {shown}")
         return "\n".join([*lines, *self.notes])
 
     def __str__(self) -> str:
@@ -102,6 +113,7 @@ class DriveGainEstimate:
             "std": self.std.tolist(),
             "interval": self.interval.tolist(),
             "factors": self.factors.tolist(),
+            "by_recording": self.by_recording.to_dict(),
             "mass": self.mass,
             "com": self.com.tolist(),
             "relative_error": self.relative_error.tolist(),
@@ -210,7 +222,8 @@ def estimate_drive_gains(
 def _estimate(runs: Runs, robot: Robot, known: Array, nominal: Array) -> DriveGainEstimate:
     system = _System.of(runs, known)
     currents = np.array([np.sqrt(np.mean(y**2)) + 1e-100 for y in runs.target])
-    factors = system.factors(runs)
+    rows = system.rows(runs)
+    factors = system.factors(runs, rows)
     whole = _merged(factors)
     noise = currents.copy()
     solution = system.start(whole, noise)
@@ -236,6 +249,15 @@ def _estimate(runs: Runs, robot: Robot, known: Array, nominal: Array) -> DriveGa
             f"These runs say little about the gain of {names}, whose current hardly depends on the "
             "load. Record motion in which that joint turns the load out of balance."
         )
+
+    def expected(left_out: NDArray[np.int64]) -> list[Array]:
+        kept = [parts for f, parts in enumerate(factors) if f not in left_out]
+        found = system.refine(_merged(kept), noise, solution)
+        x, k = found[: -system.n], found[-system.n :]
+        return [own * (r[:, :-2] @ x + r[:, -2]) for own, r in zip(k, rows, strict=True)]
+
+    currents_over = compare_recordings(runs, expected)
+    notes += differing(currents_over, robot.joint_names)
     body = known.copy()
     body[system.unknown] = solution[: len(system.unknown)]
     return DriveGainEstimate(
@@ -245,6 +267,11 @@ def _estimate(runs: Runs, robot: Robot, known: Array, nominal: Array) -> DriveGa
         std=std,
         interval=gains[:, None] + half,
         factors=gains / nominal,
+        by_recording=Shares(
+            currents_over.names,
+            gains / currents_over.values,
+            np.abs(gains) * currents_over.std / currents_over.values**2,
+        ),
         mass=float(known[0]),
         com=body[1:4] / body[0],
         relative_error=noise / currents,
@@ -269,16 +296,20 @@ class _System:
         unknown = [k for k in range(10) if np.isnan(known[k])]
         return cls(known, unknown, len(runs.target))
 
-    def factors(self, runs: Runs) -> list[list[Array]]:
-        """Per fold and joint, the triangular factor of [A | b | current]."""
+    def rows(self, runs: Runs) -> list[Array]:
+        """Per joint, [A | b | current]."""
         given = [k for k in range(10) if k not in self.unknown]
         rows = []
         for body, rest, current in zip(runs.body, runs.rest, runs.target, strict=True):
             certain = body[:, given] @ self.known[given]
             rows.append(np.column_stack([body[:, self.unknown], rest, certain, current]))
+        return rows
+
+    def factors(self, runs: Runs, rows: list[Array]) -> list[list[Array]]:
+        """Per fold and joint, the triangular factor of its rows."""
         return [
             [_triangle(block[fold == f]) for block, fold in zip(rows, runs.fold, strict=True)]
-            for f in range(runs.problem.n_folds)
+            for f in range(runs.n_folds)
         ]
 
     def start(self, whole: list[Array], noise: Array) -> Array:

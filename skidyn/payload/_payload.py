@@ -16,6 +16,7 @@ from skidyn._signals import Array
 from skidyn._text import digits
 from skidyn.evidence import jackknife, linear_terms, without_each
 from skidyn.identification import RBDRegressor, make_consistent
+from skidyn.payload._by_recording import Shares, compare_recordings, differing
 from skidyn.payload._runs import (
     FRICTION,
     SYMBOLS,
@@ -76,6 +77,11 @@ class PayloadEstimate:
         The payload's size from every joint alone, as a share of the common one, and its standard
         error; NaN for joints that do not feel it. Shares that differ beyond their errors point to
         wrong drive gains, not to the payload.
+    by_recording : Shares
+        Torque that every recording measures, as a share of what all others let expect of it:
+        ``names`` of the recordings, ``values`` and ``std`` of shape (n_recordings, n_joints). A
+        drive gain that was not the same in all recordings shows here. NaN for the only recording
+        with the payload, or without it.
     joint_names : tuple of str
         Names of the joints.
     units : tuple of str
@@ -101,6 +107,7 @@ class PayloadEstimate:
     first_moment_interval: Array
     by_joint: Array
     by_joint_std: Array
+    by_recording: Shares
     joint_names: tuple[str, ...]
     units: tuple[str, ...]
 
@@ -185,6 +192,7 @@ class PayloadEstimate:
             "first_moment_interval": self.first_moment_interval.tolist(),
             "by_joint": self.by_joint.tolist(),
             "by_joint_std": self.by_joint_std.tolist(),
+            "by_recording": self.by_recording.to_dict(),
             "joints": list(self.joint_names),
             "units": list(self.units),
             "rmse_before": self.rmse_before.tolist(),
@@ -346,10 +354,17 @@ def _estimate(runs: Runs, link: str, notes: list[str], com: Array | None = None)
     first_moment = np.where(is_open[1:4], np.nan, body[1:4])
     moments = first_moment[:, None] + wide * std[1:4, None] * [-1.0, 1.0]
     shares, share_std = _by_joint(runs, body)
-    notes = notes + _disagreement(shares, share_std)
-    before, after = _loaded_errors(designs, runs, solution, width)
     robot = runs.problem.robot
     assert robot is not None
+
+    def expected(left_out: NDArray[np.int64]) -> list[Array]:
+        kept = [rows for f, rows in enumerate(factors) if f not in left_out]
+        others = _solve(np.vstack(kept))
+        return [design @ others for design in designs]
+
+    recordings = compare_recordings(runs, expected)
+    notes = notes + _disagreement(shares, share_std) + differing(recordings, robot.joint_names)
+    before, after = _loaded_errors(designs, runs, solution, width)
     common: dict[str, Any] = {
         "std": std,
         "link": link,
@@ -359,6 +374,7 @@ def _estimate(runs: Runs, link: str, notes: list[str], com: Array | None = None)
         "first_moment_interval": moments,
         "by_joint": shares,
         "by_joint_std": share_std,
+        "by_recording": recordings,
         "joint_names": tuple(robot.joint_names),
         "units": tuple("N" if slides else "N m" for slides in runs.problem.signals.prismatic),
     }
@@ -418,7 +434,7 @@ def _by_joint(runs: Runs, body: Array) -> tuple[Array, Array]:
     for own, rest, target, fold in zip(runs.body, runs.rest, runs.target, runs.fold, strict=True):
         torque = own @ body
         design = np.column_stack([torque, rest, target])
-        parts = [_triangle(design[fold == f]) for f in range(runs.problem.n_folds)]
+        parts = [_triangle(design[fold == f]) for f in range(runs.n_folds)]
         whole = _triangle(np.vstack(parts))
         if not np.any(torque) or open_columns(whole[:, :-1], [0])[0]:
             shares.append(np.nan)
@@ -450,7 +466,7 @@ def _disagreement(shares: Array, errors: Array) -> list[str]:
 def _fold_factors(designs: list[Array], runs: Runs, noise: Array) -> list[Array]:
     """Triangular factor of [columns | torque] of every fold, joints weighted by their noise."""
     factors = []
-    for f in range(runs.problem.n_folds):
+    for f in range(runs.n_folds):
         parts = [
             np.column_stack([design, target])[fold == f] / s
             for design, target, fold, s in zip(designs, runs.target, runs.fold, noise, strict=True)

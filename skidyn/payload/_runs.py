@@ -23,6 +23,8 @@ from skidyn.robots import Robot
 SYMBOLS = ("m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 #: Effects beside the rigid body that nearly every geared robot has.
 FRICTION = ("viscous", "coulomb", "offset", "rotor_inertia")
+#: Blocks of time of the only recording with, or without, the load.
+BLOCKS = 10
 #: Share of a column that must be left when all others are taken out of it.
 LEAST_SHARE = 1e-6
 
@@ -41,17 +43,21 @@ class Runs:
         Per joint, the columns of rigid body and effects.
     target : list of ndarray of shape (n_rows_j,)
         Per joint, the torque to be explained.
+    carries : ndarray of shape (n_samples,) of bool
+        Samples with the load.
+    fold : list of ndarray of shape (n_rows_j,) of int
+        Per joint, the fold of every row: recordings, or blocks of time of few of them.
+    n_folds : int
+        Number of folds.
     """
 
     problem: Problem
     body: list[Array]
     rest: list[Array]
     target: list[Array]
-
-    @property
-    def fold(self) -> list[NDArray[np.int64]]:
-        """Fold of every row, per joint."""
-        return self.problem.fold
+    carries: NDArray[np.bool_]
+    fold: list[NDArray[np.int64]]
+    n_folds: int
 
 
 def read_runs(
@@ -109,7 +115,7 @@ def make_runs(
     )
     body = _body_rows(problem, robot, link, carries)
     rest = problem.design([problem.term_rows(term) for term in terms])
-    return Runs(problem, body, rest, problem.target)
+    return Runs(problem, body, rest, problem.target, carries, *_folds(problem, carries))
 
 
 def in_body(robot: Robot, link: str | None) -> tuple[int, Array]:
@@ -148,6 +154,25 @@ def open_columns(design: Array, columns: Sequence[int]) -> NDArray[np.bool_]:
     null[: len(values)] = values < LEAST_SHARE * values[0]
     is_open[used] = np.abs(directions[null]).max(axis=0, initial=0.0) > 1e-3
     return is_open[list(columns)]
+
+
+def _folds(problem: Problem, carries: NDArray[np.bool_]) -> tuple[list[NDArray[np.int64]], int]:
+    """Folds of the problem; the only recording with or without the load falls into blocks.
+
+    Without it nothing would tell load and robot apart.
+    """
+    fold, n_folds = [f.copy() for f in problem.fold], problem.n_folds
+    names = problem.signals.trajectory
+    for side in (names[carries], names[~carries]):
+        if not problem.whole_trajectories or len(np.unique(side)) != 1:
+            continue
+        for j, own in enumerate(problem.rows.trajectory):
+            mine = np.flatnonzero(own == side[0])
+            mine = mine[np.argsort(problem.rows.time[j][mine], kind="stable")]
+            fold[j][mine] = n_folds + np.arange(len(mine)) * BLOCKS // max(1, len(mine))
+        n_folds += BLOCKS
+    used = np.unique(np.concatenate(fold))
+    return [np.searchsorted(used, f) for f in fold], len(used)
 
 
 def _frames(runs: Any, name: str) -> list[Any]:

@@ -68,6 +68,22 @@ def test_corrects_gains_that_were_used_for_reading(currents, found):
     assert "by which the runs were read" in other.text
 
 
+def test_gain_of_one_recording_that_differs(currents, found):
+    log, loaded, unloaded = currents
+    assert found.by_recording.values.shape == (len(found.by_recording.names), 6)
+    np.testing.assert_allclose(found.by_recording.values[:, 1:3], [GAINS[1:3]] * 6, rtol=0.03)
+    first = loaded["trajectory"] == loaded["trajectory"].iloc[0]
+    changed = loaded.assign(tau2=loaded["tau2"].where(~first, 1.05 * loaded["tau2"]))
+    other = estimate_drive_gains(
+        log.robot, changed, unloaded, log.parameters["mass"], effects=FRICTION
+    )
+    gains = other.by_recording.values[:, 1]
+    assert gains[0] == pytest.approx(np.mean(gains[1:]) / 1.05, rel=0.02)
+    assert other.by_recording.names[0] == "loaded 1"
+    assert "In loaded 1, shoulder_lift_joint measures" in other.text
+    assert "of what the other recordings" not in found.text
+
+
 def test_known_centre_of_mass_narrows_the_intervals(currents, found):
     log, loaded, unloaded = currents
     truth = log.parameters

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Every recording against all others: drive gains that are not the same in all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidyn._signals import Array
+from skidyn.evidence import jackknife
+from skidyn.payload._runs import Runs
+
+#: Blocks of time of a recording, left out in turn for the standard error of its share.
+BLOCKS = 10
+#: What a recording has to differ by to be named: standard errors, and at least this share.
+DIFFERS, LEAST = 4.0, 0.01
+#: Standard error, as a share, beyond which a recording says nothing about a joint.
+LARGEST_ERROR = 0.1
+
+
+@dataclass(frozen=True)
+class Shares:
+    """What every recording measures of what all others let expect of it.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Recordings, such as ``"loaded 1"``: their order is that in which they were given.
+    values, std : ndarray of shape (n_recordings, n_joints)
+        Shares and their standard errors; NaN for the only recording of its kind, and for joints
+        that it does not move.
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    std: Array
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain numbers, for JSON."""
+        return {
+            "recordings": list(self.names),
+            "values": self.values.tolist(),
+            "std": self.std.tolist(),
+        }
+
+
+def compare_recordings(
+    runs: Runs, predict: Callable[[NDArray[np.int64]], Sequence[Array]]
+) -> Shares:
+    """Share of the expected torque or current that every recording measures, joint by joint.
+
+    Parameters
+    ----------
+    runs : Runs
+        Averaged rows of all recordings.
+    predict : callable
+        From the folds that are left out to what the others let expect of all rows, per joint.
+
+    Returns
+    -------
+    Shares
+        The standard error of a share holds the spread over the blocks of its recording and, since
+        the others say what to expect, half the usual distance between recordings.
+    """
+    rows, n = runs.problem.rows, len(runs.target)
+    numbers = np.unique(runs.problem.signals.trajectory)
+    loaded = np.array([runs.carries[runs.problem.signals.trajectory == k].any() for k in numbers])
+    values, std = np.full((2, len(numbers), n), np.nan)
+    for r, number in enumerate(numbers):
+        if np.sum(loaded == loaded[r]) < 2:
+            continue
+        mine = [trajectory == number for trajectory in rows.trajectory]
+        folds = [fold[own] for fold, own in zip(runs.fold, mine, strict=True)]
+        expected = predict(np.unique(np.concatenate(folds)))
+        for j, own in enumerate(mine):
+            order = np.argsort(rows.time[j][own])
+            x, y = expected[j][own][order], runs.target[j][own][order]
+            blocks = np.array_split(np.arange(len(x)), BLOCKS)
+            both = np.array([x[b] @ y[b] for b in blocks])
+            size = np.array([x[b] @ x[b] for b in blocks])
+            if len(x) < BLOCKS or not np.all(size.sum() - size > 0):
+                continue
+            values[r, j] = both.sum() / size.sum()
+            without = (both.sum() - both) / (size.sum() - size)
+            std[r, j] = float(jackknife(without))
+    known = np.isfinite(values)
+    for j in np.flatnonzero(known.sum(axis=0) > 2):
+        own = values[known[:, j], j]
+        usual = np.median(np.abs(own - np.median(own)))
+        std[known[:, j], j] = np.hypot(std[known[:, j], j], usual / 2)
+    return Shares(_names(loaded), values, std)
+
+
+def differing(shares: Shares, joint_names: Sequence[str]) -> list[str]:
+    """A note where a recording measures more or less than the others let expect."""
+    away = np.abs(shares.values - 1.0)
+    told = (shares.std < LARGEST_ERROR) & (away > LEAST) & (away > DIFFERS * shares.std)
+    if not told.any():
+        return []
+    r, j = divmod(int(np.argmax(np.where(told, away / shares.std, 0.0))), told.shape[1])
+    return [
+        f"In {shares.names[r]}, {joint_names[j]} measures {100 * shares.values[r, j]:.1f} ± "
+        f"{100 * shares.std[r, j]:.1f} % of what the other recordings let expect: its drive gain "
+        "or its friction was not the same there."
+    ]
+
+
+def _names(loaded: NDArray[np.bool_]) -> tuple[str, ...]:
+    place = np.where(loaded, np.cumsum(loaded), np.cumsum(~loaded))
+    return tuple(
+        f"{'loaded' if is_loaded else 'unloaded'} {k}"
+        for is_loaded, k in zip(loaded, place, strict=True)
+    )
