@@ -15,6 +15,9 @@ class LoadDependentFriction(Effect):
     """Gear friction that grows with the transmitted torque, or with another ``power`` of it.
 
     The power is 1 where the shape has none; the torque is in units of 1 N m then.
+
+    The gear transmits what the bodies need at the joint; the torque that accelerates the rotor is
+    spent before it, and is no part of the load.
     """
 
     kind = "load_dependent_friction"

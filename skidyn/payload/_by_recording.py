@@ -88,10 +88,10 @@ def compare_recordings(
             without = (both.sum() - both) / (size.sum() - size)
             std[r, j] = float(jackknife(without))
     known = np.isfinite(values)
-    for j in np.flatnonzero(known.sum(axis=0) > 2):
-        own = values[known[:, j], j]
-        usual = np.median(np.abs(own - np.median(own)))
-        std[known[:, j], j] = np.hypot(std[known[:, j], j], usual / 2)
+    for some, shares, errors in zip(known.T, values.T, std.T, strict=True):
+        if some.sum() > 2:
+            usual = np.median(np.abs(shares[some] - np.median(shares[some])))
+            errors[some] = np.hypot(errors[some], usual / 2)
     return Shares(_names(loaded), values, std)
 
 
