@@ -197,6 +197,48 @@ def names_of_table(X: Any, columns: str = "time, q1.., dq1..") -> list[str]:
     return names
 
 
+def command_columns(names: Sequence[str], joint_names: Sequence[str]) -> list[str]:
+    """Names of the columns that hold the commanded positions.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Columns of a log.
+    joint_names : sequence of str
+        Joints.
+
+    Returns
+    -------
+    list of str
+        One for each joint.
+
+    Raises
+    ------
+    ColumnError
+        A joint has none.
+
+    Examples
+    --------
+    >>> from skidyn._columns import command_columns
+    >>> command_columns(["time", "q1", "cmd1"], ["elbow"])
+    ['cmd1']
+    """
+    numbers = range(1, len(joint_names) + 1)
+    schemes = (
+        [f"q_ref{j}" for j in numbers],
+        [f"q_ref_{name}" for name in joint_names],
+        [f"cmd{j}" for j in numbers],
+    )
+    for wanted in schemes:
+        if set(wanted) <= set(names):
+            return wanted
+    lost = ", ".join(name for name in schemes[0] if name not in names)
+    raise ColumnError(
+        f"the log lacks the column(s) {lost}: the commanded positions, which skidyn.logs.read_log "
+        "names cmd1.."
+    )
+
+
 def with_columns(X: Any, columns: dict[str, np.ndarray]) -> Any:
     """Copy of a pandas or polars table with some columns replaced or added."""
     if hasattr(X, "assign"):

@@ -43,13 +43,20 @@ def read_model_and_log(
 
 
 def read_frame(
-    options: argparse.Namespace, robot: Robot | None, *, check: bool = True
+    options: argparse.Namespace,
+    robot: Robot | None,
+    *,
+    check: bool = True,
+    needs_torque: bool = True,
 ) -> pd.DataFrame:
     """The log, with the columns, units and gains that the options give."""
     from skidyn.logs import read_log
 
+    said = reading(options)
     with working("Reading", options):
-        return read_log(list(options.logs), robot=robot, check=check, **reading(options))
+        return read_log(
+            list(options.logs), robot=robot, check=check, needs_torque=needs_torque, **said
+        )
 
 
 def reading(options: argparse.Namespace) -> dict[str, Any]:

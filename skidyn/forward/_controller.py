@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from skidyn._columns import command_columns
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Array
 
@@ -113,7 +114,8 @@ def fit_controller(log: Any, torque: Any, *, follows_velocity: bool | None = Non
     Parameters
     ----------
     log : DataFrame
-        ``time`` (s), ``q1..``, ``dq1..`` and the reference ``q_ref1..`` (rad, m).
+        ``time`` (s), ``q1..``, ``dq1..`` and the reference ``q_ref1..`` or ``cmd1..``
+        (rad, m).
     torque : array-like of shape (n_samples, n_joints)
         Torque of the drive, N m or N.
     follows_velocity : bool or None, default=None
@@ -145,14 +147,15 @@ def fit_controller(log: Any, torque: Any, *, follows_velocity: bool | None = Non
     table, y = log, np.asarray(torque, dtype=float)
     y = y.reshape(len(y), -1)
     n = y.shape[1]
-    names = [f"{s}{j + 1}" for s in ("q", "dq", "q_ref") for j in range(n)]
+    names = [f"{s}{j + 1}" for s in ("q", "dq") for j in range(n)]
     lost = [name for name in ["time", *names] if name not in list(table.columns)]
     if lost:
         raise SkidynError(f"the log lacks the column(s) {', '.join(lost)}; a controller needs them")
+    commands = command_columns(list(table.columns), [f"joint{j + 1}" for j in range(n)])
     time = np.asarray(table["time"], dtype=float)
     q, dq, ref = (
-        np.column_stack([np.asarray(table[f"{s}{j + 1}"], dtype=float) for j in range(n)])
-        for s in ("q", "dq", "q_ref")
+        np.column_stack([np.asarray(table[name], dtype=float) for name in own])
+        for own in (names[:n], names[n:], commands)
     )
     rate = np.gradient(ref, time, axis=0)
     step = float(np.median(np.diff(time)))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn._columns import column_names, names_of_table, resolve_columns
+from skidyn._columns import column_names, command_columns, names_of_table, resolve_columns
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Array, Signals, signals_from
 from skidyn.evidence import smooth_motion
@@ -113,18 +113,10 @@ def _refuse_gaps(values: Array, what: str) -> None:
 
 
 def _reference(X: Any, model: Any) -> Array:
-    names = column_names(X) or []
-    n = model.robot_.n_joints
-    for wanted in (
-        [f"q_ref{j + 1}" for j in range(n)],
-        [f"q_ref_{name}" for name in model.robot_.joint_names],
-    ):
-        if all(name in names for name in wanted):
-            reference = np.column_stack([np.asarray(X[name], dtype=float) for name in wanted])
-            _refuse_gaps(reference, "references")
-            return reference
-    lost = [f"q_ref{j + 1}" for j in range(n) if f"q_ref{j + 1}" not in names]
-    raise SkidynError(f"X lacks the reference column(s) {', '.join(lost)} of the controller")
+    wanted = command_columns(column_names(X) or [], model.robot_.joint_names)
+    reference = np.column_stack([np.asarray(X[name], dtype=float) for name in wanted])
+    _refuse_gaps(reference, "references")
+    return reference
 
 
 def run(

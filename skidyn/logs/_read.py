@@ -54,6 +54,7 @@ def read_log(
     drop_repeated: bool = False,
     split_leaps: bool = False,
     restore_gravity: bool = False,
+    needs_torque: bool = True,
     check: bool = True,
     max_bytes: int = MAX_BYTES,
 ) -> pd.DataFrame:
@@ -119,8 +120,12 @@ def read_log(
         recordings were joined.
     restore_gravity : bool, default=False
         Add the gravity torque of ``robot`` to torque from which a driver has taken it off.
+    needs_torque : bool, default=True
+        Refuse a log without torque. False reads logs of commands and positions too, whose servos
+        are sensors of torque (:func:`skidyn.simulation.servo_torque`).
     check : bool, default=True
-        Judge the quality of the log (:func:`check_log`) and warn of what looks wrong.
+        Judge the quality of the log (:func:`check_log`) and warn of what looks wrong. A log
+        without torque is not judged.
     max_bytes : int
         Largest size of one file once unpacked.
 
@@ -180,6 +185,7 @@ def read_log(
             split_leaps=split_leaps,
             restore_gravity=restore_gravity,
         ),
+        needs_torque,
     )
     tables: list[pd.DataFrame] = []
     files: list[str] = []
@@ -208,7 +214,7 @@ def read_log(
     frame.attrs = {"joint_names": joints, "files": files, "notes": notes}
     for note in notes:
         warn_about_log(note)
-    if check:
+    if check and "tau1" in frame:
         quality = check_log(frame, robot)
         # wrong bodies of the description are no fault of the log: diagnose tells who keeps them
         told = [str(check) for check in quality.checks if check.check != "bodies"]

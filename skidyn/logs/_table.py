@@ -57,6 +57,12 @@ class TableOptions:
     split_gaps: float | Literal["auto"] | None = "auto"
     split_dwells: float | None = None
     remedies: Remedies = Remedies()
+    needs_torque: bool = True
+
+    @property
+    def needed(self) -> tuple[str, ...]:
+        """Quantities that the log must hold."""
+        return ("q", "tau") if self.needs_torque else ("q",)
 
 
 def build_table(
@@ -96,8 +102,9 @@ def build_table(
     _refuse_unused_units(tables, options.units or {}, source)
     table = align_channels(tables, [c.name for c in channels], options.resample_rate, match.notes)
     n = count_joints(table, source)
-    table = _torque_from_current(table, n, options.drive_gains, source)
-    require_columns(table, n, ("q", "tau"), source)
+    if options.needs_torque or options.drive_gains is not None:
+        table = _torque_from_current(table, n, options.drive_gains, source)
+    require_columns(table, n, options.needed, source)
     stated = [c.attributes["joint_names"] for c in channels if "joint_names" in c.attributes]
     if options.robot is None and stated and len(stated[0]) == n:
         match.joint_names = list(stated[0])
@@ -239,7 +246,7 @@ def _clean(
         velocities = {f"dq{k + 1}": dq[:, k] for k in range(n)}
         table = pd.concat([table, pd.DataFrame(velocities, index=table.index)], axis=1)
         match.notes.append(f"{source}: no velocities recorded; derived by central differences of q")
-    require_columns(table, n, ("q", "dq", "tau"), source)
+    require_columns(table, n, ("dq", *options.needed), source)
     return table
 
 

@@ -9,7 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn._columns import names_of_table, resolve_columns, trajectory_numbers
+from skidyn._columns import (
+    command_columns,
+    names_of_table,
+    resolve_columns,
+    trajectory_numbers,
+)
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Array, Signals, signals_from
 from skidyn.evidence import smooth_motion
@@ -40,8 +45,8 @@ def servo_torque(controller: Controller, log: Any) -> Array:
     controller : Controller
         Gains of the servos, delay of the command, limit of the torque.
     log : DataFrame
-        ``time`` (s), ``q1..``, ``dq1..`` (rad, m) and the command ``q_ref1..``; with several
-        recordings also ``trajectory``.
+        ``time`` (s), ``q1..``, ``dq1..`` (rad, m) and the command ``q_ref1..`` or
+        ``cmd1..``; with several recordings also ``trajectory``.
 
     Returns
     -------
@@ -81,7 +86,8 @@ def fit_servo(robot: Robot, log: Any, *, shared: bool = False) -> Controller:
     robot : Robot
         Robot, whose inertial parameters are taken as true: the gains scale with them.
     log : DataFrame
-        ``time`` (s), ``q1..``, ``dq1..`` and ``q_ref1..``, and ``trajectory`` if there are several.
+        ``time`` (s), ``q1..``, ``dq1..`` and the command ``q_ref1..`` or ``cmd1..``, and
+        ``trajectory`` if there are several.
     shared : bool, default=False
         One gain for all joints: they have the same servo and settings. Needed where a joint feels
         no gravity.
@@ -193,10 +199,7 @@ def _read(log: Any, robot: Robot | None) -> tuple[Signals, Array]:
     columns = resolve_columns(names, len(names), joints, require_acceleration=False)
     if columns.time is None:
         raise SkidynError("the log has no column 'time' (s)")
-    wanted = [f"q_ref{j + 1}" for j in range(len(joints))]
-    lost = [name for name in wanted if name not in names]
-    if lost:
-        raise SkidynError(f"the log lacks the command column(s) {', '.join(lost)}")
+    wanted = command_columns(names, joints)
     used = [*columns.q, *columns.dq, columns.time]
     used += [] if columns.trajectory is None else [columns.trajectory]
     table = np.zeros((len(log), len(names)))

@@ -57,3 +57,30 @@ def test_simulate_runs_a_fitted_model_along_a_log(capsys, tmp_path):
     assert "q1" in (tmp_path / "motion.csv").read_text().splitlines()[0]
     assert cli.main(words[:3]) == 2
     assert "--log is missing" in capsys.readouterr().err
+
+
+def test_simulate_follows_the_commands_of_a_log_without_torque(capsys, tmp_path):
+    pytest.importorskip("skops")
+    from skidyn import save_model
+    from skidyn.identification import RBDRegressor
+
+    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=2, duration=3.0)
+    save_model(tmp_path / "arm.skops", RBDRegressor(log.robot).fit(log.X, log.y))
+    frame = log.frame
+    for j in (1, 2):  # a servo of 40 N m/rad and 2 N m s/rad
+        own = frame[f"tau{j}"] + 2 * frame[f"dq{j}"]
+        frame[f"q_ref{j}"] = frame[f"q{j}"] + own / 40
+    frame.to_csv(tmp_path / "whole.csv", index=False)
+    frame.drop(columns=["tau1", "tau2"]).to_csv(tmp_path / "run.csv", index=False)
+    words = ["simulate", "--model", str(tmp_path / "arm.skops"), "--json", "--log"]
+    given = '{"stiffness": 40, "damping": 2, "follows_velocity": false}'
+    errors = []
+    for name, controller in (("run", given), ("whole", "fit")):
+        assert cli.main([*words, str(tmp_path / f"{name}.csv"), "--controller", controller]) == 0
+        errors.append(json.loads(capsys.readouterr().out)["position"])
+    assert max(errors[0]) < 0.01
+    assert errors[1] == pytest.approx(errors[0], rel=0.05)
+    assert cli.main([*words, str(tmp_path / "run.csv")]) == 2
+    assert "lacks tau1" in capsys.readouterr().err
+    assert cli.main([*words, str(tmp_path / "run.csv"), "--controller", "{}"]) == 2
+    assert "expected fit, or stiffness" in capsys.readouterr().err

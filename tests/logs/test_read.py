@@ -10,6 +10,7 @@ import pytest
 from skidyn.datasets import load_planar_arm
 from skidyn.exceptions import LogError, LogWarning
 from skidyn.logs import read_log
+from skidyn.simulation import Controller, servo_torque
 
 ROBOT = load_planar_arm()
 N = 200
@@ -306,3 +307,16 @@ def test_other_messages_by_topic_and_mapping(tmp_path):
     }
     frame = quiet_read(tmp_path / "bag", topics=["/drive"], columns=columns)
     assert_same(frame, source)
+
+
+def test_commands_may_stand_in_place_of_torque(tmp_path):
+    time = np.arange(20) * 0.01
+    table = pd.DataFrame({"time": time, "q1": np.sin(time), "q_ref1": np.sin(time) + 0.1})
+    table.to_csv(tmp_path / "run.csv", index=False)
+    with pytest.raises(LogError, match="lacks tau1"):
+        read_log(tmp_path / "run.csv")
+    with pytest.warns(LogWarning, match="no velocities recorded"):
+        frame = read_log(tmp_path / "run.csv", needs_torque=False)
+    assert frame.columns.tolist() == ["time", "trajectory", "q1", "dq1", "cmd1"]
+    torque = servo_torque(Controller(20.0), frame)
+    np.testing.assert_allclose(torque, 2.0)
