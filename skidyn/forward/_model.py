@@ -281,6 +281,12 @@ class ForwardModel:
         terms: Sequence[Term],
     ) -> Array:
         model = self.model
+        # Motion that has run away stays lost; an effect may refuse to look at it.
+        lost = ~np.isfinite(np.column_stack([q, dq, ddq, direction])).all(axis=1)
+        if lost.any():
+            q, dq, ddq, direction = (
+                np.where(lost[:, None], 0.0, x) for x in (q, dq, ddq, direction)
+            )
         rigid = model.rigid_body_torque(q, dq, ddq)
         signals = _Rows(
             q,
@@ -301,6 +307,7 @@ class ForwardModel:
         for term in terms:
             for j, block in term.torque_columns(signals).items():
                 torque[:, j] += block @ model.effect_coefficients_[term]
+        torque[lost] = np.nan
         return torque
 
     def starting_states(self, signals: Signals) -> Array:

@@ -8,7 +8,7 @@ import pytest
 from sklearn.model_selection import cross_val_score
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
-from skidyn.effects import Term
+from skidyn.effects import Coefficient, Effect, Term, register_effect, unregister_effect
 from skidyn.exceptions import SkidynError
 from skidyn.identification import RBDRegressor
 from skidyn.model_selection import TrajectoryKFold
@@ -73,6 +73,29 @@ def test_motion_that_explodes_is_infinite_not_silent(log, models):
     assert "without bound" in errors.text
     verdict = judge_by_simulation(models[0], broken, log.X[test], log.y[test])
     assert "without bound" in verdict.text
+
+
+def test_an_effect_that_refuses_motion_without_bound_does_not_stop_the_rest(log):
+    class Wary(Effect):
+        kind = "wary"
+        title = "Spring that looks at numbers only"
+        formula = "k q"
+        coefficients = (Coefficient("k", "N m/rad"),)
+
+        def columns(self, signals, joint, **shape):
+            if not np.isfinite(np.asarray(signals.q, dtype=float)).all():
+                raise ValueError("positions without bound")
+            return np.asarray(signals.q[:, joint], dtype=float)[:, None]
+
+    register_effect(Wary)
+    try:
+        model = RBDRegressor(log.robot, [Term("wary", (1,))]).fit(log.X, log.y)
+        model.effect_coefficients_[model.effect_terms_[0]] = np.array([-1e5])
+        test = log.frame["trajectory"] == 4
+        errors = simulation_errors(model, log.X[test], log.y[test])
+        assert errors.n_lost > 0
+    finally:
+        unregister_effect("wary")
 
 
 def test_scorer_prefers_the_model_that_moves_like_the_robot(log):
