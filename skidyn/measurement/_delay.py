@@ -18,6 +18,8 @@ LAGS = np.linspace(-0.06, 0.06, 13)
 GROUPS = 8
 #: Distance of the lags between which a parabola is laid, s, and how often at most.
 NEAR, STEPS = 2e-3, 6
+#: How far a lag may move, s, or twice its standard error.
+FAR = 1e-3
 #: Least velocity of rows that count, in rad/s (a tenth of it in m/s).
 SLIDING = 0.05
 #: Largest share of the torque's spread that the fit of a joint may leave for its lag to count.
@@ -136,11 +138,12 @@ def find_delay(fits: Fits) -> Delay:
     return Delay(common, error, lags, own_errors, gain, own_gains, halves, early, late, drift)
 
 
-def refined_lag(fits: Fits, start: float, late: Sequence[int]) -> float:
+def refined_lag(fits: Fits, start: float, error: float, late: Sequence[int]) -> float:
     """Lag of some torques at which all joints together are explained best.
 
     Bodies are the same for all joints here, and residuals Student's t, so that it is known better
-    than from joints one by one, and costs more.
+    than from joints one by one, and costs more. Where it is far from what joints say by themselves,
+    an effect that is missing has moved it, and it stays as it was.
 
     Parameters
     ----------
@@ -148,6 +151,8 @@ def refined_lag(fits: Fits, start: float, late: Sequence[int]) -> float:
         Rows.
     start : float, s
         About how late they are.
+    error : float, s
+        Standard error of that.
     late : sequence of int
         Joints, from 0, whose torque is late; that of others is not.
 
@@ -187,7 +192,7 @@ def refined_lag(fits: Fits, start: float, late: Sequence[int]) -> float:
         lag += float(np.clip(step, -2 * NEAR, 2 * NEAR))
         if abs(step) < NEAR / 20:
             break
-    return lag
+    return lag if abs(lag - start) < max(2 * error, FAR) else start
 
 
 def _first_half(fits: Fits) -> NDArray[np.bool_]:

@@ -358,7 +358,9 @@ class TorqueDelay(Check):
             and alike.sum() > measurement.n_joints / 2
             and (alike.mean() >= AGREEING or weight[alike].sum() >= AGREEING)
         ):
-            lag = _whole(measurement, refined_lag(fits, found.common, range(fits.n_joints)))
+            lag = _whole(
+                measurement, refined_lag(fits, found.common, found.error, range(fits.n_joints))
+            )
             ms = 1e3 * lag
             late = float(f"{lag + early:.5f}")
             yield self.suspicion(
@@ -372,12 +374,13 @@ class TorqueDelay(Check):
             )
             return
         for k in late_joints(found):
-            lag = _whole(measurement, refined_lag(fits, float(found.joints[k]), [k]))
+            lag = _whole(measurement, refined_lag(fits, found.joints[k], found.errors[k], [k]))
             lag = float(f"{lag:.5f}")
             slow, fast = 1e3 * found.halves[k]
             yield self.suspicion(
                 f"the torque of {measurement.joint(k)} is {'late' if lag > 0 else 'early'} by "
-                f"about {abs(1e3 * lag):.1f} ms, and that of other joints is not",
+                f"about {abs(1e3 * lag):.1f} ms, and that of other joints is not"
+                + ("" if lag > 0 else ", or its position and velocity are late"),
                 f"in its slower rows by {slow:.1f} ms, in its faster ones by {fast:.1f} ms, which "
                 f"gains {found.gains[k]:.0f} (log-likelihood)",
                 "suspected",
