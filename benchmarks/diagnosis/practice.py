@@ -61,7 +61,7 @@ def answer(case: Path, keep: Path | None = None) -> dict:
         command += ["--urdf", str(case / "robot.urdf"), "--model", ",".join(base)]
         start = time.perf_counter()
         run = subprocess.run(
-            [*command, "--out", str(out)],
+            [*command, "--no-cache", "--out", str(out)],
             capture_output=True,
             text=True,
             env=os.environ | {"OMP_NUM_THREADS": "1"},

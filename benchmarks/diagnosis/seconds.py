@@ -80,6 +80,11 @@ def prepare(folder: Path, rows: int) -> dict[str, list[str]]:
             "--html",
             f"{folder}/long.html",
         ],
+        f"again, {rows} x 7, page": [
+            *diagnose("long", panda, "long.json"),
+            "--html",
+            f"{folder}/long.html",
+        ],
         "diagnose, 40,000 x 7": diagnose("many", panda, "many.json"),
         "diagnose, 10,000 x 14": diagnose("14", f"{folder}/chain14.urdf", "14.json"),
         "diagnose, 10,000 x 30": diagnose("30", f"{folder}/chain30.urdf", "30.json"),

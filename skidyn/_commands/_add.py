@@ -8,8 +8,9 @@ from typing import Any
 
 from skidyn._commands._arguments import JsonFile, command, with_joints, with_report
 from skidyn._commands._input import joint_numbers, read_model_and_log, read_robot, recorded_options
-from skidyn._commands._output import parameters, print_json, run_diagnosis, write_json
+from skidyn._commands._output import parameters, print_json, run_diagnosis
 from skidyn._text import digits
+from skidyn._writing import write_json
 
 DESCRIPTION = """\
 Add an effect to a model that skidyn diagnose has judged, and print the held-out error before and

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from skidyn._commands._arguments import Page, command
-from skidyn._commands._output import print_json, rmse_per_joint, working, write_reports
+from skidyn._commands._output import print_json, rmse_per_joint, working, write_page
 from skidyn._text import digits
 
 #: Speed in rad/s above which a joint moves.
@@ -61,7 +61,7 @@ def run(options: argparse.Namespace) -> None:
         if row["speaks"]:
             a, b = (digits(errors[row["joint"] - 1]) for errors in (before, after))
             say(f"   {row['name']} (joint {row['joint']}): {a} → {b} {row['unit']}")
-    write_reports(diagnosis, None, options.html, {"log": "simulated by skidyn demo"})
+    write_page(diagnosis, options.html, {"log": "simulated by skidyn demo"})
     page = str(Path(options.html).resolve())
     if options.json:
         kinds = [finding.kind for finding in diagnosis.findings]

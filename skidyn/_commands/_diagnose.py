@@ -5,22 +5,23 @@ from __future__ import annotations
 
 import argparse
 import shlex
+import warnings
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from skidyn._commands._arguments import JsonFile, Page, command, with_log
 from skidyn._commands._input import read_model_and_log
+from skidyn._commands._kept import Kept, noting
 from skidyn._commands._output import (
-    print_diagnosis,
     print_json,
     provenance,
     run_diagnosis,
     working,
-    write_reports,
 )
-
-if TYPE_CHECKING:
-    from skidyn.diagnosis import Diagnosis
+from skidyn._commands._story import answer_lines
+from skidyn._exceptions import LogWarning
+from skidyn._writing import write_json
 
 DESCRIPTION = """\
 Compare a model with a log and learn which physical effect it lacks.
@@ -46,41 +47,80 @@ def add_parser(commands: Any) -> None:
         action="store_true",
         help="also judge findings by the simulated motion; those that worsen it are not added",
     )
+    parser.add_argument(
+        "--no-cache",
+        action="store_true",
+        help="diagnose again although the same was asked before, and keep no answer beside the log",
+    )
     parser.add_argument("--effects", help="kinds to try, separated by commas (default: all)")
 
 
 def run(options: argparse.Namespace) -> None:
-    model, frame, tau = read_model_and_log(options, check=False)
-    diagnosis = run_diagnosis(model, frame, tau, options)
-    if options.simulate:
-        with working("Simulating", options):
-            diagnosis.judge_by_simulation()
-    write_reports(diagnosis, options.out, options.html, provenance(options))
+    kept = Kept(options)
+    answer = kept.read()
+    again = answer is not None and (answer["page"] is not None or not options.html)
+    if answer is None or not again:
+        answer = _answer(options)
+        kept.write(answer)
+    for note in answer["noted"]:
+        warnings.warn(note, LogWarning, stacklevel=2)
+    if options.out:
+        write_json(options.out, {**answer["report"], "provenance": provenance(options)})
+    if options.html:
+        from skidyn.report import write_html
+
+        write_html(options.html, answer["page"])
     if options.json:
-        print_json(diagnosis.to_dict())
-    else:
-        print_diagnosis(diagnosis, options)
-        for path in filter(None, (options.out, options.html)):
-            print(f"written: {Path(path).resolve()}")
-        for line in _next(diagnosis, options):
-            print(line)
+        print_json(answer["report"])
+        return
+    for line in answer_lines(answer):
+        print(line)
+    options.told = answer["told"]
+    for path in filter(None, (options.out, options.html)):
+        print(f"written: {Path(path).resolve()}")
+    for line in _next(answer, options):
+        print(line)
+    if again:
+        print("This was asked before, and the answer kept; --no-cache diagnoses again.")
 
 
-def _next(diagnosis: Diagnosis, options: argparse.Namespace) -> list[str]:
+def _answer(options: argparse.Namespace) -> dict[str, Any]:
+    """What is found, as values that can be kept."""
+    with noting() as noted:
+        model, frame, tau = read_model_and_log(options, check=False)
+        diagnosis = run_diagnosis(model, frame, tau, options)
+        if options.simulate:
+            with working("Simulating", options):
+                diagnosis.judge_by_simulation()
+        page = None
+        if options.html:
+            from skidyn.report import summarize
+
+            page = summarize(diagnosis, provenance=provenance(options))
+    return {
+        "report": diagnosis.to_dict(),
+        "story": diagnosis.story(),
+        "failures": [asdict(failure) for failure in diagnosis.failures],
+        "rivals": any(finding.rivals for finding in diagnosis.findings),
+        "page": page,
+        "told": list(diagnosis.warnings),
+        "noted": noted,
+    }
+
+
+def _next(answer: dict[str, Any], options: argparse.Namespace) -> list[str]:
     """The commands that may follow."""
     if not options.out:
         if options.html:
             return []
         return ["next: the same with --out report.json --html report.html keeps this as a page"]
-    if not diagnosis.findings:
-        return []
     report = shlex.quote(options.out)
-    named = [line for line in diagnosis.story()["findings"] if line["kind"] != "unknown"]
+    named = [line for line in answer["story"]["findings"] if line["kind"] != "unknown"]
     lines = []
     if named:
         joints = ",".join(map(str, named[0]["joints"]))
         kind = named[0]["kind"]
         lines.append(f"next: skidyn add --from {report} --effect {kind} --joints {joints}")
-    if any(finding.rivals for finding in diagnosis.findings):
+    if answer["rivals"]:
         lines.append(f"next: skidyn separate --from {report} --out motion.csv")
     return lines

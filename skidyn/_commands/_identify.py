@@ -8,7 +8,8 @@ from typing import Any
 
 from skidyn._commands._arguments import JsonFile, command, with_log
 from skidyn._commands._input import read_model_and_log
-from skidyn._commands._output import parameters, print_json, working, write_json
+from skidyn._commands._output import parameters, print_json, working
+from skidyn._writing import write_json
 
 #: Those that need nothing but a log.
 ESTIMATORS = ("weighted", "ordinary", "robust", "ridge", "entropic")

@@ -38,21 +38,11 @@ def run_diagnosis(
         return diagnose(model, frame, tau, effects=kinds, rate=rate, settings=settings, force=force)
 
 
-def write_reports(
-    diagnosis: Diagnosis, out: str | None, html: str | None, provenance: dict[str, Any]
-) -> None:
-    if out:
-        write_json(out, {**diagnosis.to_dict(), "provenance": provenance})
+def write_page(diagnosis: Diagnosis, html: str | None, provenance: dict[str, Any]) -> None:
     if html:
         from skidyn.report import summarize, write_html
 
         write_html(html, summarize(diagnosis, provenance=provenance))
-
-
-def write_json(path: str, content: dict[str, Any]) -> None:
-    from skidyn.report import write_json
-
-    write_json(path, content)
 
 
 def write_table(frame: pd.DataFrame, path: str) -> None:
@@ -173,14 +163,6 @@ def print_json(content: Any) -> None:
     from skidyn._plain import plain
 
     print(json.dumps(plain(content), indent=2))
-
-
-def print_diagnosis(diagnosis: Diagnosis, options: argparse.Namespace) -> None:
-    from skidyn._commands._story import story_lines
-
-    for line in story_lines(diagnosis.story(), diagnosis.failures):
-        print(line)
-    options.told = list(diagnosis.warnings)
 
 
 def print_comparison(comparison: Comparison) -> None:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 from skidyn._checks import warn_about_log
 from skidyn._commands._arguments import Input, JsonFile, command, with_log_only
 from skidyn._commands._input import json_option, read_frame, read_robot
-from skidyn._commands._output import print_json, working, write_json
+from skidyn._commands._output import print_json, working
 from skidyn._exceptions import SkidynError
+from skidyn._writing import write_json
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -9,7 +9,7 @@ from typing import Any
 
 from skidyn._commands._arguments import Page, command, with_report
 from skidyn._commands._input import read_model_and_log, recorded_options
-from skidyn._commands._output import print_json, provenance, run_diagnosis, write_reports
+from skidyn._commands._output import print_json, provenance, run_diagnosis, write_page
 
 DESCRIPTION = """\
 Turn a report into one HTML page that needs no network. The log is read anew and the diagnosis run
@@ -31,7 +31,7 @@ def run(options: argparse.Namespace) -> None:
     options = recorded_options(options)
     model, frame, tau = read_model_and_log(options)
     diagnosis = run_diagnosis(model, frame, tau, options)
-    write_reports(diagnosis, None, options.html, provenance(options))
+    write_page(diagnosis, options.html, provenance(options))
     page = str(Path(options.html).resolve())
     if options.json:
         print_json({"html": page})

@@ -6,6 +6,7 @@ from __future__ import annotations
 import shutil
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from types import SimpleNamespace
 from typing import Any
 
 from skidyn._text import digits, joints_told, listed
@@ -51,6 +52,15 @@ def story_lines(story: Mapping[str, Any], failures: Sequence[Any] = ()) -> Itera
     if any(row["speaks"] for row in story["joints"]):
         yield ""
         yield story["left"]
+
+
+def answer_lines(answer: Mapping[str, Any]) -> Iterator[str]:
+    """The same of an answer that may have been kept, whose failures are mappings."""
+    failures = [
+        SimpleNamespace(**{**told, "places": [SimpleNamespace(**p) for p in told["places"]]})
+        for told in answer["failures"]
+    ]
+    yield from story_lines(answer["story"], failures)
 
 
 def where_lines(failures: Sequence[Any]) -> Iterator[str]:

@@ -12,7 +12,6 @@ from skidyn._exceptions import SkidynError
 from skidyn._plain import plain
 from skidyn._text import digits, inside, joints_told, listed
 from skidyn._version import versions
-from skidyn.metrics import paired_comparison, trajectory_errors
 from skidyn.report._heat import judged_regimes
 from skidyn.report._parameters import parameter_rows
 from skidyn.report._picture import read_all
@@ -153,6 +152,8 @@ def _side(diagnosis: Diagnosis, name: str, provenance: Mapping[str, Any]) -> dic
 
 def _ratios(first: Diagnosis, second: Diagnosis, same: bool) -> list[dict[str, Any]]:
     """Error of the second over the first, as given; an interval where the log is the same."""
+    from skidyn.metrics import paired_comparison  # not paid for by who only writes a page
+
     rows = []
     for j in range(len(first.joint_names)):
         before = first.rmse_before[j]
@@ -169,6 +170,8 @@ def _ratios(first: Diagnosis, second: Diagnosis, same: bool) -> list[dict[str, A
 
 def _errors(diagnosis: Diagnosis, joint: int) -> Array:
     """Mean squared error of every trajectory while the joint slides, (N m)^2 or N^2."""
+    from skidyn.metrics import trajectory_errors  # not paid for by who only writes a page
+
     c = diagnosis.comparison
     use = c.sliding[:, joint]
     _, errors = trajectory_errors(

@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from skidyn.diagnosis import regimes
-
 if TYPE_CHECKING:
     from skidyn.diagnosis import Diagnosis
 
@@ -19,6 +17,8 @@ DEEPEST = 5.0
 
 def judged_regimes(diagnosis: Diagnosis) -> list[list[bool]]:
     """Whether effects are judged in a regime, by joint and regime."""
+    from skidyn.diagnosis import regimes  # not paid for by who only writes a page
+
     judged = diagnosis.comparison.judged_samples
     table = []
     for inside in regimes(diagnosis.comparison).values():

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array, Signals
-from skidyn.diagnosis import regimes
 from skidyn.report._decimate import rows_with_peaks
 
 if TYPE_CHECKING:
@@ -43,6 +42,8 @@ def traces(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         ``starts`` of the trajectories, ``apart`` (stretches of time that are not judged, with the
         reason) and ``frame`` (range of the residual's axis, and what lies outside it).
     """
+    from skidyn.diagnosis import regimes  # not paid for by who only writes a page
+
     comparison, after = diagnosis.comparison, diagnosis.comparison_after
     signals = comparison.signals
     clock, starts = elapsed(signals)

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from skidyn.diagnosis import notes
 from skidyn.effects import get_effect
 from skidyn.report._figures import finding_charts
 from skidyn.report._maps import residual_maps
@@ -23,6 +22,8 @@ class What(Picture):
 
     def read(self, subject: Diagnosis) -> list[dict[str, Any]]:
         """Every finding with its curves and maps."""
+        from skidyn.diagnosis import notes  # not paid for by who only writes a page
+
         return [
             {
                 **finding.to_dict(),
