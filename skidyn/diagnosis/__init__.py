@@ -56,4 +56,3 @@ from skidyn.diagnosis._rule import variance_inflation as variance_inflation
 from skidyn.diagnosis._screen import CANDIDATE_RIDGE as CANDIDATE_RIDGE
 from skidyn.diagnosis._spectrum import find_lines as find_lines
 from skidyn.diagnosis._split import split_effects as split_effects
-from skidyn.diagnosis._story import sure as sure

@@ -8,4 +8,4 @@ from skidyn.forward._controller import (
 )
 from skidyn.forward._model import ForwardModel as ForwardModel
 from skidyn.forward._run import STEP as STEP, Task as Task, read_task as read_task, run as run
-from skidyn.forward._windows import Windows as Windows, make_windows as make_windows
+from skidyn.forward._windows import make_windows as make_windows

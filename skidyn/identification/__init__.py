@@ -30,4 +30,4 @@ from skidyn.identification._recordings import (
     recognise as recognise,
     remember as remember,
 )
-from skidyn.identification._regression import Regression as Regression, Solution as Solution
+from skidyn.identification._regression import Solution as Solution
