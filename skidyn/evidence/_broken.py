@@ -105,13 +105,24 @@ def without_broken(motion: SmoothedMotion, logged: Signals, torque: Array) -> Sm
     torque : ndarray of shape (n_samples, n_joints)
         Logged torque.
     """
-    wrong = leaps(torque, logged, TORQUE_SHARE, reversals(logged))
+    wrong, broken = _broken(logged, torque)
     # The torque of every joint depends on all positions.
-    position = np.asarray(leaps(logged.q, logged, POSITION_SHARE).any(1))
+    position = np.asarray(broken.any(1))
     if position.any():
         position = binary_dilation(position, iterations=max(1, motion.half_width))
     valid = motion.valid & ~wrong & ~position[:, None]
     return replace(motion, valid=valid)
+
+
+def _broken(signals: Signals, torque: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Broken samples of torque and of positions, looked for once in the same signals."""
+
+    def find() -> NDArray[np.bool_]:
+        return leaps(torque, signals, TORQUE_SHARE, reversals(signals))
+
+    of, wrong = signals.once("broken torque", lambda: (torque, find()))
+    position = signals.once("broken positions", lambda: leaps(signals.q, signals, POSITION_SHARE))
+    return wrong if of is torque else find(), position
 
 
 def broken_notes(signals: Signals, torque: Array, joint_names: tuple[str, ...]) -> list[str]:
@@ -134,10 +145,8 @@ def broken_notes(signals: Signals, torque: Array, joint_names: tuple[str, ...]) 
     if signals.time is None:
         return []
     notes = []
-    for what, values, broken in (
-        ("torque", torque, leaps(torque, signals, TORQUE_SHARE, reversals(signals))),
-        ("position", signals.q, leaps(signals.q, signals, POSITION_SHARE)),
-    ):
+    wrong, position = _broken(signals, torque)
+    for what, values, broken in (("torque", torque, wrong), ("position", signals.q, position)):
         for j in np.flatnonzero(broken.any(0)):
             rows = np.flatnonzero(broken[:, j])
             first = rows[0]
