@@ -172,8 +172,11 @@ class ReconsideringSearch(JudgingSearch):
             self._restore(kept)
         return None
 
-    def withdraw(self, newest: Hypothesis | None = None) -> None:
-        """Take back what no longer holds beside all that was added after it."""
+    def withdraw(self, newest: Hypothesis | None = None) -> Hypothesis | None:
+        """Take back what no longer holds beside all that was added after it.
+
+        Returns the newest finding, its shapes found again where it took the place of another.
+        """
         for old in [h for h in self.findings if h is not newest and h.torque is None]:
             without = [c for c in self.chosen if c not in old.candidates]
             richer = newest is not None and family_of(old) == family_of(newest) != ""
@@ -194,6 +197,7 @@ class ReconsideringSearch(JudgingSearch):
                 kept = ()
             if len(kept) < len(old.candidates):
                 self._replace(old, kept, without)
+        return newest
 
     def _refined_anew(self, finding: Hypothesis) -> Hypothesis:
         """A finding with its shapes found again, now that others have changed."""

@@ -65,7 +65,8 @@ class _Search(ReconsideringSearch):
                 break
             steps.append(Step([best, *(h for h in ranking if h.kind != best.kind)], best))
             self.add(best)
-            self.withdraw(best)
+            best = self.withdraw(best) or best
+            steps[-1].added = best
             self.refit()
             best = self._settled(best, steps)
             self.reconsider(best, steps)

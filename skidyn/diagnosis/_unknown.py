@@ -114,27 +114,28 @@ def describe_unknowns(
         effect = term.effect
         assert isinstance(effect, NamelessEffect)
         guessed = effect.variables(term.places[0], dict(term.shape))
-        if len(term.places) > 1:  # on the whole robot, as a force at the tool
+        if effect.scope == "robot":  # as a force at the tool
             for joint in term.places:
                 own = (f"q{joint + 1}",)
                 shape = _shape(problem, term, joint, whole[span], left[:, span], own)
                 found.append(UnknownTorque(joint + 1, guessed, (), shape, None))
             continue
-        (joint,) = term.places
         known = np.ones(len(whole), dtype=bool)
         known[span] = False
-        without = _Remainder([d[:, known] for d in design], sigma, joint)
-        rows = without(problem.term_rows(term)[joint])
-        explained = rows @ whole[span]
-        residual = target[joint] - design[joint] @ whole + explained
-        tests = depends_on(problem, joint, residual, guessed, rows, without)
-        needed = {t.variable for t in tests if t.needed}
-        if effect.is_of_one_number or not needed:
-            needed = set(guessed)
-        variables = tuple(sorted(needed, key=lambda v: (v not in guessed, v)))
-        shape = _shape(problem, term, joint, whole[span], left[:, span], variables)
-        proposal = propose(problem, joint, residual, explained, variables, _waves(term), without)
-        found.append(UnknownTorque(joint + 1, variables, tuple(tests), shape, proposal))
+        for joint in term.places:
+            without = _Remainder([d[:, known] for d in design], sigma, joint)
+            rows = without(problem.term_rows(term)[joint])
+            explained = rows @ whole[span]
+            residual = target[joint] - design[joint] @ whole + explained
+            tests = depends_on(problem, joint, residual, guessed, rows, without)
+            needed = {t.variable for t in tests if t.needed}
+            if effect.is_of_one_number or not needed:
+                needed = set(guessed)
+            variables = tuple(sorted(needed, key=lambda v: (v not in guessed, v)))
+            shape = _shape(problem, term, joint, whole[span], left[:, span], variables)
+            waves = _waves(term)
+            proposal = propose(problem, joint, residual, explained, variables, waves, without)
+            found.append(UnknownTorque(joint + 1, variables, tuple(tests), shape, proposal))
     return found
 
 

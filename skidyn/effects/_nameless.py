@@ -384,6 +384,7 @@ class TorqueBetweenTwoJoints(NamelessEffect):
     between them stores energy, as a cable that tightens or links that touch each other.
     """
 
+    is_of_one_number = True
     kind = "torque_between_two_joints"
     title = "Torque between two joints"
     formula = r"f(x),\quad x = q_i + r\,q_j"
