@@ -14,7 +14,7 @@ distribution, J. American Statistical Association 84(408), 881-896.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
@@ -331,30 +331,34 @@ class Fits:
         columns, designs, places, targets = self._designs(reading)
         return self._spread(columns, fit_together(designs, places, targets))
 
-    def predicted_without(self, rows: NDArray[np.bool_]) -> dict[int, tuple[Array, float]]:
+    def predicted_without(
+        self, parts: Iterable[NDArray[np.bool_]]
+    ) -> Iterator[dict[int, tuple[Array, float]]]:
         """What bodies that are identified without some rows predict for these.
 
         Parameters
         ----------
-        rows : ndarray of shape (n_rows,) of bool
-            Rows that are left out.
+        parts : iterable of ndarray of shape (n_rows,) of bool
+            Rows that are left out, one part after the other.
 
-        Returns
-        -------
+        Yields
+        ------
         dict of int to (ndarray, float)
             By joint: prediction of the rows left out in which it moves, and scale of the residual
             of the others.
         """
         joints, designs, places, targets = self._designs(Reading())
-        out = [rows[self.moving[:, k]] for k in joints]
-        kept = [(d[~o], y[~o]) for d, y, o in zip(designs, targets, out, strict=True)]
-        if any(len(y) < FEWEST for _, y in kept):
-            return {}
-        fits = fit_together([d for d, _ in kept], places, [y for _, y in kept])
-        return {
-            k: (d[o] @ fit.coefficients, fit.scale)
-            for k, d, o, fit in zip(joints, designs, out, fits, strict=True)
-        }
+        for rows in parts:
+            out = [rows[self.moving[:, k]] for k in joints]
+            kept = [(d[~o], y[~o]) for d, y, o in zip(designs, targets, out, strict=True)]
+            if any(len(y) < FEWEST for _, y in kept):
+                yield {}
+                continue
+            fits = fit_together([d for d, _ in kept], places, [y for _, y in kept])
+            yield {
+                k: (d[o] @ fit.coefficients, fit.scale)
+                for k, d, o, fit in zip(joints, designs, out, fits, strict=True)
+            }
 
     def only(self, rows: NDArray[np.bool_]) -> Fits:
         """Some of the rows."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import repeat
 
 import numpy as np
 from numpy.typing import NDArray
@@ -210,9 +211,10 @@ def _multiples(seen: Explained) -> list[Multiple]:
     # one recording of a few spoils the bodies that all of them identify
     apart = bool(np.any(seen.errors[1] > SPOILED))
     told = []
-    for run in np.unique(fits.signals.trajectory):
-        rows = _rows_of(fits, run)
-        others = fits.predicted_without(rows) if apart else {}
+    runs = np.unique(fits.signals.trajectory)
+    parts = [_rows_of(fits, run) for run in runs]
+    predicted = fits.predicted_without(parts) if apart else repeat({})
+    for run, rows, others in zip(runs, parts, predicted, strict=False):
         for k in seen.joints:
             use = fits.moving[:, k]
             y = fits.average(fits.torque[:, k])[use]
