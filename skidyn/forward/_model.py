@@ -282,7 +282,7 @@ class ForwardModel:
     ) -> Array:
         model = self.model
         # Motion that has run away stays lost; an effect may refuse to look at it.
-        lost: NDArray[np.bool_] = ~np.isfinite(np.column_stack([q, dq, ddq, direction])).all(axis=1)
+        lost = np.asarray(~np.isfinite(np.column_stack([q, dq, ddq, direction])).all(axis=1))
         if lost.any():
             q, dq, ddq, direction = (
                 np.where(lost[:, None], 0.0, x) for x in (q, dq, ddq, direction)
