@@ -26,7 +26,7 @@ from skidyn.effects import Term, make_terms
 from skidyn.evidence import Problem
 from skidyn.identification import RBDRegressor
 from skidyn.measurement import Suspicion
-from skidyn.simulation import HORIZON, SimulationVerdict, judge_additions
+from skidyn.simulation import HORIZON, Controller, SimulationVerdict, judge_additions
 
 #: How the sentence on a finding begins that the model for simulation is without.
 _VETO = "Not in the completed model, because it worsens the simulated motion:"
@@ -223,7 +223,7 @@ class Diagnosis:
         return self._refitted([t for f in kept for t in f.terms])
 
     def judge_by_simulation(
-        self, horizon: float | None = HORIZON
+        self, horizon: float | None = HORIZON, *, controller: Controller | None = None
     ) -> list[SimulationVerdict | None]:
         """Judge every finding by the motion of the model along recordings left out of its fit.
 
@@ -235,6 +235,9 @@ class Diagnosis:
         ----------
         horizon : float, s, or None, default=1.0
             Time after which the simulated model is put back on the log; None for whole recordings.
+        controller : Controller, optional
+            Drives the model by the commands of X (``q_ref1..`` or ``cmd1..``) in place of the
+            torque: for logs of position servos.
 
         Returns
         -------
@@ -256,7 +259,9 @@ class Diagnosis:
                 "an RBDRegressor"
             )
         additions = [finding.terms for finding in self.findings]
-        verdicts = judge_additions(self.base_model, additions, *self.data[:2], horizon=horizon)
+        verdicts = judge_additions(
+            self.base_model, additions, *self.data[:2], controller=controller, horizon=horizon
+        )
         self.vetoed = [
             f for f, v in zip(self.findings, verdicts, strict=True) if v is not None and v.worsens
         ]

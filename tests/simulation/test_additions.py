@@ -8,7 +8,7 @@ from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
 from skidyn.exceptions import SkidynError
 from skidyn.identification import RBDRegressor
-from skidyn.simulation import judge_additions
+from skidyn.simulation import Controller, judge_additions, servo_torque
 
 FRICTION = ("viscous", "coulomb")
 
@@ -83,6 +83,20 @@ def test_a_diagnosis_keeps_what_helps_and_tells_what_does_not(log, diagnosis):
     diagnosis.base_model = given
     diagnosis.judge_by_simulation()
     assert not [note for note in diagnosis.warnings if "worsens the simulated motion" in note]
+
+
+def test_findings_of_a_log_of_commands_are_judged_through_the_servo(log):
+    servo = Controller(60.0, 4.0, follows_velocity=False)
+    torque = np.asarray(log.y)
+    commands = (
+        log.frame[["q1", "q2"]].to_numpy()
+        + (torque + 4.0 * log.frame[["dq1", "dq2"]].to_numpy()) / 60.0
+    )
+    X = log.X.assign(cmd1=commands[:, 0], cmd2=commands[:, 1])
+    diagnosis = diagnose(RBDRegressor(log.robot, FRICTION), X, servo_torque(servo, X))
+    assert [finding.kind for finding in diagnosis.findings] == ["spring"]
+    (verdict,) = diagnosis.judge_by_simulation(controller=servo)
+    assert verdict.improves and diagnosis.vetoed == []
 
 
 def test_only_models_with_an_inertia_are_judged(log, diagnosis):
