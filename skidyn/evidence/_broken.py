@@ -58,15 +58,18 @@ def leaps(
             for end in (rows.start, rows.stop - WIDTH // 2):
                 least[end : end + WIDTH // 2] = 1.0
     broken = np.zeros(values.shape, dtype=bool)
-    coarse = STEPS * _smallest_change(values)
+    coarse = None
     for name in np.unique(signals.trajectory):
         own = signals.trajectory == name
-        low, high = np.quantile(away[own], TAILS, axis=0)
         bottom, top = np.quantile(values[own], TAILS, axis=0)
+        distance = np.abs(away[own])
         # Strictly above: a signal that rests has no range and no leaps.
-        broken[own] = np.abs(away[own]) > np.maximum(
-            np.maximum(FAR * (high - low), coarse), least[own] * (top - bottom)
-        )
+        far = distance > least[own] * (top - bottom)
+        if not far.any():
+            continue
+        coarse = STEPS * _smallest_change(values) if coarse is None else coarse
+        low, high = np.quantile(away[own], TAILS, axis=0)
+        broken[own] = far & (distance > np.maximum(FAR * (high - low), coarse))
     return broken
 
 

@@ -242,6 +242,7 @@ class _Windows:
     row: NDArray[np.int64]
     sample: NDArray[np.int64]
     weight: Array
+    full: Array  # weight of every window, (n_windows,)
 
 
 def _windows(time: Array, offset: int, window: float) -> _Windows:
@@ -256,7 +257,8 @@ def _windows(time: Array, offset: int, window: float) -> _Windows:
     within = np.arange(len(row)) - np.repeat(np.cumsum(length) - length, length)
     sample = np.repeat(first, length) + within
     weight = np.cos(np.pi * (time[sample] - middle[row]) / width) ** 2
-    return _Windows(middle, row, sample + offset, weight)
+    full = np.bincount(row, weight, minlength=len(middle))
+    return _Windows(middle, row, sample + offset, weight, full)
 
 
 Entries = tuple[NDArray[np.int64], NDArray[np.int64], Array, int]
@@ -267,9 +269,8 @@ def _weigh(span: _Windows, use: NDArray[np.bool_]) -> tuple[Entries, NDArray[np.
     n = len(span.middle)
     kept = use[span.sample]
     row, sample, weight = span.row[kept], span.sample[kept], span.weight[kept]
-    full = np.bincount(span.row, span.weight, minlength=n)
     total = np.bincount(row, weight, minlength=n)
-    keep = (total > 0) & (total >= LEAST_WEIGHT * full)
+    keep = (total > 0) & (total >= LEAST_WEIGHT * span.full)
     gain = np.sqrt(np.bincount(row, weight**2, minlength=n))
     inside = keep[row]
     number = np.cumsum(keep) - 1
@@ -278,8 +279,9 @@ def _weigh(span: _Windows, use: NDArray[np.bool_]) -> tuple[Entries, NDArray[np.
 
 
 def _stack(parts: list[Entries], n_samples: int) -> csr_matrix:
-    shift = np.cumsum([0, *(part[3] for part in parts)])
-    row = np.concatenate([part[0] + s for part, s in zip(parts, shift[:-1], strict=True)])
+    """Rows of all segments; entries are sorted by row and by sample already."""
+    lengths = [np.bincount(part[0], minlength=part[3]) for part in parts]
+    start = np.cumsum(np.concatenate([[0], *lengths]))
     sample = np.concatenate([part[1] for part in parts])
     value = np.concatenate([part[2] for part in parts])
-    return csr_matrix((value, (row, sample)), shape=(int(shift[-1]), n_samples))
+    return csr_matrix((value, sample, start), shape=(len(start) - 1, n_samples))
