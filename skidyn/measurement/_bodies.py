@@ -172,6 +172,16 @@ class TorqueScale(Check):
             wrong = not USUAL[0] <= gain <= USUAL[1] and k in known
             if gained > (LEAST if wrong else SURE) and apart > LEAST and not low <= own <= high:
                 found[k] = own
+            elif wrong and gained > 0:
+                yield self.suspicion(
+                    f"either the torque of {measurement.joint(k)} is at another scale than that of "
+                    "the other joints, or the bodies it moves are not those stated",
+                    f"it is {gain:.3g} times that of the stated bodies; the other joints cannot "
+                    "tell which",
+                    "noted",
+                    [k],
+                    _gain_remedy({k: gain}),
+                )
         told, evidence = ", ".join(f"{gains[k]:.3g}" for k in found), []
         if found:
             fitted = ", ".join(f"{gain:.3g}" for gain in found.values())
@@ -253,8 +263,8 @@ def joint_gain(fits: Fits, k: int, gain: float) -> tuple[float, float, float]:
         change[k] -= rows * log / max(other.inflation[k], 1.0)
         return float(change.sum())
 
-    log, step = np.log(gain), 0.2
-    best = gained(log)
+    step = 0.08  # summits are as narrow as the noise is small
+    best, log = max((gained(x), x) for x in np.log(gain) + step * np.arange(-5, 6))
     while step > 0.005:
         near, other = max((gained(x), x) for x in (log - step, log + step))
         if near > best:

@@ -127,7 +127,8 @@ def check_measurement(measurement: Measurement) -> list[Suspicion]:
             continue
         told = list(check.look(measurement))
         found += told
-        measurement.scaled |= check.name == "torque_scale" and bool(told)
+        doubted = any(s.certainty != "noted" for s in told)
+        measurement.scaled |= check.name == "torque_scale" and doubted
         if check in _UNITS and any(s.certainty == "certain" for s in told):
             misread = 1
         elif check in _SCALES and any(s.certainty == "suspected" for s in told):
