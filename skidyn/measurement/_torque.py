@@ -206,7 +206,10 @@ class Columns(Check):
     def _told(
         self, measurement: Measurement, kind: str, changes: list[Change], final: Reading
     ) -> Suspicion:
-        joints = sorted({j for change in changes for j in change.joints})
+        turned = [j for change in changes for j in change.joints]
+        joints = sorted(set(turned))
+        if kind.endswith("_sign"):  # what was turned round twice is as it was
+            joints = [j for j in joints if turned.count(j) % 2]
         names = ", ".join(measurement.joint(j) for j in joints)
         best = max(changes, key=lambda change: change.gain)
         evidence = (

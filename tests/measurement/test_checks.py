@@ -16,10 +16,13 @@ from skidyn.measurement import (
     Measurement,
     Remedy,
     Suspicion,
+    _torque,
     check_measurement,
     list_checks,
     refuse_certain,
 )
+from skidyn.measurement._fits import Reading
+from skidyn.measurement._readings import Change
 
 ROBOT = load_planar_arm()
 LOG = make_hidden_effect_log(ROBOT, "stribeck", joints=[2], n_trajectories=4, random_state=3)
@@ -368,3 +371,14 @@ def test_a_torque_far_beyond_the_effort_limit():
     assert "torque_scale" not in told_of(LOG.frame, robot)
     told = told_of(LOG.frame.assign(tau2=1e3 * LOG.frame["tau2"]), robot)["torque_scale"]
     assert told.joints == (2,) and told.remedy.option == "--gain tau2=0.001"
+
+
+def test_a_torque_that_is_turned_round_twice_is_as_it_was(monkeypatch):
+    every, one = frozenset([0, 1]), frozenset([1])
+    changes = [
+        Change("torque_sign", (0, 1), Reading(flip_torque=every), gain=80.0, drop=0.6),
+        Change("torque_sign", (0,), Reading(flip_torque=one), gain=50.0, drop=0.5),
+    ]
+    monkeypatch.setattr(_torque, "find_changes", lambda fits: changes)
+    told = told_of(LOG.frame)["reading"]
+    assert told.joints == (2,) and told.remedy.option == "--flip tau2"
