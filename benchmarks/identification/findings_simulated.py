@@ -21,10 +21,7 @@ from skidyn.logs import load_recording
 from skidyn.robots import Robot
 
 #: Runs of the UR10e of about 20 s, and its drive gains, N m/A.
-UR10E_RUNS = [
-    *("ur-20_02_05-20sec_12harm", "ur-20_02_05-20sec_8harm", "ur-20_02_06-20sec_10harm"),
-    *("ur-20_02_06-20sec_5harm", "ur-20_02_10-20sec_7harm"),
-]
+UR10E_RUNS = ["ur-20_02_05-20sec_12harm", "ur-20_02_06-20sec_10harm", "ur-20_02_10-20sec_7harm"]
 UR10E_GAINS = 0.91 * np.array([14.87, 13.26, 11.13, 10.62, 11.03, 11.47])
 EFFECTS = ("viscous", "coulomb", "offset", "rotor_inertia")
 
