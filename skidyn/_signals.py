@@ -142,6 +142,14 @@ class Signals:
         """Time in s; the sample number where no time is logged."""
         return np.arange(self.n_samples, dtype=float) if self.time is None else self.time
 
+    @cached_property
+    def steps(self) -> list[float]:
+        """Usual time from one sample to the next in every segment, s; 1 where there is one only."""
+        return [
+            float(np.median(np.diff(self.clock[rows]))) if rows.stop - rows.start > 1 else 1.0
+            for rows in self.segments
+        ]
+
     def once(self, name: Hashable, make: Callable[[], Any]) -> Any:
         """What ``make`` derives from these signals, computed when it is first asked for.
 

@@ -32,11 +32,10 @@ def smooth_derivatives(
         Derivatives per s and per s^2.
     """
     result = tuple(np.zeros_like(values) for _ in range(3))
-    for rows in signals.segments:
+    for rows, step in zip(signals.segments, signals.steps, strict=True):
         y = values[rows]
         if len(y) < 7:
             continue
-        step = float(np.median(np.diff(signals.clock[rows])))
         half = max(3, int(_SMOOTHING / 2 / step))
         width = min(2 * half + 1, (len(y) - 1) // 2 * 2 + 1)
         parts = local_polynomial(y, width, min(order, width - 1), step)

@@ -39,10 +39,10 @@ def _oscillator(load: Array, signals: Signals, resonance: float, damping: float)
 
     omega = 2 * np.pi * resonance
     wind_up = np.zeros_like(load)
-    for rows in signals.segments:
+    for rows, step in zip(signals.segments, signals.steps, strict=True):
         if rows.stop - rows.start < 7:
             continue
-        rate = 1.0 / float(np.median(np.diff(signals.clock[rows])))
+        rate = 1.0 / step
         # The swing of a link faster than the sampling cannot be seen; it follows at once.
         w = min(omega, rate)
         b, a, settled = _swing(w, damping, rate)
@@ -187,8 +187,7 @@ class Backlash(_LinkSideEffect):
         assert signals.load is not None
         free = signals.load[:, joint] / _link_inertia(signals, joint)
         position: Array = np.zeros_like(free)
-        for rows in signals.segments:
-            step = float(np.median(np.diff(signals.clock[rows]))) if len(free[rows]) > 1 else 1.0
+        for rows, step in zip(signals.segments, signals.steps, strict=True):
             position[rows] = _flight(free[rows], step, shape["gap"] / 2)
         return position
 
