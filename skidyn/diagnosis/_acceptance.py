@@ -220,8 +220,13 @@ class JudgingSearch(RankingSearch):
         """The hypothesis, or the simpler kind that its unresolved terms are; what has them waits.
 
         Pre-sliding shorter than can be seen is Coulomb friction. The terms that are resolved are
-        found again beside it.
+        found again beside it. What is at the far end of its range is no such effect.
         """
+        inside = tuple(c for c in hypothesis.candidates if not self._beyond(c))
+        if not inside:
+            return None
+        if len(inside) < len(hypothesis.candidates):
+            hypothesis = replace(hypothesis, candidates=inside)
         unresolved = {c: kind for c in hypothesis.candidates if (kind := self._limit_kind(c))}
         if not unresolved:
             return hypothesis
@@ -234,6 +239,15 @@ class JudgingSearch(RankingSearch):
             return found
         rest = tuple(c for c in hypothesis.candidates if c not in unresolved)
         return replace(hypothesis, candidates=rest) if rest else None
+
+    def _beyond(self, candidate: Candidate) -> bool:
+        """Whether the first shape parameter of a name ends at the far end of its range."""
+        shapes = candidate.term.effect.shapes
+        if candidate.kind == UNKNOWN or not shapes or shapes[0].name not in candidate.term.shape:
+            return False
+        unit = self.problem.signals.unit[candidate.joints[0]] if shapes[0].scales else 1.0
+        far = self.settings.far_end * shapes[0].high * unit
+        return bool(candidate.term.shape[shapes[0].name] >= far)
 
     def _limit_kind(self, candidate: Candidate) -> str:
         """The kind that a candidate cannot be told from, for a shape that is not resolved."""

@@ -139,6 +139,9 @@ class Settings:
     resolved : float
         Times the lower end of the range of a shape parameter that its refined value must reach;
         below, the effect is the simpler kind that it becomes there.
+    far_end : float
+        Share of the upper end of the range of its first shape parameter from which on an effect is
+        not named: a refined value that ends there belongs to something else.
     member : float
         Chance at which one of several recordings differs, once all together are more than chance.
     most_recordings : int
@@ -183,6 +186,7 @@ class Settings:
     family_share: float = 0.95
     ripple_share: float = 0.8
     resolved: float = 2.0
+    far_end: float = 0.95
     member: float = 0.05
     most_recordings: int = 2
     recordings_share: float = 0.8

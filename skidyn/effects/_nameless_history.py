@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
+from scipy.signal import lfilter
 
 from skidyn._signals import Array, Signals
 from skidyn.effects._base import Shape
@@ -25,6 +26,8 @@ from skidyn.effects._tool import tool_jacobian, tool_position
 _WAYS = (0.01, 0.03, 0.1, 0.3)
 #: Plays, as shares of the range of a position, and splines of a function of what lags.
 _PLAYS, _LAGGING = (0.03, 0.06, 0.1, 0.15, 0.22), 16
+#: Times in s over which a torque may relax.
+_RELAXATION = (0.1, 0.3, 1.0, 3.0)
 #: Times since the start of a recording over which a torque may fade, as shares of its length.
 _FADING = (0.05, 0.15, 0.5)
 
@@ -118,6 +121,125 @@ class FunctionOfLaggingPosition(NamelessEffect):
         return splines(lagging, shape["low"], shape["high"], _LAGGING)
 
 
+class FunctionOfLaggingVelocity(NamelessEffect):
+    """A torque that switches at one speed on the way up and at another one on the way down."""
+
+    kind = "function_of_lagging_velocity"
+    drawn_against = "dq"
+    title = "Function of the velocity with play"
+    formula = r"f(\mathcal{P}_r[\dot q])"
+    coefficients = unnamed_coefficients(_LAGGING)
+    depends_on = ("dq_own",)
+    softness = 2e-3
+    is_of_one_number = True
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        low, high = supported_range(signals, signals.dq[:, joints[0]])
+        return [{"play": share * (high - low), "low": low, "high": high} for share in _PLAYS[2:]]
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        dq, play = signals.dq[:, joint], shape["play"]
+        lagging = dq - play * stop_state(dq, signals.segments, play)
+        return splines(lagging, shape["low"], shape["high"], _LAGGING)
+
+
+class RelaxingSpring(NamelessEffect):
+    """A torque that follows the position and fades when it rests: rubber, hoses, grease [1]_.
+
+    References
+    ----------
+    .. [1] J. D. Ferry (1980), Viscoelastic properties of polymers, 3rd ed., Wiley, chapter 1
+       (Maxwell elements).
+    """
+
+    kind = "relaxing_spring"
+    title = "Torque that relaxes"
+    formula = r"\sum_i k_i\,(q - q_i),\quad T_i\,\dot q_i = q - q_i"
+    coefficients = unnamed_coefficients(len(_RELAXATION))
+    depends_on = ("q_own", "dq_own")
+    needs = ("time",)
+    is_of_one_number = True
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        q = signals.q[:, joint]
+        return np.column_stack([q - _followed(q, signals, time) for time in _RELAXATION])
+
+
+def _followed(x: Array, signals: Signals, time_constant: float) -> Array:
+    """What follows a signal with a time constant, from its value at the start of each segment."""
+    y = np.array(x)
+    for rows in signals.segments:
+        steps = np.diff(signals.clock[rows])
+        if len(steps) == 0:
+            continue
+        fade = np.exp(-float(np.median(steps)) / time_constant)
+        # y[i] = fade y[i-1] + (1 - fade) (x[i] + x[i-1]) / 2
+        own = x[rows]
+        weights = [(1 - fade) / 2, (1 - fade) / 2]
+        y[rows.start + 1 : rows.stop] = lfilter(
+            weights, [1.0, -fade], own[1:], zi=[fade * own[0] + weights[1] * own[0]]
+        )[0]
+    return y
+
+
+class FunctionOfOwnTorque(NamelessEffect):
+    """A torque that depends on the one that the drive delivers: a dead zone, a curved gain."""
+
+    kind = "function_of_own_torque"
+    drawn_against = "load"
+    title = "Function of the joint's torque"
+    formula = r"f(\tau_\mathrm{model})"
+    coefficients = unnamed_coefficients(12)
+    needs = ("model_torque",)
+    softness = 2e-3
+    is_of_one_number = True
+
+    def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
+        return (f"tau{joint + 1}",)
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        if signals.model_torque is None:
+            return []
+        low, high = supported_range(signals, signals.model_torque[:, joints[0]])
+        return [{"low": low, "high": high}] if high > low else []
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        assert signals.model_torque is not None
+        torque = signals.model_torque[:, joint]
+        return splines(torque, shape["low"], shape["high"], len(self.coefficients))
+
+
+class DragOnTool(NamelessEffect):
+    """A drag of the tool that depends on its height: a bath that it dips into, air, brushes."""
+
+    kind = "drag_on_tool"
+    drawn_against = "dq"
+    title = "Drag on the tool"
+    formula = r"J_n(q)^\top c(z(q))\,v"
+    coefficients = unnamed_coefficients(10)
+    softness = 2e-3
+    scope = "robot"
+    needs = ("robot",)
+
+    def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
+        return ("tool position", "tool velocity")
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        if signals.robot is None:
+            return []
+        low, high = supported_range(signals, tool_position(signals)[:, 2])
+        return [{"low": low, "high": high}] if high > low else []
+
+    def torque_columns(
+        self, signals: Signals, joints: Sequence[int], **shape: Any
+    ) -> dict[int, Array]:
+        height = tool_position(signals)[:, 2]
+        field = splines(height, shape["low"], shape["high"], len(self.coefficients))
+        jacobian = tool_jacobian(signals)
+        velocity = np.einsum("ian,in->ia", jacobian, signals.dq)
+        return {j: np.sum(jacobian[:, :, j] * velocity, axis=1)[:, None] * field for j in joints}
+
+
 class FrictionOverOtherLoad(NamelessEffect):
     """Friction of one joint that grows with the load of another."""
 
@@ -167,19 +289,10 @@ class ForceOverToolPosition(NamelessEffect):
     def torque_columns(
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
-        position = tool_position(signals)
-        low, high = np.array(shape["low"]), np.array(shape["high"])
-        span = np.where(high - low > 1e-6, high - low, np.inf)
-        orders = legvander(np.clip((2 * position - low - high) / span, -1.0, 1.0), 2)
-        field = [
-            orders[:, 0, a] * orders[:, 1, b] * orders[:, 2, c]
-            for a, b, c in itertools.product(range(3), repeat=3)
-            if a + b + c <= 2
-        ]
+        field = _quadratics(tool_position(signals), shape["low"], shape["high"])
         jacobian = tool_jacobian(signals)
         return {
-            j: np.column_stack([-jacobian[:, axis, j] * f for axis in range(3) for f in field])
-            for j in joints
+            j: np.hstack([-jacobian[:, axis, [j]] * field for axis in range(3)]) for j in joints
         }
 
 
@@ -230,6 +343,20 @@ class ForceNearPoint(NamelessEffect):
         return columns
 
 
+def _quadratics(position: Array, low: Sequence[float], high: Sequence[float]) -> Array:
+    """Polynomials of a place up to order two, (n_samples, 10)."""
+    least, most = np.array(low), np.array(high)
+    span = np.where(most - least > 1e-6, most - least, np.inf)
+    orders = legvander(np.clip((2 * position - least - most) / span, -1.0, 1.0), 2)
+    return np.column_stack(
+        [
+            orders[:, 0, a] * orders[:, 1, b] * orders[:, 2, c]
+            for a, b, c in itertools.product(range(3), repeat=3)
+            if a + b + c <= 2
+        ]
+    )
+
+
 def _spread_out(points: Array, count: int) -> Array:
     """Some of the points, each as far as possible from those before it."""
     thin = points[:: max(1, len(points) // 2000)]
@@ -255,6 +382,10 @@ HISTORY: tuple[type[NamelessEffect], ...] = (
     FrictionSinceReversal,
     FunctionOfWaySinceReversal,
     FunctionOfLaggingPosition,
+    FunctionOfLaggingVelocity,
+    RelaxingSpring,
+    FunctionOfOwnTorque,
+    DragOnTool,
     FrictionOverOtherLoad,
     ForceOverToolPosition,
     ForceNearPoint,
