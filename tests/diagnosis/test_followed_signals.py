@@ -28,6 +28,7 @@ FORMS = {
     ),
     "fades after a reversal": (1, 3.0, lambda x: _since_reversal(x, "q1"), {"q1", "dq1"}, None),
     "snaps over": (3, 2.0, lambda x: _snapped(x, "q3", 0.15), {"q3"}, None),
+    "relaxes": (2, 6.0, lambda x: _relaxed(x, "q2", 0.5), {"q2", "dq2"}, None),
     "bump": (2, 4.0, lambda x: np.exp(-((x["q2"] / 0.15) ** 2)), {"q2"}, None),
 }
 
@@ -55,6 +56,18 @@ def _snapped(x, name, play):
             at = np.sign(here) if abs(here) > play else at
             state[row] = at
     return state
+
+
+def _relaxed(x, name, time_constant):
+    """Position less what follows it with a time constant."""
+    left = np.zeros(len(x))
+    for _, rows in x.groupby("trajectory").indices.items():
+        q, t = x[name].to_numpy()[rows], x["time"].to_numpy()[rows]
+        slow = q[0]
+        for i in range(1, len(q)):
+            slow += (t[i] - t[i - 1]) / time_constant * (q[i] - slow)
+            left[rows[i]] = q[i] - slow
+    return left
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -118,3 +131,18 @@ def test_what_lies_between_two_joints_is_one_finding_on_both():
     (finding,) = diagnosis.findings
     assert finding.joints == (3, 4)
     assert set(finding.variables) == {"q3", "q4"}
+
+
+def test_a_bath_that_the_tool_dips_into_drags_on_all_joints():
+    log = make_hidden_effect_log(load_ur5(), None, noise="low", random_state=11)
+    q, dq = (log.X[[f"{s}{j}" for j in range(1, 7)]].to_numpy() for s in ("q", "dq"))
+    place = log.robot.forward_kinematics(q)[0]
+    jacobian = log.robot.jacobian(q)[:, :3]
+    velocity = np.einsum("ian,in->ia", jacobian, dq)
+    deep = place[:, 2] < np.quantile(place[:, 2], 0.5)
+    y = np.array(log.y) + 30 * np.einsum("ian,ia->in", jacobian, velocity) * deep[:, None]
+
+    diagnosis = diagnose(RBDRegressor(log.robot, ("viscous", "coulomb")), log.X, y)
+
+    assert diagnosis.verdict == "unknown"
+    assert set(diagnosis.findings[0].variables) == {"tool position", "tool velocity"}

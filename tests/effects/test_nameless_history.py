@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Columns of nameless torques that follow history, the drive's torque or the place of the tool."""
+
+import numpy as np
+import pytest
+
+from skidyn.effects import Term, get_effect
+
+
+@pytest.mark.parametrize("kind", ["function_of_lagging_position", "function_of_lagging_velocity"])
+def test_a_switch_is_a_function_of_the_position_with_play(signals, kind):
+    x = (signals.q if kind.endswith("position") else signals.dq)[:, 0]
+    play, state = 0.2, np.zeros(len(x))
+    for rows in signals.segments:
+        at = 0.0
+        for i in range(rows.start, rows.stop):
+            at = np.sign(x[i]) if abs(x[i]) > play else at
+            state[i] = at
+    shape = {"play": play, "low": x.min(), "high": x.max()}
+    columns = get_effect(kind).columns(signals, 0, **shape)
+    known = state != 0
+    left = state - columns @ np.linalg.lstsq(columns[known], state[known], rcond=None)[0]
+    assert np.mean(left[known] ** 2) < 0.05  # splines round the edge
+
+
+def test_what_relaxes_follows_the_position_and_fades(signals):
+    rest = signals.with_(q=np.where(np.arange(600) % 300 < 100, 0.0, 0.5)[:, None] * np.ones(2))
+    columns = get_effect("relaxing_spring").columns(rest, 0)
+    assert np.all(np.abs(columns[:100]) < 1e-12)
+    since = rest.time[120] - rest.time[100]
+    for column, time_constant in zip(columns.T, (0.1, 0.3, 1.0, 3.0), strict=True):
+        expected = 0.5 * np.exp(-since / time_constant)
+        assert column[120] == pytest.approx(expected, rel=0.06)
+
+
+def test_a_drag_takes_energy_from_the_tool(signals, robot):
+    position = robot.forward_kinematics(signals.q)[0][:, 2]
+    shape = {"low": position.min() - 0.01, "high": position.max() + 0.01}
+    term = Term("drag_on_tool", (1, 2), shape)
+    columns = term.torque_columns(signals)
+    power = sum(c.sum(axis=1) * signals.dq[:, j] for j, c in columns.items())
+    jacobian = robot.jacobian(signals.q)[:, :3]
+    velocity = np.einsum("ian,in->ia", jacobian, signals.dq)
+    np.testing.assert_allclose(power, np.sum(velocity**2, axis=1), atol=1e-9)
+
+
+def test_a_function_of_the_drives_torque_names_it(signals):
+    effect = get_effect("function_of_own_torque")
+    (shape,) = effect.grid(signals, (1,))
+    assert effect.variables(1, shape) == ("tau2",)
+    columns = effect.columns(signals, 1, **shape)
+    np.testing.assert_allclose(columns.sum(axis=1), 1.0, atol=1e-9)
