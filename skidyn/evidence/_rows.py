@@ -257,7 +257,7 @@ def _windows(time: Array, offset: int, window: float) -> _Windows:
     within = np.arange(len(row)) - np.repeat(np.cumsum(length) - length, length)
     sample = np.repeat(first, length) + within
     weight = np.cos(np.pi * (time[sample] - middle[row]) / width) ** 2
-    full = np.bincount(row, weight, minlength=len(middle))
+    full: Array = np.bincount(row, weight, minlength=len(middle)).astype(float)
     return _Windows(middle, row, sample + offset, weight, full)
 
 

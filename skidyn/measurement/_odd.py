@@ -213,8 +213,8 @@ def _multiples(seen: Explained) -> list[Multiple]:
     told = []
     runs = np.unique(fits.signals.trajectory)
     parts = [_rows_of(fits, run) for run in runs]
-    predicted = fits.predicted_without(parts) if apart else repeat({})
-    for run, rows, others in zip(runs, parts, predicted, strict=False):
+    elsewhere = fits.predicted_without(parts) if apart else repeat({})
+    for run, rows, others in zip(runs, parts, elsewhere, strict=False):
         for k in seen.joints:
             use = fits.moving[:, k]
             y = fits.average(fits.torque[:, k])[use]
