@@ -27,6 +27,8 @@ from skidyn.robots import Robot
 #: Factor, as a logarithm, to which the lengths of a description may be known (one standard
 #: deviation), the largest step of it, and how many steps are made.
 KNOWN_TO, STEP, ROUNDS = 0.2, 0.3, 3
+#: Logarithm of a factor that no description is wrong by: something else is.
+FARTHEST = 0.6
 #: Log-likelihood below which a step is not worth making.
 LITTLE = 4.0
 #: Least length, m, and the change of a factor for a slope.
@@ -72,10 +74,14 @@ class Lengths(Check):
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         fits = readable_fits(measurement)
-        if fits is None or measurement.stale or measurement.scaled or measurement.lost:
+        if fits is None or measurement.scaled or measurement.lost:
+            return
+        if measurement.stale or measurement.computed:
             return
         found = find_lengths(fits)
         if found is None or found.gain < LEAST:
+            return
+        if not SHARE < np.abs(found.factors).max() < FARTHEST:
             return
         plain = fits.identified(Reading())
         confirmed = float(found.there.fits.identified(Reading()).margin(plain).sum())

@@ -364,6 +364,8 @@ class TorqueDelay(Check):
             lag = _whole(
                 measurement, refined_lag(fits, found.common, found.error, range(fits.n_joints))
             )
+            if abs(lag) < SMALLEST:
+                return
             ms = 1e3 * lag
             late = float(f"{lag + early:.5f}")
             yield self.suspicion(

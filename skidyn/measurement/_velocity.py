@@ -239,6 +239,7 @@ class VelocityDelay(Check):
             return
         common = float(np.median(told))
         alike = np.abs(told - common) < max(NEARLY, 0.3 * abs(common))
+        alike &= np.abs(told) > 0.5 * abs(common)  # of two joints one may not be late at all
         if (
             abs(common) < max(SMALLEST, STEPS / measurement.rate)
             or alike.mean() < AGREEING
