@@ -176,15 +176,11 @@ class Signals:
         return {name: value for name, value in self.__dict__.items() if name != "_kept"}
 
     def named(self, name: str) -> Array:
-        """A signal by its name, joints counted from 1: ``"dq3"``, ``"temp2"``, ``"time"``, ...
-
-        ``"tau2"`` is the torque of the model, which that of the sensor is compared with.
-        """
+        """A signal by its name, joints counted from 1: ``"dq3"``, ``"temp2"``, ``"time"``, ..."""
         if name == "time":
             return self.clock
         kind = name.rstrip("0123456789")
-        fields = {"temp": "temperature", "tau": "model_torque"}
-        table = getattr(self, fields.get(kind, kind))
+        table = self.temperature if kind == "temp" else getattr(self, kind)
         assert table is not None
         return np.asarray(table[:, int(name[len(kind) :]) - 1])
 

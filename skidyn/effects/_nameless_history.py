@@ -182,33 +182,6 @@ def _followed(x: Array, signals: Signals, time_constant: float) -> Array:
     return y
 
 
-class FunctionOfOwnTorque(NamelessEffect):
-    """A torque that depends on the one that the drive delivers: a dead zone, a curved gain."""
-
-    kind = "function_of_own_torque"
-    drawn_against = "load"
-    title = "Function of the joint's torque"
-    formula = r"f(\tau_\mathrm{model})"
-    coefficients = unnamed_coefficients(12)
-    needs = ("model_torque",)
-    softness = 2e-3
-    is_of_one_number = True
-
-    def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
-        return (f"tau{joint + 1}",)
-
-    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        if signals.model_torque is None:
-            return []
-        low, high = supported_range(signals, signals.model_torque[:, joints[0]])
-        return [{"low": low, "high": high}] if high > low else []
-
-    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        assert signals.model_torque is not None
-        torque = signals.model_torque[:, joint]
-        return splines(torque, shape["low"], shape["high"], len(self.coefficients))
-
-
 class DragOnTool(NamelessEffect):
     """A drag of the tool that depends on its height: a bath that it dips into, air, brushes."""
 
@@ -384,7 +357,6 @@ HISTORY: tuple[type[NamelessEffect], ...] = (
     FunctionOfLaggingPosition,
     FunctionOfLaggingVelocity,
     RelaxingSpring,
-    FunctionOfOwnTorque,
     DragOnTool,
     FrictionOverOtherLoad,
     ForceOverToolPosition,

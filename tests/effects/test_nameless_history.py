@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Columns of nameless torques that follow history, the drive's torque or the place of the tool."""
+"""Columns of nameless torques that follow history or the place of the tool."""
 
 import numpy as np
 import pytest
@@ -42,11 +42,3 @@ def test_a_drag_takes_energy_from_the_tool(signals, robot):
     jacobian = robot.jacobian(signals.q)[:, :3]
     velocity = np.einsum("ian,in->ia", jacobian, signals.dq)
     np.testing.assert_allclose(power, np.sum(velocity**2, axis=1), atol=1e-9)
-
-
-def test_a_function_of_the_drives_torque_names_it(signals):
-    effect = get_effect("function_of_own_torque")
-    (shape,) = effect.grid(signals, (1,))
-    assert effect.variables(1, shape) == ("tau2",)
-    columns = effect.columns(signals, 1, **shape)
-    np.testing.assert_allclose(columns.sum(axis=1), 1.0, atol=1e-9)
