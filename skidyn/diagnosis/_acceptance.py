@@ -242,8 +242,10 @@ class JudgingSearch(RankingSearch):
 
     def _beyond(self, candidate: Candidate) -> bool:
         """Whether the first shape parameter of a name ends at the far end of its range."""
-        shapes = candidate.term.effect.shapes
-        if candidate.kind == UNKNOWN or not shapes or shapes[0].name not in candidate.term.shape:
+        effect, shapes = candidate.term.effect, candidate.term.effect.shapes
+        if candidate.kind == UNKNOWN or effect.search != "grid" or not shapes:
+            return False  # a line in a spectrum ends where the spectrum does
+        if shapes[0].name not in candidate.term.shape:
             return False
         unit = self.problem.signals.unit[candidate.joints[0]] if shapes[0].scales else 1.0
         far = self.settings.far_end * shapes[0].high * unit
