@@ -174,7 +174,7 @@ class JudgingSearch(RankingSearch):
     def shadow(self, hypothesis: Hypothesis) -> bool:
         """Whether an explanation is so small that earlier ones' imperfect formulas may leave it."""
         joints = sorted({j for c in hypothesis.candidates for j in c.rows})
-        settings, tolerance = self.settings, self._tolerance
+        settings, tolerance = self.settings, self._tolerance(hypothesis)
         own, earlier = self._removed(self.left, hypothesis.gain), self.start - self.left
         if not self._mostly_small(joints, hypothesis.gain, own, tolerance * earlier):
             return False
@@ -183,9 +183,11 @@ class JudgingSearch(RankingSearch):
         most = self._mostly_small(joints, hypothesis.gain, own, 0.5 * self.left)
         return not known or most or self._price(hypothesis.candidates) > settings.white
 
-    @property
-    def _tolerance(self) -> Array:
-        """Share of the squared error removed so far that formulas may have left, by joint."""
+    def _tolerance(self, beside: Hypothesis) -> Array:
+        """Share of the squared error removed so far that formulas may have left, by joint.
+
+        How a link swings is a formula of first order: it leaves a nameless function more.
+        """
         settings = self.settings
         shares = np.full(self.problem.n_joints, settings.exact_tolerance)
         for h in self.findings:
@@ -195,7 +197,9 @@ class JudgingSearch(RankingSearch):
             for c in h.candidates:
                 if c.term.effect.is_exact:
                     continue
-                share = settings.nameless_tolerance if nameless else settings.form_tolerance
+                swings = c.term.effect.moves_link and beside.kind == UNKNOWN
+                loose = nameless or swings
+                share = settings.nameless_tolerance if loose else settings.form_tolerance
                 reached = list(c.rows)
                 shares[reached] = np.maximum(shares[reached], share)
         return shares

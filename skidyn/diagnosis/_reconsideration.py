@@ -239,7 +239,7 @@ class ReconsideringSearch(JudgingSearch):
         before, after = (e.sum(0) for e in errors)
         joints = sorted({j for c in old.candidates for j in c.rows})
         gain = self._counts * np.log(np.maximum(before, 1e-300) / np.maximum(after, 1e-300))
-        least = self._tolerance * (self.start - after)
+        least = self._tolerance(old) * (self.start - after)
         return self._mostly_small(joints, gain, before - after, least)
 
     def _replace(

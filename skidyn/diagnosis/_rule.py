@@ -125,7 +125,8 @@ class Settings:
     exact_tolerance : float
         The same where every formula is exact (:attr:`Effect.is_exact`).
     nameless_tolerance : float
-        The same for what a nameless function leaves: its form is only near the true one.
+        The same for what a nameless function leaves: its form is only near the true one; and for
+        what an effect that moves the link leaves to a nameless function.
     alike : float
         Two effects on different joints whose scores differ by less than this share are not told
         apart by the data.
