@@ -49,6 +49,14 @@ class Results:
         stated = {row["name"]: (row["value"], row["std"]) for row in self.parameter_table()}
         return drawn + model_table(self.robot_, self.effect_terms_, stated, self.noise_std_)
 
+    def _repr_html_inner(self) -> str:
+        return self._html_repr()
+
+    def _repr_mimebundle_(self, **kwargs: Any) -> dict[str, str]:
+        # scikit-learn 1.6 does not ask for `_html_repr`
+        bundle: dict[str, str] = super()._repr_mimebundle_(**kwargs)  # type: ignore[misc]
+        return bundle | {"text/html": self._html_repr()} if "text/html" in bundle else bundle
+
     def parameter_table(self) -> list[dict[str, Any]]:
         """Every coefficient with its standard error.
 
