@@ -70,7 +70,6 @@ class Lengths(Check):
     name = "lengths"
     suspects = "lengths of links in the description that are not those of the robot"
     stage = 2
-    misnames = True
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         fits = readable_fits(measurement)
