@@ -17,6 +17,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,8 +47,23 @@ CONSTANT = 1e-10
 Sum = tuple[tuple[int, ...], tuple[float, ...]]
 
 
-def followed_signals(problem: Problem, joint: int, residual: Array) -> list[tuple[str, ...]]:
-    """Sets of signals that the residual of a joint may be a function of.
+class Followed(NamedTuple):
+    """What the residual of a joint may be a function of; empty where the motion predicts nothing.
+
+    Attributes
+    ----------
+    sets : list of tuple of str
+        Different sets of one to three signals.
+    sums : list of Sum
+        The best sum of two positions and that of three, each added or subtracted.
+    """
+
+    sets: list[tuple[str, ...]]
+    sums: list[Sum]
+
+
+def followed_signals(problem: Problem, joint: int, residual: Array) -> Followed:
+    """Sets of signals, and sums of positions, that the residual of a joint may be a function of.
 
     Parameters
     ----------
@@ -57,11 +73,6 @@ def followed_signals(problem: Problem, joint: int, residual: Array) -> list[tupl
         Joint, from 0.
     residual : ndarray of shape (n_samples,)
         Torque that the model leaves, N m or N.
-
-    Returns
-    -------
-    list of tuple of str
-        Different sets of one to three signals; empty where the motion predicts nothing.
     """
     y = average_at_rows(problem, joint, residual)
     step = max(1, -(-len(y) // MOST_ROWS))
@@ -70,59 +81,33 @@ def followed_signals(problem: Problem, joint: int, residual: Array) -> list[tupl
     # numbered without gaps: trajectories that were dropped must not leave an empty quarter below
     numbers, fold = np.unique(problem.fold[joint][::step], return_inverse=True)
     if len(numbers) < 4:
-        return []
+        return Followed([], [])
     found = [*_by_trees(signals, y, fold), *_by_products(signals, y, fold)]
-    return list(dict.fromkeys(found))
-
-
-def followed_sums(problem: Problem, joint: int, residual: Array) -> list[Sum]:
-    """Sums of positions that the residual of a joint may be a function of.
-
-    Parameters
-    ----------
-    problem : Problem
-        Rows and folds.
-    joint : int
-        Joint, from 0.
-    residual : ndarray of shape (n_samples,)
-        Torque that the model leaves, N m or N.
-
-    Returns
-    -------
-    list of (joints, weights)
-        The best sum of two positions and that of three, each added or subtracted; those that
-        predict something.
-    """
-    y = average_at_rows(problem, joint, residual)
-    step = max(1, -(-len(y) // MOST_ROWS))
-    signals = averaged_signals(problem, joint)
-    y = y[::step]
-    fold = np.unique(problem.fold[joint][::step], return_inverse=True)[1]
-    if fold.max(initial=0) < 3:
-        return []
-    turning = [k for k in range(problem.n_joints) if not problem.signals.prismatic[k]]
+    turning = np.flatnonzero(~problem.signals.prismatic).tolist()
     near = sorted(sorted(turning, key=lambda k: abs(k - joint))[:MOST_NEAR])
-    groups: list[list[Sum]] = [
-        [
+    positions = {k: signals[f"q{k + 1}"] for k in near}
+    return Followed(list(dict.fromkeys(found)), _by_sums(positions, y, fold))
+
+
+def _by_sums(positions: dict[int, Array], y: Array, fold: NDArray[np.int64]) -> list[Sum]:
+    """The best sum of two positions and that of three, those that predict something."""
+    found = []
+    for count in (2, 3):
+        sums: list[Sum] = [
             (places, (1.0, *weights))
-            for places in itertools.combinations(near, count)
+            for places in itertools.combinations(positions, count)
             for weights in itertools.product((1.0, -1.0), repeat=count - 1)
         ]
-        for count in (2, 3)
-    ]
-    found = []
-    for sums in filter(None, groups):
-        columns = []
-        for places, weights in sums:
-            total = np.asarray(
-                sum(w * signals[f"q{k + 1}"][::step] for k, w in zip(places, weights, strict=True))
-            )
-            waves = [wave(m * total) for m in WAVES for wave in (np.sin, np.cos)]
-            columns.append(np.column_stack(waves))
-        best = _best_block(columns, y, fold)
+        best = _best_block([_waves(positions, *of) for of in sums], y, fold) if sums else None
         if best is not None:
             found.append(sums[best])
     return found
+
+
+def _waves(positions: dict[int, Array], places: Sequence[int], weights: Sequence[float]) -> Array:
+    """Sines and cosines of a sum of positions, shape (n_rows, 2 n_waves)."""
+    total = np.asarray(sum(w * positions[k] for k, w in zip(places, weights, strict=True)))
+    return np.column_stack([wave(m * total) for m in WAVES for wave in (np.sin, np.cos)])
 
 
 def _best_block(blocks: Sequence[Array], y: Array, fold: NDArray[np.int64]) -> int | None:
@@ -144,22 +129,21 @@ def _best_block(blocks: Sequence[Array], y: Array, fold: NDArray[np.int64]) -> i
         left[f] = energy[f] - 2 * np.einsum("bk,bk->b", weights, right[f])
         left[f] += np.einsum("bk,bkl,bl->b", weights, own[f], weights)
     best = int(np.argmin(left.sum(0)))
-    gain = (energy - left[:, best]) / np.maximum(np.maximum(energy, left[:, best]), 1e-300)
-    enough = left[:, best].sum() < (1 - LEAST_SHARE) * energy.sum()
-    if not enough or float(ttest_1samp(gain, 0.0, alternative="greater").pvalue) >= CHANCE:
-        return None
-    return best
+    return best if _predictable(energy, left[:, best]) else None
 
 
-def _predictable(y: Array, left: Array, fold: NDArray[np.int64]) -> bool:
-    """Whether a learner takes away more of the folds left out than chance would.
+def _predictable(before: Array, after: Array) -> bool:
+    """Whether a learner takes away more of the squared errors of folds left out than chance would.
 
     The gain of a fold is relative to its own error, so that one lively fold does not decide.
     """
-    before, after = np.bincount(fold, y**2), np.bincount(fold, left)
     gain = (before - after) / np.maximum(np.maximum(before, after), 1e-300)
-    enough = bool(left.sum() < (1 - LEAST_SHARE) * np.sum(y**2))
+    enough = bool(after.sum() < (1 - LEAST_SHARE) * before.sum())
     return enough and float(ttest_1samp(gain, 0.0, alternative="greater").pvalue) < CHANCE
+
+
+def _by_fold(values: Array, fold: NDArray[np.int64]) -> Array:
+    return np.bincount(fold, values).astype(float)
 
 
 def _by_trees(
@@ -191,7 +175,7 @@ def _by_trees(
             if left[seen].sum() >= np.sum(y[seen] ** 2):
                 return []  # noise: trees that follow it do worse than none, and more would too
         trees.append(learner)
-    if not _predictable(y, left, fold):
+    if not _predictable(_by_fold(y**2, fold), _by_fold(left, fold)):
         return []
     for out, learner in zip(parts, trees, strict=True):
         for i in range(len(names)):
@@ -227,7 +211,7 @@ def _by_products(
         out = fold == f
         weights = np.linalg.lstsq(columns[~out], y[~out], rcond=None)[0]
         left[out] = (y[out] - columns[out] @ weights) ** 2
-    if not _predictable(y, left, fold):
+    if not _predictable(_by_fold(y**2, fold), _by_fold(left, fold)):
         return []
     names = list(signals)
     sets = [{names[i] for i in of[:, k] if i >= 0} for k in chosen]

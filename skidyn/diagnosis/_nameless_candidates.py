@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._clock import LOWEST, clock_line
-from skidyn.diagnosis._followed_signals import followed_signals, followed_sums
+from skidyn.diagnosis._followed_signals import followed_signals
 from skidyn.diagnosis._hypothesis import (
     UNKNOWN,
 )
@@ -46,7 +46,6 @@ def nameless_candidates(
     list of Candidate
     """
     followed = [followed_signals(problem, j, residual[:, j]) for j in range(problem.n_joints)]
-    sums = [followed_sums(problem, j, residual[:, j]) for j in range(problem.n_joints)]
     candidates = []
     for kind in nameless_kinds():
         effect = get_effect(kind)
@@ -59,10 +58,10 @@ def nameless_candidates(
                 continue
             shapes = effect.grid(problem.signals, joints)
             if isinstance(effect, FunctionOfSignals):
-                sets = [names for names in followed[joint] if len(names) == effect.n_signals]
+                sets = [names for names in followed[joint].sets if len(names) == effect.n_signals]
                 shapes = [effect.shape_of(problem.signals, names) for names in sets]
             if isinstance(effect, FunctionOfSum):
-                shapes = [effect.shape_of(problem.signals, *of) for of in sums[joint]]
+                shapes = [effect.shape_of(problem.signals, *of) for of in followed[joint].sums]
             if effect.search == "clock":
                 line = clock_line(
                     problem.signals,

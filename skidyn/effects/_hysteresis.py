@@ -100,6 +100,14 @@ def cut_strokes(position: Array, segments: list[slice]) -> Strokes:
     return Strokes(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
+def strokes_of(signals: Signals, joint: int) -> Strokes:
+    """Strokes of a joint, from 0, cut once for everything that follows its path."""
+    strokes: Strokes = signals.once(
+        ("strokes", joint), lambda: cut_strokes(signals.q[:, joint], signals.segments)
+    )
+    return strokes
+
+
 def _run(strokes: Strokes, n_samples: int, law: Law) -> Array:
     """State of a rate-independent hysteresis along a path, zero at the start of each segment."""
     state = np.zeros(n_samples)
@@ -221,10 +229,7 @@ class PathMemory(Effect):
 
     def path_states(self, signals: Signals, joint: int, **shape: Any) -> list[Array]:
         """States along the logged path, zero at the start of every segment."""
-        # The path is cut once for all laws and all their shapes.
-        strokes = signals.once(
-            ("strokes", joint), lambda: cut_strokes(signals.q[:, joint], signals.segments)
-        )
+        strokes = strokes_of(signals, joint)
         return [_run(strokes, signals.n_samples, law) for law in self.laws(**shape)]
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:

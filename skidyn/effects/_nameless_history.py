@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
-from scipy.signal import lfilter
 
 from skidyn._signals import Array, Signals
 from skidyn.effects._base import Shape
-from skidyn.effects._hysteresis import cut_strokes, dahl_state, stop_state
+from skidyn.effects._hysteresis import dahl_state, stop_state, strokes_of
 from skidyn.effects._nameless import (
     NamelessEffect,
     splines,
@@ -85,7 +84,7 @@ class FunctionOfWaySinceReversal(NamelessEffect):
     depends_on = ("q_own", "dq_own")
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        strokes = cut_strokes(signals.q[:, joint], signals.segments)
+        strokes = strokes_of(signals, joint)
         way = np.zeros(signals.n_samples)
         way[strokes.rows] = strokes.way / signals.unit[joint]
         fading = np.column_stack([np.exp(-way / w) for w in _WAYS])
@@ -167,12 +166,13 @@ class RelaxingSpring(NamelessEffect):
 
 def _followed(x: Array, signals: Signals, time_constant: float) -> Array:
     """What follows a signal with a time constant, from its value at the start of each segment."""
+    from scipy.signal import lfilter  # not paid for by who only checks a log
+
     y = np.array(x)
-    for rows in signals.segments:
-        steps = np.diff(signals.clock[rows])
-        if len(steps) == 0:
+    for rows, step in zip(signals.segments, signals.steps, strict=True):
+        if rows.stop - rows.start < 2:
             continue
-        fade = np.exp(-float(np.median(steps)) / time_constant)
+        fade = np.exp(-step / time_constant)
         # y[i] = fade y[i-1] + (1 - fade) (x[i] + x[i-1]) / 2
         own = x[rows]
         weights = [(1 - fade) / 2, (1 - fade) / 2]
