@@ -15,7 +15,7 @@ from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._comparison import Comparison
 from skidyn.diagnosis._confidence import confidence
-from skidyn.diagnosis._correction import refitted_errors
+from skidyn.diagnosis._correction import is_physics, refitted_errors
 from skidyn.diagnosis._episodes import (
     Episode,
     away_from_reversals,
@@ -93,7 +93,7 @@ def conclude(
     intervals = parameter_intervals(problem, terms, result.fit.noise)
     history = [step.entry for step in steps]
     shown = [entry["rmse"] for entry in history]
-    if not hasattr(model, "with_effects") or not hasattr(model, "effects"):
+    if not is_physics(model):
         shown, remark = _refitted(problem, result, model, data, shown)
         notes = [*notes, remark]
     rivals = {s.added.kind: rivals_of(s) for s in result.steps if s.added is not None}
@@ -146,7 +146,7 @@ def conclude(
 
 
 def _refitted(
-    problem: Problem, result: SearchResult, model: Any, data: tuple[Any, Any], errors: list[Any]
+    problem: Problem, result: SearchResult, model: Any, data: tuple[Any, ...], errors: list[Any]
 ) -> tuple[list[Any], str]:
     """Errors that count for a model that is not physics, and what is to be said of its names."""
     assert problem.robot is not None

@@ -13,6 +13,7 @@ from sklearn.exceptions import NotFittedError
 from sklearn.utils import _safe_indexing
 from sklearn.utils.validation import check_is_fitted
 
+from skidyn._columns import column_names
 from skidyn._signals import Array, Signals, read_signals
 from skidyn.effects import Term, make_terms
 from skidyn.evidence import Problem, make_problem
@@ -80,8 +81,8 @@ class CorrectedRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         """
         if not hasattr(self.regressor, "fit"):
             return self.fit_effects(X, y, sample_weight)
-        weights = {} if sample_weight is None else {"sample_weight": sample_weight}
-        self.regressor_ = clone(self.regressor, safe=False).fit(X, y, **weights)
+        self.regressor_ = clone(self.regressor, safe=False)
+        self.regressor_.fit(X, y, **_weights(self.regressor_, sample_weight))
         return self._fit_effects(X, y, sample_weight)
 
     def fit_effects(self, X: Any, y: Any, sample_weight: Any = None) -> CorrectedRegressor:
@@ -162,12 +163,34 @@ class CorrectedRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         return problem
 
 
+def is_physics(model: Any) -> bool:
+    """Whether a model is refitted together with effects, rather than corrected by them."""
+    takes_effects = hasattr(model, "with_effects") and hasattr(model, "effects")
+    return takes_effects and not isinstance(model, CorrectedRegressor)
+
+
+def _weights(regressor: Any, sample_weight: Any) -> dict[str, Any]:
+    """Keyword of fit for weights of samples; those of a Pipeline go to its last step."""
+    from sklearn.pipeline import Pipeline
+
+    name = "sample_weight"
+    while isinstance(regressor, Pipeline):
+        step, regressor = regressor.steps[-1]
+        name = f"{step}__{name}"
+    return {} if sample_weight is None else {name: sample_weight}
+
+
 #: Copies of a model that is not physics are refitted on so many folds at most.
 REFITS = 4
 
 
 def refitted_errors(
-    regressor: Any, robot: Robot, steps: Sequence[Sequence[Term]], X: Any, y: Any
+    regressor: Any,
+    robot: Robot,
+    steps: Sequence[Sequence[Term]],
+    X: Any,
+    y: Any,
+    sample_weight: Any = None,
 ) -> list[Array] | None:
     """Error of copies of a regressor, refitted with more and more effects, on rows left out.
 
@@ -186,6 +209,8 @@ def refitted_errors(
         Motion, with time and trajectory.
     y : array-like of shape (n_samples, n_joints)
         Measured torque, N m or N.
+    sample_weight : array-like of shape (n_samples,), default=None
+        Weight of every sample in the fits; errors count all samples alike.
 
     Returns
     -------
@@ -208,10 +233,12 @@ def refitted_errors(
         return None
     total = [np.zeros(torque.shape[1]) for _ in steps]
     for train, test in GroupKFold(n_folds).split(torque, groups=groups):
-        own = clone(regressor).fit(_safe_indexing(X, train), _safe_indexing(y, train))
+        weight = None if sample_weight is None else _safe_indexing(sample_weight, train)
+        own = clone(regressor)
+        own.fit(_safe_indexing(X, train), _safe_indexing(y, train), **_weights(own, weight))
         for k, terms in enumerate(steps):
             model = CorrectedRegressor(own, robot, list(terms))
-            model.fit_effects(_safe_indexing(X, train), torque[train])
+            model.fit_effects(_safe_indexing(X, train), torque[train], weight)
             predicted = model.predict(_safe_indexing(X, test)).reshape(len(test), -1)
             total[k] += np.sum((predicted - torque[test]) ** 2, axis=0)
     return [np.sqrt(t / len(torque)) for t in total]
@@ -224,9 +251,10 @@ class Opened:
     Attributes
     ----------
     model : regressor
-        The innermost model that knows effects, or the given regressor.
+        The innermost model that knows effects, or the given regressor without the steps of a
+        Pipeline that give signals.
     X : table
-        What the innermost model sees.
+        What the model sees.
     outer : tuple of Pipeline
         What it was taken out of, the outermost first; the steps before the model are fitted.
     """
@@ -237,11 +265,14 @@ class Opened:
 
     def closed(self, model: Any) -> Any:
         """A better model where the old one was, fitted."""
-        from sklearn.pipeline import Pipeline
-
         for pipeline in reversed(self.outer):
-            model = Pipeline([*pipeline.steps[:-1], (pipeline.steps[-1][0], model)])
+            model = _with_steps(pipeline, [*pipeline.steps[:-1], (pipeline.steps[-1][0], model)])
         return model
+
+
+def _with_steps(pipeline: Pipeline, steps: list[tuple[str, Any]]) -> Pipeline:
+    """A Pipeline like another, of these fitted steps."""
+    return pipeline.__class__(**{**pipeline.get_params(deep=False), "steps": steps})
 
 
 def _fitted(steps: Pipeline, X: Any, y: Any) -> Pipeline:
@@ -256,6 +287,9 @@ def _fitted(steps: Pipeline, X: Any, y: Any) -> Pipeline:
 
 def open_model(model: Any, X: Any, y: Any) -> Opened:
     """Take the rigid-body model out of searches, pipelines and transformed targets.
+
+    A Pipeline without such a model is opened behind the steps that give named signals: effects are
+    functions of those, and not of what the learner's own steps make of them.
 
     Parameters
     ----------
@@ -288,11 +322,23 @@ def open_model(model: Any, X: Any, y: Any) -> Opened:
             inner = inner.regressor
         elif isinstance(inner, Pipeline):
             steps = _fitted(inner[:-1], table, y)
-            outer.append(Pipeline([*steps.steps, inner.steps[-1]]))
+            outer.append(_with_steps(inner, [*steps.steps, inner.steps[-1]]))
             table = steps.transform(table) if len(steps) else table
             inner = inner.steps[-1][1]
         else:
             break
-    return (
-        Opened(inner, table, tuple(outer)) if hasattr(inner, "with_effects") else Opened(model, X)
-    )
+    if hasattr(inner, "with_effects"):
+        return Opened(inner, table, tuple(outer))
+    return _behind_signals(model, X) if isinstance(model, Pipeline) else Opened(model, X)
+
+
+def _behind_signals(pipeline: Pipeline, X: Any) -> Opened:
+    """A Pipeline opened behind the steps that give named signals, such as derivatives."""
+    n_before = 0
+    for k, (_, step) in enumerate(pipeline.steps[:-1], 1):
+        table = pipeline[k - 1 : k].transform(X) if getattr(step, "gives_signals", False) else None
+        if table is None or column_names(table) is None:
+            break
+        X, n_before = table, k
+    rest, name = pipeline[n_before:], pipeline.steps[-1][0]
+    return Opened(rest, X, (_with_steps(pipeline, [*pipeline.steps[:n_before], (name, rest)]),))

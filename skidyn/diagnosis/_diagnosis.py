@@ -17,7 +17,7 @@ from skidyn._exceptions import ColumnError, EffectError, LogError, LogWarning
 from skidyn._order import refuse_shuffled
 from skidyn._signals import Array, Signals, read_signals
 from skidyn.diagnosis._conclusion import conclude
-from skidyn.diagnosis._correction import open_model
+from skidyn.diagnosis._correction import is_physics, open_model
 from skidyn.diagnosis._hypothesis import SearchResult
 from skidyn.diagnosis._limits import Gates, Limit, find_limits, without_withdrawn
 from skidyn.diagnosis._result import Diagnosis
@@ -69,7 +69,8 @@ def diagnose(
         The model to be judged. An :class:`~skidyn.identification.RBDRegressor` is refitted together
         with every candidate effect, fold by fold; any other fitted regressor is taken as it is and
         its residual is diagnosed. A model of the first kind is taken out of a search or a
-        ``TransformedTargetRegressor``; out of a ``Pipeline`` too, which the better model is.
+        ``TransformedTargetRegressor``, and out of a ``Pipeline``. The better model of a
+        ``Pipeline`` is a ``Pipeline``.
     X : DataFrame or array of shape (n_samples, n_features)
         Motion, following the X contract, with ``time`` and ``trajectory`` where they are known.
     tau : array-like of shape (n_samples, n_joints)
@@ -199,8 +200,7 @@ def _diagnose(
         )
     for note in notes:
         warnings.warn(note, LogWarning, stacklevel=4)
-    own = _is_rigid_body_regressor(model)
-    residual = None if own else torque - _prediction(model, X, torque)
+    residual = None if is_physics(model) else torque - _prediction(model, X, torque)
     once = ~copied_rows(signals, torque)
     if not once.all():
         signals, torque = signals.take(once), torque[once]
@@ -276,10 +276,6 @@ def _check_rows(problem: Problem) -> None:
             "no joint slides long enough for a diagnosis: the log is too short, scattered in "
             "time, or all joints rest"
         )
-
-
-def _is_rigid_body_regressor(model: Any) -> bool:
-    return hasattr(model, "with_effects") and hasattr(model, "effects")
 
 
 def _residual_problem(

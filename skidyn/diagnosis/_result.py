@@ -13,7 +13,7 @@ import numpy as np
 from skidyn._exceptions import EffectError, SkidynError
 from skidyn._signals import Array
 from skidyn.diagnosis._comparison import REGIMES, Comparison, error_map
-from skidyn.diagnosis._correction import CorrectedRegressor, Opened
+from skidyn.diagnosis._correction import CorrectedRegressor, Opened, is_physics
 from skidyn.diagnosis._failures import Failure, RestError, find_failures, find_rest_errors
 from skidyn.diagnosis._findings import Finding
 from skidyn.diagnosis._hypothesis import SearchResult
@@ -326,14 +326,15 @@ class Diagnosis:
 
     def _refitted(self, terms: Sequence[Term]) -> Any:
         model = self.base_model
-        if not hasattr(model, "with_effects"):
-            assert self.problem.robot is not None
-            corrected = CorrectedRegressor(model, self.problem.robot).with_effects(terms)
-            return corrected.fit_effects(*self.data)
-        if isinstance(model, CorrectedRegressor) and hasattr(model, "regressor_"):
-            kept = CorrectedRegressor(model.regressor_, model.robot, model.effects)
-            return kept.with_effects(terms).fit_effects(*self.data)
-        better = model.with_effects(terms).fit(*self.data)
+        if is_physics(model):
+            better = model.with_effects(terms).fit(*self.data)
+        else:
+            if not isinstance(model, CorrectedRegressor):
+                assert self.problem.robot is not None
+                model = CorrectedRegressor(model, self.problem.robot)
+            elif hasattr(model, "regressor_"):
+                model = CorrectedRegressor(model.regressor_, model.robot, model.effects)
+            better = model.with_effects(terms).fit_effects(*self.data)
         return better if self.opened is None else self.opened.closed(better)
 
     def to_dict(self) -> dict[str, Any]:

@@ -46,6 +46,8 @@ class DropKeys(SignalTransformer):
     1
     """
 
+    gives_signals = False
+
     def __init__(self, *, trajectory: ColumnSpec = "auto", time: ColumnSpec = "auto") -> None:
         self.trajectory = trajectory
         self.time = time

@@ -27,6 +27,8 @@ class SignalTransformer(LogTransformer):
 
     trajectory: ColumnSpec
     time: ColumnSpec
+    #: Whether the table that it gives is a log again: signals in their units, and key columns.
+    gives_signals: ClassVar[bool] = True
 
     _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
         "trajectory": [str, Integral, None],
@@ -280,6 +282,7 @@ class SignalScaler(SignalTransformer):
            [8., 1.]])
     """
 
+    gives_signals = False
     _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
         **SignalTransformer._parameter_constraints,
         "kind": [str],

@@ -7,13 +7,14 @@ from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.compose import TransformedTargetRegressor
 from sklearn.linear_model import Ridge
 from sklearn.model_selection import GridSearchCV, GroupKFold, cross_val_score
-from sklearn.pipeline import Pipeline
+from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import EffectSearchCV, diagnose
 from skidyn.identification import RBDRegressor
 from skidyn.model_selection import TrajectoryKFold
+from skidyn.preprocessing import DropKeys, SmoothDerivatives
 
 LOG = make_hidden_effect_log(
     load_planar_arm(), "spring", joints=[2], n_trajectories=6, duration=6.0
@@ -49,6 +50,61 @@ def test_models_inside_others_are_opened(model):
     assert isinstance(diagnosis.model, expected)
     before, after = (np.square(m.predict(LOG.X) - LOG.y).mean() for m in (model, diagnosis.model))
     assert after < before
+
+
+@pytest.mark.parametrize(
+    ("steps", "before"),
+    [
+        ([DropKeys(), Ridge()], []),
+        ([StandardScaler().set_output(transform="pandas"), DropKeys(), Ridge()], []),
+        (
+            [SmoothDerivatives().set_output(transform="pandas"), DropKeys(), Ridge()],
+            ["smoothderivatives"],
+        ),
+    ],
+    ids=["keys", "scaled", "derived"],
+)
+def test_effects_found_on_a_pipeline_return_a_pipeline(steps, before):
+    X = LOG.X if not before else LOG.X.filter(regex=r"^(trajectory|time|q\d)")
+    given = make_pipeline(*steps).fit(X, LOG.y)
+    diagnosis = diagnose(given, X, LOG.y, robot=LOG.robot, effects=KINDS)
+    for model in (diagnosis.model, diagnosis.add("spring", [2])):
+        assert isinstance(model, Pipeline)
+        assert [name for name, _ in model.steps] == [*before, "ridge"]
+    # what the user's own steps do stays inside; the effects see signals in their units, and keys
+    by_hand = given.predict(X)
+    signals = model[:-1].transform(X) if before else X
+    added = model.predict(X) - by_hand
+    q2 = np.asarray(signals["q2"], dtype=float)
+    np.testing.assert_allclose(added[:, 0], 0.0, atol=1e-9)
+    line = np.polynomial.Polynomial.fit(q2, added[:, 1], 1)(q2)
+    np.testing.assert_allclose(added[:, 1], line, atol=1e-6)
+    again = clone(model).fit(X, LOG.y)
+    np.testing.assert_allclose(again.predict(X), model.predict(X), atol=1e-6)
+    assert np.isfinite(cross_val_score(model, X, LOG.y, cv=TrajectoryKFold(2))).all()
+    alpha = {"ridge__regressor__ridge__alpha": [0.1, 10.0]}
+    search = GridSearchCV(model, alpha, cv=GroupKFold(2)).fit(X, LOG.y, groups=LOG.X["trajectory"])
+    assert isinstance(search.best_estimator_, Pipeline)
+
+
+def test_weights_reach_the_steps_of_a_corrected_pipeline():
+    weight = np.linspace(0.5, 1.5, len(LOG.X))
+    given = make_pipeline(DropKeys(), Ridge()).fit(LOG.X, LOG.y)
+    diagnosis = diagnose(given, LOG.X, LOG.y, robot=LOG.robot, sample_weight=weight)
+    assert diagnosis.findings
+    model = clone(diagnosis.model).fit(LOG.X, LOG.y, ridge__sample_weight=weight)
+    own = make_pipeline(DropKeys(), Ridge()).fit(LOG.X, LOG.y, ridge__sample_weight=weight)
+    np.testing.assert_allclose(model[-1].regressor_[-1].coef_, own[-1].coef_, rtol=1e-12)
+
+
+def test_a_corrected_model_is_diagnosed_with_its_effects():
+    given = Ridge().fit(LOG.X, LOG.y)
+    first = diagnose(given, LOG.X, LOG.y, robot=LOG.robot, effects=KINDS)
+    corrected = first.add("spring", [2])
+    again = diagnose(corrected, LOG.X, LOG.y, effects=KINDS)
+    left = np.sqrt(np.mean((corrected.predict(LOG.X) - LOG.y) ** 2, axis=0))
+    assert np.all(again.rmse_before < 1.5 * left)
+    assert [t.kind for t in again.add("spring", [1]).effect_terms_] == ["spring", "spring"]
 
 
 def test_the_search_is_one_of_scikit_learn():

@@ -2,6 +2,7 @@
 import numpy as np
 import pytest
 from sklearn.base import clone
+from sklearn.model_selection import GroupKFold
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
@@ -88,6 +89,31 @@ def test_keeps_findings_only_as_far_as_they_raise_the_score():
     assert search.best_params_ == results["params"][0]
     alone = RBDRegressor(log.robot).fit(log.X, log.y)
     np.testing.assert_allclose(search.predict(log.X), alone.predict(log.X), rtol=1e-12)
+
+
+def test_the_gain_of_a_single_fold_keeps_nothing():
+    log = make_hidden_effect_log(
+        load_planar_arm(), "spring", joints=[2], n_trajectories=6, duration=6.0
+    )
+    folds = list(GroupKFold(5).split(log.X, groups=log.X["trajectory"]))
+
+    def in_folds(*gains):
+        """Scores that rise by these gains with an effect, fold by fold."""
+        numbers = {tuple(log.y[test[0]]): k for k, (_, test) in enumerate(folds)}
+
+        def score(estimator, X, y):
+            return gains[numbers[tuple(y[0])]] * (len(estimator.effects) > 2)
+
+        return score
+
+    search = EffectSearchCV(RBDRegressor(log.robot), effects=("spring",), cv=folds)
+    for gains, kept in (
+        ((0.001, -0.01, -0.02, 0.003, 9.0), 0),
+        ((0.01, 0.001, -0.002, 0.003, 9.0), 1),
+        ((0.01, 0.01, 0.02, 0.02, -9.0), 0),
+    ):
+        search.set_params(scoring=in_folds(*gains)).fit(log.X, log.y)
+        assert search.best_index_ == kept
 
 
 @pytest.mark.parametrize(
