@@ -37,6 +37,7 @@ CLASSES = frozenset(
     for name in (
         "_columns.Columns",
         "committee._elm.ELMCommittee",
+        "diagnosis._correction.CorrectedRegressor",
         "diagnosis._effect_search.EffectSearchCV",
         "dynamics._tree.KinematicTree",
         "effects._term.Term",

@@ -326,6 +326,19 @@ def test_metadata_routing():
         np.testing.assert_allclose(scores, expected, **SAME)
 
 
+def test_a_score_of_its_own_takes_the_weights_too():
+    weight = np.random.default_rng(0).uniform(0.5, 1.5, len(X))
+    model = REGRESSORS["RBD"][0]
+    expected = []
+    for train, test in SPLITS:
+        fitted = clone(model).fit(X.iloc[train], Y[train], sample_weight=weight[train])
+        expected.append(fitted.score(X.iloc[test], Y[test], sample_weight=weight[test]))
+    with sklearn.config_context(enable_metadata_routing=True):
+        sent = {"sample_weight": weight, "groups": GROUPS}
+        scores = cross_val_score(model, X, Y, cv=GroupKFold(2), params=sent, error_score="raise")
+    np.testing.assert_allclose(scores, expected, **SAME)
+
+
 class Spy(RegressorMixin, BaseEstimator):
     """Says which columns it was given."""
 

@@ -113,6 +113,7 @@ class ELMCommittee(RegressorMixin, BaseEstimator):
     """
 
     __metadata_request__fit = {"sample_weight": True}
+    __metadata_request__score = {"sample_weight": True}
 
     _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
         "n_estimators": [Interval(Integral, 1, None, closed="left")],

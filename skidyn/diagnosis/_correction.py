@@ -47,6 +47,9 @@ class CorrectedRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         Their coefficients.
     """
 
+    __metadata_request__fit = {"sample_weight": True}
+    __metadata_request__score = {"sample_weight": True}
+
     def __init__(self, regressor: Any, robot: Robot, effects: Iterable[Any] = ()) -> None:
         self.regressor = regressor
         self.robot = robot
@@ -170,11 +173,15 @@ def is_physics(model: Any) -> bool:
 
 
 def _weights(regressor: Any, sample_weight: Any) -> dict[str, Any]:
-    """Keyword of fit for weights of samples; those of a Pipeline go to its last step."""
+    """Keyword of fit for weights of samples; those of a Pipeline go to its last step.
+
+    Where metadata is routed, the Pipeline sends them to the steps that request them.
+    """
+    from sklearn import get_config
     from sklearn.pipeline import Pipeline
 
     name = "sample_weight"
-    while isinstance(regressor, Pipeline):
+    while isinstance(regressor, Pipeline) and not get_config()["enable_metadata_routing"]:
         step, regressor = regressor.steps[-1]
         name = f"{step}__{name}"
     return {} if sample_weight is None else {name: sample_weight}

@@ -114,6 +114,7 @@ class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     """
 
     __metadata_request__fit = {"sample_weight": True, "groups": True}
+    __metadata_request__score = {"sample_weight": True}
 
     def __init__(
         self,

@@ -121,6 +121,7 @@ class HybridRegressor(CallbackSupportMixin, MetaEstimatorMixin, RegressorMixin, 
     """
 
     __metadata_request__fit = {"sample_weight": True, "groups": True}
+    __metadata_request__score = {"sample_weight": True}
 
     _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
         "physics": [HasMethods(["fit", "predict"])],

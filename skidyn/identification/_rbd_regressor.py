@@ -179,6 +179,7 @@ class RBDRegressor(Results, RegressorMixin, BaseEstimator):
 
     # With metadata routing on, weights that reach this model are for its fit.
     __metadata_request__fit = {"sample_weight": True}
+    __metadata_request__score = {"sample_weight": True}
 
     def __init__(
         self,

@@ -80,6 +80,7 @@ class SequenceRegressor(SkorchParameters, CallbackSupportMixin, RegressorMixin, 
     # BaggingRegressor leaves the rows in order and bootstraps through weights only if they are
     # requested; with metadata routing on, this is the request
     __metadata_request__fit = {"sample_weight": True}
+    __metadata_request__score = {"sample_weight": True}
 
     def __init__(
         self,

@@ -128,6 +128,7 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     """
 
     __metadata_request__fit = {"sample_weight": True, "groups": True}
+    __metadata_request__score = {"sample_weight": True}
 
     _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
         "estimator": [HasMethods(["fit", "predict"]), None],

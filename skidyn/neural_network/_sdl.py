@@ -169,6 +169,7 @@ class SDLRegressor(SequenceRegressor):
 
     _module = _JointNetwork
     __metadata_request__fit = {"sample_weight": True, "groups": True}
+    __metadata_request__score = {"sample_weight": True}
 
     def __init__(
         self,

@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+import sklearn
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.compose import TransformedTargetRegressor
 from sklearn.linear_model import Ridge
@@ -10,6 +11,7 @@ from sklearn.model_selection import GridSearchCV, GroupKFold, cross_val_score
 from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import StandardScaler
 
+import skidyn
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import EffectSearchCV, diagnose
 from skidyn.identification import RBDRegressor
@@ -87,7 +89,7 @@ def test_effects_found_on_a_pipeline_return_a_pipeline(steps, before):
     assert isinstance(search.best_estimator_, Pipeline)
 
 
-def test_weights_reach_the_steps_of_a_corrected_pipeline():
+def test_weights_reach_the_steps_of_a_corrected_pipeline(tmp_path):
     weight = np.linspace(0.5, 1.5, len(LOG.X))
     given = make_pipeline(DropKeys(), Ridge()).fit(LOG.X, LOG.y)
     diagnosis = diagnose(given, LOG.X, LOG.y, robot=LOG.robot, sample_weight=weight)
@@ -95,6 +97,20 @@ def test_weights_reach_the_steps_of_a_corrected_pipeline():
     model = clone(diagnosis.model).fit(LOG.X, LOG.y, ridge__sample_weight=weight)
     own = make_pipeline(DropKeys(), Ridge()).fit(LOG.X, LOG.y, ridge__sample_weight=weight)
     np.testing.assert_allclose(model[-1].regressor_[-1].coef_, own[-1].coef_, rtol=1e-12)
+    stored = skidyn.load_model(skidyn.save_model(tmp_path / "corrected.skops", model))
+    np.testing.assert_array_equal(stored.predict(LOG.X), model.predict(LOG.X))
+    with sklearn.config_context(enable_metadata_routing=True):
+        ridge = Ridge().set_fit_request(sample_weight=True)
+        routed = clone(diagnosis.model).set_params(ridge__regressor__ridge=ridge)
+        scores = cross_val_score(
+            routed,
+            LOG.X,
+            LOG.y,
+            cv=GroupKFold(2),
+            params={"groups": LOG.X["trajectory"], "sample_weight": weight},
+            error_score="raise",
+        )
+    assert np.isfinite(scores).all()
 
 
 def test_a_corrected_model_is_diagnosed_with_its_effects():
