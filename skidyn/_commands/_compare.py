@@ -128,7 +128,7 @@ def _compare_with_log(options: argparse.Namespace) -> None:
             "--html and --names compare two: add --against, --against-model, or give two reports. "
             "The page of one model and one log is made by skidyn diagnose --html"
         )
-    model, frame, tau = read_model_and_log(options)
+    model, frame, tau = read_model_and_log(options, check=False)  # a diagnosis checks it
     diagnosis = run_diagnosis(model, frame, tau, options, kinds=())
     comparison = diagnosis.comparison
     if options.traces:
@@ -182,7 +182,7 @@ def _names(options: argparse.Namespace, pair: list[argparse.Namespace]) -> list[
 
 
 def _diagnosed(options: argparse.Namespace) -> Diagnosis:
-    model, frame, tau = read_model_and_log(options)
+    model, frame, tau = read_model_and_log(options, check=False)  # a diagnosis checks it
     return run_diagnosis(model, frame, tau, options)
 
 

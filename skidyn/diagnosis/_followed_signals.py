@@ -39,7 +39,9 @@ COUNTS = 0.1
 #: A further product must bring this share of the squared residual.
 WORTH = 0.05
 #: Joints nearest to one among which sums of positions are formed, and their waves per rad.
-MOST_NEAR, WAVES = 8, (0.5, 1.0, 2.0)
+MOST_NEAR, WAVES, SIGNS = 8, (0.5, 1.0, 2.0), (1.0, -1.0)
+#: Share by which a sum may be wrong by rounding.
+ROUNDING = 1e-6
 #: A product that varies by a smaller share of its squares counts as constant.
 CONSTANT = 1e-10
 
@@ -91,45 +93,63 @@ def followed_signals(problem: Problem, joint: int, residual: Array) -> Followed:
 
 def _by_sums(positions: dict[int, Array], y: Array, fold: NDArray[np.int64]) -> list[Sum]:
     """The best sum of two positions and that of three, those that predict something."""
+    # waves of a sum are products of those of the positions, as complex numbers
+    turned = {k: np.exp(1j * np.outer(q, WAVES)) for k, q in positions.items()}
+    signed = {(k, sign): x if sign > 0 else x.conj() for k, x in turned.items() for sign in SIGNS}
     found = []
     for count in (2, 3):
         sums: list[Sum] = [
             (places, (1.0, *weights))
             for places in itertools.combinations(positions, count)
-            for weights in itertools.product((1.0, -1.0), repeat=count - 1)
+            for weights in itertools.product(SIGNS, repeat=count - 1)
         ]
-        best = _best_block([_waves(positions, *of) for of in sums], y, fold) if sums else None
+        waves = np.empty((len(sums), len(y), len(WAVES)), dtype=complex)
+        for into, of in zip(waves, sums, strict=True):
+            first, second, *others = (signed[k, sign] for k, sign in zip(*of, strict=True))
+            np.multiply(first, second, out=into)
+            for other in others:
+                into *= other
+        best = _best_block(waves.view(float), y, fold) if sums else None
         if best is not None:
             found.append(sums[best])
     return found
 
 
-def _waves(positions: dict[int, Array], places: Sequence[int], weights: Sequence[float]) -> Array:
-    """Sines and cosines of a sum of positions, shape (n_rows, 2 n_waves)."""
-    total = np.asarray(sum(w * positions[k] for k, w in zip(places, weights, strict=True)))
-    return np.column_stack([wave(m * total) for m in WAVES for wave in (np.sin, np.cos)])
+def _best_block(blocks: Array, y: Array, fold: NDArray[np.int64]) -> int | None:
+    """The block of columns whose fit predicts the folds left out best, if any does.
 
-
-def _best_block(blocks: Sequence[Array], y: Array, fold: NDArray[np.int64]) -> int | None:
-    """The block of columns whose fit predicts the folds left out best, if any does."""
-    n_folds = int(fold.max()) + 1
-    parts = [np.flatnonzero(fold == f) for f in range(n_folds)]
-    x = np.stack([b - b.mean(0) for b in blocks])  # (n_blocks, n_rows, k)
+    Parameters
+    ----------
+    blocks : ndarray of shape (n_blocks, n_rows, k)
+    y : ndarray of shape (n_rows,)
+    fold : ndarray of shape (n_rows,)
+    """
     y = y - y.mean()
-    inside = [x[:, p] for p in parts]
+    right, mean = np.moveaxis(np.stack([y, np.full(len(y), 1 / len(y))]) @ blocks, 1, 0)
+    gram = blocks.transpose(0, 2, 1) @ blocks - len(y) * mean[:, :, None] * mean[:, None]
+    ridge = 1e-3 * len(y) * np.eye(blocks.shape[2])
+    weights = _solved(gram + ridge, right)
+    # No fit predicts rows that are left out better than it follows them when they are not.
+    gain = np.sum(weights * (2 * right - np.matmul(gram, weights[..., None])[..., 0]), axis=1)
+    able = np.flatnonzero(gain > (1 - ROUNDING) * LEAST_SHARE * float(y @ y))
+    if not len(able):
+        return None
+    x = blocks[able] - mean[able, None]
+    parts = [np.flatnonzero(fold == f) for f in range(int(fold.max()) + 1)]
+    inside = [x[:, rows] for rows in parts]
     own = np.array([a.transpose(0, 2, 1) @ a for a in inside])
-    right = np.array([y[p] @ a for a, p in zip(inside, parts, strict=True)])
-    energy = np.array([y[p] @ y[p] for p in parts])
-    ridge = 1e-3 * len(y) * np.eye(x.shape[2])
-    left = np.zeros((n_folds, len(blocks)))
-    for f in range(n_folds):
-        weights = np.linalg.solve(
-            own.sum(0) - own[f] + ridge, (right.sum(0) - right[f])[..., None]
-        )[..., 0]
-        left[f] = energy[f] - 2 * np.einsum("bk,bk->b", weights, right[f])
-        left[f] += np.einsum("bk,bkl,bl->b", weights, own[f], weights)
+    along = np.array([y[rows] @ a for a, rows in zip(inside, parts, strict=True)])
+    energy = np.array([y[rows] @ y[rows] for rows in parts])
+    weights = _solved(own.sum(0) - own + ridge, along.sum(0) - along)
+    left = energy[:, None] - 2 * np.einsum("fbk,fbk->fb", weights, along)
+    left += np.einsum("fbk,fbkl,fbl->fb", weights, own, weights, optimize=True)
     best = int(np.argmin(left.sum(0)))
-    return best if _predictable(energy, left[:, best]) else None
+    return int(able[best]) if _predictable(energy, left[:, best]) else None
+
+
+def _solved(gram: Array, right: Array) -> Array:
+    """Solutions of many small systems, shape (..., k)."""
+    return np.asarray(np.linalg.solve(gram, right[..., None])[..., 0])
 
 
 def _predictable(before: Array, after: Array) -> bool:

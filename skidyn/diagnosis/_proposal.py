@@ -78,8 +78,9 @@ def grammar(variables: Sequence[str], joint: int) -> list[str]:
         places += [f"{w}({a} {o} {b})" for w in ("sin", "cos") for o in "-+"] + [f"{a} * {b}"]
     speeds = [f(v) for v in velocities for f in _SPEEDS]
     own = f"dq{joint + 1}"
+    speeds += [f"{a} * {b}" for a, b in itertools.combinations(sorted(velocities), 2)]
     for a, b in itertools.permutations(velocities, 2):
-        speeds += [f"{a} * {b}", f"{a} * abs({b})", f"sign({a}) * abs({b})", f"sign({a}) * {b}"]
+        speeds += [f"{a} * abs({b})", f"sign({a}) * abs({b})", f"sign({a}) * {b}"]
     frictions = [own, f"sign({own})"] if own in velocities else speeds
     mixed = [f"{p} * {v}" for p in places for v in frictions if positions]
     return list(dict.fromkeys([*places, *speeds, *mixed, *others]))

@@ -183,14 +183,14 @@ class RankingSearch(SearchState):
             # A few waves a turn are what a nameless function left of its own edges.
             lines = [
                 line
-                for line in find_lines(problem, residual)
+                for line in find_lines(problem, residual, self.significant)
                 if line.term.shape["N"] >= RESOLVED or not self._follows_position(line.joint)
             ]
             found.append(self._of_lines("torque_ripple", "N", 1.0, lines, least))
         if self.vibration:
             # On samples, of which there are many more than rows.
             least = self.settings.least_drop * len(residual) / max(1, problem.rows.counts.max())
-            lines = find_vibrations(problem, residual)
+            lines = find_vibrations(problem, residual, self.significant)
             found.append(self._of_lines(UNKNOWN, "frequency", 0.1, lines, least))
         return [h for h in found if h is not None]
 

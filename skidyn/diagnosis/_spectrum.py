@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -52,7 +53,13 @@ class Line:
     torque: Array
 
 
-def find_lines(problem: Problem, residual: Array) -> list[Line]:
+def _any(chance: float) -> bool:
+    return True
+
+
+def find_lines(
+    problem: Problem, residual: Array, significant: Callable[[float], bool] = _any
+) -> list[Line]:
     """The strongest lines of each joint that stand out of the local noise level.
 
     Parameters
@@ -61,6 +68,8 @@ def find_lines(problem: Problem, residual: Array) -> list[Line]:
         Motion and the samples that slide.
     residual : ndarray of shape (n_samples, n_joints), N m
         Measured torque less the model.
+    significant : callable, optional
+        Whether a line of a chance is wanted; all by default.
     """
     fold = problem.sample_folds(int(np.argmax(problem.rows.counts)))
     lines = []
@@ -74,6 +83,8 @@ def find_lines(problem: Problem, residual: Array) -> list[Line]:
                 continue
             # Power over its level is exponentially distributed; any wave of a joint may be highest.
             chance = min(1.0, 2 * HIGHEST * float(np.exp(-height)))
+            if not significant(chance):
+                continue
             term = Term.at("torque_ripple", (joint,), {"N": waves})
             line = _test_line(problem, term, chance, 2 * HIGHEST, use, r, fold)
             weak = _explained_share(r[use], line.torque[use]) <= 0.2
@@ -81,7 +92,9 @@ def find_lines(problem: Problem, residual: Array) -> list[Line]:
     return lines
 
 
-def find_vibrations(problem: Problem, residual: Array) -> list[Line]:
+def find_vibrations(
+    problem: Problem, residual: Array, significant: Callable[[float], bool] = _any
+) -> list[Line]:
     """The strongest wave in time of each joint that averaged rows are too slow for.
 
     Parameters
@@ -90,6 +103,8 @@ def find_vibrations(problem: Problem, residual: Array) -> list[Line]:
         Motion and the samples that slide.
     residual : ndarray of shape (n_samples, n_joints), N m or N
         Measured torque less the model.
+    significant : callable, optional
+        Whether a line of a chance is wanted; all by default.
     """
     signals, lines = problem.signals, []
     if signals.time is None:
@@ -98,7 +113,7 @@ def find_vibrations(problem: Problem, residual: Array) -> list[Line]:
     for joint in range(problem.n_joints):
         use, r = problem.rows.sliding[:, joint], residual[:, joint]
         found = clock_line(signals, r, use, problem.motion.rate, (SLOWEST, np.inf))
-        if found is not None:
+        if found is not None and significant(found.chance):
             term = Term.at("vibration", (joint,), {"frequency": found.frequency})
             line = _test_line(problem, term, found.chance, 1.0, use, r, fold)
             lines.append(_capped(line, found.height))
@@ -171,15 +186,17 @@ def _test_line(
 ) -> Line:
     (joint,) = term.places
     block = term.torque_columns(problem.signals)[joint]
+    rows = np.flatnonzero(use)
+    rows = rows[np.argsort(fold[rows], kind="stable")]
+    edges = np.flatnonzero(np.diff(fold[rows])) + 1
     grams, cross = [], []
-    for f in np.unique(fold[use]):
-        here = use & (fold == f)
+    for here in np.split(rows, edges):
         grams.append(block[here].T @ block[here])
         cross.append(block[here].T @ r[here])
     total, right = sum(grams), sum(cross)
     both = np.linalg.lstsq(total, right, rcond=None)[0]
     left = (r - block @ both)[use]
-    steps, count = sample_blocks(problem)
+    steps, count = problem.signals.once("half seconds", lambda: sample_blocks(problem))
     sums: Array = np.stack([np.bincount(steps[use], z * left, count) for z in block[use].T], axis=1)
     by_blocks = chance_of_score(np.asarray(right), sums[np.any(sums != 0, axis=1)])
     chance = max(chance, min(1.0, tried * by_blocks))

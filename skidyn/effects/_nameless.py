@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
+from numpy.typing import NDArray
 
 from skidyn._signals import Array, Signals
 from skidyn.effects._base import Coefficient, Effect, Shape
@@ -247,31 +248,64 @@ class FunctionOfSignals(NamelessEffect):
 def splines(x: Array, low: float, high: float, count: int) -> Array:
     """Cubic B-splines on a range, continued beyond it, shape (n_samples, count).
 
-    Together they add up to a constant, which the model may lack.
-    """
-    from scipy.interpolate import BSpline  # not paid for by who only checks a log
+    Together they add up to a constant, which the model may lack. The recursion is that of Cox and
+    de Boor [1]_, for the four splines that are not zero at a sample.
 
+    References
+    ----------
+    .. [1] L. Piegl, W. Tiller (1997), The NURBS book, 2nd ed., Springer, algorithm A2.2.
+    """
+    if not high > low:
+        return np.zeros((len(x), count))
     degree = 3
-    inner = np.linspace(low, high, count - degree + 1)
-    knots = np.r_[[low] * degree, inner, [high] * degree]
+    n_pieces = count - degree
+    knots = np.r_[[low] * degree, np.linspace(low, high, n_pieces + 1), [high] * degree]
 
     def functions(inside: Array) -> Array:
         inside = np.clip(inside, low, high - 1e-9 * (high - low))
-        return np.asarray(BSpline.design_matrix(inside, knots, degree).toarray())
+        piece = ((inside - low) * (n_pieces / (high - low))).astype(np.int64)
+        piece = np.minimum(piece, n_pieces - 1)
+        before = [inside - knots[piece + degree - k] for k in range(degree)]
+        after = [knots[piece + degree + 1 + k] - inside for k in range(degree)]
+        values: list[Any] = [1.0]
+        for order in range(1, degree + 1):
+            carried, raised = 0.0, []
+            for r, value in enumerate(values):
+                part = value / (after[r] + before[order - 1 - r])
+                raised.append(carried + after[r] * part)
+                carried = before[order - 1 - r] * part
+            values = [*raised, carried]
+        columns = np.zeros((len(inside), count))
+        place = np.arange(0, columns.size, count) + piece
+        for r, value in enumerate(values):
+            columns.ravel()[place + r] = value
+        return columns
 
     return continued(functions, x, low, high)
 
 
 def supported_range(signals: Signals, x: Array) -> tuple[float, float]:
     """Range of a signal that several trajectories cover: elsewhere one of them would decide."""
-    numbers = np.unique(signals.trajectory)
-    ends = np.array(
-        [np.quantile(x[signals.trajectory == k], [_OUTSIDE, 1 - _OUTSIDE]) for k in numbers]
-    )
+    (found,) = supported_ranges(signals, x[:, None])
+    return found
+
+
+def supported_ranges(signals: Signals, x: Array) -> list[tuple[float, float]]:
+    """:func:`supported_range` of several signals, shape (n_samples, n_signals)."""
+    rows = signals.once("rows of trajectories", lambda: _rows_of_trajectories(signals))
+    ends = np.array([np.quantile(x[own], [_OUTSIDE, 1 - _OUTSIDE], axis=0) for own in rows])
     ends.sort(axis=0)
     at = min(_REACHING, (len(ends) + 1) // 2) - 1
-    low, high = float(ends[at, 0]), float(ends[-1 - at, 1])
-    return (low, high) if high > low else (float(ends[0, 0]), float(ends[-1, 1]))
+    return [
+        (float(low[at]), float(high[-1 - at]))
+        if high[-1 - at] > low[at]
+        else (float(low[0]), float(high[-1]))
+        for low, high in np.moveaxis(ends, 2, 0).transpose(0, 2, 1)
+    ]
+
+
+def _rows_of_trajectories(signals: Signals) -> list[NDArray[np.int64]]:
+    return [np.flatnonzero(signals.trajectory == k) for k in np.unique(signals.trajectory)]
 
 
 def continued(functions: Callable[[Array], Array], x: Array, low: float, high: float) -> Array:
@@ -282,9 +316,10 @@ def continued(functions: Callable[[Array], Array], x: Array, low: float, high: f
         (np.minimum(x - low, 0.0), low, low + reach),
         (np.maximum(x - high, 0.0), high, high - reach),
     ):
-        if beyond.any():
+        rows = np.flatnonzero(beyond)
+        if len(rows):
             at_edge, inside = functions(np.array([edge, inner]))
-            values += np.outer(beyond / (edge - inner), at_edge - inside)
+            values[rows] += np.outer(beyond[rows] / (edge - inner), at_edge - inside)
     return values
 
 
@@ -417,11 +452,12 @@ class TorqueBetweenTwoJoints(NamelessEffect):
         middle = tuple((low + high) / 2 for low, high in ranges)
         half = tuple((high - low) / 2 for low, high in ranges)
         found = []
-        for ratio in (unit * value for value in self.shapes[0].grid):
+        ratios = unit * np.array(self.shapes[0].grid)
+        sums = signals.q[:, [joints[0]]] + ratios * signals.q[:, [joints[1]]]
+        for ratio, (low, high) in zip(
+            ratios.tolist(), supported_ranges(signals, sums), strict=True
+        ):
             # What the sum itself covers, kept in terms that stay when the ratio is refined.
-            low, high = supported_range(
-                signals, signals.q[:, joints[0]] + ratio * signals.q[:, joints[1]]
-            )
             share = (high - low) / 2 / max(half[0] + abs(ratio) * half[1], 1e-300)
             shift = (low + high) / 2 - (middle[0] + ratio * middle[1])
             shape = {"middle": middle, "half": half, "share": share, "shift": shift}

@@ -307,12 +307,12 @@ class ForceNearPoint(NamelessEffect):
         position = tool_position(signals)
         point = np.array([shape[axis] for axis in "xyz"])
         away = (position - point) / max(shape["width"], 1e-9)
-        near = np.exp(-0.5 * np.sum(away**2, axis=1))[:, None]
+        near = np.exp(-0.5 * np.einsum("ia,ia->i", away, away))[:, None]
         jacobian = tool_jacobian(signals)
+        radial = np.einsum("iaj,ia->ij", jacobian, away)
         columns = {}
         for j in joints:
-            radial = np.sum(jacobian[:, :, j] * away, axis=1, keepdims=True)
-            columns[j] = -near * np.column_stack([radial, jacobian[:, :, j]])
+            columns[j] = -near * np.column_stack([radial[:, j], jacobian[:, :, j]])
         return columns
 
 

@@ -147,6 +147,9 @@ class Fits:
     _moved: dict[Reading, Array] = field(default_factory=dict, repr=False)
     _parts: dict[Reading, tuple[Array, Array]] = field(default_factory=dict, repr=False)
     _fitted: dict[tuple[Any, ...], RobustFit] = field(default_factory=dict, repr=False)
+    _felt: dict[Reading, list[tuple[Array, NDArray[np.int64]]]] = field(
+        default_factory=dict, repr=False
+    )
 
     @property
     def n_joints(self) -> int:
@@ -180,7 +183,7 @@ class Fits:
         torque = self.torque.copy()
         for column, gain in gains.items():
             torque[:, column] /= gain
-        return Fits(self.robot, self.signals, torque, self.moving, self.recorded, self.left_out)
+        return replace(self, torque=torque, _known={}, _fitted={})
 
     def with_gravity(self, reading: Reading) -> Fits:
         """The same rows with the gravity torque of the stated bodies added, read as they are."""
@@ -407,20 +410,35 @@ class Fits:
         self, reading: Reading
     ) -> tuple[list[int], list[Array], list[NDArray[np.int64]], list[Array]]:
         """Columns of the torque, and designs, places of coefficients and targets of their fit."""
-        robot, s = self._robot(reading), self.motion(reading)
-        base = base_parameter_index(robot)
-        regressor = self.mean_regressor(robot, s, base)
+        felt = self._felt_columns(replace(reading, **_PLAIN))
         read = [self.torque_column(reading, j) for j in range(self.n_joints)]
         joints = [j for j, (column, _) in enumerate(read) if self.usable(column)]
-        p = len(base)
         designs, places, targets = [], [], []
         for j in joints:
             y, use = self.mean_torque(read[j][0])
-            felt = np.flatnonzero(regressor[:, j].any(axis=0))  # bodies that the joint moves
-            designs.append(np.hstack([regressor[use, j][:, felt], self._own_columns(s, j)[use]]))
-            places.append(np.append(felt, p + OWN * j + np.arange(OWN)))
+            columns, place = felt[j]
+            designs.append(columns[use])
+            places.append(place)
             targets.append(read[j][1] * y[use])
         return [read[j][0] for j in joints], designs, places, targets
+
+    def _felt_columns(self, motion: Reading) -> list[tuple[Array, NDArray[np.int64]]]:
+        """Mean columns of what every joint feels, and the places of their coefficients.
+
+        Those of the last motion are kept: readings of the torque share them.
+        """
+        if motion not in self._felt:
+            self._felt.clear()
+            robot, s = self._robot(motion), self.motion(motion)
+            base = base_parameter_index(robot)
+            regressor = self.mean_regressor(robot, s, base)
+            found = []
+            for j in range(self.n_joints):
+                felt = np.flatnonzero(regressor[:, j].any(axis=0))  # bodies that the joint moves
+                columns = np.hstack([regressor[:, j][:, felt], self._own_columns(s, j)])
+                found.append((columns, np.append(felt, len(base) + OWN * j + np.arange(OWN))))
+            self._felt[motion] = found
+        return self._felt[motion]
 
     def mean_regressor(self, robot: Robot, s: Signals, index: NDArray[np.int64]) -> Array:
         """Some columns of the mean regressor, (n_rows, n_joints, len(index)), chunk by chunk."""
