@@ -49,6 +49,7 @@ def story_lines(story: Mapping[str, Any], failures: Sequence[Any] = ()) -> Itera
         when = f"; it acts {line['when']}" if line.get("when") else ""
         yield f"  {k}. {line['what']} on {line['where']}{size}; {line['sure']}{when}"
     yield from where_lines(failures)
+    yield from motion_lines(story.get("simulation"))
     if any(row["speaks"] for row in story["joints"]):
         yield ""
         yield story["left"]
@@ -61,6 +62,32 @@ def answer_lines(answer: Mapping[str, Any]) -> Iterator[str]:
         for told in answer["failures"]
     ]
     yield from story_lines(answer["story"], failures)
+
+
+def motion_lines(motion: Mapping[str, Any] | None) -> Iterator[str]:
+    """Errors of the simulated motion of every joint; none where no simulation was asked for."""
+    if motion is None:
+        return
+    yield ""
+    yield motion["heading"]
+    names = [_name(row) for row in motion["joints"]]
+    width = max(map(len, names), default=5)
+    models = ["before", "after"] if motion["added"] else ["before"]
+    heads = models if motion["added"] else ["error"]
+    cells = "".join(f"{head:>9s}" for head in heads)
+    wide = len(cells)
+    yield f"  {'':{width}s}{'position':>{wide}s}{'velocity':>{wide + 6}s}{'no forces':>15s}"
+    yield f"  {'joint':{width}s}{cells}      {cells}"
+    for name, row in zip(names, motion["joints"], strict=True):
+        unit = row["unit"]
+        place, speed = (
+            "".join(f"{digits(row[model][what]):>9s}" for model in models)
+            for what in ("position", "velocity")
+        )
+        coasting = digits(row["without_forces"])
+        yield f"  {name:{width}s}{place} {unit:3s}  {speed} {unit + '/s':5s}{coasting:>9s} {unit}"
+    if motion["text"]:
+        yield f"  {motion['text']}"
 
 
 def where_lines(failures: Sequence[Any]) -> Iterator[str]:

@@ -177,7 +177,7 @@ def _weights(regressor: Any, sample_weight: Any) -> dict[str, Any]:
 
     Where metadata is routed, the Pipeline sends them to the steps that request them.
     """
-    from sklearn import get_config
+    from sklearn._config import get_config
     from sklearn.pipeline import Pipeline
 
     name = "sample_weight"

@@ -47,7 +47,9 @@ def notebook(story: Mapping[str, Any]) -> str:
             "<th style='text-align:left'>Held-out error</th></tr></thead><tbody>"
             f"{''.join(_row(row, largest) for row in rows)}</tbody></table>"
         )
-    last = [text for text in (story["quiet"], story["left"]) if text]
+    motion = story.get("simulation")
+    moved = "" if motion is None else f"{motion['heading']}. {motion['text']}"
+    last = [text for text in (story["quiet"], story["left"], moved) if text]
     parts += [f"<p style='margin:.2em 0'>{escape(text)}</p>" for text in last]
     return f"<div>{''.join(parts)}</div>"
 

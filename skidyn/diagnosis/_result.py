@@ -20,13 +20,14 @@ from skidyn.diagnosis._hypothesis import SearchResult
 from skidyn.diagnosis._limits import Limit
 from skidyn.diagnosis._notebook import notebook
 from skidyn.diagnosis._remainder import Remainder
+from skidyn.diagnosis._simulated import of_finding, report_of, simulated
 from skidyn.diagnosis._story import story
 from skidyn.diagnosis._unknown import UnknownTorque
 from skidyn.effects import Term, make_terms
 from skidyn.evidence import Problem
 from skidyn.identification import RBDRegressor
 from skidyn.measurement import Suspicion
-from skidyn.simulation import HORIZON, Controller, SimulationVerdict, judge_additions
+from skidyn.simulation import HORIZON, Controller, InTurn, SimulationVerdict, judge_in_turn
 
 #: How the sentence on a finding begins that the model for simulation is without.
 _VETO = "Not in the completed model, because it worsens the simulated motion:"
@@ -84,6 +85,8 @@ class Diagnosis:
     vetoed : list of Finding
         Findings that worsen the simulated motion, which :attr:`model` leaves out; empty before
         :meth:`judge_by_simulation`.
+    in_turn : InTurn or None
+        What :meth:`judge_by_simulation` found for every finding and for all together.
 
     Examples
     --------
@@ -115,6 +118,7 @@ class Diagnosis:
     parts: Remainder | None = None
     opened: Opened | None = field(repr=False, default=None)
     vetoed: list[Finding] = field(repr=False, default_factory=list)
+    in_turn: InTurn | None = field(repr=False, default=None)
 
     def __repr__(self) -> str:
         units = ["N" if slides else "N m" for slides in self.problem.signals.prismatic]
@@ -177,9 +181,10 @@ class Diagnosis:
             ``verdict``, ``mark``, ``headline``, ``text``; ``findings`` in a line each (``what``,
             ``where``, ``size``, ``sure``, ``change``); ``joints`` with ``before``, ``after`` and
             ``noise`` (N m or N) and ``speaks`` where there is something to say; ``quiet``,
-            ``left``, ``doubts`` about the log and other ``warnings``.
+            ``left``, ``doubts`` about the log and other ``warnings``; ``simulation`` with errors
+            of the simulated motion, after :meth:`judge_by_simulation`.
         """
-        return story(self)
+        return {**story(self), "simulation": simulated(self.in_turn, self.findings)}
 
     def _repr_html_(self) -> str:
         return notebook(self.story())
@@ -227,9 +232,10 @@ class Diagnosis:
     ) -> list[SimulationVerdict | None]:
         """Judge every finding by the motion of the model along recordings left out of its fit.
 
-        An effect that lowers the error of the torque may worsen the motion. One that does so beyond
-        chance goes to :attr:`vetoed`, a sentence on it to :attr:`warnings`, and :attr:`model` comes
-        without it; :meth:`add` adds it all the same.
+        The errors of the motion without and with the findings stand in :attr:`simulation`, on the
+        page and in the report. An effect that lowers the error of the torque may worsen the motion.
+        One that does so beyond chance goes to :attr:`vetoed`, a sentence on it to :attr:`warnings`,
+        and :attr:`model` comes without it; :meth:`add` adds it all the same.
 
         Parameters
         ----------
@@ -259,9 +265,10 @@ class Diagnosis:
                 "an RBDRegressor"
             )
         additions = [finding.terms for finding in self.findings]
-        verdicts = judge_additions(
+        self.in_turn = judge_in_turn(
             self.base_model, additions, *self.data[:2], controller=controller, horizon=horizon
         )
+        verdicts = self.in_turn.verdicts
         self.vetoed = [
             f for f, v in zip(self.findings, verdicts, strict=True) if v is not None and v.worsens
         ]
@@ -272,6 +279,14 @@ class Diagnosis:
                 self.warnings.append(f"{_VETO} {finding.title} of {where}. {verdict.text}")
         self.__dict__.pop("model", None)
         return verdicts
+
+    @property
+    def simulation(self) -> SimulationVerdict | None:
+        """Simulated motion of the model as given, and with the findings; None before it is judged.
+
+        The second model has no finding that worsens the motion or that cannot be simulated.
+        """
+        return None if self.in_turn is None else self.in_turn.together
 
     def add(self, kind: str, joints: Sequence[int] | None = None) -> Any:
         """Add an effect to the model and fit it again.
@@ -355,10 +370,14 @@ class Diagnosis:
             "sensor_noise": [float(x) for x in self.sensor_noise],
             "remainder": [float(x) for x in self.remainder],
             "remainder_inflation": [float(x) for x in self.remainder_inflation],
-            "effects": [finding.to_dict() for finding in self.findings],
+            "effects": [
+                {**finding.to_dict(), **of_finding(self.in_turn, k)}
+                for k, finding in enumerate(self.findings)
+            ],
             "unexplained": self.unexplained,
             "limits": [limit.to_dict() for limit in self.limits],
             "history": self.history,
             "warnings": list(self.warnings),
             "checks": [check.to_dict() for check in self.checks],
+            "simulation": report_of(self.in_turn),
         }

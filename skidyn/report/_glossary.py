@@ -31,6 +31,10 @@ MEANINGS = {
     "from estimates with parts of the log left out.",
     "rival": "Another effect that explains this recording nearly as well. The motion that is "
     "named beside it would tell them apart.",
+    "position error": "Root mean square of simulated minus logged position, along recordings that "
+    "were left out of the fit of the model.",
+    "without forces": "A model that keeps the velocity with which a piece begins. A model that is "
+    "to be of use in a simulation must be nearer to the log.",
     "q-value": "Share of false findings that is to be expected among all findings reported at "
     "this level.",
     "trajectory": "One piece of motion of the log, with the number that the log gives it, or "

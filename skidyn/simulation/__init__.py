@@ -33,4 +33,5 @@ __all__ = [
 ]
 
 # For other packages of skidyn; no part of the public interface.
+from skidyn.simulation._additions import InTurn as InTurn, judge_in_turn as judge_in_turn
 from skidyn.simulation._score import HORIZON as HORIZON

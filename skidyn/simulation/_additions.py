@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from sklearn.base import clone
 
 from skidyn._columns import names_of_table
 from skidyn._exceptions import SkidynError
+from skidyn._keys import keys_of
 from skidyn.forward import Controller
 from skidyn.identification import RBDRegressor
 from skidyn.model_selection import held_out_folds
@@ -84,32 +86,75 @@ def judge_additions(
     >>> verdicts[0].improves
     True
     """
-    folds = _folds(X, model.trajectory)
+    judged = judge_in_turn(model, additions, X, y, controller=controller, horizon=horizon)
+    return judged.verdicts
+
+
+@dataclass(frozen=True)
+class InTurn:
+    """What additions do one by one, and together.
+
+    Parameters
+    ----------
+    verdicts : list of SimulationVerdict or None
+        Of every addition, on top of those before it that did not worsen the motion; None where
+        simulation says nothing.
+    added : list of bool
+        Whether the last model has it: neither worsens it the motion, nor is it an effect that
+        cannot be simulated.
+    together : SimulationVerdict
+        The model with all that were added against the model without any.
+    """
+
+    verdicts: list[SimulationVerdict | None]
+    added: list[bool]
+    together: SimulationVerdict
+
+    @property
+    def silent(self) -> bool:
+        """Whether both motions are further from the log than that of a model without forces."""
+        return min(_typical(self.together.before), _typical(self.together.after)) >= 1.0
+
+
+def judge_in_turn(
+    model: RBDRegressor,
+    additions: Sequence[Iterable[Any]],
+    X: Any,
+    y: Any,
+    *,
+    controller: Controller | None = None,
+    horizon: float | None = HORIZON,
+) -> InTurn:
+    """Judge additions as :func:`judge_additions` does, and keep what they do together."""
+    folds = _folds(model, X)
     torque = np.asarray(y, dtype=float)
     if model.consistent is False:
         model = clone(model).set_params(consistent=True)
     used: list[Any] = []
-    errors = _held_out(model, used, X, torque, folds, controller, horizon)
+    first = errors = _held_out(model, used, X, torque, folds, controller, horizon)
     verdicts: list[SimulationVerdict | None] = []
+    added = []
     for addition in additions:
         terms = [*used, *addition]
         try:
             after = _held_out(model, terms, X, torque, folds, controller, horizon)
         except SkidynError:
             verdicts.append(None)
+            added.append(False)
             continue
         verdict = compare_errors(errors, after)
         verdicts.append(verdict if min(_typical(errors), _typical(after)) < 1.0 else None)
-        if verdicts[-1] is None or not verdict.worsens:
+        added.append(verdicts[-1] is None or not verdict.worsens)
+        if added[-1]:
             used, errors = terms, after
-    return verdicts
+    return InTurn(verdicts, added, compare_errors(first, errors))
 
 
-def _folds(X: Any, trajectory: Any) -> list[tuple[Rows, Rows]]:
-    """Rows to fit and rows to simulate."""
+def _folds(model: RBDRegressor, X: Any) -> list[tuple[Rows, Rows]]:
+    """Rows to fit and rows to simulate: recording by recording, or pieces of a single one."""
     names = names_of_table(X)
-    column = names[trajectory] if isinstance(trajectory, int) else trajectory or "trajectory"
-    number = np.asarray(X[column]) if column in names else np.zeros(len(X))
+    column = keys_of(X, trajectory=model.trajectory, time=model.time).trajectory
+    number = np.zeros(len(X)) if column is None else np.asarray(X[names[column]])
     return held_out_folds(number, _FOLDS)
 
 

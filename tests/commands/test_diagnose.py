@@ -27,6 +27,9 @@ def test_findings_are_judged_by_simulation_where_it_is_asked_for(work, run, monk
     assert code == cli.DONE
     assert len(judged) == 1 and len(judged[0]) == len(report["effects"]) == 1
     assert not [note for note in report["warnings"] if "worsens the simulated" in note]
+    motion = report["simulation"]
+    assert len(motion["before"]["position"]) == len(motion["after"]["velocity"]) == 2
+    assert report["effects"][0]["simulation"]["added"]
 
 
 def test_diagnose_writes_report_and_page(diagnosed):

@@ -37,6 +37,23 @@ def test_the_verdict_comes_first_and_each_thing_once(story):
     assert "axis1" not in text
 
 
+def test_the_simulated_motion_is_told_where_it_was_asked_for(story):
+    error = {"position": 0.0123, "final": 0.02, "velocity": 0.11}
+    story["simulation"] = {
+        "heading": "Simulated motion, 1 s at a time, on recordings left out of the fit",
+        "text": "The error of the simulated motion falls: -37 %.", "added": True,
+        "joints": [{"joint": 1, "name": "axis1", "unit": "rad", "before": error,
+                    "after": {**error, "position": 0.0045}, "without_forces": 0.34}],
+    }  # fmt: skip
+    lines = list(story_lines(story))
+    (row,) = [line for line in lines if "rad/s" in line]
+    assert row.split() == ["axis1", "(1)", *"0.012 0.0045 rad 0.11 0.11 rad/s 0.34 rad".split()]
+    assert "  The error of the simulated motion falls: -37 %." in lines
+    story["simulation"] |= {"added": False, "text": ""}
+    (row,) = [line for line in story_lines(story) if "rad/s" in line]
+    assert row.split() == ["axis1", "(1)", *"0.012 rad 0.11 rad/s 0.34 rad".split()]
+
+
 def test_a_doubt_about_the_log_comes_before_any_name(story):
     story["doubts"] = ["the torque of joint 2 has the other sign: evidence."]
     assert next(iter(story_lines(story))).startswith("Check the log first: the torque of joint 2")
