@@ -28,6 +28,7 @@ import pandas as pd
 from spoils import SPOILS, Spoiled
 from spoils_of_clocks import CLOCKS
 from spoils_of_joints import JOINTS
+from spoils_of_owners import OWNERS
 from spoils_of_parts import PARTS
 
 from skidyn.datasets import (
@@ -42,7 +43,7 @@ from skidyn.measurement import Suspicion
 from skidyn.robots import Robot
 
 ROBOTS = (load_panda, load_ur5, load_scara, load_planar_arm)
-MISTAKES = SPOILS | PARTS | CLOCKS | JOINTS
+MISTAKES = SPOILS | PARTS | CLOCKS | JOINTS | OWNERS
 EFFECTS = (None, "stribeck", None, "payload", "torque_ripple", None, "spring", None)
 
 

@@ -311,7 +311,7 @@ def _split_at_leaps(table: pd.DataFrame, names: Sequence[str], notes: list[str])
 
 
 def _without_repeated(table: pd.DataFrame, n: int, notes: list[str]) -> pd.DataFrame:
-    from skidyn.measurement import is_held, is_repeated
+    from skidyn.measurement import idle_rows, is_held, is_repeated
 
     q = table[[f"q{k + 1}" for k in range(n)]].to_numpy(dtype=float)
     number = table["trajectory"].to_numpy()
@@ -324,6 +324,8 @@ def _without_repeated(table: pd.DataFrame, n: int, notes: list[str]) -> pd.DataF
     torques = [f"tau{k + 1}" for k in range(n)]
     if set(torques) <= set(table.columns):
         moved = np.any(q[1:] != q[:-1], axis=1) & (number[1:] == number[:-1])
-        again |= is_held(table[torques].to_numpy(dtype=float), moved)
+        torque = table[torques].to_numpy(dtype=float)
+        again |= is_held(torque, moved)
+        again |= idle_rows(q, torque, table["time"].to_numpy(dtype=float), number)
     notes.append(f"drop_repeated: {int(again.sum())} of {len(q)} rows left out")
     return table[~again].reset_index(drop=True)

@@ -23,6 +23,7 @@ from skidyn.measurement._checks import names_in_doubt as names_in_doubt
 from skidyn.measurement._copies import copied_rows as copied_rows
 from skidyn.measurement._measures import (
     find_leaps as find_leaps,
+    idle_rows as idle_rows,
     is_held as is_held,
     is_repeated as is_repeated,
     position_step as position_step,

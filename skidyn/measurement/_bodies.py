@@ -27,6 +27,9 @@ USUAL = (0.4, 2.5)
 CLEARLY = (0.62, 1.6)
 #: Multiples of an effort limit that only another unit reaches.
 FAR = 20.0
+#: Rates of clock and velocities that are tried.
+RATES = (0.1, 0.2, 0.33, 0.5, 2.0, 3.0, 5.0, 10.0)
+AS_IT_IS = Reading()
 #: Factors of units of torque.
 UNITS = {1e3: "Nmm", 1e2: "Ncm", 1e-3: "kNm"}
 #: Error with stated bodies, as a share of the spread, and in errors with identified ones, from
@@ -128,6 +131,19 @@ class TorqueScale(Check):
         gains = {k: float(g) for k, g in enumerate(here) if np.isfinite(g) and g > 0}
         values = np.array(list(gains.values()))
         sure = np.array(list(known.values()))
+        rate = _other_rate(fits) if odd else None
+        if rate is not None:
+            value = float(f"{rate:.3g}")
+            words = f"time={1 / value:.6g},dq={value:g}"
+            yield self.suspicion(
+                "the clock runs at another rate, and the velocities were derived with it",
+                f"sampled {value:g} times as fast, torques follow the robot's own by "
+                f"{_rate_gain(fits, rate):.0f} (log-likelihood) better, each at a scale "
+                "that bodies make",
+                "suspected",
+                remedy=(f"--gain {words}", f"gain={{'time': {1 / value:.6g}, 'dq': {value:g}}}"),
+            )
+            return
         every = bool(odd) and (_one_sided(values) or (len(sure) > 1 and _one_sided(sure)))
         if not every:
             yield from self._of_joints(measurement, fits, gains, known)
@@ -206,6 +222,31 @@ class TorqueScale(Check):
             )
 
 
+def _rate_gain(fits: Fits, rate: float) -> float:
+    """Log-likelihood that another rate of clock and velocities gains."""
+    here, there = fits.nominal(Reading()), fits.nominal(Reading(stretch=rate))
+    return float(there.margin(here).sum())
+
+
+def _other_rate(fits: Fits) -> float | None:
+    """Rate of clock and velocities at which every torque is at a scale that bodies make.
+
+    Inertia grows with its square, gravity does not, so that no scale of a torque does the same.
+    """
+    best, log = max((_rate_gain(fits, float(np.exp(x))), x) for x in np.log(RATES))
+    step = 0.2
+    while step > 0.01:
+        near, other = max((_rate_gain(fits, float(np.exp(x))), x) for x in (log - step, log + step))
+        if near > best:
+            best, log = near, other
+        else:
+            step /= 2
+    rate = float(np.exp(log))
+    gains = list(_known_gains(fits, Reading(stretch=rate)).values())
+    usual = len(gains) > 1 and all(USUAL[0] <= gain <= USUAL[1] for gain in gains)
+    return rate if best > SURE and usual and not CLEARLY[0] < rate < CLEARLY[1] else None
+
+
 def _beyond_limits(measurement: Measurement) -> dict[int, float]:
     """Torques far beyond what the description says a joint can hold, while others are within."""
     robot = measurement.robot
@@ -275,10 +316,10 @@ def joint_gain(fits: Fits, k: int, gain: float) -> tuple[float, float, float]:
     return float(np.exp(log)), best, best - far
 
 
-def _known_gains(fits: Fits) -> dict[int, float]:
+def _known_gains(fits: Fits, reading: Reading = AS_IT_IS) -> dict[int, float]:
     """Multiple of the robot's own torque, of the columns of which it explains enough."""
-    here = fits.nominal(Reading())
-    s = fits.motion(Reading())
+    here = fits.nominal(reading)
+    s = fits.motion(reading)
     known = {}
     for k in range(fits.n_joints):
         if not fits.usable(k) or not here.gain[k] > 0:

@@ -82,12 +82,24 @@ def _is_short(values: Array) -> bool:
 
 
 class ConstantTorque(Check):
-    """A torque that never changes, in the log or in one of its trajectories."""
+    """A torque that never changes: in the log, in a trajectory, or at the ends of trajectories."""
 
     name = "constant_torque"
-    suspects = "torque that is constant, in the whole log or in some trajectories"
+    suspects = (
+        "torque that is constant, in the whole log, in some trajectories, or before drives are "
+        "enabled"
+    )
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        idle = measurement.idle
+        if idle.any():
+            yield self.suspicion(
+                "torque was not measured at the ends of recordings",
+                f"in {int(idle.sum())} rows, {idle.mean():.1%}, no torque changes: the drives were "
+                "not enabled, or their values came late",
+                "certain",
+                remedy=("--drop-repeated", "drop_repeated=True"),
+            )
         number = measurement.signals.trajectory
         runs = np.unique(number)
         lost = cut_columns(measurement)
@@ -186,11 +198,12 @@ class HeldTorque(Check):
                 remedy=("--drop-repeated", "drop_repeated=True"),
             )
             return
-        shares = np.zeros(measurement.n_joints)
+        shares, lost = np.zeros(measurement.n_joints), cut_columns(measurement)
         for k in range(measurement.n_joints):
             torque = measurement.torque[:, k]
             # even steps are those of a coarse sensor, not of a slow one
-            if len(np.unique(torque)) > 0.1 * len(torque) and np.isnan(position_step(torque)):
+            fine = len(np.unique(torque)) > 0.1 * len(torque) and np.isnan(position_step(torque))
+            if k not in lost and fine:
                 shares[k] = np.mean(torque[1:][moved] == torque[:-1][moved])
         held = np.flatnonzero(shares > HELD)
         if len(held):

@@ -33,6 +33,8 @@ from skidyn.measurement._elapsed import LostRows
 from skidyn.measurement._lengths import Lengths
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._odd import OddRecording
+from skidyn.measurement._odd_motion import OddMotion
+from skidyn.measurement._smoothing import SmoothedTorque
 from skidyn.measurement._suspicion import CERTAINTIES, Suspicion
 from skidyn.measurement._torque import Columns, TorqueDelay, UnsignedTorque
 from skidyn.measurement._units import ClockUnit, PositionUnit, WrappedPosition
@@ -45,6 +47,7 @@ CHECKS: tuple[Check, ...] = (
     PositionUnit(),
     Velocity(),
     WrappedPosition(),
+    OddMotion(),
     JoinedRecordings(),
     RepeatedRows(),
     RepeatedRecordings(),
@@ -60,8 +63,9 @@ CHECKS: tuple[Check, ...] = (
     VelocityDelay(),
     HeldTorque(),
     ComputedTorque(),
-    Lengths(),
     TorqueDelay(),
+    SmoothedTorque(),
+    Lengths(),
     ConstantTorque(),
     CopiedTorque(),
     ClippedTorque(),
@@ -129,6 +133,8 @@ def check_measurement(measurement: Measurement) -> list[Suspicion]:
         found += told
         doubted = any(s.certainty != "noted" for s in told)
         measurement.scaled |= check.name == "torque_scale" and doubted
+        measurement.late |= check.name == "torque_delay" and doubted
+        measurement.smoothed |= check.name == "smoothed_torque" and doubted
         if check in _UNITS and any(s.certainty == "certain" for s in told):
             misread = 1
         elif check in _SCALES and any(s.certainty == "suspected" for s in told):

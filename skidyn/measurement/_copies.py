@@ -73,20 +73,29 @@ class CopiedTorque(Check):
     misnames = True
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        for k, what, j in copied_columns(measurement):
+            yield self.suspicion(
+                f"the torque of {measurement.joint(k)} is the {what} of {measurement.joint(j)}",
+                "in every row, to the last digits and a factor",
+                "certain" if what != "torque" else "suspected",
+                [k] if what != "torque" else [j, k],
+            )
+
+
+def copied_columns(measurement: Measurement) -> list[tuple[int, str, int]]:
+    """Torques that are another channel: joint, what it is, and of which joint, from 0."""
+    if measurement.copies is None:
         s, torque = measurement.signals, measurement.torque
         channels = {"torque": torque, "position": s.q, "velocity": s.dq}
-        for k in range(measurement.n_joints):
-            for what, values in channels.items():
-                for j in range(measurement.n_joints):
-                    itself = what == "torque" and j >= k
-                    if not itself and _is_line(values[:, j], torque[:, k]):
-                        yield self.suspicion(
-                            f"the torque of {measurement.joint(k)} is the {what} of "
-                            f"{measurement.joint(j)}",
-                            "in every row, to the last digits and a factor",
-                            "certain" if what != "torque" else "suspected",
-                            [k] if what != "torque" else [j, k],
-                        )
+        joints = range(measurement.n_joints)
+        measurement.copies = [
+            (k, what, j)
+            for k in joints
+            for what, values in channels.items()
+            for j in joints
+            if not (what == "torque" and j >= k) and _is_line(values[:, j], torque[:, k])
+        ]
+    return measurement.copies
 
 
 def _is_line(x: Array, y: Array) -> bool:

@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +18,36 @@ LAGS = np.linspace(-0.06, 0.06, 13)
 GROUPS = 8
 #: Distance of the lags between which a parabola is laid, s, and how often at most.
 NEAR, STEPS = 2e-3, 6
+#: Fewest rows of a recording for its own lag.
+FEWEST_OF_RUN = 15
+#: How near lags of joints in one recording are that agree, s.
+NEARLY = 0.008
 #: How far a lag may move, s, or twice its standard error.
 FAR = 1e-3
 #: Least velocity of rows that count, in rad/s (a tenth of it in m/s).
 SLIDING = 0.05
 #: Largest share of the torque's spread that the fit of a joint may leave for its lag to count.
 LEFT = 0.5
+
+
+@dataclass(frozen=True)
+class RunDelay:
+    """Lag of the torque in one recording.
+
+    Attributes
+    ----------
+    lag, error : float, s
+        Lag and its standard error, from joint to joint.
+    gain : float
+        Log-likelihood gained by it over the lag of the other recordings.
+    agreeing : float
+        Share of the likelihood gained on joints whose own lag is near it.
+    """
+
+    lag: float
+    error: float
+    gain: float
+    agreeing: float
 
 
 @dataclass(frozen=True)
@@ -50,6 +74,8 @@ class Delay:
         drift apart.
     drift_error : float, s
         Standard error of their difference.
+    runs : dict of int to RunDelay
+        What every recording says.
     """
 
     common: float
@@ -62,6 +88,7 @@ class Delay:
     early: float = np.nan
     late: float = np.nan
     drift_error: float = np.nan
+    runs: Mapping[int, RunDelay] = field(default_factory=dict)
 
 
 def find_delay(fits: Fits) -> Delay:
@@ -79,6 +106,8 @@ def find_delay(fits: Fits) -> Delay:
     regressor = fits.average(fits.robot.torque_regressor(s.q, s.dq, s.ddq))
     shifted = [fits.average(fits.torque_at(lag)) for lag in LAGS]
     tables, firsts, lags = [], [], np.full(n, np.nan)
+    squares: dict[int, list[Array]] = {}
+    run_of = s.trajectory[::SAMPLES]
     first = _first_half(fits)
     for j in range(n):
         use = _sliding(fits, s, j)
@@ -108,6 +137,8 @@ def find_delay(fits: Fits) -> Delay:
         ):
             continue
         tables.append((len(rest), errors))
+        for run, cost in _run_costs(basis, y, int(np.argmin(total)), run_of[use]):
+            squares.setdefault(run, []).append(cost)
         sooner = rest * first[use][:, None]
         firsts.append(np.stack([(p**2).sum(axis=0) for p in np.array_split(sooner, GROUPS)]))
         lags[j] = _lowest(total)
@@ -135,7 +166,65 @@ def find_delay(fits: Fits) -> Delay:
     whole = sum(n / 2 * np.log(e.sum(axis=0)) for n, e in tables)
     gain = float(whole[len(LAGS) // 2] - whole.min())
     early, late = lag(firsts), lag(seconds)
-    return Delay(common, error, lags, own_errors, gain, own_gains, halves, early, late, drift)
+    runs = _of_runs(squares)
+    return Delay(common, error, lags, own_errors, gain, own_gains, halves, early, late, drift, runs)
+
+
+def _run_costs(
+    basis: Array, torque: Array, usual: int, run_of: Array
+) -> Iterator[tuple[int, Array]]:
+    """Half the squared residual of every recording over noise, by lag, with the bodies of others.
+
+    Parameters
+    ----------
+    basis : ndarray of shape (n_rows, n_columns)
+        Orthonormal columns.
+    torque : ndarray of shape (n_rows, n_lags)
+        Torque at every lag.
+    usual : int
+        Lag at which the other recordings are fitted.
+    run_of : ndarray of shape (n_rows,)
+        Recording of every row.
+    """
+    y = torque[:, usual]
+    whole = basis.T @ y
+    for run in np.unique(run_of).tolist():
+        rows = run_of == run
+        own = basis[rows]
+        gram = np.eye(basis.shape[1]) - own.T @ own
+        gram[np.diag_indices(len(gram))] += 1e-3  # what only this recording moves is not known
+        bodies = np.linalg.solve(gram, whole - own.T @ y[rows])
+        noise = float(np.mean((y[~rows] - basis[~rows] @ bodies) ** 2)) if (~rows).any() else 0.0
+        if rows.sum() < FEWEST_OF_RUN or noise <= 0:
+            continue
+        left = torque[rows] - (own @ bodies)[:, None]
+        # what the bodies of the others are not known to costs nothing
+        known = (left**2).sum(axis=0) - ((own.T @ left) ** 2).sum(axis=0)
+        yield run, known / (2 * noise)
+
+
+def _of_runs(squares: Mapping[int, list[Array]]) -> dict[int, RunDelay]:
+    """Lags of single recordings, from half the squared residuals of their joints over noise."""
+    if len(squares) < 3:
+        return {}
+    whole = {run: np.sum(parts, axis=0) for run, parts in squares.items()}
+    found = {}
+    for run, parts in squares.items():
+        usual = _lowest(np.sum([cost for other, cost in whole.items() if other != run], axis=0))
+        lag = _lowest(whole[run])
+        here, there = (int(np.argmin(np.abs(LAGS - x))) for x in (usual, lag))
+        if there in (0, len(LAGS) - 1):
+            continue
+        gains = np.array([part[here] - part[there] for part in parts])
+        own = np.array([_lowest(part) for part in parts])
+        weight = np.maximum(gains, 0)
+        near = np.abs(own - lag) < max(NEARLY, 0.3 * abs(lag))
+        total = max(float(weight.sum()), 1e-12)
+        error = float(np.sqrt(weight @ (own - lag) ** 2 / total / max(len(own), 1)))
+        found[run] = RunDelay(
+            lag - usual, error, float(gains.sum()), float(weight[near].sum()) / total
+        )
+    return found
 
 
 def refined_lag(fits: Fits, start: float, error: float, late: Sequence[int]) -> float:

@@ -73,7 +73,7 @@ class Lengths(Check):
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         fits = readable_fits(measurement)
-        if fits is None or measurement.scaled or measurement.lost:
+        if fits is None or measurement.scaled or measurement.lost or measurement.smoothed:
             return
         if measurement.stale or measurement.computed:
             return

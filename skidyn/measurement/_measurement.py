@@ -9,11 +9,13 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skidyn._signals import Array, Signals
 from skidyn.measurement._measures import (
     excited,
     find_leaps,
+    idle_rows,
     is_repeated,
     longest_plateau_share,
     velocity_consistency,
@@ -48,9 +50,9 @@ class Measurement:
     identified : bool, optional
         Whether bodies are going to be identified, so that those of the description may be wrong; by
         default it is not known.
-    unsigned, changes, delay, late_position, readable, stale, lost, odd, scaled : optional
+    unsigned, changes, delay, copies, late_position, readable, stale, lost, odd : optional
         What checks found that other checks use; filled in by them.
-    computed, frictionless : bool, optional
+    scaled, late, smoothed, computed, frictionless : bool, optional
         What checks found that other checks use; filled in by them.
 
     Examples
@@ -71,12 +73,15 @@ class Measurement:
     unsigned: tuple[list[int], dict[int, float]] | None = field(default=None, repr=False)
     changes: list[Change] | None = field(default=None, repr=False)
     delay: Delay | None = field(default=None, repr=False)
+    copies: list[tuple[int, str, int]] | None = field(default=None, repr=False)
     late_position: float = field(default=0.0, repr=False)
     readable: bool = field(default=True, repr=False)
     stale: bool = field(default=False, repr=False)
     lost: bool = field(default=False, repr=False)
     odd: bool = field(default=False, repr=False)
     scaled: bool = field(default=False, repr=False)
+    late: bool = field(default=False, repr=False)
+    smoothed: bool = field(default=False, repr=False)
     computed: bool = field(default=False, repr=False)
     frictionless: bool = field(default=False, repr=False)
     #: Rows to which positions leap; trajectories are taken to end there.
@@ -149,10 +154,22 @@ class Measurement:
     def velocities(self) -> list[tuple[float, float]]:
         """Slope and correlation of integrated velocity on position, by joint."""
         s = self.signals
+        odd = list(self.odd_motion)
+        parts = [rows for rows in s.segments if s.trajectory[rows.start] not in odd]
         return [
-            velocity_consistency(s.clock, self._unwrapped(k), s.dq[:, k], s.segments)
+            velocity_consistency(s.clock, self._unwrapped(k), s.dq[:, k], parts)
             for k in range(self.n_joints)
         ]
+
+    @cached_property
+    def odd_motion(self) -> dict[int, dict[int, float]]:
+        """Recordings in which velocities are not the usual multiple of the rate of positions."""
+        if len(self.leaps):
+            return {}  # parts between leaps have no numbers of their own
+        from skidyn.measurement._odd_motion import odd_motion
+
+        every = range(self.n_joints)
+        return odd_motion(self.signals, np.column_stack([self._unwrapped(k) for k in every]))
 
     def _unwrapped(self, k: int) -> Array:
         """Position without leaps by a turn, where it stays within one."""
@@ -199,4 +216,25 @@ class Measurement:
         """Averaged rows to which readings of the measurement are fitted."""
         from skidyn.measurement._fits import make_fits  # with it all columns of the evidence
 
-        return None if self.robot is None else make_fits(self.signals, self.torque, self.robot)
+        if self.robot is None:
+            return None
+        odd = [*self.odd_motion, *(run for runs in self.stuck.values() for run in runs)]
+        out = self.idle | np.isin(self.signals.trajectory, odd)
+        if out.all():
+            return None
+        if not out.any():
+            return make_fits(self.signals, self.torque, self.robot)
+        return make_fits(self.signals.take(~out), self.torque[~out], self.robot)
+
+    @cached_property
+    def stuck(self) -> dict[int, list[int]]:
+        """Recordings in which a position never changes although its velocity does, by joint."""
+        from skidyn.measurement._odd_motion import stuck_positions
+
+        return {} if len(self.leaps) else stuck_positions(self.signals)
+
+    @cached_property
+    def idle(self) -> NDArray[np.bool_]:
+        """Rows at the ends of recordings in which torque was not measured."""
+        s = self.signals
+        return idle_rows(s.q, self.torque, s.clock, s.trajectory)

@@ -15,6 +15,11 @@ HELD, AT_ONCE = 0.2, 0.7
 #: beyond what positions leave of even motion, and farther than this share of its range; recordings
 #: are joined in this many places at most, as a share of the rows.
 FARTHER, BEYOND, RANGE, PLACES = 4.0, 8.0, 1e-3, 2e-3
+#: Share of zeros among torques from which they come by themselves; way of a joint, as a share of
+#: its range, while torques that do not change are not measured.
+MOSTLY_ZERO, IDLE_WAY = 0.3, 0.01
+#: Rows, and time in s, at an end of a recording in which no torque changes, to be told.
+IDLE_ROWS, IDLE_TIME = 8, 0.05
 #: Steps that a position may be held before it catches up.
 CATCH_UP = 5
 
@@ -44,7 +49,9 @@ def is_repeated(position: np.ndarray, velocity: np.ndarray, trajectory: np.ndarr
     """Rows in which no position changes although some joint moves, as a mask."""
     again = np.zeros(len(position), dtype=bool)
     same = np.all(position[1:] == position[:-1], axis=1) & (trajectory[1:] == trajectory[:-1])
-    moving = np.any(np.abs(velocity[1:]) > 0.02 * np.abs(velocity).max(axis=0), axis=1)
+    # a velocity that never changes was not measured
+    fast = np.where(np.ptp(velocity, axis=0) > 0, 0.02 * np.abs(velocity).max(axis=0), np.inf)
+    moving = np.any(np.abs(velocity[1:]) > fast, axis=1)
     again[1:] = same & moving
     # a coarse sensor holds its value too, but each joint by itself
     single = np.mean(position[1:] == position[:-1], axis=0)
@@ -82,6 +89,47 @@ def is_held(torque: np.ndarray, moved: np.ndarray) -> np.ndarray:
     if share > HELD and share > AT_ONCE * single.max() and at_once:
         again[1:] = together
     return again
+
+
+def idle_rows(
+    position: np.ndarray, torque: np.ndarray, time: np.ndarray, trajectory: np.ndarray
+) -> np.ndarray:
+    """Rows at the ends of recordings in which torque was not measured yet, or any more, as a mask.
+
+    Before drives are enabled every torque is zero; a recorder whose torques come late repeats the
+    first ones.
+
+    Parameters
+    ----------
+    position, torque : ndarray of shape (n_samples, n_joints)
+        Recorded signals.
+    time : ndarray of shape (n_samples,), s
+        Recorded clock.
+    trajectory : ndarray of shape (n_samples,)
+        Recording of every row.
+
+    Returns
+    -------
+    ndarray of shape (n_samples,) of bool
+        Rows of zeros, or rows of the same torques in which a joint moves.
+    """
+    idle = np.zeros(len(torque), dtype=bool)
+    if torque.shape[1] < 2 or np.mean(torque == 0) > MOSTLY_ZERO:
+        return idle  # of one joint, or coarse: zeros come by themselves
+    steps = np.diff(time)[trajectory[1:] == trajectory[:-1]]
+    least = max(IDLE_ROWS, IDLE_TIME / max(float(np.median(steps)), 1e-9)) if len(steps) else np.inf
+    far = IDLE_WAY * np.ptp(position, axis=0)
+    for run in np.unique(trajectory):
+        rows = np.flatnonzero(trajectory == run)
+        for end in (rows, rows[::-1]):
+            changes = np.any(torque[end] != torque[end[0]], axis=1)
+            same = end[: int(np.argmax(changes))]  # none where it is constant throughout
+            if len(same) < least:
+                continue
+            moved = np.any(np.ptp(position[same], axis=0) > far)
+            if moved or not torque[same].any():
+                idle[same] = True
+    return idle
 
 
 def rest_share(velocity: np.ndarray) -> float:

@@ -30,8 +30,12 @@ CLEAR = 2.0
 SCALED, UNLIKE = 0.8, 0.4
 #: Multiples that are those of the other recordings, and the share of these that have one.
 ONE, MOST = (0.7, 1.4), 0.6
+#: Share of rows at the extreme torque from which its multiple in a recording says nothing.
+CUT = 0.1
 #: Residual of a recording over that of all from which its torque is of something else.
 LARGER = 3.0
+#: What another zero may leave in a recording, as a share of what the best effect leaves.
+BETTER = 0.8
 #: Share of its residual that the best effect may leave, and still be what is odd in a recording.
 LEFT = 0.5
 #: Residual from which another zero of a position is tried, and the least that is told, rad.
@@ -92,6 +96,8 @@ class OddRecording(Check):
             for one in own:
                 if not (alike or one.spoils):
                     continue
+                if _clipped(measurement, one):
+                    continue  # its torque is another multiple because it is cut
                 within = USUAL[0] <= one.multiple <= USUAL[1]
                 if not within and one.gain > LEAST and abs(one.likeness) > SCALED:
                     scaled.append(one)
@@ -150,6 +156,14 @@ class OddRecording(Check):
             )
 
 
+def _clipped(measurement: Measurement, one: Multiple) -> bool:
+    """Whether much of the torque in a recording stays at its extreme values."""
+    torque = measurement.torque[:, one.joint]
+    own = torque[measurement.signals.trajectory == one.run]
+    cut = float(np.mean((own >= torque.max()) | (own <= torque.min())))
+    return measurement.at_limit[one.joint] > 0 and cut > CUT
+
+
 def _sizes(measurement: Measurement) -> dict[int, float]:
     """Recordings in which all torques spread far more, or less, than in the others."""
     number = measurement.signals.trajectory
@@ -197,7 +211,7 @@ def _zero_of(fits: Fits, run: int) -> tuple[int, float, float] | None:
         return None
     without, left = left_by_effects(fits, worst, rows)
     share = after[worst] / before[worst]
-    return (joint, angle, value - plain) if share < min(LEFT, left / without) else None
+    return (joint, angle, value - plain) if share < min(LEFT, BETTER * left / without) else None
 
 
 def _rows_of(fits: Fits, run: int) -> NDArray[np.bool_]:

@@ -311,7 +311,7 @@ def _alternatives(fits: Fits, reading: Reading, here: Outcome) -> Iterator[Chang
 
 
 def _orders(fits: Fits, reading: Reading) -> Iterator[Change]:
-    """Orders of the columns: two exchanged, by name, backwards."""
+    """Orders of the columns: two exchanged, by name, backwards, one further."""
     n = fits.n_joints
     for name in ("order", "torque_order"):
         now = list(getattr(reading, name) or range(n))
@@ -323,8 +323,9 @@ def _orders(fits: Fits, reading: Reading) -> Iterator[Change]:
         if n > 2 and getattr(reading, name) is None:
             by_name = sorted(range(n), key=lambda j: fits.robot.joint_names[j])
             tried += [[by_name.index(j) for j in range(n)], list(range(n))[::-1]]
+            tried += [list(np.roll(range(n), k)) for k in (1, -1)]  # a column was lost or added
         for order in tried:
-            wanted = None if order == list(range(n)) else tuple(order)
+            wanted = None if order == list(range(n)) else tuple(map(int, order))
             moved = tuple(j for j in range(n) if order[j] != j)
             if wanted is not None:
                 changed: Any = {name: wanted}
@@ -334,10 +335,10 @@ def _orders(fits: Fits, reading: Reading) -> Iterator[Change]:
 def _gravities(fits: Fits, reading: Reading, here: Outcome) -> Iterator[Change]:
     """Other directions of gravity, the one that fits best among them, and none."""
     own = np.asarray(fits.robot.gravity, dtype=float)
-    if not np.linalg.norm(own):
-        return
-    # first, so that it goes before a direction in which no joint feels gravity
-    yield Change("no_gravity", (), replace(reading, gravity=(0.0, 0.0, 0.0)))
+    known = bool(np.linalg.norm(own))
+    if known:
+        # first, so that it goes before a direction in which no joint feels gravity
+        yield Change("no_gravity", (), replace(reading, gravity=(0.0, 0.0, 0.0)))
     directions = [sign * axis for axis in np.eye(3) for sign in (-1.0, 1.0)]
     best = fitted_gravity(fits, reading, here)
     if best is not None and np.linalg.norm(best) > 0:
@@ -345,7 +346,7 @@ def _gravities(fits: Fits, reading: Reading, here: Outcome) -> Iterator[Change]:
         if float(np.max(np.abs(best))) < UPRIGHT:
             directions.append(best)
     for direction in directions:
-        cosine = float(direction @ own / np.linalg.norm(own))
+        cosine = float(direction @ own / np.linalg.norm(own)) if known else 0.0
         if np.rad2deg(np.arccos(np.clip(cosine, -1, 1))) >= LEAST_ANGLE:
             x, y, z = (float(v) for v in GRAVITY * direction)
             yield Change("gravity", (), replace(reading, gravity=(x, y, z)))

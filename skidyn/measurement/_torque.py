@@ -10,7 +10,8 @@ import numpy as np
 
 from skidyn._signals import Array
 from skidyn.measurement._check import Check
-from skidyn.measurement._delay import Delay, find_delay, refined_lag
+from skidyn.measurement._copies import copied_columns
+from skidyn.measurement._delay import Delay, RunDelay, find_delay, refined_lag
 from skidyn.measurement._fits import Fits, Reading, fit_admissible, friction
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import reversals
@@ -43,6 +44,9 @@ AGREEING = 0.75
 APART, SAME = 0.008, 0.3
 
 
+#: Share of the recordings that may be late by themselves, and log-likelihood that they must gain:
+#: what one carries shifts the lag of few rows, too.
+ODD, RUN_SURE = 0.34, 80.0
 #: How near a lag is to a whole number of samples that is one, s, and in samples.
 WHOLE, MOST_WHOLE = 4e-4, 0.1
 
@@ -295,9 +299,7 @@ def _one_of_two(told: Suspicion, changes: Iterable[Change]) -> Suspicion:
 def asked_changes(measurement: Measurement, fits: Fits) -> list[Change]:
     """Changes to the reading of all recordings that a measurement asks for."""
     if measurement.changes is None:
-        unsigned, _ = unsigned_columns(measurement)
-        lost = [*unsigned, *cut_columns(measurement)]
-        measurement.changes = find_changes(fits.without(lost))
+        measurement.changes = find_changes(fits.without(_lost_columns(measurement)))
     return measurement.changes
 
 
@@ -315,9 +317,14 @@ def readable_fits(measurement: Measurement) -> Fits | None:
     fits = measurement.fits if measurement.readable else None
     if fits is None:
         return None
+    return fits.without(_lost_columns(measurement))
+
+
+def _lost_columns(measurement: Measurement) -> list[int]:
+    """Columns of the torque without a sign, or that are no torque."""
     unsigned, _ = unsigned_columns(measurement)
-    lost = [*unsigned, *cut_columns(measurement)]
-    return fits.without(lost) if lost else fits
+    copied = [k for k, what, _ in copied_columns(measurement) if what != "torque"]
+    return [*unsigned, *cut_columns(measurement), *copied]
 
 
 class TorqueDelay(Check):
@@ -345,6 +352,17 @@ class TorqueDelay(Check):
                 "recordings into short ones that are set right each",
                 "suspected",
             )
+            return
+        odd = late_runs(found)
+        for run, one in odd.items():
+            yield self.suspicion(
+                f"in trajectory {run} torque is {'late' if one.lag > 0 else 'early'} by about "
+                f"{abs(1e3 * one.lag):.0f} ms against the others",
+                f"there it is explained better by {one.gain:.0f} (log-likelihood) at that lag, "
+                f"{one.agreeing:.0%} of it on joints that agree; fix that file, or leave it out",
+                "suspected",
+            )
+        if odd:
             return
         # a joint whose lag is not known to itself agrees with nothing
         use = np.isfinite(found.joints) & (found.errors < max(abs(found.common), SMALLEST))
@@ -403,6 +421,21 @@ def _whole(measurement: Measurement, lag: float) -> float:
         if abs(samples - np.round(samples)) < near
         else lag
     )
+
+
+def late_runs(found: Delay) -> dict[int, RunDelay]:
+    """Recordings whose torque is late or early by itself."""
+    odd = {
+        run: one
+        for run, one in found.runs.items()
+        if abs(one.lag) > max(APART, ERRORS * one.error)
+        and one.gain > RUN_SURE
+        and one.agreeing >= AGREEING
+    }
+    # one that is late makes others look early
+    first = max(odd.values(), key=lambda one: one.gain, default=None)
+    odd = {r: one for r, one in odd.items() if first and one.lag * first.lag > 0}
+    return odd if len(odd) <= ODD * len(found.runs) else {}
 
 
 def late_joints(found: Delay) -> list[int]:

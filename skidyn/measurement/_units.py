@@ -61,7 +61,8 @@ class ClockUnit(Check):
                     remedy=unit_remedy({"time": unit}),
                 )
                 return
-        if measurement.rate < 2:
+        shared = measurement.velocity_scale
+        if measurement.rate < 2 and not (shared > 1 and unnamed_scale(measurement, shared)):
             # the unit in which a robot would have been sampled at a usual rate
             usual = [
                 u
@@ -77,7 +78,6 @@ class ClockUnit(Check):
                 remedy=unit_remedy({"time": unit}),
             )
             return
-        shared = measurement.velocity_scale
         if measurement.lost:
             return  # rows that are missing make every velocity too slow
         if unnamed_scale(measurement, shared) and not _too_far(measurement, DISTANT).any():

@@ -28,8 +28,6 @@ from skidyn.measurement._units import (
 
 #: Range of a position, rad or m, and spread of a velocity, that are those of a joint that moves.
 LEAST_MOTION, LEAST_SPEED = 0.02, 0.02
-#: Way that a velocity makes of a recording whose position is stuck, rad or m.
-LEAST_SWEPT = 0.1
 #: Windows over which velocities are compared with positions, at most.
 WINDOWS = 3000
 #: Lags of the velocity that are tried, s; the least that is told, s and in time steps; the share
@@ -79,9 +77,8 @@ class Velocity(Check):
                 constant,
             )
             return [told]
-        stuck = _stuck(measurement)
-        if stuck:
-            return [self._held(measurement, k, runs) for k, runs in stuck.items()]
+        if measurement.stuck:
+            return [self._held(measurement, k, runs) for k, runs in measurement.stuck.items()]
         groups: dict[str, list[int]] = {}
         for k, (slope, correlation) in enumerate(measurement.velocities):
             if not np.isfinite(slope) or not measurement.excited[k] or abs(slope - 1) < NEAR:
@@ -159,22 +156,6 @@ def _constant(measurement: Measurement) -> list[int]:
     moves &= np.ptp(s.q, axis=0) > LEAST_MOTION
     turns = (np.mean(np.diff(s.dq, axis=0) != 0, axis=0) > 0.5) & (s.dq.std(axis=0) > LEAST_SPEED)
     return [int(k) for k in np.flatnonzero((still & turns) | (stands & moves))]
-
-
-def _stuck(measurement: Measurement) -> dict[int, list[int]]:
-    """Trajectories in which a position never changes although its velocity does, by joint."""
-    s = measurement.signals
-    runs = np.unique(s.trajectory)
-    if len(runs) < 2 or len(measurement.leaps):
-        return {}  # parts between leaps have no numbers of their own
-    found: dict[int, list[int]] = {}
-    for run in runs:
-        rows = s.trajectory == run
-        for k in np.flatnonzero(np.ptp(s.q[rows], axis=0) == 0):
-            swept = np.abs(s.dq[rows, k][1:]) @ np.abs(np.diff(s.clock[rows]))
-            if swept > LEAST_SWEPT and s.dq[rows, k].std() > LEAST_SPEED:
-                found.setdefault(int(k), []).append(int(run))
-    return found
 
 
 def _of_units(slope: float) -> bool:

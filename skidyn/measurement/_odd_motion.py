@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Check of recordings against each other: velocities, positions or a clock unlike the others'."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from skidyn._signals import Array, Signals
+from skidyn.measurement._check import Check
+from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._measures import velocity_consistency
+from skidyn.measurement._suspicion import Suspicion
+
+#: Correlation of integrated velocity with position from which its slope is a scale, and below which
+#: a velocity is of something else; that of the other recordings where it is so.
+SCALED, UNLIKE, USUALLY = 0.9, 0.5, 0.98
+#: How far a slope must be off those of the other recordings, as a share of them, how near these are
+#: to each other, how many there are at least, and the share of recordings that are alike.
+FAR, NEAR, FEWEST, MOST = 0.25, 0.1, 3, 0.6
+#: Way of a joint in a recording, as a share of that in the others, from which it is compared.
+MOVED = 0.25
+#: How nearly joints share a slope.
+SHARED = 0.05
+#: Spread of a velocity, and its way through a recording whose position is stuck, in rad or m.
+LEAST_SPEED, LEAST_SWEPT = 0.02, 0.1
+
+
+class OddMotion(Check):
+    """A recording in which velocities, positions or the clock are not those of the others."""
+
+    name = "odd_motion"
+    suspects = "single recordings whose clock, positions or velocities have another unit or sign"
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        for run, slopes in measurement.odd_motion.items():
+            names = ", ".join(measurement.joint(k) for k in slopes)
+            sizes = np.array(list(slopes.values()))
+            known = np.isfinite(sizes)
+            told = ", ".join(f"{size:.4g}" for size in sizes[known])
+            every = len(slopes) == sum(measurement.excited) and len(slopes) > 1
+            if every and known.all() and np.ptp(sizes) < SHARED * abs(float(np.median(sizes))):
+                what = "clock, positions or velocities have another unit than in the others"
+            elif known.all() and np.all(np.abs(sizes + 1) < FAR):
+                what = f"the velocity or the position of {names} has the other sign"
+            else:
+                what = f"the velocity of {names} is not the rate of its position"
+            evidence = "; it is of something else" if not known.all() else ""
+            yield self.suspicion(
+                f"in trajectory {run} {what}",
+                (f"velocities are {told} times the rates of positions there" if told else "there")
+                + f", in the other trajectories they agree{evidence}; fix that file, or leave it "
+                "out",
+                "certain",
+                () if every else list(slopes),
+            )
+
+
+def odd_motion(signals: Signals, position: Array) -> dict[int, dict[int, float]]:
+    """Slopes of integrated velocity on position in recordings in which it is not the usual one.
+
+    Parameters
+    ----------
+    signals : Signals
+        Recorded motion.
+    position : ndarray of shape (n_samples, n_joints)
+        Positions without leaps by a turn.
+
+    Returns
+    -------
+    dict of int to dict of int to float
+        By recording and joint, from 0; NaN where the velocity is not that of the joint at all.
+    """
+    runs = np.unique(signals.trajectory)
+    n = signals.n_joints
+    if len(runs) <= FEWEST:
+        return {}
+    slopes, likeness, way = (np.full((len(runs), n), np.nan) for _ in range(3))
+    for r, run in enumerate(runs):
+        number = signals.trajectory
+        parts = [rows for rows in signals.segments if number[rows.start] == run]
+        for k in range(n):
+            dq = signals.dq[:, k]
+            slopes[r, k], likeness[r, k] = velocity_consistency(
+                signals.clock, position[:, k], dq, parts
+            )
+            way[r, k] = np.ptp(position[number == run, k])
+    found: dict[int, dict[int, float]] = {}
+    for k in range(n):
+        moves = way[:, k] > MOVED * np.median(way[:, k])
+        scaled = moves & (np.abs(likeness[:, k]) > SCALED)
+        if scaled.sum() <= FEWEST:
+            continue
+        usual = float(np.median(slopes[scaled, k]))
+        off = np.abs(slopes[:, k] / usual - 1) if usual else np.full(len(runs), np.inf)
+        alike = scaled & (off < NEAR)
+        if alike.sum() < max(FEWEST, MOST * len(runs)):
+            continue
+        other = moves & (np.abs(likeness[:, k]) < UNLIKE)
+        other &= bool(np.median(likeness[alike, k]) > USUALLY)
+        for r in np.flatnonzero((scaled & (off > FAR)) | other):
+            slope = float(slopes[r, k]) if scaled[r] else float("nan")
+            found.setdefault(int(runs[r]), {})[k] = slope
+    # what differs in many is no matter of single recordings
+    return found if len(found) <= (1 - MOST) * len(runs) else {}
+
+
+def stuck_positions(signals: Signals) -> dict[int, list[int]]:
+    """Recordings in which a position never changes although its velocity does, by joint.
+
+    Parameters
+    ----------
+    signals : Signals
+        Recorded motion.
+
+    Returns
+    -------
+    dict of int to list of int
+        Numbers of recordings by joint, from 0.
+    """
+    runs = np.unique(signals.trajectory)
+    if len(runs) < 2:
+        return {}
+    found: dict[int, list[int]] = {}
+    for run in runs:
+        rows = signals.trajectory == run
+        for k in np.flatnonzero(np.ptp(signals.q[rows], axis=0) == 0):
+            swept = np.abs(signals.dq[rows, k][1:]) @ np.abs(np.diff(signals.clock[rows]))
+            if swept > LEAST_SWEPT and signals.dq[rows, k].std() > LEAST_SPEED:
+                found.setdefault(int(k), []).append(int(run))
+    return found

@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Check whether torque was smoothed: dry friction then begins to turn before its joint does.
+
+Dry friction turns where a joint does. What friction does when a joint turns (presliding) comes
+after it and takes a way; a low pass without delay spreads the step over the same time before and
+after, in all joints alike. Left alone, it gets the name of a presliding friction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from skidyn._signals import Array, Signals
+from skidyn.evidence import smooth_motion
+from skidyn.measurement._check import Check
+from skidyn.measurement._fits import student
+from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._suspicion import Suspicion
+
+#: Standard deviations of the smoothing that are tried, s, and ways of presliding, rad (a tenth in
+#: metres).
+WIDTHS = 0.01 * 2.0 ** np.arange(5)
+WAYS = 0.001 * 2.0 ** np.arange(8)
+#: Half of the time around a turn that is looked at, s, and the degree of what else is there.
+AROUND, DEGREE = 0.4, 3
+#: Turns of a joint, at least and at most; samples around each at least.
+FEWEST, MOST, SAMPLES = 6, 60, 15
+#: Least speed before and after a turn, as a share of the largest.
+FAST = 0.03
+#: Log-likelihood that smoothing gains on a joint that has a word, and in sum; the share of joints
+#: whose friction shows how it turns that must agree on a width, and at least how many; the shortest
+#: width that is no matter of samples, s.
+WORD, LEAST, AGREEING, JOINTS, SHORTEST = 2.0, 15.0, 0.6, 2, 0.05
+
+
+@dataclass(frozen=True)
+class Turns:
+    """What friction in different forms explains around the turns of a joint.
+
+    Attributes
+    ----------
+    step : float
+        Log-likelihood of friction that turns at once.
+    smoothed : ndarray of shape (n_widths,)
+        That of smoothed friction.
+    presliding : float
+        That of the best presliding.
+    """
+
+    step: float
+    smoothed: Array
+    presliding: float
+
+    @property
+    def width(self) -> int:
+        """Place of the best width."""
+        return int(np.argmax(self.smoothed))
+
+    @property
+    def gain(self) -> float:
+        """What smoothing gains over what friction can do by itself, and over hardly any of it."""
+        friction = max(self.step, self.presliding, float(self.smoothed[0]))
+        return float(self.smoothed.max()) - friction
+
+
+class SmoothedTorque(Check):
+    """Torque through a low pass without delay."""
+
+    name = "smoothed_torque"
+    suspects = "torque that was smoothed, so that friction seems to turn before and after the joint"
+    stage = 2
+    misnames = True
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        if measurement.stale or measurement.lost or measurement.late or measurement.computed:
+            return
+        found = {}
+        motion = smooth_motion(measurement.signals).signals  # noise would blur when a joint turns
+        for k in np.flatnonzero(measurement.excited).tolist():
+            turns = at_turns(motion, measurement.torque[:, k], k)
+            if turns is not None and max(turns.smoothed.max(), turns.presliding) > turns.step:
+                found[k] = turns
+        widths = [turns.width for turns in found.values() if turns.gain > WORD]
+        common = max(set(widths), key=widths.count) if widths else 0
+        alike = [k for k, t in found.items() if t.width == common and t.gain > WORD]
+        total = sum(turns.gain for turns in found.values() if turns.width == common)
+        if WIDTHS[common] < SHORTEST or total < LEAST:
+            return
+        if len(alike) < max(min(JOINTS, measurement.n_joints), AGREEING * len(found)):
+            return
+        yield self.suspicion(
+            f"the torque was smoothed over about {1e3 * 2.5 * WIDTHS[common]:.0f} ms",
+            f"friction turns before the joints do and as slowly after, alike on {len(alike)} of "
+            f"{len(found)} joints whose friction shows how it turns, which gains {total:.0f} "
+            "(log-likelihood) over any friction that turns with the joint; record torque as it is "
+            "measured",
+            "suspected",
+            alike,
+        )
+
+
+def at_turns(signals: Signals, torque: Array, joint: int) -> Turns | None:
+    """Fit friction in different forms to the torque around the turns of a joint.
+
+    Parameters
+    ----------
+    signals : Signals
+        Smoothed motion.
+    torque : ndarray of shape (n_samples,), N m or N
+        Recorded torque of the joint.
+    joint : int
+        Joint, from 0.
+
+    Returns
+    -------
+    Turns or None
+        None where it turns too seldom.
+    """
+    q, dq = signals.q[:, joint], signals.dq[:, joint]
+    steps = np.diff(signals.clock)
+    step = float(np.median(steps[steps > 0]))
+    half = int(AROUND / step)
+    if half < SAMPLES / 2:
+        return None
+    fast = FAST * float(np.abs(dq).max())
+    places = []
+    for rows in signals.segments:
+        sign = np.sign(dq[rows])
+        for turn in np.flatnonzero(sign[1:] * sign[:-1] < 0) + rows.start:
+            part = slice(turn - half, turn + half + 1)
+            if part.start < rows.start or part.stop > rows.stop:
+                continue
+            before, after = dq[part][: half // 2], dq[part][-(half // 2) :]
+            clean = np.all(np.sign(before) == np.sign(before[0])) and np.all(
+                np.sign(after) == -np.sign(before[0])
+            )
+            if clean and min(np.abs(before).mean(), np.abs(after).mean()) > fast:
+                places.append(part)
+    if len(places) < FEWEST:
+        return None
+    places = places[:: 1 + len(places) // MOST]
+    forms = [np.sign(dq)]
+    forms += [_smoothed(np.sign(dq), signals, width / step) for width in WIDTHS]
+    forms += [presliding(q, signals, way * float(signals.unit[joint])) for way in WAYS]
+    fits = [_likelihood(form, torque, places) for form in forms]
+    rest = max(fits, key=lambda fit: fit[0])[1]
+    # neighbouring samples are alike, in all forms as in the best one
+    alike = float(np.clip(rest[1:] @ rest[:-1] / (rest @ rest + 1e-300), 0.0, 0.95))
+    values = np.array([value for value, _ in fits]) * (1 - alike) / (1 + alike)
+    return Turns(
+        float(values[0]), values[1 : 1 + len(WIDTHS)], float(values[1 + len(WIDTHS) :].max())
+    )
+
+
+def _smoothed(values: Array, signals: Signals, width: float) -> Array:
+    """Values through a Gaussian, recording by recording."""
+    out = values.copy()
+    for rows in signals.segments:
+        out[rows] = gaussian_filter1d(values[rows], width, mode="nearest")
+    return out
+
+
+def presliding(position: Array, signals: Signals, way: float) -> Array:
+    """Friction that turns over a way after the joint has turned (Dahl's model), from -1 to 1.
+
+    Parameters
+    ----------
+    position : ndarray of shape (n_samples,), rad or m
+        Position of a joint.
+    signals : Signals
+        Recordings.
+    way : float, rad or m
+        Way over which friction turns.
+
+    References
+    ----------
+    P. R. Dahl (1968), A solid friction model, Aerospace Corporation TOR-0158(3107-18)-1.
+    """
+    state = np.zeros(len(position))
+    for rows in signals.segments:
+        z, own = 0.0, position[rows]
+        values = [z]
+        for change in np.diff(own).tolist():
+            toward = 1.0 if change > 0 else -1.0
+            z = toward + (z - toward) * np.exp(-abs(change) / way)
+            values.append(z)
+        state[rows] = values
+    return state
+
+
+def _likelihood(form: Array, torque: Array, places: list[slice]) -> tuple[float, Array]:
+    """Log-likelihood of one size of friction and a slow torque of its own around every turn."""
+    rests, columns = [], []
+    for part in places:
+        x = np.linspace(-1, 1, part.stop - part.start)
+        basis, _ = np.linalg.qr(np.vander(x, DEGREE + 1))
+        y, f = torque[part], form[part]
+        rests.append(y - basis @ (basis.T @ y))
+        columns.append(f - basis @ (basis.T @ f))
+    y, f = np.concatenate(rests), np.concatenate(columns)
+    weight = np.ones(len(y))
+    scale, rest = 1.0, y
+    for _ in range(5):
+        size = max(0.0, float((weight * f) @ y) / max(float((weight * f) @ f), 1e-300))
+        rest = y - size * f
+        scale = float(np.sqrt(np.mean(weight * rest**2))) + 1e-12
+        weight = 5.0 / (4.0 + (rest / scale) ** 2)
+    return student(rest, scale), rest
