@@ -99,7 +99,7 @@ def odd_motion(signals: Signals, position: Array) -> dict[int, dict[int, float]]
             continue
         other = moves & (np.abs(likeness[:, k]) < UNLIKE)
         other &= bool(np.median(likeness[alike, k]) > USUALLY)
-        for r in np.flatnonzero((scaled & (off > FAR)) | other):
+        for r in np.flatnonzero((scaled & (off > FAR)) | other).tolist():
             slope = float(slopes[r, k]) if scaled[r] else float("nan")
             found.setdefault(int(runs[r]), {})[k] = slope
     # what differs in many is no matter of single recordings

@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 
 from skidyn._signals import Array, Signals
 from skidyn.evidence import smooth_motion
@@ -158,6 +157,8 @@ def at_turns(signals: Signals, torque: Array, joint: int) -> Turns | None:
 
 def _smoothed(values: Array, signals: Signals, width: float) -> Array:
     """Values through a Gaussian, recording by recording."""
+    from scipy.ndimage import gaussian_filter1d  # half a tenth of a second that a start would take
+
     out = values.copy()
     for rows in signals.segments:
         out[rows] = gaussian_filter1d(values[rows], width, mode="nearest")

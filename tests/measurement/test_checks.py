@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from skidyn.datasets import load_planar_arm, load_scara, make_hidden_effect_log
+from skidyn.datasets import load_planar_arm, load_scara, load_ur5, make_hidden_effect_log
 from skidyn.diagnosis import Settings, diagnose
 from skidyn.effects import Signals
 from skidyn.exceptions import LogError
 from skidyn.identification import RBDRegressor
-from skidyn.logs import check_log
+from skidyn.logs import check_log, read_log
 from skidyn.measurement import (
     Measurement,
     Remedy,
@@ -382,3 +382,43 @@ def test_a_torque_that_is_turned_round_twice_is_as_it_was(monkeypatch):
     monkeypatch.setattr(_torque, "find_changes", lambda fits: changes)
     told = told_of(LOG.frame)["reading"]
     assert told.joints == (2,) and told.remedy.option == "--flip tau2"
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_torque_before_drives_are_enabled(backwards, tmp_path):
+    frame = LOG.frame.copy()
+    for rows in frame.groupby("trajectory").groups.values():
+        frame.loc[rows[-40:] if backwards else rows[:40], ["tau1", "tau2"]] = 0.0
+    told = [s for s in check_log(frame, ROBOT).checks if s.certainty != "noted"]
+    assert [s.check for s in told] == ["constant_torque"] and told[0].certainty == "certain"
+    assert "in 160 rows" in told[0].evidence and told[0].remedy.option == "--drop-repeated"
+    frame.to_parquet(tmp_path / "log.parquet")
+    kept = read_log(tmp_path / "log.parquet", robot=ROBOT, drop_repeated=True)
+    assert len(kept) == len(frame) - 160 and (kept[["tau1", "tau2"]] != 0).all(axis=None)
+
+
+def test_a_description_without_gravity():
+    told = told_of(LOG.frame, replace(ROBOT, gravity=np.zeros(3)))["reading"]
+    assert told.remedy.option.startswith("--gravity=")
+    x, y, z = (float(v) for v in told.remedy.option.partition("=")[2].split(","))
+    assert z == pytest.approx(-9.8, abs=0.3) and abs(y) < 0.1 and abs(x) < 2
+
+
+def test_row_numbers_in_the_place_of_time():
+    step = float(np.median(np.diff(LOG.frame["time"])))
+    told = told_of(LOG.frame.assign(time=np.round(LOG.frame["time"] / step)))["clock_unit"]
+    assert told.remedy.option == f"--gain time={step:g}"
+
+
+@pytest.mark.parametrize("factor", [0.5, 4.0])
+def test_a_rate_that_is_wrong_in_clock_and_velocities(factor):
+    robot = load_ur5()
+    frame = make_hidden_effect_log(
+        robot, None, n_trajectories=4, duration=6.0, random_state=3
+    ).frame
+    velocities = {f"dq{k}": frame[f"dq{k}"] / factor for k in range(1, 7)}
+    told = told_of(frame.assign(time=factor * frame["time"], **velocities), robot)["torque_scale"]
+    assert told.suspicion.startswith("the clock runs at another rate")
+    words = dict(pair.split("=") for pair in told.remedy.option.split(" ")[1].split(","))
+    assert float(words["time"]) == pytest.approx(1 / factor, rel=0.1)
+    assert float(words["dq"]) == pytest.approx(factor, rel=0.1)

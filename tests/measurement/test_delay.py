@@ -42,3 +42,16 @@ def test_clocks_of_other_rates():
     (told,) = late(lambda since: 0.005 * since)
     assert told.suspicion == "the clock of the torque runs at another rate than that of the motion"
     assert told.remedy is None
+
+
+def test_one_recording_that_is_late():
+    run = int(FRAME["trajectory"].unique()[3])
+    own = FRAME["trajectory"] == run
+    frame = FRAME.copy()
+    for name in TORQUES:
+        frame.loc[own, name] = FRAME.loc[own, name].shift(3).bfill()
+    (told,) = [s for s in check_log(frame, ROBOT).checks if s.check == "torque_delay"]
+    words = told.suspicion.split(" ")
+    assert told.suspicion.startswith(f"in trajectory {run} torque is late by about ")
+    assert float(words[words.index("ms") - 1]) == pytest.approx(30, abs=4)
+    assert told.certainty == "suspected" and told.remedy is None
