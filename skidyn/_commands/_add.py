@@ -41,7 +41,7 @@ def run(options: argparse.Namespace) -> None:
     from skidyn.effects import make_terms
 
     options = recorded_options(options)
-    model, frame, tau = read_model_and_log(options)
+    model, frame, tau = read_model_and_log(options, check=False)  # a diagnosis checks it
     robot = read_robot(options)
     joints = joint_numbers(options.on)
     spec = options.effect if joints is None else (options.effect, joints)

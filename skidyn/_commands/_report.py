@@ -29,7 +29,7 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> None:
     options = recorded_options(options)
-    model, frame, tau = read_model_and_log(options)
+    model, frame, tau = read_model_and_log(options, check=False)  # a diagnosis checks it
     diagnosis = run_diagnosis(model, frame, tau, options)
     write_page(diagnosis, options.html, provenance(options))
     page = str(Path(options.html).resolve())

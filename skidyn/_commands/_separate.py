@@ -39,7 +39,7 @@ def run(options: argparse.Namespace) -> None:
     from skidyn.diagnosis import design_separating_motion
 
     options = recorded_options(options)
-    model, frame, tau = read_model_and_log(options)
+    model, frame, tau = read_model_and_log(options, check=False)  # a diagnosis checks it
     diagnosis = run_diagnosis(model, frame, tau, options)
     with working("Designing the motion", options):
         motion = design_separating_motion(

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,7 +30,7 @@ Mask = NDArray[np.bool_]
 
 
 def nameless_candidates(
-    problem: Problem, residual: Array, *, followed_only: bool = False
+    problem: Problem, residual: Array, *, followed_on: Collection[int] | None = None
 ) -> list[Candidate]:
     """Nameless functions of the signals for every joint.
 
@@ -38,14 +40,16 @@ def nameless_candidates(
         Rows and folds.
     residual : ndarray of shape (n_samples, n_joints)
         Torque that the model leaves, N m or N.
-    followed_only : bool, default=False
-        Only those whose signals are chosen by what the residual follows.
+    followed_on : collection of int, optional
+        Joints, from 0, for which alone those are made whose signals are chosen by what the residual
+        follows, and no others; all nameless functions of all joints by default.
 
     Returns
     -------
     list of Candidate
     """
-    followed = [followed_signals(problem, j, residual[:, j]) for j in range(problem.n_joints)]
+    looked_at = range(problem.n_joints) if followed_on is None else followed_on
+    followed = {j: followed_signals(problem, j, residual[:, j]) for j in looked_at}
     candidates = []
     for kind in nameless_kinds():
         effect = get_effect(kind)
@@ -54,7 +58,7 @@ def nameless_candidates(
             joint = joints[0]
             if effect.search == "spectrum" or effect.not_shown(problem.signals, joint):
                 continue
-            if followed_only and effect.search != "screened":
+            if followed_on is not None and (effect.search != "screened" or joint not in followed):
                 continue
             shapes = effect.grid(problem.signals, joints)
             if isinstance(effect, FunctionOfSignals):

@@ -121,11 +121,10 @@ def _zeroed_anew(
         if not 1 < len(own) <= MOST_TERMS or own[0].width > 1:
             continue
         rows = {j: np.hstack([c.rows[j] for c in own]) for j in own[0].rows}
-        together = tester.test(rows)
+        together, alone = tester.test_each(rows)
         if not significant(together.chance):
             continue
         # One that does nearly all of it stands out by itself.
-        alone = [tester.test(c.rows) for c in own]
         strongest = max((t.drop for t in alone if significant(t.chance)), default=0.0)
         if strongest < MOSTLY * together.drop:
             chosen += own

@@ -30,7 +30,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -282,6 +282,25 @@ class Tester:
         parts = np.split(both, ends)
         alone = self._test(own, [part[:, 1:] for part in parts], [part[:, 0] for part in parts])
         return replace(test, chance=max(test.chance, alone.chance))
+
+    def test_each(self, rows: dict[int, Array]) -> tuple[Test, Iterator[Test]]:
+        """Test some columns together, and, as far as it is asked for, each column by itself.
+
+        Parameters
+        ----------
+        rows : dict of int to ndarray of shape (n_rows_j, n_coefficients)
+            Averaged columns, per joint they reach.
+        """
+        new = self._swept(rows)
+        alone = (
+            self._test(
+                {j: block[:, [c]] for j, block in rows.items()},
+                [z[:, [c]] for z in new],
+                self.residual,
+            )
+            for c in range(new[0].shape[1])
+        )
+        return self._test(rows, new, self.residual), alone
 
     def _test(self, rows: dict[int, Array], new: list[Array], residual: Sequence[Array]) -> Test:
         """Test columns from which what the model can do has been taken."""

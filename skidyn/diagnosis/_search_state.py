@@ -29,6 +29,9 @@ from skidyn.diagnosis._rule import (
 )
 from skidyn.evidence import Problem
 
+#: Share of a joint's squared residual up to which a change of it leaves what it follows as it was.
+SAME = 1e-3
+
 
 class Kept(NamedTuple):
     """What is put back where something was only tried."""
@@ -60,7 +63,8 @@ class SearchState:
         self.pool = catalogue_candidates(problem, self.kinds)
         self.nameless = nameless and bool(settings.max_findings)
         if self.nameless:
-            self.pool += nameless_candidates(problem, problem.torque - problem.explained(base))
+            self._followed = problem.torque - problem.explained(base)
+            self.pool += nameless_candidates(problem, self._followed)
         self.by_recording = recording_candidates(problem, self.kinds)
         self.n_tests = max(1, len(self.pool) + len(self.by_recording))
         self.whole_pool = self.pool
@@ -139,8 +143,13 @@ class SearchState:
         """Add functions of the signals that what is left follows now, which others had covered."""
         if not self.nameless:
             return
+        residual, before = self.residual, self._followed
+        change = np.mean((residual - before) ** 2, axis=0)
+        joints = np.flatnonzero(change > SAME * np.mean(before**2, axis=0)).tolist()
+        self._followed = before.copy()
+        self._followed[:, joints] = residual[:, joints]
         known = {c.term for c in self.whole_pool}
-        found = nameless_candidates(self.problem, self.residual, followed_only=True)
+        found = nameless_candidates(self.problem, residual, followed_on=joints)
         new = [c for c in found if c.term not in known]
         self.pool, self.whole_pool = [*self.pool, *new], [*self.whole_pool, *new]
         self.n_tests += len(new)

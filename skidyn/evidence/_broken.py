@@ -11,11 +11,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation, median_filter
 
 from skidyn._signals import Array, Signals
 from skidyn.evidence._kinematics import SmoothedMotion
+from skidyn.evidence._rows import widened
 
 #: Samples of the running median; up to three of them may be broken.
 WIDTH = 7
@@ -53,7 +54,7 @@ def leaps(
     for rows in signals.segments:
         if rows.stop - rows.start >= 2 * WIDTH:
             block = values[rows]
-            away[rows] = block - median_filter(block, size=(WIDTH, 1), mode="reflect")
+            away[rows] = block - _running_median(block)
             # At either end a step has no other side to be told from a leap.
             for end in (rows.start, rows.stop - WIDTH // 2):
                 least[end : end + WIDTH // 2] = 1.0
@@ -71,6 +72,16 @@ def leaps(
         low, high = np.quantile(away[own], TAILS, axis=0)
         broken[own] = far & (distance > np.maximum(FAR * (high - low), coarse))
     return broken
+
+
+def _running_median(values: Array) -> Array:
+    """Median of the samples around each, columns by themselves, reflected at either end."""
+    middle = WIDTH // 2
+    result = np.empty_like(values)
+    for k, column in enumerate(values.T):
+        windows = sliding_window_view(np.pad(column, middle, mode="symmetric"), WIDTH)
+        result[:, k] = np.partition(windows, middle, axis=1)[:, middle]
+    return result
 
 
 def _smallest_change(values: Array) -> Array:
@@ -93,7 +104,7 @@ def reversals(signals: Signals) -> NDArray[np.bool_]:
     """
     turns = np.zeros(signals.dq.shape, dtype=bool)
     turns[1:] = np.diff(np.sign(signals.dq), axis=0) != 0
-    return np.asarray(binary_dilation(turns, np.ones((WIDTH, 1), dtype=bool)))
+    return widened(turns, WIDTH // 2)
 
 
 def without_broken(motion: SmoothedMotion, logged: Signals, torque: Array) -> SmoothedMotion:
@@ -112,7 +123,7 @@ def without_broken(motion: SmoothedMotion, logged: Signals, torque: Array) -> Sm
     # The torque of every joint depends on all positions.
     position = np.asarray(broken.any(1))
     if position.any():
-        position = binary_dilation(position, iterations=max(1, motion.half_width))
+        position = widened(position, max(1, motion.half_width))
     valid = motion.valid & ~wrong & ~position[:, None]
     return replace(motion, valid=valid)
 

@@ -16,7 +16,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation
 from scipy.sparse import csr_matrix
 
 from skidyn._signals import Array, Signals
@@ -199,10 +198,17 @@ def sliding_samples(
             turns = np.flatnonzero(np.diff(np.sign(velocity)))
             still[turns] = True
             still[np.minimum(turns + 1, len(still) - 1)] = True
-            if margins[joint] > 0:
-                still = binary_dilation(still, iterations=int(margins[joint]))
-            sliding[rows, joint] = ~still & valid[rows, joint]
+            sliding[rows, joint] = ~widened(still, int(margins[joint])) & valid[rows, joint]
     return sliding
+
+
+def widened(mask: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
+    """A mask along its first axis with so many more samples on each side of all that it holds."""
+    total = np.zeros((len(mask) + 1, *mask.shape[1:]), dtype=np.int64)
+    np.cumsum(mask, axis=0, out=total[1:])
+    place = np.arange(len(mask))
+    before, after = np.maximum(place - reach, 0), np.minimum(place + reach + 1, len(mask))
+    return np.asarray(total[after] > total[before])
 
 
 def window_rows(signals: Signals, use: NDArray[np.bool_], window: float = WINDOW) -> Rows:

@@ -12,6 +12,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
 
 from skidyn._signals import Array, Signals
 from skidyn.evidence import smooth_motion
@@ -23,7 +25,7 @@ from skidyn.measurement._suspicion import Suspicion
 #: Standard deviations of the smoothing that are tried, s, and ways of presliding, rad (a tenth in
 #: metres).
 WIDTHS = 0.01 * 2.0 ** np.arange(5)
-WAYS = 0.001 * 2.0 ** np.arange(8)
+WAYS = np.array([0.001 * 2.0**k for k in range(8)])
 #: Half of the time around a turn that is looked at, s, and the degree of what else is there.
 AROUND, DEGREE = 0.4, 3
 #: Turns of a joint, at least and at most; samples around each at least.
@@ -142,10 +144,13 @@ def at_turns(signals: Signals, torque: Array, joint: int) -> Turns | None:
     if len(places) < FEWEST:
         return None
     places = places[:: 1 + len(places) // MOST]
-    forms = [np.sign(dq)]
-    forms += [_smoothed(np.sign(dq), signals, width / step) for width in WIDTHS]
-    forms += [presliding(q, signals, way * float(signals.unit[joint])) for way in WAYS]
-    fits = [_likelihood(form, torque, places) for form in forms]
+    index = np.array([np.arange(part.start, part.stop) for part in places])
+    sign = np.sign(dq)
+    forms = [sign[index], *(_smoothed(sign, signals, index, width / step) for width in WIDTHS)]
+    forms += list(presliding(q, signals, WAYS * float(signals.unit[joint]))[:, index])
+    slow, _ = np.linalg.qr(np.vander(np.linspace(-1, 1, index.shape[1]), DEGREE + 1))
+    left = _without(torque[index], slow)
+    fits = [_likelihood(_without(form, slow), left) for form in forms]
     rest = max(fits, key=lambda fit: fit[0])[1]
     # neighbouring samples are alike, in all forms as in the best one
     alike = float(np.clip(rest[1:] @ rest[:-1] / (rest @ rest + 1e-300), 0.0, 0.95))
@@ -155,17 +160,19 @@ def at_turns(signals: Signals, torque: Array, joint: int) -> Turns | None:
     )
 
 
-def _smoothed(values: Array, signals: Signals, width: float) -> Array:
-    """Values through a Gaussian, recording by recording."""
-    from scipy.ndimage import gaussian_filter1d  # half a tenth of a second that a start would take
+def _smoothed(values: Array, signals: Signals, index: NDArray[np.int64], width: float) -> Array:
+    """Values through a Gaussian around some samples, those of a row within one recording."""
+    reach = int(4 * width + 0.5)  # where the filter ends
+    kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
+    ends = np.array([(rows.start, rows.stop - 1) for rows in signals.segments])
+    own = np.searchsorted(ends[:, 0], index[:, 0], side="right") - 1
+    wide = np.arange(-reach, index.shape[1] + reach) + index[:, [0]]
+    wide = np.clip(wide, ends[own, :1], ends[own, 1:])
+    windows = sliding_window_view(values[wide], len(kernel), axis=1)
+    return np.asarray(windows @ (kernel / kernel.sum()))
 
-    out = values.copy()
-    for rows in signals.segments:
-        out[rows] = gaussian_filter1d(values[rows], width, mode="nearest")
-    return out
 
-
-def presliding(position: Array, signals: Signals, way: float) -> Array:
+def presliding(position: Array, signals: Signals, ways: Array) -> Array:
     """Friction that turns over a way after the joint has turned (Dahl's model), from -1 to 1.
 
     Parameters
@@ -174,35 +181,45 @@ def presliding(position: Array, signals: Signals, way: float) -> Array:
         Position of a joint.
     signals : Signals
         Recordings.
-    way : float, rad or m
-        Way over which friction turns.
+    ways : ndarray of shape (n_ways,), rad or m
+        Ways over which friction turns.
+
+    Returns
+    -------
+    ndarray of shape (n_ways, n_samples)
 
     References
     ----------
     P. R. Dahl (1968), A solid friction model, Aerospace Corporation TOR-0158(3107-18)-1.
     """
-    state = np.zeros(len(position))
+    state = np.zeros((len(ways), len(position)))
     for rows in signals.segments:
-        z, own = 0.0, position[rows]
-        values = [z]
-        for change in np.diff(own).tolist():
-            toward = 1.0 if change > 0 else -1.0
-            z = toward + (z - toward) * np.exp(-abs(change) / way)
-            values.append(z)
-        state[rows] = values
+        change = np.diff(position[rows])
+        if not len(change):
+            continue
+        toward = np.where(change > 0, 1.0, -1.0)
+        starts = np.append(0, np.flatnonzero(np.diff(toward)) + 1)  # of strokes in one direction
+        lengths = np.diff(np.append(starts, len(change)))
+        passed = np.cumsum(np.abs(change))
+        before = np.append(0.0, passed)[starts]
+        fade = np.exp((before - passed[starts + lengths - 1])[:, None] / ways)
+        begin, z = np.empty((len(starts), len(ways))), np.zeros(len(ways))
+        for k, direction in enumerate(toward[starts].tolist()):
+            begin[k] = z
+            z = direction + (z - direction) * fade[k]
+        since = passed - np.repeat(before, lengths)
+        departure = np.repeat(begin, lengths, axis=0).T - toward
+        state[:, rows.start + 1 : rows.stop] = toward + departure * np.exp(-since / ways[:, None])
     return state
 
 
-def _likelihood(form: Array, torque: Array, places: list[slice]) -> tuple[float, Array]:
-    """Log-likelihood of one size of friction and a slow torque of its own around every turn."""
-    rests, columns = [], []
-    for part in places:
-        x = np.linspace(-1, 1, part.stop - part.start)
-        basis, _ = np.linalg.qr(np.vander(x, DEGREE + 1))
-        y, f = torque[part], form[part]
-        rests.append(y - basis @ (basis.T @ y))
-        columns.append(f - basis @ (basis.T @ f))
-    y, f = np.concatenate(rests), np.concatenate(columns)
+def _without(values: Array, slow: Array) -> Array:
+    """Values around every turn less a slow function of their own, one after the other."""
+    return np.asarray(values - (values @ slow) @ slow.T).ravel()
+
+
+def _likelihood(f: Array, y: Array) -> tuple[float, Array]:
+    """Log-likelihood of one size of friction, and what it leaves."""
     weight = np.ones(len(y))
     scale, rest = 1.0, y
     for _ in range(5):

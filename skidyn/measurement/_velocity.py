@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from skidyn._signals import Signals
 from skidyn.measurement._check import Check
@@ -190,6 +189,8 @@ def _other_order(measurement: Measurement) -> list[int] | None:
             for k in odd
         ]
     )
+    from scipy.optimize import linear_sum_assignment  # half a second of imports that few logs need
+
     rows, found = linear_sum_assignment(-likeness)
     order = list(range(n))
     for k, m in zip(rows, found, strict=True):
