@@ -42,12 +42,18 @@ class RunDelay:
         Log-likelihood gained by it over the lag of the other recordings.
     agreeing : float
         Share of the likelihood gained on joints whose own lag is near it.
+    left : float
+        Root mean square of what it leaves over the noise of the other recordings.
+    before : float
+        That at the lag of the other recordings.
     """
 
     lag: float
     error: float
     gain: float
     agreeing: float
+    left: float = 1.0
+    before: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -107,6 +113,7 @@ def find_delay(fits: Fits) -> Delay:
     shifted = [fits.average(fits.torque_at(lag)) for lag in LAGS]
     tables, firsts, lags = [], [], np.full(n, np.nan)
     squares: dict[int, list[Array]] = {}
+    counts: dict[int, int] = {}
     run_of = s.trajectory[::SAMPLES]
     first = _first_half(fits)
     for j in range(n):
@@ -139,6 +146,7 @@ def find_delay(fits: Fits) -> Delay:
         tables.append((len(rest), errors))
         for run, cost in _run_costs(basis, y, int(np.argmin(total)), run_of[use]):
             squares.setdefault(run, []).append(cost)
+            counts[run] = counts.get(run, 0) + int(np.sum(run_of[use] == run))
         sooner = rest * first[use][:, None]
         firsts.append(np.stack([(p**2).sum(axis=0) for p in np.array_split(sooner, GROUPS)]))
         lags[j] = _lowest(total)
@@ -166,7 +174,7 @@ def find_delay(fits: Fits) -> Delay:
     whole = sum(n / 2 * np.log(e.sum(axis=0)) for n, e in tables)
     gain = float(whole[len(LAGS) // 2] - whole.min())
     early, late = lag(firsts), lag(seconds)
-    runs = _of_runs(squares)
+    runs = _of_runs(squares, counts)
     return Delay(common, error, lags, own_errors, gain, own_gains, halves, early, late, drift, runs)
 
 
@@ -203,7 +211,7 @@ def _run_costs(
         yield run, known / (2 * noise)
 
 
-def _of_runs(squares: Mapping[int, list[Array]]) -> dict[int, RunDelay]:
+def _of_runs(squares: Mapping[int, list[Array]], counts: Mapping[int, int]) -> dict[int, RunDelay]:
     """Lags of single recordings, from half the squared residuals of their joints over noise."""
     if len(squares) < 3:
         return {}
@@ -221,8 +229,10 @@ def _of_runs(squares: Mapping[int, list[Array]]) -> dict[int, RunDelay]:
         near = np.abs(own - lag) < max(NEARLY, 0.3 * abs(lag))
         total = max(float(weight.sum()), 1e-12)
         error = float(np.sqrt(weight @ (own - lag) ** 2 / total / max(len(own), 1)))
+        agreeing = float(weight[near].sum()) / total
+        left, before = (np.sqrt(2 * float(whole[run][x]) / counts[run]) for x in (there, here))
         found[run] = RunDelay(
-            lag - usual, error, float(gains.sum()), float(weight[near].sum()) / total
+            lag - usual, error, float(gains.sum()), agreeing, float(left), float(before)
         )
     return found
 

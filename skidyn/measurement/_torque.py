@@ -45,8 +45,9 @@ APART, SAME = 0.008, 0.3
 
 
 #: Share of the recordings that may be late by themselves, and log-likelihood that they must gain:
-#: what one carries shifts the lag of few rows, too.
-ODD, RUN_SURE = 0.34, 80.0
+#: what one carries shifts the lag of few rows, too. How many times as much they leave without it:
+#: friction that is missing is late by itself, but leaves little.
+ODD, RUN_SURE, TIMES = 0.34, 80.0, 1.75
 #: How near a lag is to a whole number of samples that is one, s, and in samples.
 WHOLE, MOST_WHOLE = 4e-4, 0.1
 
@@ -431,6 +432,7 @@ def late_runs(found: Delay) -> dict[int, RunDelay]:
         if abs(one.lag) > max(APART, ERRORS * one.error)
         and one.gain > RUN_SURE
         and one.agreeing >= AGREEING
+        and one.before > TIMES * one.left
     }
     # one that is late makes others look early
     first = max(odd.values(), key=lambda one: one.gain, default=None)
