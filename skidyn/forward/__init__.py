@@ -7,5 +7,12 @@ from skidyn.forward._controller import (
     fit_controller as fit_controller,
 )
 from skidyn.forward._model import ForwardModel as ForwardModel
-from skidyn.forward._run import STEP as STEP, Task as Task, read_task as read_task, run as run
+from skidyn.forward._run import (
+    STEP as STEP,
+    Task as Task,
+    commanded as commanded,
+    read_task as read_task,
+    references as references,
+    run as run,
+)
 from skidyn.forward._windows import make_windows as make_windows

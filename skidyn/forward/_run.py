@@ -17,6 +17,7 @@ from skidyn.forward._controller import Controller
 from skidyn.forward._model import Conditions, ForwardModel
 from skidyn.forward._stepper import LOST, State, Stepper
 from skidyn.forward._windows import Windows, make_windows
+from skidyn.robots import Robot
 
 Rows = NDArray[np.int64]
 
@@ -66,13 +67,18 @@ def read_task(
             raise SkidynError(f"y has {torque.shape[1]} column(s); the robot has {n} joints")
         _refuse_gaps(torque, "torques")
         return Task(signals, windows, torque)
-    reference = _reference(X, model)
-    rate = np.zeros_like(reference)
+    return commanded(signals, windows, controller, references(X, model.robot_))
+
+
+def commanded(signals: Signals, windows: Windows, controller: Controller, reference: Array) -> Task:
+    """Pieces of a log that a controller drives along its reference."""
     assert signals.time is not None
+    rate = np.zeros_like(reference)
     for rows in signals.segments:
         if rows.stop - rows.start > 1:
             rate[rows] = np.gradient(reference[rows], signals.time[rows], axis=0)
-    return Task(signals, windows, None, controller.checked(n), reference, rate)
+    checked = controller.checked(reference.shape[1])
+    return Task(signals, windows, None, checked, reference, rate)
 
 
 def motion_of(model: Any, X: Any) -> Signals:
@@ -112,8 +118,9 @@ def _refuse_gaps(values: Array, what: str) -> None:
         )
 
 
-def _reference(X: Any, model: Any) -> Array:
-    wanted = command_columns(column_names(X) or [], model.robot_.joint_names)
+def references(X: Any, robot: Robot) -> Array:
+    """Commanded positions of a log, shape (n_samples, n_joints)."""
+    wanted = command_columns(column_names(X) or [], robot.joint_names)
     reference = np.column_stack([np.asarray(X[name], dtype=float) for name in wanted])
     _refuse_gaps(reference, "references")
     return reference

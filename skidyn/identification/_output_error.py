@@ -2,7 +2,8 @@
 """The output error estimator: coefficients for which the simulated motion is that of the log.
 
 Least squares of the torque sees the motion as exact and errs by what is wrong with it; here the
-torque drives the model and the motion is what is compared [1]_. Gauss-Newton steps from the
+torque drives the model, or commands do through a controller, and the motion is what is compared
+[1]_. Gauss-Newton steps from the
 least-squares solution; the sensitivities are differences of models that are simulated together,
 in the same steps and with the same exchanges of sticking and sliding.
 
@@ -25,7 +26,7 @@ from skidyn._exceptions import SkidynError
 from skidyn._progress import tell
 from skidyn._signals import Array, Signals
 from skidyn.effects import TermSum
-from skidyn.forward import ForwardModel, Task, make_windows, run
+from skidyn.forward import Controller, ForwardModel, Task, commanded, make_windows, run
 from skidyn.identification._regression import Regression, Solution
 
 #: Step of the simulation, s; logs that are faster are thinned, their torque averaged.
@@ -45,6 +46,8 @@ def refine_by_simulation(
     signals: Signals,
     torque: Array,
     horizon: float | None,
+    controller: Controller | None = None,
+    reference: Array | None = None,
 ) -> Solution:
     """Coefficients that simulate best, from those of a fitted model.
 
@@ -62,6 +65,10 @@ def refine_by_simulation(
         Logged torque.
     horizon : float, s, or None
         Length of the pieces; None for whole trajectories.
+    controller : Controller, optional
+        Drives the models toward the reference in place of the torque.
+    reference : ndarray of shape (n_samples, n_joints), rad or m, optional
+        Commanded positions.
 
     Raises
     ------
@@ -70,7 +77,13 @@ def refine_by_simulation(
     """
     if signals.time is None:
         raise SkidynError("estimator='output_error' simulates and needs the column 'time' (s) in X")
-    error = _OutputError.of(model, regression, solution, signals, torque, horizon)
+    thin, driven, rows = _thinned(signals, torque)
+    windows = make_windows(thin, horizon)
+    if controller is None or reference is None:
+        task = Task(thin, windows, driven)
+    else:
+        task = commanded(thin, windows, controller, reference[rows])
+    error = _OutputError.of(model, regression, solution, task)
     theta = np.zeros(len(error.free))
     residual = error.residuals(theta[None])[0]
     # Every joint counts by the size of its errors at the start.
@@ -134,14 +147,9 @@ class _OutputError:
         model: Any,
         regression: Regression,
         solution: Solution,
-        signals: Signals,
-        torque: Array,
-        horizon: float | None,
+        task: Task,
     ) -> _OutputError:
         forward = ForwardModel(model, free=True)
-        thin, driven = _thinned(signals, torque)
-        windows = make_windows(thin, horizon)
-        task = Task(thin, windows, driven)
         n_rigid = regression.n_rigid
         places = dict(TermSum(regression.terms).slices(n_rigid))
         inside = [np.arange(places[t].start, places[t].stop) for t in forward.inside]
@@ -161,7 +169,7 @@ class _OutputError:
             model.robot_.inertial_parameters,
             regression.rigid_index,
             inside_index,
-            _folds(thin, regression.n_folds)[windows.rows],
+            _folds(task.signals, regression.n_folds)[task.windows.rows],
             regression.n_folds,
             model._smooths(),
         )
@@ -226,7 +234,7 @@ def _folds(signals: Signals, n_folds: int) -> NDArray[np.int64]:
     return fold
 
 
-def _thinned(signals: Signals, torque: Array) -> tuple[Signals, Array]:
+def _thinned(signals: Signals, torque: Array) -> tuple[Signals, Array, NDArray[np.int64]]:
     """Samples some :data:`STEP` apart; the torque is averaged over what lies between them."""
     rows, smooth = [], torque.copy()
     for own in signals.segments:
@@ -236,4 +244,4 @@ def _thinned(signals: Signals, torque: Array) -> tuple[Signals, Array]:
         if every > 1:
             smooth[own] = uniform_filter1d(torque[own], every, axis=0, mode="nearest")
     index = np.concatenate(rows)
-    return signals.take(index), smooth[index]
+    return signals.take(index), smooth[index], index

@@ -36,6 +36,7 @@ from skidyn.evidence import (
     sample_blocks,
     smooth_motion,
 )
+from skidyn.forward import Controller, references
 from skidyn.identification._constraints import BodyConstraints
 from skidyn.identification._estimators import ESTIMATORS, Estimator, find_estimator
 from skidyn.identification._every_sample import may_take_samples, predicts_better
@@ -237,7 +238,12 @@ class RBDRegressor(Results, RegressorMixin, BaseEstimator):
 
     # ------------------------------------------------------------------ public
     def fit(
-        self, X: Any, y: Any, sample_weight: Any = None, instruments: Any = None
+        self,
+        X: Any,
+        y: Any,
+        sample_weight: Any = None,
+        instruments: Any = None,
+        controller: Controller | None = None,
     ) -> RBDRegressor:
         """Identify the model.
 
@@ -253,6 +259,10 @@ class RBDRegressor(Results, RegressorMixin, BaseEstimator):
         instruments : DataFrame or array of shape (n_samples, n_features), optional
             The columns of X along a motion whose errors have nothing to do with those of X, such
             as the reference of the controller; for ``estimator="instrumental"`` only.
+        controller : Controller, optional
+            Drives the simulated model by the commands of X (``q_ref1..`` or ``cmd1..``, rad or m)
+            in place of y; for ``estimator="output_error"`` only. For a log of a position servo y is
+            then :func:`skidyn.simulation.servo_torque`, from which the fit starts.
 
         Returns
         -------
@@ -262,11 +272,20 @@ class RBDRegressor(Results, RegressorMixin, BaseEstimator):
         Raises
         ------
         ColumnError
-            X does not follow the contract, or y has the wrong number of joints.
+            X does not follow the contract, or y has the wrong number of joints; X lacks commands.
         ValueError
-            A parameter has no meaning, or instruments are missing, not wanted or of other rows.
+            A parameter has no meaning; instruments are missing, not wanted or of other rows; a
+            controller is not wanted, or is none.
         """
         method = self._method()
+        if controller is not None and not isinstance(controller, Controller):
+            raise ValueError(
+                f"controller={controller!r}; expected a skidyn.simulation.Controller or None"
+            )
+        if controller is not None and not method.simulates:
+            raise ValueError(
+                f"estimator={self.estimator!r} takes no controller; 'output_error' does"
+            )
         if instruments is not None and self.estimator != "instrumental":
             raise ValueError(
                 f"estimator={self.estimator!r} takes no instruments; 'instrumental' does"
@@ -308,8 +327,9 @@ class RBDRegressor(Results, RegressorMixin, BaseEstimator):
         solution = self._solve(method, every, shown, kept)
         self._store(every, solution)
         if method.simulates:
+            commands = None if controller is None else references(X, self.robot_)[order]
             solution = refine_by_simulation(
-                self, every, solution, problem.signals, torque, self.horizon
+                self, every, solution, problem.signals, torque, self.horizon, controller, commands
             )
             self._store(every, solution)
         joints = range(problem.n_joints)

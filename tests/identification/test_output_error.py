@@ -6,9 +6,9 @@ import pandas as pd
 import pytest
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
-from skidyn.exceptions import SkidynError
+from skidyn.exceptions import ColumnError, SkidynError
 from skidyn.identification import RBDRegressor, is_consistent
-from skidyn.simulation import Controller, simulate, simulation_errors
+from skidyn.simulation import Controller, servo_torque, simulate, simulation_errors
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +51,44 @@ def test_exact_data_keep_the_exact_model(clean):
     refined = RBDRegressor(clean.robot, estimator="output_error").fit(X, torque)
     again = simulation_errors(refined, X, torque)
     assert again.score < 1.05 * plain.score < 0.05
+
+
+@pytest.fixture(scope="module")
+def servo_log(clean):
+    """An arm with friction in a position servo, logged without noise, and what drives it."""
+    arm = RBDRegressor(clean.robot, ("viscous", "coulomb"), "nominal").fit(clean.X, clean.y)
+    frame = clean.X[clean.frame["trajectory"] <= 2].reset_index(drop=True)
+    wanted = frame.assign(cmd1=frame["q1"], cmd2=frame["q2"])
+    servo = Controller(stiffness=60.0, follows_velocity=False)
+    motion = simulate(arm, wanted, controller=servo, horizon=None)
+    log = wanted[["time", "trajectory", "cmd1", "cmd2"]]
+    return arm, servo, log.assign(**{c: motion[c].to_numpy() for c in ("q1", "q2", "dq1", "dq2")})
+
+
+def test_commands_drive_the_model_through_a_controller(servo_log):
+    """A torque whose constant is wrong is where the fit starts, and not where it ends."""
+    arm, servo, log = servo_log
+    torque = 0.8 * servo_torque(servo, log)
+    model = RBDRegressor(arm.robot, arm.effects, "nominal", estimator="output_error", horizon=None)
+    start = RBDRegressor(arm.robot, arm.effects, "nominal").fit(log, torque)
+    found = model.fit(log, torque, controller=servo)
+    coulomb = [m.effect_coefficients_[m.effect_terms_[2]][0] for m in (arm, start, found)]
+    assert abs(coulomb[1] / coulomb[0] - 1) > 0.15
+    assert abs(coulomb[2] / coulomb[0] - 1) < 0.03
+    errors = [simulation_errors(m, log, controller=servo).position for m in (start, found)]
+    assert np.all(errors[1] < 0.9 * errors[0]) and errors[1][0] < 0.1 * errors[0][0]
+
+
+def test_a_controller_needs_commands_and_the_estimator_that_simulates(servo_log):
+    arm, servo, log = servo_log
+    torque, model = servo_torque(servo, log), RBDRegressor(arm.robot, arm.effects, "nominal")
+    with pytest.raises(ValueError, match="'weighted' takes no controller; 'output_error' does"):
+        model.fit(log, torque, controller=servo)
+    model.set_params(estimator="output_error")
+    with pytest.raises(ValueError, match=r"expected a skidyn\.simulation\.Controller"):
+        model.fit(log, torque, controller=60.0)
+    with pytest.raises(ColumnError, match="cmd"):
+        model.fit(log.drop(columns=["cmd1", "cmd2"]), torque, controller=servo)
 
 
 def test_consistent_on_request(clean):
