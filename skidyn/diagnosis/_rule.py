@@ -41,7 +41,7 @@ from skidyn._signals import Array
 from skidyn.evidence import RIDGE, Problem
 
 #: A block is at least so long in s, and at least so many correlation times of the residual.
-SHORTEST_BLOCK, CORRELATION_TIMES = 0.5, 8.0
+SHORTEST_BLOCK, CORRELATION_TIMES = 0.5, 12.0
 #: Autocorrelations are added up to this lag in rows, or to the first one below this value.
 MOST_LAGS, SMALL = 12, 0.05
 #: Blocks needed beyond the coefficients that are tested; and blocks, beyond twice the coefficients,
@@ -350,12 +350,14 @@ class Tester:
         k = len(score)
         longest = self._duration / (2 * k + ENOUGH_BLOCKS)
         block, count = time_blocks(self.problem, min(max(SHORTEST_BLOCK, length), longest))
-        sums = np.zeros((count, k))
-        for index, z, r in zip(block, new, left, strict=True):
-            for c in range(k):
-                sums[:, c] += np.bincount(index, z[:, c] * r, count)
-        n_rows = int(self.problem.rows.counts.sum())
-        return chance_of_score(score, sums * np.sqrt(n_rows / self._free))
+        index = np.concatenate(block)
+        order = np.argsort(index, kind="stable")
+        ends = np.searchsorted(index[order], np.arange(1, count))
+        columns = np.split(np.concatenate(new)[order], ends)
+        residual = np.split(np.concatenate(left)[order], ends)
+        sums = np.array([z.T @ r for z, r in zip(columns, residual, strict=True)])
+        grams = np.array([z.T @ z for z in columns])
+        return chance_of_score(score, left_out_scores(sums, grams))
 
 
 def chance_of_score(score: Array, sums: Array) -> float:
@@ -376,6 +378,34 @@ def chance_of_score(score: Array, sums: Array) -> float:
     spread += 1e-12 * np.trace(spread) * np.eye(k)
     wald = float(score @ np.linalg.solve(spread, score))
     return float(fisher.sf(wald * (free - k + 1) / (k * free), k, free - k + 1))
+
+
+def left_out_scores(sums: Array, grams: Array) -> Array:
+    """Scores of blocks as they are for the coefficients that the other blocks have by themselves.
+
+    A block that holds most of what is known of a coefficient pulls it, and has a small residual for
+    that reason. The squares of these scores sum up to the jackknife's variance [1]_.
+
+    Parameters
+    ----------
+    sums : ndarray of shape (n_blocks, n_coefficients)
+        Scores with the residual of the coefficients that all blocks give.
+    grams : ndarray of shape (n_blocks, n_coefficients, n_coefficients)
+        Products of the columns of every block.
+
+    Returns
+    -------
+    ndarray of shape (n_blocks, n_coefficients)
+
+    References
+    ----------
+    .. [1] J. G. MacKinnon, M. O. Nielsen, M. D. Webb (2023), Fast and reliable jackknife and
+       bootstrap methods for cluster-robust inference, J. Applied Econometrics 38(5).
+    """
+    gram = grams.sum(0)
+    ridge = RIDGE * np.trace(gram) / len(gram) * np.eye(len(gram))
+    others = gram - grams + ridge
+    return np.asarray(np.linalg.solve(others, sums[..., None])[..., 0] @ gram)
 
 
 def time_blocks(problem: Problem, length: float) -> tuple[list[NDArray[np.int64]], int]:

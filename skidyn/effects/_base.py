@@ -116,7 +116,8 @@ class Effect:
         What enters nonlinearly.
     forms : tuple of dict
         Other forms of the formula that are tried beside the plain one, as further entries of the
-        shape that no search refines: ``{"power": 2.0}``.
+        shape: ``{"power": 2.0}``. An entry that is one of :attr:`shapes`, too, is where its search
+        starts; others stay as they are.
     scope : {"joint", "pair", "robot"}
         Where it acts.
     search : {"grid", "spectrum", "trajectories", "clock", "screened", "given"}
@@ -211,6 +212,11 @@ class Effect:
     def has_shape(self) -> bool:
         """Whether the columns depend on a shape that has to be given or found."""
         return bool(self.shapes) or type(self).grid is not Effect.grid
+
+    @property
+    def form_names(self) -> frozenset[str]:
+        """Names of what only further forms of the formula have in their shape."""
+        return frozenset(name for form in self.forms for name in form)
 
     @property
     def needs_fit(self) -> bool:
@@ -327,10 +333,11 @@ class Effect:
             Combinations of shape parameters.
         """
         axes = []
-        for shape in self.shapes:
+        plain = [shape for shape in self.shapes if shape.name not in self.form_names]
+        for shape in plain:
             unit = signals.unit[joints[0]] if shape.scales else 1.0
             axes.append([value * unit for value in shape.grid])
-        names = [shape.name for shape in self.shapes]
+        names = [shape.name for shape in plain]
         shapes = [dict(zip(names, values, strict=True)) for values in itertools.product(*axes)]
         return [shape | dict(form) for form in ({}, *self.forms) for shape in shapes]
 

@@ -26,7 +26,9 @@ class _PairEffect(Effect):
     scope = "pair"
     shapes: ClassVar[tuple[Shape, ...]] = (_RATIO,)
 
-    def coupled_columns(self, signals: Signals, i: int, j: int, ratio: float) -> Array:
+    def coupled_columns(
+        self, signals: Signals, i: int, j: int, ratio: float, **form: float
+    ) -> Array:
         """Columns as functions of the coupled coordinate, shape (n_samples, n_coefficients)."""
         raise NotImplementedError
 
@@ -34,14 +36,14 @@ class _PairEffect(Effect):
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
         i, j = joints
-        ratio = shape["ratio"]
-        block = self.coupled_columns(signals, i, j, ratio)
-        return {i: block, j: ratio * block}
+        block = self.coupled_columns(signals, i, j, **shape)
+        return {i: block, j: shape["ratio"] * block}
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
         unit = self.travel(signals, joints, {})
         scales = GUESSED if _differ(signals, joints) else (1.0,)
-        return [{"ratio": sign * scale * unit} for scale in scales for sign in _RATIO.grid]
+        ratios = [{"ratio": sign * scale * unit} for scale in scales for sign in _RATIO.grid]
+        return [ratio | dict(form) for form in ({}, *self.forms) for ratio in ratios]
 
     def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
         largest = LARGEST_RATIO * (GUESSED[-1] if _differ(signals, joints) else 1.0)
@@ -59,21 +61,29 @@ def _differ(signals: Signals, joints: Sequence[int]) -> bool:
 
 
 class CoupledFriction(_PairEffect):
-    """Friction of a shaft that turns with the sum of two joint velocities."""
+    """Friction of a shaft that turns with the sum of two joint velocities.
+
+    The viscous part may grow with another ``power`` of the speed (1 where the shape has none), in
+    units of 1 rad/s or 1 m/s.
+    """
 
     kind = "coupled_friction"
     drawn_against = "dq"
     title = "Coupled friction"
     formula = r"F_v\,\dot x + F_c\,\mathrm{sign}\,\dot x,\quad \dot x = \dot q_i + r\,\dot q_j"
     coefficients = (Coefficient("Fc", "N m", sign=1), Coefficient("Fv", "N m s/rad", sign=1))
+    forms = ({"power": 2.0}, {"power": 0.5})
     simplicity = 17
     rivals = ("viscous", "coulomb")
     separating_motion = "the two joints moved together, then against each other"
     reference = _GAUTIER
 
-    def coupled_columns(self, signals: Signals, i: int, j: int, ratio: float) -> Array:
+    def coupled_columns(
+        self, signals: Signals, i: int, j: int, ratio: float, **form: float
+    ) -> Array:
         speed = signals.dq[:, i] + ratio * signals.dq[:, j]
-        return np.column_stack([np.tanh(speed / (SIGN_BLUR * signals.unit[i])), speed])
+        drag = np.sign(speed) * np.abs(speed) ** form.get("power", 1.0)
+        return np.column_stack([np.tanh(speed / (SIGN_BLUR * signals.unit[i])), drag])
 
 
 class CoupledInertia(_PairEffect):
@@ -89,15 +99,18 @@ class CoupledInertia(_PairEffect):
     separating_motion = "the two joints accelerated together, then against each other"
     reference = _GAUTIER
 
-    def coupled_columns(self, signals: Signals, i: int, j: int, ratio: float) -> Array:
+    def coupled_columns(
+        self, signals: Signals, i: int, j: int, ratio: float, **form: float
+    ) -> Array:
         return (signals.ddq[:, i] + ratio * signals.ddq[:, j])[:, None]
 
 
 class CouplingSpring(_PairEffect):
     """Spring or hose between two joints.
 
-    One that stiffens has ``power`` 3 in its shape, and the coupled coordinate ``x0`` at which it is
-    slack; coordinates are in units of 1 rad or 1 m then, so that the unit of the stiffness stays.
+    One that stiffens has ``power`` 3 in its shape, and one that goes slack, as a cable does, has
+    the ``side`` on which it is tight; both have the coupled coordinate ``x0`` at which their torque
+    begins. Coordinates are in units of 1 rad or 1 m there, so that the unit of the stiffness stays.
     """
 
     kind = "coupling_spring"
@@ -108,7 +121,11 @@ class CouplingSpring(_PairEffect):
         _RATIO,
         Shape("x0", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
     )
-    forms = ({"power": 3.0},)
+    forms = (
+        {"x0": 0.0, "power": 3.0},
+        {"x0": 0.0, "side": 1.0},
+        {"x0": 0.0, "side": -1.0},
+    )
     simplicity = 16
     rivals = ("spring",)
     separating_motion = "slow motion of the two joints together, then against each other"
@@ -116,19 +133,18 @@ class CouplingSpring(_PairEffect):
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
         i, j = joints
-        plain = super().grid(signals, joints)
-        stiffening = []
-        for shape in plain:
-            x = signals.q[:, i] + shape["ratio"] * signals.q[:, j]
-            middle = float(x.min() + x.max()) / 2
-            stiffening += [shape | {**form, "x0": middle} for form in self.forms]
-        return plain + stiffening
+        shapes = super().grid(signals, joints)
+        for shape in shapes:
+            if "x0" in shape:
+                x = signals.q[:, i] + shape["ratio"] * signals.q[:, j]
+                shape["x0"] = float(x.min() + x.max()) / 2
+        return shapes
 
-    def torque_columns(
-        self, signals: Signals, joints: Sequence[int], **shape: Any
-    ) -> dict[int, Array]:
-        ratio, power = shape["ratio"], shape.get("power", 1.0)
-        i, j = joints
-        x = signals.q[:, i] + ratio * signals.q[:, j] - shape.get("x0", 0.0)
-        block = np.column_stack([np.sign(x) * np.abs(x) ** power, np.ones_like(x)])
-        return {i: block, j: ratio * block}
+    def coupled_columns(
+        self, signals: Signals, i: int, j: int, ratio: float, **form: float
+    ) -> Array:
+        x = signals.q[:, i] + ratio * signals.q[:, j] - form.get("x0", 0.0)
+        if "side" in form:
+            x = form["side"] * np.maximum(0.0, form["side"] * x)
+        force = np.sign(x) * np.abs(x) ** form.get("power", 1.0)
+        return np.column_stack([force, np.ones_like(x)])

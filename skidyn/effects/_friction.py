@@ -52,7 +52,11 @@ class Coulomb(Effect):
 
 
 class Stribeck(Effect):
-    """Extra dry friction at low speed that fades as the lubricant film builds up."""
+    """Extra dry friction at low speed that fades as the lubricant film builds up.
+
+    It fades exponentially, or with ``lorentzian`` in its shape as
+    ``1 / (1 + (|dq| / vs)^delta)``.
+    """
 
     kind = "stribeck"
     drawn_against = "dq"
@@ -63,6 +67,7 @@ class Stribeck(Effect):
         Shape("vs", "rad/s", (0.03, 0.05, 0.075, 0.11, 0.16, 0.25), 0.01, 1.0),
         Shape("delta", "1", (2.0,), 0.4, 2.6, scales=False),
     )
+    forms = ({"lorentzian": 1.0},)
     simplicity = 8
     rivals = ("coulomb", "nonlinear_viscous", "lugre", "dahl")
     separating_motion = "constant-speed sweeps from 0.01 to 0.5 rad/s in both directions"
@@ -70,7 +75,9 @@ class Stribeck(Effect):
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         speed = np.abs(signals.dq[:, joint]) / shape["vs"]
-        friction: Array = np.exp(-(speed ** shape["delta"])) * signals.sign[:, joint]
+        grown = speed ** shape["delta"]
+        fading = 1 / (1 + grown) if "lorentzian" in shape else np.exp(-grown)
+        friction: Array = fading * signals.sign[:, joint]
         return friction[:, None]
 
 

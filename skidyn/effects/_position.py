@@ -13,13 +13,26 @@ from skidyn.effects._base import Array, Coefficient, Effect, Shape
 
 
 class PositionDependentFriction(Effect):
-    """Dry friction whose level changes along the joint's travel."""
+    """Dry friction whose level changes along the joint's travel.
+
+    It follows a wave, or is higher (lower) at one spot ``place`` of some ``width`` by a dry part
+    ``dFc`` and a viscous part ``dFv``.
+    """
 
     kind = "position_dependent_friction"
     title = "Position-dependent friction"
-    formula = r"A\cos(n q - \varphi)\,\mathrm{sign}(\dot q)"
+    formula = (
+        r"A\cos(n q - \varphi)\,\mathrm{sign}(\dot q)\ \text{or}\ "
+        r"(\Delta F_c\,\mathrm{sign}(\dot q) + \Delta F_v\,\dot q)\,e^{-(q - q_s)^2/2 w^2}"
+    )
     coefficients = (Coefficient("a", "N m"), Coefficient("b", "N m"))
-    shapes = (Shape("n", "1/rad", (1.0, 2.0), 1.0, 100.0, spacing="linear", scales=False),)
+    shapes = (
+        Shape("n", "1/rad", (1.0, 2.0), 1.0, 100.0, spacing="linear", scales=False),
+        Shape("place", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
+        Shape("width", "rad", (), 1e-3, 10.0),
+    )
+    #: Where a spot is looked for, and its width, as shares of the travel.
+    forms = tuple({"place": k / 8, "width": w} for w in (0.06, 0.15) for k in range(1, 8))
     simplicity = 22
     rivals = ("load_dependent_friction", "coulomb")
     separating_motion = "slow sweeps over the whole travel in both directions"
@@ -27,25 +40,37 @@ class PositionDependentFriction(Effect):
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
         waves = (15.0, 30.0, 60.0) if signals.prismatic[joints[0]] else (1.0, 2.0)
-        return [{"n": n} for n in waves]
+        q = signals.q[:, joints[0]]
+        low, span = float(q.min()), float(np.ptp(q))
+        spots = [
+            {"place": low + span * form["place"], "width": span * form["width"]}
+            for form in self.forms
+        ]
+        return [*({"n": n} for n in waves), *spots]
 
     def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
-        return 1.0
+        return super().travel(signals, joints, shape) if "place" in shape else 1.0
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        phase = shape["n"] * signals.q[:, joint]
-        sign = signals.sign[:, joint]
+        q, sign = signals.q[:, joint], signals.sign[:, joint]
+        if "place" in shape:
+            near = np.exp(-0.5 * ((q - shape["place"]) / shape["width"]) ** 2)
+            return np.column_stack([near * sign, near * signals.dq[:, joint]])
+        phase = shape["n"] * q
         return np.column_stack([np.cos(phase) * sign, np.sin(phase) * sign])
 
     def parameters(
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
     ) -> dict[str, Any]:
-        a, b = coefficients
+        a, b = map(float, coefficients)
+        if "place" in shape:
+            return {"dFc": a, "dFv": b, **shape}
         return {"A": float(np.hypot(a, b)), "phase": float(np.arctan2(b, a)), **shape}
 
     def units(self, prismatic: bool = False) -> dict[str, str]:
-        torque, wave = ("N", "1/m") if prismatic else ("N m", "1/rad")
-        return {"A": torque, "phase": "rad", "n": wave}
+        torque, length = ("N", "m") if prismatic else ("N m", "rad")
+        spot = {"dFc": torque, "dFv": f"{torque} s/{length}", "place": length, "width": length}
+        return {"A": torque, "phase": "rad", "n": f"1/{length}"} | spot
 
 
 class TorqueRipple(Effect):

@@ -73,7 +73,11 @@ class TimeDelay(Effect):
 
 
 class Saturation(Effect):
-    """The logged or delivered torque is cut off at a limit."""
+    """The logged or delivered torque is cut off at a limit.
+
+    With ``rounding`` in its shape the torque bends towards the limit before it: by the hyperbolic
+    tangent if that is 1.
+    """
 
     kind = "saturation"
     drawn_against = "load"
@@ -81,6 +85,8 @@ class Saturation(Effect):
     formula = r"-c\,\mathrm{sign}(\tau)\max(0,\,|\tau| - L)"
     coefficients = (Coefficient("share", "1", sign=1, is_share=True),)
     shapes = (Shape("limit", "N m", (0.97, 0.93, 0.88, 0.8, 0.7, 0.6), 1e-9, np.inf, scales=False),)
+    #: A rounded limit is seen long before it is reached.
+    forms = ({"rounding": 1.0},)
     needs = ("model_torque",)
     simplicity = 15
     rivals = ("torque_gain",)
@@ -90,11 +96,20 @@ class Saturation(Effect):
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
         assert signals.model_torque is not None
         highest = float(np.quantile(np.abs(signals.model_torque[:, joints[0]]), 0.999))
-        return [{"limit": share * highest} for share in self.shapes[0].grid if highest > 0]
+        if not highest > 0:
+            return []
+        sharp = [{"limit": share * highest} for share in self.shapes[0].grid]
+        rounded = [
+            {"limit": highest / share} | dict(form) for form in self.forms for share in (0.6, 0.9)
+        ]
+        return sharp + rounded
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         assert signals.model_torque is not None
         torque = signals.model_torque[:, joint]
+        if "rounding" in shape:
+            limit = shape["limit"]
+            return np.asarray(limit * np.tanh(torque / limit) - torque)[:, None]
         missing: Array = -np.sign(torque) * np.maximum(0.0, np.abs(torque) - shape["limit"])
         return missing[:, None]
 

@@ -11,6 +11,9 @@ import numpy as np
 from skidyn._signals import Signals
 from skidyn.effects._base import Array, Coefficient, Effect, Shape
 
+#: Shares of the samples between which a contact is one: with more it is a spring.
+FEWEST_TOUCHING, MOST_TOUCHING = 0.001, 0.6
+
 
 class Offset(Effect):
     """Constant torque: a sensor or current zero, an unbalanced drive."""
@@ -58,7 +61,12 @@ class Spring(Effect):
 
 
 class NonlinearSpring(Effect):
-    """Spring that stiffens or softens: a cubic in position."""
+    """Spring that stiffens or softens: a cubic in position, or pieces of different stiffness.
+
+    A spring of pieces has ``low`` and ``high`` in its shape, the positions between which its
+    stiffness is ``k1``; below it is ``k2`` and above ``k3``, all in N m/rad. Springs with two
+    rates, with slack, or that yield beyond some torque are of this form.
+    """
 
     kind = "nonlinear_spring"
     title = "Nonlinear spring"
@@ -69,6 +77,12 @@ class NonlinearSpring(Effect):
         Coefficient("k3", "N m/rad^3"),
         Coefficient("tau0", "N m", is_zero=True),
     )
+    shapes = (
+        Shape("low", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
+        Shape("high", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
+    )
+    #: Quantiles of the position at which the search for the pieces starts.
+    forms = ({"low": 0.2, "high": 0.8}, {"low": 0.4, "high": 0.6})
     simplicity = 29
     rivals = ("spring", "gravity_compensator", "end_stop")
     separating_motion = "slow motion over the whole travel"
@@ -77,11 +91,28 @@ class NonlinearSpring(Effect):
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
         # Powers of the distance from the middle of the travel keep the columns well conditioned.
         q = signals.q[:, joints[0]]
-        return [{"q_middle": float((q.min() + q.max()) / 2)}]
+        pieces = [{k: float(np.quantile(q, share)) for k, share in f.items()} for f in self.forms]
+        return [{"q_middle": float((q.min() + q.max()) / 2)}, *pieces]
+
+    def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
+        if "low" not in shape:
+            return True
+        q = signals.q[:, joints[0]]
+        least = float(np.mean(q < shape["low"])), float(np.mean(q > shape["high"]))
+        return bool(shape["low"] < shape["high"]) and min(least) > FEWEST_TOUCHING
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        x = signals.q[:, joint] - shape["q_middle"]
+        q = signals.q[:, joint]
+        if "low" in shape:
+            low, high = shape["low"], shape["high"]
+            pieces = [np.clip(q, low, high), np.minimum(q - low, 0.0), np.maximum(q - high, 0.0)]
+            return np.column_stack([*pieces, np.ones_like(q)])
+        x = q - shape["q_middle"]
         return np.column_stack([x, x**2, x**3, np.ones_like(x)])
+
+    def units(self, prismatic: bool = False) -> dict[str, str]:
+        length = "m" if prismatic else "rad"
+        return super().units(prismatic) | {"q_middle": length}
 
 
 class GravityCompensator(Effect):
@@ -114,43 +145,79 @@ class GravityCompensator(Effect):
         return super().not_shown(signals, joint)
 
 
-#: Shares of the samples between which a contact is one: with more it is a spring.
-FEWEST_TOUCHING, MOST_TOUCHING = 0.001, 0.6
-
-
 class EndStop(Effect):
     """One-sided elastic contact beyond a position: bumper, hose, cable pulled tight.
 
-    A soft bumper stiffens: then the torque grows with the second ``power`` of the way (1 where the
-    shape has none), in units of 1 rad or 1 m, so that the unit of the stiffness stays.
+    A soft bumper stiffens: then the torque grows with another ``power`` of the way (1 where the
+    shape has none), in units of 1 rad or 1 m, so that the unit of the stiffness stays. One that
+    loses energy resists more on the way in: the torque is larger by the factor ``1 + damping``
+    times the speed of the approach [1]_, and never pulls. With ``q_low`` in the shape there is one
+    at either end, the second below that position and as stiff as the first.
+
+    References
+    ----------
+    .. [1] K. H. Hunt, F. R. E. Crossley (1975), Coefficient of restitution interpreted as damping
+       in vibroimpact, J. Applied Mechanics 42(2).
     """
 
     kind = "end_stop"
     title = "End stop"
-    formula = r"s\,k\,\max(0,\ s\,(q - q_\mathrm{lim}))^p,\quad s = \pm 1"
+    formula = (
+        r"s\,k\,\max(0,\ s\,(q - q_\mathrm{lim}))^p\,"
+        r"\max(0,\ 1 + d\,s\,\dot q),\quad s = \pm 1"
+    )
     coefficients = (Coefficient("k", "N m/rad", sign=1),)
-    shapes = (Shape("q_lim", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),)
-    forms = ({"power": 2.0},)
+    shapes = (
+        Shape("q_lim", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
+        Shape("q_low", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
+        Shape("damping", "s/rad", (), 1e-3, 1e3, scales=False, has_interval=False),
+    )
+    forms = (
+        {"power": 2.0},
+        {"power": 1.0, "damping": 0.5},
+        {"power": 1.5, "damping": 0.5},
+        {"q_low": 0.0},
+    )
     simplicity = 10
     rivals = ("spring", "nonlinear_spring")
     separating_motion = "slow approach to both ends of the travel"
     reference = "Siciliano, Sciavicco, Villani, Oriolo (2009), Robotics, Springer."
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        q = signals.q[:, joints[0]]
-        shares = (0.80, 0.84, 0.88, 0.92, 0.95)
-        return [
-            {"q_lim": float(side * np.quantile(side * q, share)), "side": side} | stiffening
-            for stiffening in ({}, *map(dict, self.forms))
-            for share in shares
+        q, unit = signals.q[:, joints[0]], signals.unit[joints[0]]
+        stops = [
+            {"q_lim": float(side * np.quantile(side * q, share)), "side": side}
+            for share in (0.80, 0.84, 0.88, 0.92, 0.95)
             for side in (1.0, -1.0)
         ]
+        stiffening, *damped, _ = map(dict, self.forms)
+        some = [stops[k] for k in (2, 3, 6, 7)]
+        softer = [
+            stop | form | {"damping": form["damping"] / unit} for form in damped for stop in some
+        ]
+        both = [
+            {"q_lim": float(np.quantile(q, share)), "q_low": float(np.quantile(q, 1 - share))}
+            | {"side": 1.0}
+            for share in (0.80, 0.88, 0.95)
+        ]
+        return [*stops, *(stop | stiffening for stop in stops), *softer, *both]
 
     def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
-        beyond = shape["side"] * (signals.q[:, joints[0]] - shape["q_lim"]) > 0
-        return bool(FEWEST_TOUCHING < beyond.mean() < MOST_TOUCHING)
+        q = signals.q[:, joints[0]]
+        beyond = float(np.mean(shape["side"] * (q - shape["q_lim"]) > 0))
+        if "q_low" not in shape:
+            return FEWEST_TOUCHING < beyond < MOST_TOUCHING
+        below = float(np.mean(q < shape["q_low"]))
+        return min(beyond, below) > FEWEST_TOUCHING and beyond + below < MOST_TOUCHING
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        beyond = shape["side"] * (signals.q[:, joint] - shape["q_lim"])
-        depth: Array = shape["side"] * np.maximum(0.0, beyond) ** shape.get("power", 1.0)
-        return depth[:, None]
+        q, dq = signals.q[:, joint], signals.dq[:, joint]
+        power, damping = shape.get("power", 1.0), shape.get("damping", 0.0)
+        torque = np.zeros_like(q)
+        ends = [(shape["side"], shape["q_lim"])]
+        if "q_low" in shape:
+            ends.append((-1.0, shape["q_low"]))
+        for side, limit in ends:
+            push = side * np.maximum(0.0, side * (q - limit)) ** power
+            torque += push * np.maximum(0.0, 1.0 + damping * side * dq) if damping else push
+        return torque[:, None]

@@ -106,11 +106,7 @@ class Term:
     @property
     def is_further_form(self) -> bool:
         """Whether the formula is another one than the plain one of its kind."""
-        shape = self.shape
-        return any(
-            all(shape.get(name) == value for name, value in form.items())
-            for form in self.effect.forms
-        )
+        return not self.effect.form_names.isdisjoint(self.shape)
 
     @property
     def effect(self) -> Effect:

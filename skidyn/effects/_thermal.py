@@ -16,9 +16,15 @@ REFERENCE_TEMPERATURE = 30.0
 _BITTENCOURT = "Bittencourt, Wernholt, Sander-Tavallaey, Brogardh (2010), IROS, 4548-4554."
 
 
-def _warmth(signals: Signals, joint: int) -> Array:
+#: Temperature range over which what follows the temperature levels off, K.
+_LEVELLING = ({"levels_over": 6.0}, {"levels_over": 15.0})
+
+
+def _warmth(signals: Signals, joint: int, levels_over: float = np.inf) -> Array:
+    """Warmth above the reference in K; what levels off has its slope there."""
     assert signals.temperature is not None
-    return signals.temperature[:, joint] - REFERENCE_TEMPERATURE
+    warm = signals.temperature[:, joint] - REFERENCE_TEMPERATURE
+    return -levels_over * np.expm1(-warm / levels_over) if np.isfinite(levels_over) else warm
 
 
 def _constant_temperature(signals: Signals, joint: int) -> str | None:
@@ -28,7 +34,15 @@ def _constant_temperature(signals: Signals, joint: int) -> str | None:
 
 
 class TemperatureFriction(Effect):
-    """Viscous and Coulomb friction that change with a logged temperature."""
+    """Viscous and Coulomb friction that change with a logged temperature.
+
+    As grease does [1]_, it may level off exponentially ``levels_over`` some K.
+
+    References
+    ----------
+    .. [1] A. C. Bittencourt, P. Axelsson (2014), Modeling and experiment design for identification
+       of wear in a robot joint under load and temperature uncertainties, IEEE/ASME TMECH 19(5).
+    """
 
     kind = "temperature_friction"
     drawn_against = "temperature"
@@ -40,13 +54,14 @@ class TemperatureFriction(Effect):
         Coefficient("d2Fv_dT2", "N m s/(rad K^2)"),
     )
     needs = ("temperature",)
+    forms = _LEVELLING
     simplicity = 14
     rivals = ("friction_drift", "temperature_offset")
     separating_motion = "the same sweep on the cold and on the warm robot"
     reference = _BITTENCOURT
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        warm = _warmth(signals, joint)
+        warm = _warmth(signals, joint, **shape)
         dq = signals.dq[:, joint]
         return np.column_stack([warm * dq, warm * signals.sign[:, joint], warm**2 * dq])
 
@@ -55,7 +70,7 @@ class TemperatureFriction(Effect):
 
 
 class TemperatureOffset(Effect):
-    """Torque offset that changes with a logged temperature."""
+    """Torque offset that changes with a logged temperature, and may level off exponentially."""
 
     kind = "temperature_offset"
     drawn_against = "temperature"
@@ -67,13 +82,14 @@ class TemperatureOffset(Effect):
         Coefficient("tau0", "N m", is_zero=True),
     )
     needs = ("temperature",)
+    forms = _LEVELLING
     simplicity = 13
     rivals = ("offset", "temperature_friction")
     separating_motion = "one pose held or one sweep repeated while the robot warms up"
     reference = _BITTENCOURT
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        warm = _warmth(signals, joint)
+        warm = _warmth(signals, joint, **shape)
         return np.column_stack([warm, warm**2, np.ones(signals.n_samples)])
 
     def not_shown(self, signals: Signals, joint: int) -> str | None:

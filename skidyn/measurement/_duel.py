@@ -164,7 +164,8 @@ def _likely(
         ]
         if tried:
             gain, columns = max(tried, key=lambda pair: pair[0])
-            counted = sum(not c.is_zero for c in effect.coefficients) + len(effect.shapes)
+            counted = sum(not c.is_zero for c in effect.coefficients)
+            counted += sum(s.name not in effect.form_names for s in effect.shapes)
             cost = COST * counted
             promising.append((gain - cost, effect, columns, cost))
     promising.sort(key=lambda item: -item[0])

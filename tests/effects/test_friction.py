@@ -31,3 +31,9 @@ def test_further_forms_have_other_powers(signals, columns_of):
     np.testing.assert_allclose(squared, np.column_stack([v**2, np.ones_like(v)]))
     root = columns_of("load_dependent_friction", signals, power=0.5)[:, 0]
     np.testing.assert_allclose(root, np.sqrt(load) * sign)
+
+
+def test_stribeck_friction_may_fade_as_a_lorentz_curve(signals, columns_of):
+    speed = np.abs(signals.dq[:, 0]) / 0.2
+    fading = columns_of("stribeck", signals, vs=0.2, delta=2.0, lorentzian=1.0)[:, 0]
+    np.testing.assert_allclose(fading, signals.sign[:, 0] / (1 + speed**2))

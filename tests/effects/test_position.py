@@ -19,3 +19,14 @@ def test_periodic_effects_name_amplitude_and_phase(signals):
     found = friction.parameters(a, {"n": 2.0})
     expected = found["A"] * np.cos(2 * q - found["phase"]) * signals.sign[:, 0]
     np.testing.assert_allclose(friction.columns(signals, 0, n=2.0) @ a, expected)
+
+
+def test_friction_in_one_spot_of_the_travel(signals):
+    effect = get_effect("position_dependent_friction")
+    columns = effect.columns(signals, 0, place=0.2, width=0.05)
+    near = np.exp(-0.5 * ((signals.q[:, 0] - 0.2) / 0.05) ** 2)
+    np.testing.assert_allclose(columns[:, 0], near * signals.sign[:, 0])
+    np.testing.assert_allclose(columns[:, 1], near * signals.dq[:, 0])
+    found = effect.parameters(np.array([1.0, 2.0]), {"place": 0.2, "width": 0.05})
+    assert found == {"dFc": 1.0, "dFv": 2.0, "place": 0.2, "width": 0.05}
+    assert set(found) <= set(effect.units())

@@ -27,3 +27,9 @@ def test_saturation_and_gain(signals, columns_of):
     np.testing.assert_array_equal(positive, np.maximum(torque, 0))
     negative = columns_of("torque_gain", signals, sign=-1.0)[:, 0]
     np.testing.assert_array_equal(negative, np.minimum(torque, 0))
+
+
+def test_a_rounded_limit_is_approached(signals, columns_of):
+    torque = signals.model_torque[:, 0]
+    missing = columns_of("saturation", signals, limit=0.8, rounding=1.0)[:, 0]
+    np.testing.assert_allclose(torque + missing, 0.8 * np.tanh(torque / 0.8))

@@ -31,3 +31,27 @@ def test_a_bumper_that_stiffens(signals, columns_of):
     q = signals.q[:, 0]
     low = columns_of("end_stop", signals, q_lim=-0.4, side=-1.0, power=2.0)[:, 0]
     np.testing.assert_allclose(low, -(np.minimum(0, q + 0.4) ** 2))
+
+
+def test_a_bumper_that_loses_energy_resists_the_way_in_and_never_pulls(signals, columns_of):
+    q, dq = signals.q[:, 0], signals.dq[:, 0]
+    lossy = columns_of("end_stop", signals, q_lim=0.3, side=1.0, damping=3.0)[:, 0]
+    depth = np.maximum(0.0, q - 0.3)
+    np.testing.assert_allclose(lossy, depth * np.maximum(0.0, 1 + 3.0 * dq))
+    assert np.any((depth > 0) & (lossy == 0))
+
+
+def test_stops_at_both_ends_push_back_to_the_middle(signals, columns_of):
+    q = signals.q[:, 0]
+    both = columns_of("end_stop", signals, q_lim=0.3, q_low=-0.4, side=1.0)[:, 0]
+    np.testing.assert_allclose(both, np.maximum(0, q - 0.3) + np.minimum(0, q + 0.4))
+
+
+def test_a_spring_of_pieces_is_continuous(signals, columns_of):
+    pieces = columns_of("nonlinear_spring", signals, low=-0.2, high=0.3) @ [2.0, 5.0, 1.0, 0.5]
+    inside = [2 * 0.3 + 0.5, 2 * -0.2 + 0.5]
+    corners = [np.min(np.abs(pieces - value)) for value in inside]
+    assert max(corners) < 0.01
+    q = signals.q[:, 0]
+    np.testing.assert_allclose(pieces[q > 0.3], 1.1 + q[q > 0.3] - 0.3)
+    np.testing.assert_allclose(pieces[q < -0.2], 0.1 + 5 * (q[q < -0.2] + 0.2))

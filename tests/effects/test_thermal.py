@@ -17,3 +17,10 @@ def test_temperature(signals, columns_of):
     np.testing.assert_allclose(offset, np.column_stack([warm, warm**2, np.ones_like(warm)]))
     cold = signals.with_(temperature=None)
     assert "no temperature" in get_effect("temperature_friction").not_shown(cold, 0)
+
+
+def test_what_levels_off_starts_with_the_same_slope(signals, columns_of):
+    warm = signals.temperature[:, 0] - 30.0
+    levelled = columns_of("temperature_offset", signals, levels_over=6.0)[:, 0]
+    np.testing.assert_allclose(levelled, 6.0 * (1 - np.exp(-warm / 6.0)))
+    assert np.all(levelled <= warm + 1e-12)
