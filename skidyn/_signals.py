@@ -176,11 +176,14 @@ class Signals:
         return {name: value for name, value in self.__dict__.items() if name != "_kept"}
 
     def named(self, name: str) -> Array:
-        """A signal by its name, joints counted from 1: ``"dq3"``, ``"temp2"``, ``"time"``, ..."""
+        """A signal by its name, joints counted from 1: ``"dq3"``, ``"temp2"``, ``"time"``, ...
+
+        ``"tau3"`` is the torque of the model.
+        """
         if name == "time":
             return self.clock
         kind = name.rstrip("0123456789")
-        table = self.temperature if kind == "temp" else getattr(self, kind)
+        table = getattr(self, {"temp": "temperature", "tau": "model_torque"}.get(kind, kind))
         assert table is not None
         return np.asarray(table[:, int(name[len(kind) :]) - 1])
 

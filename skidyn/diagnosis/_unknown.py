@@ -141,7 +141,7 @@ def describe_unknowns(
 
 def _waves(term: Term) -> list[str]:
     """Expressions of a torque that is periodic in time."""
-    if "frequency" not in term.shape:
+    if term.effect.search not in ("clock", "spectrum"):
         return []
     omega = 2 * np.pi * float(term.shape["frequency"])
     return [f"{wave}({omega:.9g} * t)" for wave in ("sin", "cos")]

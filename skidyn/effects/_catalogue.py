@@ -23,6 +23,7 @@ from skidyn.effects._hysteresis import Dahl, LuGre, MaxwellSlip
 from skidyn.effects._inertia import RotorInertia
 from skidyn.effects._load import LoadDependentFriction
 from skidyn.effects._nameless import NAMELESS
+from skidyn.effects._nameless_coupled import COUPLED
 from skidyn.effects._nameless_history import HISTORY
 from skidyn.effects._position import PositionDependentFriction, TorqueRipple
 from skidyn.effects._registry import get_effect, register_effect
@@ -67,7 +68,7 @@ _CLASSES: tuple[type[Effect], ...] = (
     ExternalWrench,
     EnvironmentContact,
 )
-for _cls in (*_CLASSES, *NAMELESS, *HISTORY, Formula):
+for _cls in (*_CLASSES, *NAMELESS, *HISTORY, *COUPLED, Formula):
     register_effect(_cls)
 
 #: What users may write for a term: a kind, a kind with joints counted from 1, or a Term.

@@ -306,7 +306,10 @@ class LuGre(PathMemory):
 
 
 class MaxwellSlip(PathMemory):
-    """Several spring-slider elements in parallel."""
+    """Several spring-slider elements in parallel.
+
+    Their ways from rest to slip differ by a factor, 2 or the ``spread`` of the shape.
+    """
 
     kind = "maxwell_slip"
     drawn_against = "dq"
@@ -317,6 +320,7 @@ class MaxwellSlip(PathMemory):
         Coefficient("F2", "N m"),
         Coefficient("F3", "N m"),
     )
+    forms = ({"spread": 5.0},)
     shapes = (
         Shape(
             "presliding",
@@ -334,4 +338,6 @@ class MaxwellSlip(PathMemory):
     reference = "Al-Bender, Lampaert, Swevers (2005), IEEE TAC 50(11), 1883-1887."
 
     def laws(self, **shape: Any) -> tuple[Law, ...]:
-        return tuple(_stop_law(shape["presliding"] * share) for share in (1.0, 0.5, 2.0))
+        spread = shape.get("spread", 2.0)
+        ways = (shape["presliding"] * share for share in (1.0, 1 / spread, spread))
+        return tuple(map(_stop_law, ways))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Nameless torques that follow history, another joint's load or the place of the tool."""
+"""Nameless torques that follow history or the place of the tool."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from skidyn.effects._tool import tool_jacobian, tool_position
 #: Ways since the last reversal, rad or tenths of m, over which a torque may fade.
 _WAYS = (0.01, 0.03, 0.1, 0.3)
 #: Plays, as shares of the range of a position, and splines of a function of what lags.
-_PLAYS, _LAGGING = (0.03, 0.06, 0.1, 0.15, 0.22), 16
+_PLAYS, _LAGGING = (0.03, 0.06, 0.1, 0.15, 0.22, 0.33, 0.5), 16
 #: Times in s over which a torque may relax.
 _RELAXATION = (0.1, 0.3, 1.0, 3.0)
 #: Times since the start of a recording over which a torque may fade, as shares of its length.
@@ -134,7 +134,7 @@ class FunctionOfLaggingVelocity(NamelessEffect):
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
         low, high = supported_range(signals, signals.dq[:, joints[0]])
-        return [{"play": share * (high - low), "low": low, "high": high} for share in _PLAYS[2:]]
+        return [{"play": share * (high - low), "low": low, "high": high} for share in _PLAYS[2:5]]
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         dq, play = signals.dq[:, joint], shape["play"]
@@ -211,32 +211,6 @@ class DragOnTool(NamelessEffect):
         jacobian = tool_jacobian(signals)
         velocity = np.einsum("ian,in->ia", jacobian, signals.dq)
         return {j: np.sum(jacobian[:, :, j] * velocity, axis=1)[:, None] * field for j in joints}
-
-
-class FrictionOverOtherLoad(NamelessEffect):
-    """Friction of one joint that grows with the load of another."""
-
-    kind = "friction_over_other_load"
-    drawn_against = "dq"
-    title = "Friction that follows another joint's load"
-    formula = r"f(|\tau_k|)\,\mathrm{sign}\,\dot q_j"
-    coefficients = unnamed_coefficients(2)
-    needs = ("load",)
-
-    def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
-        return (f"load{int(shape['other']) + 1}", f"dq{joint + 1}")
-
-    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        if signals.load is None:
-            return []
-        size = np.sqrt(np.mean(signals.load**2, axis=0))
-        return [s | {"size": float(size[s["other"]])} for s in self.others(signals, joints[0])]
-
-    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        assert signals.load is not None
-        load = np.abs(signals.load[:, int(shape["other"])]) / max(shape["size"], 1e-300)
-        sign = signals.sign[:, joint]
-        return np.column_stack([load * sign, load**2 * sign])
 
 
 class ForceOverToolPosition(NamelessEffect):
@@ -358,7 +332,6 @@ HISTORY: tuple[type[NamelessEffect], ...] = (
     FunctionOfLaggingVelocity,
     RelaxingSpring,
     DragOnTool,
-    FrictionOverOtherLoad,
     ForceOverToolPosition,
     ForceNearPoint,
 )

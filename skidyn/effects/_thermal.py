@@ -16,6 +16,8 @@ REFERENCE_TEMPERATURE = 30.0
 _BITTENCOURT = "Bittencourt, Wernholt, Sander-Tavallaey, Brogardh (2010), IROS, 4548-4554."
 
 
+#: Recordings, spread over a log, from which on friction may be another one.
+_CHANGES = 16
 #: Temperature range over which what follows the temperature levels off, K.
 _LEVELLING = ({"levels_over": 6.0}, {"levels_over": 15.0})
 
@@ -101,7 +103,8 @@ class FrictionDrift(Effect):
 
     A gear warms up quickly at first and then ever more slowly: friction is a parabola of a warm-up
     that approaches its end with a time constant. The first two coefficients are the change from the
-    start of the log to its end.
+    start of the log to its end. Friction that changed at once, as after a repair or when a seal
+    slips, has the time ``since`` when it did in its shape.
     """
 
     kind = "friction_drift"
@@ -121,6 +124,7 @@ class FrictionDrift(Effect):
     shapes = (
         Shape("time_constant", "s", (0.2, 0.6, 3.0), 1.0, 1e6, scales=False, has_interval=False),
     )
+    forms = ({"since": 0.0},)
     needs = ("time",)
     simplicity = 31
     rivals = ("temperature_friction",)
@@ -135,17 +139,23 @@ class FrictionDrift(Effect):
         (shape,) = self.shapes  # its grid: shares of the span
         constants = np.clip(span * np.array(shape.grid), shape.low, shape.high)
         start = float(clock.min())
-        return [{"time_constant": float(c), "t0": start, "span": span} for c in constants]
+        gradual = [{"time_constant": float(c), "t0": start, "span": span} for c in constants]
+        begun = np.sort([clock[rows.start] for rows in signals.segments])[1:]
+        few = begun[:: max(1, len(begun) // _CHANGES + 1)]
+        return gradual + [{"since": float(t)} for t in few]
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        dq = signals.dq[:, joint]
+        sign = signals.sign[:, joint]
+        if "since" in shape:
+            later = (signals.clock >= shape["since"]).astype(float)
+            return np.column_stack([later * dq, later * sign, 0 * dq, 0 * dq])
         since, time_constant = signals.clock - shape["t0"], shape["time_constant"]
         # Before the log began, as it changed at its start.
         risen = np.where(
             since > 0, -np.expm1(-since.clip(0) / time_constant), since / time_constant
         )
         x = risen / -np.expm1(-shape["span"] / time_constant)
-        dq = signals.dq[:, joint]
-        sign = signals.sign[:, joint]
         bent = x * (1 - x)
         return np.column_stack([x * dq, x * sign, bent * dq, bent * sign])
 

@@ -127,14 +127,31 @@ class ExternalWrench(_ToolEffect):
         return {f"force_{a}": "N" for a in "xyz"}
 
 
+#: Directions, azimuth and elevation in rad, in which planes are looked for that face no axis: walls
+#: and tilted tables.
+_OBLIQUE = (
+    *((np.pi * (k + 0.5) / 2, 0.0) for k in range(4)),
+    *((np.pi * k / 2, np.pi / 3) for k in range(4)),
+)
+
+
 class EnvironmentContact(Effect):
-    """A soft plane that the tool presses into."""
+    """A soft plane that the tool presses into.
+
+    Its normal is an axis of the base, or points to ``azimuth`` and ``elevation``, where the plane
+    lies at ``z0`` beside the place ``x``, ``y``, ``z``.
+    """
 
     kind = "environment_contact"
     title = "Contact with the environment"
     formula = r"-J_n(q)^\top n\,k\,\max(0,\ z_0 - n^\top p(q))"
     coefficients = (Coefficient("k", "N/m", sign=1),)
-    shapes = (Shape("z0", "m", (), -np.inf, np.inf, spacing="linear", scales=False),)
+    shapes = (
+        Shape("z0", "m", (), -np.inf, np.inf, spacing="linear", scales=False),
+        Shape("azimuth", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
+        Shape("elevation", "rad", (), -np.pi / 2, np.pi / 2, spacing="linear", scales=False),
+    )
+    forms = tuple({"azimuth": a, "elevation": e} for a, e in _OBLIQUE)
     scope = "robot"
     needs = ("robot",)
     simplicity = 26
@@ -144,7 +161,7 @@ class EnvironmentContact(Effect):
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
         position = tool_position(signals)
-        return [
+        along_axes = [
             {
                 "z0": float(side * np.quantile(side * position[:, axis], share)),
                 "side": side,
@@ -154,20 +171,42 @@ class EnvironmentContact(Effect):
             for side in (1.0, -1.0)
             for share in (0.05, 0.1, 0.15, 0.2, 0.3)
         ]
+        oblique = []
+        for form in map(dict, self.forms):
+            height = position @ _normal(form)
+            for share in (0.06, 0.12, 0.25):
+                edge = np.quantile(height, share)
+                place = position[height <= edge].mean(axis=0)
+                at = dict(zip("xyz", map(float, place), strict=True))
+                oblique.append({"z0": float(edge - place @ _normal(form))} | form | at)
+        return along_axes + oblique
 
     def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
-        position = tool_position(signals)
-        touching = shape["side"] * (shape["z0"] - position[:, int(shape["axis"])]) > 0
-        return bool(FEWEST_TOUCHING < touching.mean() < MOST_TOUCHING)
+        return bool(FEWEST_TOUCHING < np.mean(_depth(signals, shape) > 0) < MOST_TOUCHING)
 
     def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
-        position = tool_position(signals)
-        return float(np.ptp(position[:, int(shape["axis"])]))
+        return float(np.ptp(tool_position(signals) @ _normal(shape)))
 
     def torque_columns(
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
-        axis, side = int(shape["axis"]), shape["side"]
-        depth = np.maximum(0.0, side * (shape["z0"] - tool_position(signals)[:, axis]))
-        pressed = -side * depth[:, None] * tool_jacobian(signals)[:, axis, :]
+        reach = np.einsum("ian,a->in", tool_jacobian(signals), _normal(shape))
+        pressed = -_depth(signals, shape)[:, None] * reach
         return {j: pressed[:, [j]] for j in joints}
+
+
+def _normal(shape: Mapping[str, Any]) -> Array:
+    """Normal of a plane, pointing out of it, shape (3,)."""
+    if "azimuth" not in shape:
+        return np.asarray(float(shape["side"]) * np.eye(3)[int(shape["axis"])])
+    a, e = shape["azimuth"], shape["elevation"]
+    return np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+
+
+def _depth(signals: Signals, shape: Mapping[str, Any]) -> Array:
+    """Depth of the tool in a plane in m, 0 outside, shape (n_samples,)."""
+    position, normal = tool_position(signals), _normal(shape)
+    if "azimuth" in shape:
+        position = position - np.array([shape[axis] for axis in "xyz"])
+        return np.asarray(np.maximum(0.0, shape["z0"] - position @ normal))
+    return np.asarray(np.maximum(0.0, shape["side"] * shape["z0"] - position @ normal))

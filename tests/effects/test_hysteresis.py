@@ -5,6 +5,7 @@ import numpy as np
 
 from skidyn.effects import (
     dahl_state,
+    get_effect,
     stop_state,
 )
 
@@ -54,3 +55,11 @@ def test_dahl_with_exponent_two_by_small_steps(signals, columns_of):
             expected[i] = state
     found = columns_of("dahl", signals, presliding=way, exponent=2.0)[:, 0]
     np.testing.assert_allclose(found, expected, atol=5e-3)
+
+
+def test_maxwell_elements_of_a_wider_spread_slip_later(signals):
+    effect = get_effect("maxwell_slip")
+    plain = effect.columns(signals, 0, presliding=0.02)
+    wide = effect.columns(signals, 0, presliding=0.02, spread=5.0)
+    np.testing.assert_array_equal(plain[:, 0], wide[:, 0])
+    np.testing.assert_array_equal(wide[:, 2], effect.columns(signals, 0, presliding=0.1)[:, 0])

@@ -24,3 +24,11 @@ def test_what_levels_off_starts_with_the_same_slope(signals, columns_of):
     levelled = columns_of("temperature_offset", signals, levels_over=6.0)[:, 0]
     np.testing.assert_allclose(levelled, 6.0 * (1 - np.exp(-warm / 6.0)))
     assert np.all(levelled <= warm + 1e-12)
+
+
+def test_friction_that_changed_at_once(signals):
+    columns = get_effect("friction_drift").columns(signals, 0, since=3.0)
+    later = signals.clock >= 3.0
+    np.testing.assert_allclose(columns[:, 0], later * signals.dq[:, 0])
+    np.testing.assert_allclose(columns[:, 1], later * signals.sign[:, 0])
+    assert not columns[:, 2:].any()

@@ -39,3 +39,13 @@ def test_contact_only_below_its_plane(signals, robot):
     assert not blocks[0][tool > plane].any()
     expected = -np.maximum(0, plane - tool) * robot.jacobian(signals.q)[:, 2, 0]
     np.testing.assert_allclose(blocks[0][:, 0], expected)
+
+
+def test_a_plane_that_faces_no_axis_pushes_along_its_normal(signals):
+    effect = get_effect("environment_contact")
+    faces_x = effect.torque_columns(signals, (0, 1), axis=0, side=1.0, z0=0.4)
+    shape = {"azimuth": 0.0, "elevation": 0.0, "z0": 0.1, "x": 0.3, "y": 0.0, "z": 0.0}
+    oblique = effect.torque_columns(signals, (0, 1), **shape)
+    assert np.any(faces_x[0] != 0)
+    for joint in (0, 1):
+        np.testing.assert_allclose(oblique[joint], faces_x[joint], atol=1e-12)
