@@ -11,6 +11,7 @@ import numpy as np
 from skidyn._signals import Array, Signals
 from skidyn.effects._base import Shape
 from skidyn.effects._nameless import NamelessEffect, unnamed_coefficients
+from skidyn.effects._second_order import second_order_filter
 
 
 class FrictionOverOtherLoad(NamelessEffect):
@@ -117,16 +118,15 @@ class SwingingLoad(NamelessEffect):
     is_of_one_number = True
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        from scipy.signal import bilinear, lfilter  # not paid for by who only checks a log
+        from scipy.signal import lfilter  # not paid for by who only checks a log
 
         omega, damping = 2 * np.pi * shape["frequency"], shape["damping"]
-        swing = [1.0, 2 * damping * omega, omega**2]
         columns = np.zeros((signals.n_samples, 2))
         for rows, step in zip(signals.segments, signals.steps, strict=True):
             if rows.stop - rows.start < 7 or omega * step > 1:
                 continue  # it swings faster than the log shows
-            for k, top in enumerate(([-(omega**2)], [-omega, 0.0])):
-                b, a = bilinear(top, swing, 1 / step)
+            for k, top in enumerate(((0.0, 0.0, -(omega**2)), (0.0, -omega, 0.0))):
+                b, a = second_order_filter(top, omega, damping, 1 / step)
                 columns[rows, k] = lfilter(b, a, signals.ddq[rows, joint])
         return columns
 

@@ -12,6 +12,7 @@ import numpy as np
 from skidyn._signals import Signals
 from skidyn.effects._base import Array, Coefficient, Effect, Shape
 from skidyn.effects._derivatives import smooth_derivatives
+from skidyn.effects._second_order import second_order_filter
 
 
 def _oscillator(load: Array, signals: Signals, resonance: float, damping: float) -> Array:
@@ -53,9 +54,9 @@ def _oscillator(load: Array, signals: Signals, resonance: float, damping: float)
 @lru_cache(maxsize=256)
 def _swing(omega: float, damping: float, rate: float) -> tuple[Array, Array, Array]:
     """Digital filter of a spring-mass at a sampling rate, and its state under a unit load."""
-    from scipy.signal import bilinear, lfilter_zi
+    from scipy.signal import lfilter_zi
 
-    b, a = bilinear([1.0], [1 / omega**2, 2 * damping / omega, 1.0], rate)
+    b, a = second_order_filter((0.0, 0.0, omega**2), omega, damping, rate)
     return b, a, lfilter_zi(b, a)
 
 
