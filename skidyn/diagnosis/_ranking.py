@@ -82,6 +82,10 @@ class RankingSearch(SearchState):
         pool, errors, now = wanted.copy(), first, base
         chosen: list[Candidate] = []
         widths = np.array([c.width for c in self.pool])
+        # A further form stands for all that could have been declared: it must do so much better.
+        further = self.settings.least_gain * np.array(
+            [c.term.is_further_form for c in self.pool], dtype=float
+        )
         while pool.any():
             drops = np.where(pool, now.sum() - errors.sum(1), -np.inf)
             # Nameless functions have very different widths: each coefficient has its price, which
@@ -89,7 +93,7 @@ class RankingSearch(SearchState):
             price = 2.0
             if self.pool[int(np.argmax(drops))].kind == UNKNOWN:
                 price = self._price([self.pool[int(np.argmax(drops))]], chosen) / 3
-            found = self._first_significant(drops, drops - price * widths, tester)
+            found = self._first_significant(drops, drops - price * widths - further, tester)
             if found is None:
                 break
             i, candidate = found, self.pool[found]
@@ -167,6 +171,8 @@ class RankingSearch(SearchState):
             count = self._n_parameters(candidates)
             price = 2 * self._price(candidates)
             score = float(gain.sum()) - price * count
+            if any(c.term.is_further_form for c in candidates):
+                score -= self.settings.least_gain
             if kind == UNKNOWN:
                 # The error held out has paid for its coefficients already.
                 score = float(gain.sum()) - price * min(count, self.settings.nameless_price)

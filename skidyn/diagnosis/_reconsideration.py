@@ -86,13 +86,20 @@ class ReconsideringSearch(JudgingSearch):
 
     def reconsider(self, newest: Hypothesis, steps: list[Step]) -> None:
         """Let every kind compete again for what earlier findings explain, beside the newest."""
+        replaced = False
         for old in [h for h in self.findings if h is not newest and h.torque is None]:
             step = self._competed_again(old)
             if step is not None:
+                replaced = True
                 steps[:] = [step if s.added is old else s for s in steps]
                 newest = self._settled(newest, steps)
             elif set(old.joints) & set(newest.joints):
                 self._settled(old, steps)
+        if replaced and newest.kind == UNKNOWN and newest.torque is None:
+            # What stood beside the wrong name without one may have one beside the right name.
+            step = self._competed_again(newest)
+            if step is not None:
+                steps[:] = [step if s.added is newest else s for s in steps]
 
     def _competed_again(self, old: Hypothesis) -> Step | None:
         """Put what now wins in the place of an earlier finding: another kind, or a better shape."""

@@ -11,7 +11,8 @@ correlated, and would hide itself [1]_.
 
 **Which variance.** Two chances are computed, and the larger one decides. The first takes the sums
 of the score over blocks of time as independent, whatever happens within a block and at whatever
-size (a sandwich estimate by blocks, Hotelling's law for their finite number [2]_). Blocks are
+size (a sandwich estimate by blocks, unbiased where few of them hold most, Hotelling's law for their
+finite number [2]_). Blocks are
 several correlation times long and never cross the border of a trajectory; each holds the rows of
 all joints. The second takes the residual as stationary and inflates its variance by its
 autocorrelation. The first knows nothing of an effect that acts in one block alone, the second
@@ -41,7 +42,7 @@ from skidyn._signals import Array
 from skidyn.evidence import RIDGE, Problem
 
 #: A block is at least so long in s, and at least so many correlation times of the residual.
-SHORTEST_BLOCK, CORRELATION_TIMES = 0.5, 12.0
+SHORTEST_BLOCK, CORRELATION_TIMES = 0.5, 8.0
 #: Autocorrelations are added up to this lag in rows, or to the first one below this value.
 MOST_LAGS, SMALL = 12, 0.05
 #: Blocks needed beyond the coefficients that are tested; and blocks, beyond twice the coefficients,
@@ -111,7 +112,8 @@ class Settings:
         Chance of a false finding over everything that is tried.
     least_gain : float
         Twice the log-likelihood, held out, less the price of its parameters, that a finding must
-        gain: smoothing and coarse positions leave torques that are no chance, but small.
+        gain: smoothing and coarse positions leave torques that are no chance, but small. A nameless
+        function must gain so much more than a name, and a further form more than the plain one.
     least_share : float
         Share of the squared error of averaged rows that a finding must remove on its joints, held
         out.
@@ -357,10 +359,10 @@ class Tester:
         residual = np.split(np.concatenate(left)[order], ends)
         sums = np.array([z.T @ r for z, r in zip(columns, residual, strict=True)])
         grams = np.array([z.T @ z for z in columns])
-        return chance_of_score(score, left_out_scores(sums, grams))
+        return chance_of_score(*unbiased_scores(score, sums, grams))
 
 
-def chance_of_score(score: Array, sums: Array) -> float:
+def chance_of_score(score: Array, sums: Array, number: float | None = None) -> float:
     """Chance of a score if its sums over blocks were independent (Hotelling's T-squared).
 
     Parameters
@@ -369,43 +371,59 @@ def chance_of_score(score: Array, sums: Array) -> float:
         Of the model without the candidate, over all blocks.
     sums : ndarray of shape (n_blocks, n_coefficients)
         Of every block, with the residual that is left after the candidate.
+    number : float, optional
+        Blocks that hold as much, were all alike, where the sums are unbiased ones
+        (:func:`unbiased_scores`); what acts in few of them has their degrees of freedom and not
+        those of all. All blocks, and sums as they are, if None.
     """
     count, k = sums.shape
-    free = count - 1
     if count < k + FEWEST_BLOCKS:
         return 1.0
-    spread = sums.T @ sums * (count / free)
+    free = count - 1 if number is None else max(number, k + FEWEST_BLOCKS) - 1
+    spread = sums.T @ sums * (count / free if number is None else 1.0)
     spread += 1e-12 * np.trace(spread) * np.eye(k)
     wald = float(score @ np.linalg.solve(spread, score))
     return float(fisher.sf(wald * (free - k + 1) / (k * free), k, free - k + 1))
 
 
-def left_out_scores(sums: Array, grams: Array) -> Array:
-    """Scores of blocks as they are for the coefficients that the other blocks have by themselves.
+def unbiased_scores(score: Array, sums: Array, grams: Array) -> tuple[Array, Array, float]:
+    """Scores of blocks whose sum of squares is the variance of the score also where blocks are few.
 
-    A block that holds most of what is known of a coefficient pulls it, and has a small residual for
-    that reason. The squares of these scores sum up to the jackknife's variance [1]_.
+    A block that holds much of what is known of a coefficient pulls it towards its own torque, and
+    has a small residual for that reason (Bell, McCaffrey 2002; [1]_, equation 2.2).
 
     Parameters
     ----------
+    score : ndarray of shape (n_coefficients,)
+        Over all blocks.
     sums : ndarray of shape (n_blocks, n_coefficients)
-        Scores with the residual of the coefficients that all blocks give.
+        Scores of blocks with the residual that is left.
     grams : ndarray of shape (n_blocks, n_coefficients, n_coefficients)
         Products of the columns of every block.
 
     Returns
     -------
-    ndarray of shape (n_blocks, n_coefficients)
+    score : ndarray of shape (n_coefficients,)
+        For columns that are orthonormal.
+    sums : ndarray of shape (n_blocks, n_coefficients)
+        Of blocks for the same columns.
+    number : float
+        Of blocks, were all alike, that hold as much.
 
     References
     ----------
-    .. [1] J. G. MacKinnon, M. O. Nielsen, M. D. Webb (2023), Fast and reliable jackknife and
-       bootstrap methods for cluster-robust inference, J. Applied Econometrics 38(5).
+    .. [1] G. W. Imbens, M. Kolesar (2016), Robust standard errors in small samples: some practical
+       advice, Review of Economics and Statistics 98(4).
     """
-    gram = grams.sum(0)
-    ridge = RIDGE * np.trace(gram) / len(gram) * np.eye(len(gram))
-    others = gram - grams + ridge
-    return np.asarray(np.linalg.solve(others, sums[..., None])[..., 0] @ gram)
+    k = len(score)
+    value, vector = np.linalg.eigh(grams.sum(0) + RIDGE * np.eye(k))
+    root = vector / np.sqrt(np.maximum(value, RIDGE))
+    share = root.T @ grams @ root
+    value, vector = np.linalg.eigh(np.eye(k) - share)
+    own = np.einsum("bji,bj->bi", vector, sums @ root) / np.sqrt(np.maximum(value, RIDGE))
+    leverage = np.trace(share, axis1=1, axis2=2)
+    number = float(np.sum(leverage) ** 2 / np.sum(leverage**2))
+    return score @ root, np.einsum("bij,bj->bi", vector, own), number
 
 
 def time_blocks(problem: Problem, length: float) -> tuple[list[NDArray[np.int64]], int]:
