@@ -359,10 +359,10 @@ class Tester:
         residual = np.split(np.concatenate(left)[order], ends)
         sums = np.array([z.T @ r for z, r in zip(columns, residual, strict=True)])
         grams = np.array([z.T @ z for z in columns])
-        return chance_of_score(*unbiased_scores(score, sums, grams))
+        return chance_of_score(*unbiased_scores(score, sums, grams), unbiased=True)
 
 
-def chance_of_score(score: Array, sums: Array, number: float | None = None) -> float:
+def chance_of_score(score: Array, sums: Array, unbiased: bool = False) -> float:
     """Chance of a score if its sums over blocks were independent (Hotelling's T-squared).
 
     Parameters
@@ -371,22 +371,20 @@ def chance_of_score(score: Array, sums: Array, number: float | None = None) -> f
         Of the model without the candidate, over all blocks.
     sums : ndarray of shape (n_blocks, n_coefficients)
         Of every block, with the residual that is left after the candidate.
-    number : float, optional
-        Blocks that hold as much, were all alike, where the sums are unbiased ones
-        (:func:`unbiased_scores`); what acts in few of them has their degrees of freedom and not
-        those of all. All blocks, and sums as they are, if None.
+    unbiased : bool, default=False
+        Whether the sums are those of :func:`unbiased_scores`.
     """
     count, k = sums.shape
     if count < k + FEWEST_BLOCKS:
         return 1.0
-    free = count - 1 if number is None else max(number, k + FEWEST_BLOCKS) - 1
-    spread = sums.T @ sums * (count / free if number is None else 1.0)
+    free = count - 1
+    spread = sums.T @ sums * (1.0 if unbiased else count / free)
     spread += 1e-12 * np.trace(spread) * np.eye(k)
     wald = float(score @ np.linalg.solve(spread, score))
     return float(fisher.sf(wald * (free - k + 1) / (k * free), k, free - k + 1))
 
 
-def unbiased_scores(score: Array, sums: Array, grams: Array) -> tuple[Array, Array, float]:
+def unbiased_scores(score: Array, sums: Array, grams: Array) -> tuple[Array, Array]:
     """Scores of blocks whose sum of squares is the variance of the score also where blocks are few.
 
     A block that holds much of what is known of a coefficient pulls it towards its own torque, and
@@ -407,8 +405,6 @@ def unbiased_scores(score: Array, sums: Array, grams: Array) -> tuple[Array, Arr
         For columns that are orthonormal.
     sums : ndarray of shape (n_blocks, n_coefficients)
         Of blocks for the same columns.
-    number : float
-        Of blocks, were all alike, that hold as much.
 
     References
     ----------
@@ -421,9 +417,7 @@ def unbiased_scores(score: Array, sums: Array, grams: Array) -> tuple[Array, Arr
     share = root.T @ grams @ root
     value, vector = np.linalg.eigh(np.eye(k) - share)
     own = np.einsum("bji,bj->bi", vector, sums @ root) / np.sqrt(np.maximum(value, RIDGE))
-    leverage = np.trace(share, axis1=1, axis2=2)
-    number = float(np.sum(leverage) ** 2 / np.sum(leverage**2))
-    return score @ root, np.einsum("bij,bj->bi", vector, own), number
+    return score @ root, np.einsum("bij,bj->bi", vector, own)
 
 
 def time_blocks(problem: Problem, length: float) -> tuple[list[NDArray[np.int64]], int]:

@@ -27,6 +27,8 @@ _WAYS = (0.01, 0.03, 0.1, 0.3)
 _PLAYS, _LAGGING = (0.03, 0.06, 0.1, 0.15, 0.22, 0.33, 0.5), 16
 #: Times in s over which a torque may relax.
 _RELAXATION = (0.1, 0.3, 1.0, 3.0)
+#: Recordings at least over which a torque may drift.
+_DRIFTING = 5
 #: Times since the start of a recording over which a torque may fade, as shares of its length.
 _FADING = (0.05, 0.15, 0.5)
 
@@ -53,6 +55,32 @@ class FunctionOfTimeSinceStart(NamelessEffect):
         share = _since_start(signals) / max(shape["length"], 1e-9)
         fading = [np.exp(-share / s) for s in _FADING]
         return np.column_stack([*fading, share, np.ones_like(share)])
+
+
+class FunctionOfTime(NamelessEffect):
+    """A torque that drifts slowly over the whole log, as the zero of a sensor does."""
+
+    kind = "function_of_time"
+    drawn_against = "time"
+    title = "Slow drift over the log"
+    formula = r"f(t)"
+    coefficients = unnamed_coefficients(4)
+    depends_on = ("time",)
+    needs = ("time",)
+
+    def not_shown(self, signals: Signals, joint: int) -> str | None:
+        if len(signals.segments) < _DRIFTING:
+            return "too few recordings to tell a drift from what differs between them"
+        return super().not_shown(signals, joint)
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        start, end = float(np.min(signals.clock)), float(np.max(signals.clock))
+        return [{"low": start, "high": end}] if end > start else []
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        # Beyond the log nobody knows how it drifts: it stays.
+        share = np.clip((signals.clock - shape["low"]) / (shape["high"] - shape["low"]), 0.0, 1.0)
+        return legvander(2 * share - 1, len(self.coefficients) - 1)
 
 
 class FrictionSinceReversal(NamelessEffect):
@@ -325,6 +353,7 @@ def _since_start(signals: Signals) -> Array:
 
 
 HISTORY: tuple[type[NamelessEffect], ...] = (
+    FunctionOfTime,
     FunctionOfTimeSinceStart,
     FrictionSinceReversal,
     FunctionOfWaySinceReversal,

@@ -118,6 +118,10 @@ def idle_rows(
         return idle  # of one joint, or coarse: zeros come by themselves
     steps = np.diff(time)[trajectory[1:] == trajectory[:-1]]
     least = max(IDLE_ROWS, IDLE_TIME / max(float(np.median(steps)), 1e-9)) if len(steps) else np.inf
+    # A coarse torque repeats itself everywhere; at the ends it must do so for longer.
+    new = np.any(torque[1:] != torque[:-1], axis=1) | (trajectory[1:] != trajectory[:-1])
+    lengths = np.diff(np.flatnonzero(new), prepend=-1)
+    least = max(least, 3 * float(np.quantile(lengths, 0.99))) if len(lengths) else least
     far = IDLE_WAY * np.ptp(position, axis=0)
     for run in np.unique(trajectory):
         rows = np.flatnonzero(trajectory == run)

@@ -42,3 +42,13 @@ def test_a_drag_takes_energy_from_the_tool(signals, robot):
     jacobian = robot.jacobian(signals.q)[:, :3]
     velocity = np.einsum("ian,in->ia", jacobian, signals.dq)
     np.testing.assert_allclose(power, np.sum(velocity**2, axis=1), atol=1e-9)
+
+
+def test_a_drift_over_the_log_needs_several_recordings_and_stays_beyond_it(signals):
+    effect = get_effect("function_of_time")
+    assert "too few recordings" in effect.not_shown(signals, 0)
+    (shape,) = effect.grid(signals, (0,))
+    columns = effect.columns(signals, 0, **shape)
+    np.testing.assert_allclose(columns[[0, -1], 1], [-1.0, 1.0])
+    later = effect.columns(signals, 0, low=shape["low"], high=shape["low"] + 1.0)
+    assert np.all(later[signals.clock > shape["low"] + 1.0] == later[-1])
