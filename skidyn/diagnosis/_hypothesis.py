@@ -183,7 +183,9 @@ def simplicity_of(hypothesis: Hypothesis) -> int:
     """Rank of its kind among rivals that explain as much; the lower is named."""
     if hypothesis.kind == UNKNOWN:
         return 100
-    return get_effect(hypothesis.kind).simplicity
+    # A further form is less simple than any plain one.
+    further = any(c.term.is_further_form for c in hypothesis.candidates)
+    return get_effect(hypothesis.kind).simplicity + 50 * further
 
 
 def uses_the_fit(candidate: Candidate) -> bool:

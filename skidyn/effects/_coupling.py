@@ -108,9 +108,8 @@ class CoupledInertia(_PairEffect):
 class CouplingSpring(_PairEffect):
     """Spring or hose between two joints.
 
-    One that stiffens has ``power`` 3 in its shape, and one that goes slack, as a cable does, has
-    the ``side`` on which it is tight; both have the coupled coordinate ``x0`` at which their torque
-    begins. Coordinates are in units of 1 rad or 1 m there, so that the unit of the stiffness stays.
+    One that stiffens has ``power`` 3 in its shape, and the coupled coordinate ``x0`` at which it is
+    slack; coordinates are in units of 1 rad or 1 m then, so that the unit of the stiffness stays.
     """
 
     kind = "coupling_spring"
@@ -121,11 +120,7 @@ class CouplingSpring(_PairEffect):
         _RATIO,
         Shape("x0", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
     )
-    forms = (
-        {"x0": 0.0, "power": 3.0},
-        {"x0": 0.0, "side": 1.0},
-        {"x0": 0.0, "side": -1.0},
-    )
+    forms = ({"x0": 0.0, "power": 3.0},)
     simplicity = 16
     rivals = ("spring",)
     separating_motion = "slow motion of the two joints together, then against each other"
@@ -144,7 +139,5 @@ class CouplingSpring(_PairEffect):
         self, signals: Signals, i: int, j: int, ratio: float, **form: float
     ) -> Array:
         x = signals.q[:, i] + ratio * signals.q[:, j] - form.get("x0", 0.0)
-        if "side" in form:
-            x = form["side"] * np.maximum(0.0, form["side"] * x)
         force = np.sign(x) * np.abs(x) ** form.get("power", 1.0)
         return np.column_stack([force, np.ones_like(x)])

@@ -38,14 +38,6 @@ def test_a_spring_between_two_joints_that_stiffens(signals):
     np.testing.assert_allclose(blocks[1], -blocks[0])
 
 
-def test_a_cable_between_two_joints_is_slack_on_one_side(signals):
-    shape = {"ratio": 1.0, "side": 1.0, "x0": 0.1}
-    columns = get_effect("coupling_spring").torque_columns(signals, (0, 1), **shape)
-    tight = np.maximum(0.0, signals.q.sum(axis=1) - 0.1)
-    np.testing.assert_allclose(columns[0][:, 0], tight)
-    np.testing.assert_allclose(columns[1][:, 0], tight)
-
-
 def test_coupled_drag_may_grow_with_a_power_of_the_speed(signals):
     columns = get_effect("coupled_friction").torque_columns(signals, (0, 1), ratio=1.0, power=2.0)
     speed = signals.dq.sum(axis=1)
