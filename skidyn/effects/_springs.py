@@ -151,13 +151,9 @@ class EndStop(Effect):
     A soft bumper stiffens: then the torque grows with another ``power`` of the way (1 where the
     shape has none), in units of 1 rad or 1 m, so that the unit of the stiffness stays. One that
     loses energy resists more on the way in: the torque is larger by the factor ``1 + damping``
-    times the speed of the approach [1]_, and never pulls. With ``q_low`` in the shape there is one
-    at either end, the second below that position and as stiff as the first.
-
-    References
-    ----------
-    .. [1] K. H. Hunt, F. R. E. Crossley (1975), Coefficient of restitution interpreted as damping
-       in vibroimpact, J. Applied Mechanics 42(2).
+    times the speed of the approach (Hunt, Crossley 1975, J. Applied Mechanics 42(2)), and never
+    pulls. With ``q_low`` in the shape there is one at either end, the second below that position
+    and as stiff as the first.
     """
 
     kind = "end_stop"

@@ -38,12 +38,8 @@ def _constant_temperature(signals: Signals, joint: int) -> str | None:
 class TemperatureFriction(Effect):
     """Viscous and Coulomb friction that change with a logged temperature.
 
-    As grease does [1]_, it may level off exponentially ``levels_over`` some K.
-
-    References
-    ----------
-    .. [1] A. C. Bittencourt, P. Axelsson (2014), Modeling and experiment design for identification
-       of wear in a robot joint under load and temperature uncertainties, IEEE/ASME TMECH 19(5).
+    As grease does, it may level off exponentially ``levels_over`` some K (Bittencourt, Axelsson
+    2014, IEEE/ASME TMECH 19(5)).
     """
 
     kind = "temperature_friction"
