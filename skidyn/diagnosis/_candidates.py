@@ -60,6 +60,11 @@ class Candidate:
         """Largest magnitude of every coefficient at which the formula holds."""
         return self.term.limits
 
+    @cached_property
+    def is_further_form(self) -> bool:
+        """Whether the formula is another one than the plain one of its kind."""
+        return self.term.is_further_form
+
     @property
     def joints(self) -> tuple[int, ...]:
         """Joints of the term, from 0."""

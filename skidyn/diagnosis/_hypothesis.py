@@ -184,7 +184,7 @@ def simplicity_of(hypothesis: Hypothesis) -> int:
     if hypothesis.kind == UNKNOWN:
         return 100
     # A further form is less simple than any plain one.
-    further = any(c.term.is_further_form for c in hypothesis.candidates)
+    further = any(c.is_further_form for c in hypothesis.candidates)
     return get_effect(hypothesis.kind).simplicity + 50 * further
 
 

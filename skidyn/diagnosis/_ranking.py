@@ -84,7 +84,7 @@ class RankingSearch(SearchState):
         widths = np.array([c.width for c in self.pool])
         # A further form stands for all that could have been declared: it must do so much better.
         further = self.settings.least_gain * np.array(
-            [c.term.is_further_form for c in self.pool], dtype=float
+            [c.is_further_form for c in self.pool], dtype=float
         )
         while pool.any():
             drops = np.where(pool, now.sum() - errors.sum(1), -np.inf)
@@ -171,7 +171,7 @@ class RankingSearch(SearchState):
             count = self._n_parameters(candidates)
             price = 2 * self._price(candidates)
             score = float(gain.sum()) - price * count
-            if any(c.term.is_further_form for c in candidates):
+            if any(c.is_further_form for c in candidates):
                 score -= self.settings.least_gain
             if kind == UNKNOWN:
                 # The error held out has paid for its coefficients already.

@@ -165,7 +165,7 @@ class SearchState:
         effect stands for all that could have been declared.
         """
         one_of_many = candidate is not None and (
-            candidate.kind == UNKNOWN or candidate.term.is_further_form
+            candidate.kind == UNKNOWN or candidate.is_further_form
         )
         return self.n_tests * (self.settings.nameless_tried if one_of_many else 1)
 

@@ -16,6 +16,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from skidyn._signals import Array, Signals
+from skidyn.effects import get_effect
 from skidyn.evidence import smooth_motion
 from skidyn.measurement._check import Check
 from skidyn.measurement._fits import student
@@ -121,7 +122,7 @@ def at_turns(signals: Signals, torque: Array, joint: int) -> Turns | None:
     Turns or None
         None where it turns too seldom.
     """
-    q, dq = signals.q[:, joint], signals.dq[:, joint]
+    dq = signals.dq[:, joint]
     steps = np.diff(signals.clock)
     step = float(np.median(steps[steps > 0]))
     half = int(AROUND / step)
@@ -147,7 +148,9 @@ def at_turns(signals: Signals, torque: Array, joint: int) -> Turns | None:
     index = np.array([np.arange(part.start, part.stop) for part in places])
     sign = np.sign(dq)
     forms = [sign[index], *(_smoothed(sign, signals, index, width / step) for width in WIDTHS)]
-    forms += list(presliding(q, signals, WAYS * float(signals.unit[joint]))[:, index])
+    dahl = get_effect("dahl")
+    ways = (WAYS * float(signals.unit[joint])).tolist()
+    forms += [dahl.columns(signals, joint, presliding=way)[:, 0][index] for way in ways]
     slow, _ = np.linalg.qr(np.vander(np.linspace(-1, 1, index.shape[1]), DEGREE + 1))
     left = _without(torque[index], slow)
     fits = [_likelihood(_without(form, slow), left) for form in forms]
@@ -170,47 +173,6 @@ def _smoothed(values: Array, signals: Signals, index: NDArray[np.int64], width: 
     wide = np.clip(wide, ends[own, :1], ends[own, 1:])
     windows = sliding_window_view(values[wide], len(kernel), axis=1)
     return np.asarray(windows @ (kernel / kernel.sum()))
-
-
-def presliding(position: Array, signals: Signals, ways: Array) -> Array:
-    """Friction that turns over a way after the joint has turned (Dahl's model), from -1 to 1.
-
-    Parameters
-    ----------
-    position : ndarray of shape (n_samples,), rad or m
-        Position of a joint.
-    signals : Signals
-        Recordings.
-    ways : ndarray of shape (n_ways,), rad or m
-        Ways over which friction turns.
-
-    Returns
-    -------
-    ndarray of shape (n_ways, n_samples)
-
-    References
-    ----------
-    P. R. Dahl (1968), A solid friction model, Aerospace Corporation TOR-0158(3107-18)-1.
-    """
-    state = np.zeros((len(ways), len(position)))
-    for rows in signals.segments:
-        change = np.diff(position[rows])
-        if not len(change):
-            continue
-        toward = np.where(change > 0, 1.0, -1.0)
-        starts = np.append(0, np.flatnonzero(np.diff(toward)) + 1)  # of strokes in one direction
-        lengths = np.diff(np.append(starts, len(change)))
-        passed = np.cumsum(np.abs(change))
-        before = np.append(0.0, passed)[starts]
-        fade = np.exp((before - passed[starts + lengths - 1])[:, None] / ways)
-        begin, z = np.empty((len(starts), len(ways))), np.zeros(len(ways))
-        for k, direction in enumerate(toward[starts].tolist()):
-            begin[k] = z
-            z = direction + (z - direction) * fade[k]
-        since = passed - np.repeat(before, lengths)
-        departure = np.repeat(begin, lengths, axis=0).T - toward
-        state[:, rows.start + 1 : rows.stop] = toward + departure * np.exp(-since / ways[:, None])
-    return state
 
 
 def _without(values: Array, slow: Array) -> Array:
