@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
-from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin
 from sklearn.utils import check_random_state
 from sklearn.utils.parallel import Parallel, delayed
 from sklearn.utils.validation import _check_sample_weight, check_is_fitted, validate_data
@@ -28,7 +28,7 @@ CHUNK = 2048
 LARGEST_SINGLE_PRECISION_P = 0.99
 
 
-class ELMCommittee(RegressorMixin, BaseEstimator):
+class ELMCommittee(MultiOutputMixin, RegressorMixin, BaseEstimator):
     r"""Committee of extreme learning machines, learned exactly in one pass or online.
 
     Each member has a random hidden layer of rectifiers that stays as it is; only the linear output
@@ -149,11 +149,6 @@ class ELMCommittee(RegressorMixin, BaseEstimator):
         self.trajectory = trajectory
         self.time = time
         self.random_state = random_state
-
-    def __sklearn_tags__(self) -> Any:
-        tags = super().__sklearn_tags__()
-        tags.target_tags.multi_output = True
-        return tags
 
     @fit_context(prefer_skip_nested_validation=True)
     def fit(self, X: Any, y: Any, sample_weight: Any = None) -> ELMCommittee:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -28,7 +28,7 @@ from skidyn.diagnosis._findings import (
     rivals_of,
 )
 from skidyn.diagnosis._floor import predictable_share
-from skidyn.diagnosis._held_out import HeldOut, held_out_residual
+from skidyn.diagnosis._held_out import held_out_residual
 from skidyn.diagnosis._hypothesis import UNKNOWN, Hypothesis, SearchResult
 from skidyn.diagnosis._intervals import parameter_intervals
 from skidyn.diagnosis._limits import Limit
@@ -83,15 +83,15 @@ def conclude(
     robot = problem.robot
     assert robot is not None
     while True:
-        steps, held = _steps(problem, result, torque, sliding)
+        comparisons, history, residual, own_torque = _steps(problem, result, torque, sliding)
         terms = [*problem.terms, *_found_terms(problem, result.findings)]
         fixed = parameter_intervals(problem, terms, result.fit.noise, shapes=False)
-        useless = _useless(result.findings, steps, least_drop) or _vague(result.findings, fixed)
+        useless = _useless(result.findings, comparisons, history, least_drop)
+        useless = useless or _vague(result.findings, fixed)
         if useless is None:
             break
         result = _without(problem, result, *useless)
     intervals = parameter_intervals(problem, terms, result.fit.noise)
-    history = [step.entry for step in steps]
     shown = [entry["rmse"] for entry in history]
     if not is_physics(model):
         shown, remark = _refitted(problem, result, model, data, shown)
@@ -107,12 +107,12 @@ def conclude(
             own = [u for u in unknowns if hypothesis.kind == UNKNOWN and u.joint in joints]
             q = false_discovery_rate(chance, hypothesis.tried)
             finding = make_finding(problem, hypothesis, candidate, others, q, drop, intervals, own)
-            curves = effect_curves(problem, finding.terms, held.torque, held.residual)
+            curves = effect_curves(problem, finding.terms, own_torque, residual)
             finding.curves.extend(curves)
             findings.append(finding)
     share = predictable_share(problem, result.fit.residual)
     rmse = np.array(history[-1]["rmse"])
-    parts = find_remainder(problem, held.residual, result.fit.residual, torque, rmse, share)
+    parts = find_remainder(problem, residual, result.fit.residual, torque, rmse, share)
     least = np.maximum(
         EPISODE_LEAST_RANGE * torque_range(torque), EPISODE_LEAST_NOISE * parts.noise
     )
@@ -128,8 +128,8 @@ def conclude(
         _verdict(findings, parts),
         robot.joint_names,
         findings,
-        steps[0].comparison,
-        steps[-1].comparison,
+        comparisons[0],
+        comparisons[-1],
         history,
         parts.noise,
         _unexplained(findings, unknowns, parts, rmse),
@@ -166,30 +166,26 @@ def _refitted(
     )
 
 
-@dataclass(frozen=True)
-class _Step:
-    """The model after a finding: its held-out prediction and errors."""
-
-    comparison: Comparison
-    entry: dict[str, Any]
-
-
 def _steps(
     problem: Problem, result: SearchResult, torque: Array, sliding: NDArray[np.bool_]
-) -> tuple[list[_Step], HeldOut]:
-    """The model as given, and after each finding; what the last one leaves, by finding."""
-    steps = []
+) -> tuple[list[Comparison], list[dict[str, Any]], Array, dict[Term, Array]]:
+    """Comparison and errors of the model as given and after each finding.
+
+    Beside them what the last one leaves, held out, and the torque of its findings.
+    """
+    comparisons, history = [], []
     dry = [t for t in problem.terms if t.is_dry]
     for k in track(range(len(result.findings) + 1), "Judging what was found"):
         found = _found_terms(problem, result.findings[:k])
         keep = [*dry, *(found if k == len(result.findings) else ())]
-        held = _held_out(problem, [*problem.terms, *found], result, keep)
-        comparison = _comparison(problem, torque, held, sliding, dry)
+        residual, own = _held_out(problem, [*problem.terms, *found], result, keep)
+        comparison = _comparison(problem, torque, residual, sliding, [own[t] for t in dry])
         last = result.findings[k - 1] if k else None
         kind, joints = (last.kind, last.joints) if last else (None, ())
-        steps.append(_Step(comparison, _entry(comparison, kind, joints)))
+        comparisons.append(comparison)
+        history.append(_entry(comparison, kind, joints))
     # All terms at every sample would be most of the memory of a long log.
-    return steps, HeldOut(held.residual, {t: held.torque[t] for t in found})
+    return comparisons, history, residual, {t: own[t] for t in found}
 
 
 def _found_terms(problem: Problem, findings: Sequence[Hypothesis]) -> list[Term]:
@@ -199,7 +195,10 @@ def _found_terms(problem: Problem, findings: Sequence[Hypothesis]) -> list[Term]
 
 
 def _useless(
-    findings: Sequence[Hypothesis], steps: Sequence[_Step], least: float
+    findings: Sequence[Hypothesis],
+    comparisons: Sequence[Comparison],
+    history: Sequence[dict[str, Any]],
+    least: float,
 ) -> tuple[Hypothesis, list[Candidate]] | None:
     """The last finding with terms that leave the error of samples as large, and these terms.
 
@@ -207,7 +206,7 @@ def _useless(
     absolute one count alike; terms that do not lower the squared error at all are among them.
     """
     for k in reversed(range(len(findings))):
-        errors = [(_mean_error(step.comparison), step.entry["rmse"]) for step in steps[k : k + 2]]
+        errors = [(_mean_error(comparisons[i]), history[i]["rmse"]) for i in (k, k + 1)]
         terms = []
         for candidate in findings[k].candidates:
             # A link that gives way moves all that it carries: other joints may feel it more.
@@ -292,22 +291,23 @@ def _unknowns(problem: Problem, result: SearchResult, terms: Sequence[Term]) -> 
 
 def _held_out(
     problem: Problem, terms: Sequence[Term], result: SearchResult, keep: Sequence[Term]
-) -> HeldOut:
+) -> tuple[Array, dict[Term, Array]]:
     """Held-out residual; a line's coefficients come from the residual at the full rate."""
     waves = [t for t in terms if _on_samples(t)]
     rest = [t for t in terms if not _on_samples(t)]
     if not waves:
         return held_out_residual(problem, rest, result.fit.sigma, keep)
     torque = problem.torque - result.ripple
-    held = held_out_residual(replace_torque(problem, torque), rest, result.fit.sigma, keep)
+    bare = replace_torque(problem, torque)
+    residual, held = held_out_residual(bare, rest, result.fit.sigma, keep)
     for hypothesis in result.findings:
         if hypothesis.torque is None:
             continue
         for t in (c.term for c in hypothesis.candidates if c.term in waves):
             own = np.zeros_like(torque)
             own[:, t.places[0]] = hypothesis.torque[:, t.places[0]]
-            held.torque[t] = own
-    return held
+            held[t] = own
+    return residual, held
 
 
 def _on_samples(term: Term) -> bool:
@@ -318,19 +318,19 @@ def _on_samples(term: Term) -> bool:
 def _comparison(
     problem: Problem,
     torque: Array,
-    held: HeldOut,
+    residual: Array,
     sliding: NDArray[np.bool_],
-    dry: Sequence[Term],
+    dry: Sequence[Array],
 ) -> Comparison:
     assert problem.robot is not None
     return Comparison(
         problem.signals,
         torque,
-        torque - held.residual,
+        torque - residual,
         sliding,
         problem.robot.joint_names,
         problem.rows.sliding,
-        sum((held.torque[t] for t in dry), np.zeros_like(torque)) if dry else None,
+        sum(dry, np.zeros_like(torque)) if dry else None,
     )
 
 

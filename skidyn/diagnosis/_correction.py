@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from sklearn.base import BaseEstimator, MetaEstimatorMixin, RegressorMixin, clone
+from sklearn.base import BaseEstimator, MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, clone
 from sklearn.exceptions import NotFittedError
 from sklearn.utils import _safe_indexing
 from sklearn.utils.validation import check_is_fitted
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from sklearn.pipeline import Pipeline
 
 
-class CorrectedRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
+class CorrectedRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEstimator):
     """A regressor plus physical effects fitted to its residual.
 
     Parameters
@@ -64,11 +64,6 @@ class CorrectedRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             Effects to add.
         """
         return CorrectedRegressor(self.regressor, self.robot, [*self.effects, *effects])
-
-    def __sklearn_tags__(self) -> Any:
-        tags = super().__sklearn_tags__()
-        tags.target_tags.multi_output = True
-        return tags
 
     def fit(self, X: Any, y: Any, sample_weight: Any = None) -> CorrectedRegressor:
         """Fit a copy of the regressor, then the effects to its residual.

@@ -8,7 +8,7 @@ from numbers import Integral
 from typing import Any
 
 import numpy as np
-from sklearn.base import BaseEstimator, MetaEstimatorMixin, RegressorMixin, clone
+from sklearn.base import BaseEstimator, MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, clone
 from sklearn.utils.metaestimators import available_if
 from sklearn.utils.validation import _check_sample_weight, check_is_fitted, validate_data
 
@@ -35,7 +35,7 @@ def _refits(search: EffectSearchCV) -> bool:
     return True
 
 
-class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
+class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEstimator):
     """Find the effects a rigid-body model lacks, add them, and predict with the best model.
 
     The diagnosis adds one finding after the other. Models with the first k of them are scored on
@@ -136,11 +136,6 @@ class EffectSearchCV(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         self.cv = cv
         self.refit = refit
         self.n_jobs = n_jobs
-
-    def __sklearn_tags__(self) -> Any:
-        tags = super().__sklearn_tags__()
-        tags.target_tags.multi_output = True
-        return tags
 
     def fit(self, X: Any, y: Any, sample_weight: Any = None, groups: Any = None) -> EffectSearchCV:
         """Search for missing effects and fit the best model.

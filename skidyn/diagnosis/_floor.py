@@ -27,7 +27,7 @@ RIDGES = 10.0 ** np.arange(-3.0, 4.0)
 WORSE = 2
 
 
-def predictable_share(problem: Problem, residual: Sequence[Array], random_state: int = 0) -> Array:
+def predictable_share(problem: Problem, residual: Sequence[Array]) -> Array:
     """Share of the residual rows' squared error that is predictable on held-out folds.
 
     Parameters
@@ -36,8 +36,6 @@ def predictable_share(problem: Problem, residual: Sequence[Array], random_state:
         Rows and folds.
     residual : sequence of ndarray of shape (n_rows_j,)
         Residual rows of every joint.
-    random_state : int, default=0
-        Seed of the random features.
 
     Returns
     -------
@@ -51,7 +49,7 @@ def predictable_share(problem: Problem, residual: Sequence[Array], random_state:
         inputs = _inputs(problem, j)
         best = 0.0
         for length in LENGTHS:
-            rng = np.random.default_rng(random_state)
+            rng = np.random.default_rng(0)
             frequency = rng.normal(size=(inputs.shape[1], FEATURES // 2)) / length
             phase = inputs @ frequency
             features = np.column_stack([inputs, np.cos(phase), np.sin(phase)])

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,25 +12,9 @@ from skidyn.effects import Term, TermSum
 from skidyn.evidence import Problem, left_out_coefficients
 
 
-@dataclass(frozen=True)
-class HeldOut:
-    """Held-out prediction of a model.
-
-    Attributes
-    ----------
-    residual : ndarray of shape (n_samples, n_joints)
-        Torque less the prediction of a model fitted without the sample's fold, N m or N.
-    torque : dict of Term to ndarray of shape (n_samples, n_joints)
-        Contribution of the terms asked for, fitted to all data, N m or N.
-    """
-
-    residual: Array
-    torque: dict[Term, Array]
-
-
 def held_out_residual(
     problem: Problem, terms: Sequence[Term], sigma: Array, keep: Sequence[Term] = ()
-) -> HeldOut:
+) -> tuple[Array, dict[Term, Array]]:
     """Residual of every sample under the model fitted without its fold.
 
     Parameters
@@ -44,6 +27,13 @@ def held_out_residual(
         Noise of one row.
     keep : sequence of Term, default=()
         Terms whose own contribution is wanted.
+
+    Returns
+    -------
+    residual : ndarray of shape (n_samples, n_joints), N m or N
+        Torque less the prediction of a model fitted without the sample's fold.
+    torque : dict of Term to ndarray of shape (n_samples, n_joints), N m or N
+        Contribution of the terms asked for, fitted to all data.
     """
     design = problem.design([problem.term_rows(t) for t in terms])
     whole, left = left_out_coefficients(
@@ -71,4 +61,4 @@ def held_out_residual(
                 own[:, j] += block @ whole[place]
         if own is not None:
             torque[term] = own
-    return HeldOut(problem.torque - prediction, torque)
+    return problem.torque - prediction, torque

@@ -136,13 +136,13 @@ def _spectrum(q: Array, r: Array) -> tuple[Array, Array]:
     return power, np.maximum(level, np.finfo(float).tiny)
 
 
-def _peaks(q: Array, r: Array, count: int = 2) -> list[tuple[float, float]]:
-    """Waves and heights (power over the level that stays without the line) of the top lines."""
+def _peaks(q: Array, r: Array) -> list[tuple[float, float]]:
+    """Waves and heights (power over the level that stays without the line) of the top two lines."""
     power, level = _spectrum(q, r)
     ratio = power / level
     ratio[: int(LOWEST * SPAN / (2 * np.pi))] = 0.0
     peaks = []
-    for _ in range(count):
+    for _ in range(2):
         k = int(np.argmax(ratio))
         ratio[max(0, k - 8) : k + 9] = 0.0
         waves = _strongest_wave(q, r, k / 2 - 0.5, k / 2 + 0.5)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from skidyn._signals import Array
 from skidyn.diagnosis import Candidate, find_lines, split_effects
 from skidyn.effects import Term, list_effects
-from skidyn.evidence import Normal, Problem, column_sizes
+from skidyn.evidence import Problem, solve_left_out
 
 #: Chance above which a line of the spectrum is noise.
 CHANCE = 1e-3
@@ -81,14 +81,7 @@ def fit_ripple(problem: Problem, term: Term, residual: Array, fold: NDArray[np.i
     a, y, of = columns[use], residual[use, joint], fold[use]
     grams = np.array([a[of == f].T @ a[of == f] for f in range(problem.n_folds)])
     cross = np.array([a[of == f].T @ y[of == f] for f in range(problem.n_folds)])
-    size = column_sizes(grams.sum(0))
-    left = np.array(
-        [
-            Normal(grams.sum(0) - g, cross.sum(0) - c, size).solution
-            for g, c in zip(grams, cross, strict=True)
-        ]
-    )
-    whole = Normal(grams.sum(0), cross.sum(0), size).solution
+    whole, left = solve_left_out(grams, cross)
     return Ripple(np.sum(columns * left[fold], axis=1), left, whole)
 
 
@@ -165,11 +158,7 @@ def _quarters(
             own = a[quarter == f] / s
             grams[f] += own.T @ own
             cross[f] += own.T @ (y[quarter == f] / s)
-    size = column_sizes(grams.sum(0))
-    fits = [
-        Normal(grams.sum(0) - g, cross.sum(0) - c, size).solution
-        for g, c in zip(grams, cross, strict=True)
-    ]
+    _, fits = solve_left_out(grams, cross)
     errors = []
     for a, y, quarter in zip(design, target, problem.rows.quarter, strict=True):
         left = [y[quarter == f] - a[quarter == f] @ fits[f] for f in range(QUARTERS)]

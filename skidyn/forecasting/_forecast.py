@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin
 from sklearn.linear_model import Ridge
 from sklearn.utils import Bunch
 from sklearn.utils.validation import check_is_fitted, validate_data
@@ -60,16 +60,11 @@ def forecast_table(
     return Bunch(X=np.c_[number, values[rows - 1]], y=values[rows], rows=rows)
 
 
-class _Forecaster(RegressorMixin, BaseEstimator):
+class _Forecaster(MultiOutputMixin, RegressorMixin, BaseEstimator):
     """Checks that the past of every output is among the features."""
 
     trajectory: ColumnSpec
     time: ColumnSpec
-
-    def __sklearn_tags__(self) -> Any:
-        tags = super().__sklearn_tags__()
-        tags.target_tags.multi_output = True
-        return tags
 
     def _keys(self) -> Keys:
         return fitted_keys(self)

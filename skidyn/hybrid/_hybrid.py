@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.base import BaseEstimator, MetaEstimatorMixin, RegressorMixin, clone
+from sklearn.base import BaseEstimator, MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, clone
 from sklearn.model_selection import check_cv
 from sklearn.utils import _safe_indexing
 from sklearn.utils.validation import (
@@ -45,7 +45,9 @@ NOT_TESTED = (
 )
 
 
-class HybridRegressor(CallbackSupportMixin, MetaEstimatorMixin, RegressorMixin, BaseEstimator):
+class HybridRegressor(
+    CallbackSupportMixin, MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEstimator
+):
     """Physical model plus a learner on its residual, which is kept only where it helps.
 
     The physics is cross-fitted, so that the learner sees the residual on trajectories that the
@@ -148,11 +150,6 @@ class HybridRegressor(CallbackSupportMixin, MetaEstimatorMixin, RegressorMixin, 
         self.alpha = alpha
         self.trajectory = trajectory
         self.time = time
-
-    def __sklearn_tags__(self) -> Any:
-        tags = super().__sklearn_tags__()
-        tags.target_tags.multi_output = True
-        return tags
 
     @fit_context(prefer_skip_nested_validation=False)
     def fit(self, X: Any, y: Any, sample_weight: Any = None, groups: Any = None) -> HybridRegressor:

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.base import BaseEstimator, MetaEstimatorMixin, RegressorMixin, clone
+from sklearn.base import BaseEstimator, MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, clone
 from sklearn.ensemble import HistGradientBoostingRegressor
 from sklearn.utils.parallel import Parallel, delayed
 from sklearn.utils.validation import (
@@ -31,7 +31,7 @@ from skidyn.model_selection import order_of_log
 Array = NDArray[np.float64]
 
 
-class OwnJointRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
+class OwnJointRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEstimator):
     """One regressor per joint on that joint's own motion and pre-sliding states.
 
     What a good physical model leaves over is mostly friction inside single joints. A learner that
@@ -105,11 +105,6 @@ class OwnJointRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         self.n_jobs = n_jobs
         self.trajectory = trajectory
         self.time = time
-
-    def __sklearn_tags__(self) -> Any:
-        tags = super().__sklearn_tags__()
-        tags.target_tags.multi_output = True
-        return tags
 
     @fit_context(prefer_skip_nested_validation=False)
     def fit(self, X: Any, y: Any, sample_weight: Any = None) -> OwnJointRegressor:

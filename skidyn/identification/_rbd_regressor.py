@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin
 from sklearn.utils.metaestimators import available_if
 from sklearn.utils.validation import _check_sample_weight, check_is_fitted, validate_data
 
@@ -65,7 +65,7 @@ def _keeps_no_rows(model: RBDRegressor) -> bool:
     return True
 
 
-class RBDRegressor(Results, RegressorMixin, BaseEstimator):
+class RBDRegressor(Results, MultiOutputMixin, RegressorMixin, BaseEstimator):
     """Inverse dynamics of a robot: rigid body plus effects, identified together.
 
     Parameters
@@ -230,11 +230,6 @@ class RBDRegressor(Results, RegressorMixin, BaseEstimator):
             state["effect_coefficients_"] = dict(state["effect_coefficients_"])
             state["evidence_"] = Evidence(columns, dict(factors), dict(counts))
         super().__setstate__(state)
-
-    def __sklearn_tags__(self) -> Any:
-        tags = super().__sklearn_tags__()
-        tags.target_tags.multi_output = True
-        return tags
 
     # ------------------------------------------------------------------ public
     def fit(

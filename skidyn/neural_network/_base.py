@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin
 from sklearn.utils import check_random_state
 from sklearn.utils.parallel import Parallel, delayed
 from sklearn.utils.validation import _check_sample_weight, check_is_fitted, validate_data
@@ -51,7 +51,9 @@ Array = NDArray[np.float64]
 SIDE_BY_SIDE = 10
 
 
-class SequenceRegressor(SkorchParameters, CallbackSupportMixin, RegressorMixin, BaseEstimator):
+class SequenceRegressor(
+    SkorchParameters, CallbackSupportMixin, MultiOutputMixin, RegressorMixin, BaseEstimator
+):
     """Base of the recurrent regressors: one LSTM network, or one for each output."""
 
     per_joint = False
@@ -132,11 +134,6 @@ class SequenceRegressor(SkorchParameters, CallbackSupportMixin, RegressorMixin, 
             state["_weights"] = self.weights_
             del state["_net"]
         return state
-
-    def __sklearn_tags__(self) -> Any:
-        tags = super().__sklearn_tags__()
-        tags.target_tags.multi_output = True
-        return tags
 
     # ---- what subclasses may change ----
 

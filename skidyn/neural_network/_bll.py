@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from joblib import parallel_config
 from numpy.typing import NDArray
-from sklearn.base import BaseEstimator, MetaEstimatorMixin, RegressorMixin, clone
+from sklearn.base import BaseEstimator, MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, clone
 from sklearn.compose import TransformedTargetRegressor
 from sklearn.ensemble import BaggingRegressor
 from sklearn.linear_model import Ridge
@@ -48,7 +48,7 @@ BLOCKS = 3
 FOLDS_OF_HEAD, ALPHAS = 5, (1.0, 1e2, 1e4, 1e6)
 
 
-class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
+class BLLRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEstimator):
     """Bagged LSTM networks, stacked by a meta-regressor (BLL).
 
     Members are trained on bootstraps of the log; their mean is the input of a meta-regressor,
@@ -214,11 +214,6 @@ class BLLRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         )
         defaults = {"estimator": member, "final_estimator": head, "resample": "window"}
         return cls(**(defaults | parameters))
-
-    def __sklearn_tags__(self) -> Any:
-        tags = super().__sklearn_tags__()
-        tags.target_tags.multi_output = True
-        return tags
 
     @fit_context(prefer_skip_nested_validation=False)
     def fit(self, X: Any, y: Any, sample_weight: Any = None, groups: Any = None) -> BLLRegressor:
