@@ -58,3 +58,13 @@ def listening(listener: Listener) -> Iterator[None]:
         yield
     finally:
         _LISTENER.reset(token)
+
+
+@contextmanager
+def unheard() -> Iterator[None]:
+    """Pass on nothing of what is reported inside the ``with`` block."""
+    token = _LISTENER.set(None)
+    try:
+        yield
+    finally:
+        _LISTENER.reset(token)

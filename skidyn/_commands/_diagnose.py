@@ -52,6 +52,13 @@ def add_parser(commands: Any) -> None:
         action="store_true",
         help="diagnose again although the same was asked before, and keep no answer beside the log",
     )
+    parser.add_argument(
+        "--jobs",
+        type=int,
+        default=-1,
+        metavar="N",
+        help="processes at most (default: one for each core; one on systems other than Linux)",
+    )
     parser.add_argument("--effects", help="kinds to try, separated by commas (default: all)")
 
 

@@ -29,7 +29,7 @@ FOLDER, MOST = ".skidyn", 16
 #: Logs and robots that are one file each, whatever lies beside them.
 LOGS, ROBOTS = (".csv", ".parquet"), (".urdf",)
 #: Options that do not change what is found, only where it goes.
-ELSEWHERE = {"command", "run", "words", "out", "html", "json", "no_cache"}
+ELSEWHERE = {"command", "run", "words", "out", "html", "json", "jobs", "no_cache"}
 
 
 @contextmanager

@@ -35,7 +35,16 @@ def run_diagnosis(
     # what a log is not does not stop a comparison, only what is concluded from it
     force = kinds == () or bool(getattr(options, "force", False))
     with working("Comparing" if kinds == () else "Searching for what is missing", options):
-        return diagnose(model, frame, tau, effects=kinds, rate=rate, settings=settings, force=force)
+        return diagnose(
+            model,
+            frame,
+            tau,
+            effects=kinds,
+            rate=rate,
+            settings=settings,
+            force=force,
+            n_jobs=getattr(options, "jobs", -1),
+        )
 
 
 def write_page(diagnosis: Diagnosis, html: str | None, provenance: dict[str, Any]) -> None:

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn._progress import track
+from skidyn._progress import tell
 from skidyn._signals import Array
 from skidyn.effects import Term, get_effect
 from skidyn.evidence import Problem
@@ -106,8 +106,8 @@ def catalogue_candidates(problem: Problem, kinds: Iterable[str]) -> list[Candida
             terms += [Term.at(kind, joints, s) for s in effect.grid(problem.signals, joints)]
     # What kinds with the same needs share for a joint is kept for one joint at a time.
     ordered = sorted(terms, key=lambda term: (term.effect.needs, term.places))
-    for term in track(ordered, "Preparing effects"):
-        problem.term_rows(term)
+    tell("Preparing effects")
+    problem.prepare(ordered)
     return [Candidate(t.kind, t, problem.term_rows(t), n_shapes=_refined(t)) for t in terms]
 
 

@@ -13,6 +13,7 @@ from sklearn.utils.validation import _check_sample_weight
 from threadpoolctl import threadpool_limits
 
 from skidyn._columns import ColumnSpec
+from skidyn._cores import alone, aside, cores
 from skidyn._exceptions import ColumnError, EffectError, LogError, LogWarning
 from skidyn._order import refuse_shuffled
 from skidyn._signals import Array, Signals, read_signals
@@ -29,12 +30,13 @@ from skidyn.diagnosis._rule import (
     correlation_time,
     time_blocks,
 )
-from skidyn.diagnosis._search import search
+from skidyn.diagnosis._search import prepare_search, search
 from skidyn.diagnosis._swift import look_at_swift
 from skidyn.effects import Term, list_effects, make_terms
 from skidyn.evidence import Fit, Problem, make_problem
 from skidyn.measurement import (
     Measurement,
+    Suspicion,
     check_measurement,
     copied_rows,
     names_in_doubt,
@@ -60,6 +62,7 @@ def diagnose(
     settings: Settings | None = None,
     force: bool = False,
     sample_weight: Any = None,
+    n_jobs: int | None = None,
 ) -> Diagnosis:
     """Compare a model with measurements and learn which physical effects it lacks.
 
@@ -93,6 +96,10 @@ def diagnose(
         (:func:`skidyn.measurement.check_measurement`).
     sample_weight : array-like of shape (n_samples,), optional
         Weight of every sample in all fits; those of weight 0 are left out.
+    n_jobs : int, optional
+        Processes, as joblib counts them: None is 1 unless a ``joblib.parallel_config`` says
+        otherwise, -1 all cores. The result is the same to the last bit. On systems other than
+        Linux there is one process.
 
     Returns
     -------
@@ -109,7 +116,7 @@ def diagnose(
     EffectError
         The catalogue has no such effect.
     ValueError
-        ``settings`` or ``smooth`` has no meaning.
+        ``settings``, ``smooth`` or ``n_jobs`` has no meaning.
 
     Examples
     --------
@@ -120,7 +127,8 @@ def diagnose(
     >>> [(finding.kind, finding.joints) for finding in diagnosis.findings]
     [('stribeck', (2,))]
     """
-    with threadpool_limits(1):  # many small matrices: more threads only wait for each other
+    # many small matrices: more threads only wait for each other
+    with threadpool_limits(1), cores(n_jobs):
         opened = open_model(model, X, tau)
         diagnosis = _diagnose(
             opened.model,
@@ -184,15 +192,47 @@ def _diagnose(
         )
     kinds = list_effects() if effects is None else list(effects)
     identified = getattr(model, "parameters", "identified") == "identified"
-    checks = check_measurement(
-        Measurement(signals, torque, robot, robot.joint_names, identified=identified)
-    )
-    if not force:
-        refuse_certain(checks)
+    measurement = Measurement(signals, torque, robot, robot.joint_names, identified=identified)
+    once = ~copied_rows(signals, torque)
+    judged, kept_weight = torque, weight
+    if not once.all():
+        signals, judged = signals.take(once), torque[once]
+        kept_weight = None if weight is None else weight[once]
+
+    def checked() -> list[Suspicion]:
+        checks = check_measurement(measurement)
+        if not force:
+            refuse_certain(checks)
+        return checks
+
+    def posed() -> Problem:
+        if not is_physics(model):
+            left = (torque - _prediction(model, X, torque))[once]
+            return _residual_problem(signals, left, robot, smooth, settings, kept_weight)
+        return make_problem(
+            signals,
+            judged,
+            robot=robot,
+            rigid_body=identified,
+            terms=own_terms(model, robot, X, tau),
+            smooth=smooth,
+            weight=kept_weight,
+        )
+
+    with aside(checked) as told:
+        try:
+            problem = posed()
+            _check_rows(problem)
+            # with another core while the checks run, which rarely leave no kind to be named
+            searcher = None if alone() else prepare_search(problem, kinds, settings)
+        except Exception:
+            told()  # what is wrong with the log says more
+            raise
+        checks = told()
     notes = [str(check) for check in checks]
     doubts = [] if force else names_in_doubt(checks)
     if doubts:
-        kinds = []
+        kinds, searcher = [], None
         notes.append(
             f"The measurement is in doubt ({'; '.join(doubts)}), so that no physical effect is "
             "named: what is missing is given as a function of the signals. Settle it, or go on "
@@ -200,27 +240,10 @@ def _diagnose(
         )
     for note in notes:
         warnings.warn(note, LogWarning, stacklevel=4)
-    residual = None if is_physics(model) else torque - _prediction(model, X, torque)
-    once = ~copied_rows(signals, torque)
-    if not once.all():
-        signals, torque = signals.take(once), torque[once]
-        residual = None if residual is None else residual[once]
-        weight = None if weight is None else weight[once]
-    if residual is None:
-        problem = make_problem(
-            signals,
-            torque,
-            robot=robot,
-            rigid_body=identified,
-            terms=own_terms(model, robot, X, tau),
-            smooth=smooth,
-            weight=weight,
-        )
-    else:
-        problem = _residual_problem(signals, residual, robot, smooth, settings, weight)
-    _check_rows(problem)
-    steady = not {check.check for check in checks} & UNSTEADY
-    result = search(problem, kinds, settings, vibration=steady)
+    if searcher is None:
+        searcher = prepare_search(problem, kinds, settings)
+    searcher.vibration &= not {check.check for check in checks} & UNSTEADY
+    result = searcher.run()
     wider, completed = look_at_reversals(problem, result, kinds, settings)
     if wider is problem:
         wider, completed = look_at_swift(problem, result, kinds, settings)
@@ -228,7 +251,7 @@ def _diagnose(
     sliding = problem.rows.sliding
     least = settings.least_drop
     data = (X, tau) if weight is None else (X, tau, weight)
-    diagnosis = conclude(wider, completed, limits, sliding, torque, notes, least, model, data)
+    diagnosis = conclude(wider, completed, limits, sliding, judged, notes, least, model, data)
     diagnosis.checks = checks
     kept = {c.site for h in diagnosis.result.findings for c in h.candidates}
     found = [c for h in completed.findings for c in h.candidates]

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
+from skidyn._cores import each
 from skidyn._signals import Array
 from skidyn.diagnosis._variables import average_at_rows
 from skidyn.evidence import Problem
@@ -42,10 +43,11 @@ def predictable_share(problem: Problem, residual: Sequence[Array]) -> Array:
     ndarray of shape (n_joints,)
         Between 0 and 1.
     """
-    share = np.zeros(problem.n_joints)
-    for j, r in enumerate(residual):
+
+    def of_joint(j: int) -> float:
+        r = residual[j]
         if len(r) < 4 * problem.n_folds:
-            continue
+            return 0.0
         inputs = _inputs(problem, j)
         best = 0.0
         for length in LENGTHS:
@@ -54,8 +56,9 @@ def predictable_share(problem: Problem, residual: Sequence[Array]) -> Array:
             phase = inputs @ frequency
             features = np.column_stack([inputs, np.cos(phase), np.sin(phase)])
             best = max(best, _held_out_share(features, r, problem.fold[j], problem.n_folds))
-        share[j] = best
-    return share
+        return best
+
+    return np.array(each(of_joint, range(problem.n_joints)))
 
 
 def _inputs(problem: Problem, joint: int) -> Array:

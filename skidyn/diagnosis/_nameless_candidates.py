@@ -8,6 +8,7 @@ from collections.abc import Collection
 import numpy as np
 from numpy.typing import NDArray
 
+from skidyn._cores import each
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._clock import LOWEST, clock_line
@@ -49,8 +50,9 @@ def nameless_candidates(
     list of Candidate
     """
     looked_at = range(problem.n_joints) if followed_on is None else followed_on
-    followed = {j: followed_signals(problem, j, residual[:, j]) for j in looked_at}
-    candidates = []
+    found = each(lambda j: followed_signals(problem, j, residual[:, j]), looked_at)
+    followed = dict(zip(looked_at, found, strict=True))
+    made: list[tuple[Term, tuple[str, ...]]] = []
     for kind in nameless_kinds():
         effect = get_effect(kind)
         assert isinstance(effect, NamelessEffect)
@@ -76,8 +78,9 @@ def nameless_candidates(
                 )
                 shapes = [] if line is None else [{"frequency": line.frequency}]
             for shape in shapes:
-                term = Term.at(kind, joints, shape)
-                names = effect.variables(joint, shape)
-                rows = problem.screening_rows(term)
-                candidates.append(Candidate(UNKNOWN, term, rows, names, len(effect.shapes)))
-    return candidates
+                made.append((Term.at(kind, joints, shape), effect.variables(joint, shape)))
+    all_rows = problem.prepare([term for term, _ in made], screening=True)
+    return [
+        Candidate(UNKNOWN, term, rows, names, len(term.effect.shapes))
+        for (term, names), rows in zip(made, all_rows, strict=True)
+    ]

@@ -3,13 +3,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn._progress import track
+from skidyn._cores import each
+from skidyn._progress import tell, track
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._hypothesis import (
@@ -32,6 +35,8 @@ from skidyn.diagnosis._spectrum import Line, find_lines, find_vibrations
 from skidyn.diagnosis._split import split_effects
 
 Mask = NDArray[np.bool_]
+#: Places in the pool of what is added, and by how much the held-out error falls.
+_Greedy = tuple[list[int], float]
 
 
 class RankingSearch(SearchState):
@@ -39,11 +44,14 @@ class RankingSearch(SearchState):
 
     def rank(self) -> list[Hypothesis]:
         """Explanations of the residual, best first."""
-        rough = self._greedy_by_kind() + self._splits()
-        rough.sort(key=lambda item: item[1])
+        tell(f"{self._round}: screening effects")
+        screening, recordings = self._screening(), self._by_kind_of_recording()
+        looks: list[Callable[[], Any]] = [self._lines, self._splits, *screening, *recordings]
+        lines, splits, *found = each(lambda look: look(), looks)
+        rough = sorted(self._found(found[: len(screening)]) + splits, key=lambda item: item[1])
         ranking = self._finals([candidates for candidates, _ in rough[: self.settings.finalists]])
-        ranking += [self._against_functions(h, ranking) for h in self._lines()]
-        ranking += self._recordings()
+        ranking += [self._against_functions(h, ranking) for h in lines]
+        ranking += self._finals([own for of_kind in found[len(screening) :] for own in of_kind])
         # What says least comes last: differences between recordings, and vibration.
         return sorted(
             ranking, key=lambda h: (says_little(h) or self._holds_in_all(h, ranking), -h.score)
@@ -62,24 +70,32 @@ class RankingSearch(SearchState):
 
     def _greedy_by_kind(self, nameless: bool = True) -> list[tuple[list[Candidate], float]]:
         """For each kind, terms added joint by joint while each lowers the held-out error."""
+        return self._found(each(lambda look: look(), self._screening(nameless)))
+
+    def _found(self, greedy: Iterable[_Greedy]) -> list[tuple[list[Candidate], float]]:
+        """What was added of every kind, and minus the gain of it."""
+        rough = [([self.pool[i] for i in places], drop) for places, drop in greedy if places]
+        return [(own, -(drop - 2 * sum(c.width for c in own))) for own, drop in rough]
+
+    def _screening(self, nameless: bool = True) -> list[Callable[[], _Greedy]]:
+        """A look for each kind."""
         screen = Screen(self.problem, self.sigma, self.pool, self.target)
         kinds = np.array([c.kind for c in self.pool])
         base_model = screen.model(self.blocks)
         base = screen.held_out(base_model)
         first = screen.step(base_model)
         tester = self.tester(self.chosen)
-        found = []
-        wanted = [kind for kind in dict.fromkeys(kinds) if nameless or kind != UNKNOWN]
-        for kind in track(wanted, f"{self._round}: screening effects"):
-            chosen, drop = self._greedy(screen, kinds == kind, base, first, tester)
-            if chosen:
-                found.append((chosen, -(drop - 2 * sum(c.width for c in chosen))))
-        return found
+        return [
+            partial(self._greedy, screen, kinds == kind, base, first, tester)
+            for kind in dict.fromkeys(kinds)
+            if nameless or kind != UNKNOWN
+        ]
 
     def _greedy(
         self, screen: Screen, wanted: Mask, base: Array, first: Array, tester: Tester
-    ) -> tuple[list[Candidate], float]:
+    ) -> _Greedy:
         pool, errors, now = wanted.copy(), first, base
+        index: list[int] = []
         chosen: list[Candidate] = []
         widths = np.array([c.width for c in self.pool])
         # A further form stands for all that could have been declared: it must do so much better.
@@ -96,15 +112,16 @@ class RankingSearch(SearchState):
             found = self._first_significant(drops, drops - price * widths - further, tester)
             if found is None:
                 break
-            i, candidate = found, self.pool[found]
+            candidate = self.pool[found]
+            index.append(found)
             chosen.append(candidate)
-            now = errors[i]
+            now = errors[found]
             pool &= self._still_open(candidate, chosen)
             if pool.any():
                 model = screen.model([*self.blocks, *(c.rows for c in chosen)])
                 errors = screen.step(model, pool)
                 tester = self.tester([*self.chosen, *chosen])
-        return chosen, float(base.sum() - now.sum())
+        return index, float(base.sum() - now.sum())
 
     def _first_significant(self, drops: Array, order: Array, tester: Tester) -> int | None:
         """The first of the best few candidates that is large enough and more than chance."""
@@ -261,18 +278,18 @@ class RankingSearch(SearchState):
             return ripple
         return replace(ripple, score=min(score, ripple.score))
 
-    def _recordings(self) -> list[Hypothesis]:
-        """What changed from one recording to the next."""
-        found = []
-        for kind in dict.fromkeys(c.kind for c in self.by_recording):
-            if any(c.kind == kind and some_recordings(c) for c in self.chosen):
-                continue
+    def _by_kind_of_recording(self) -> list[Callable[[], list[list[Candidate]]]]:
+        """A look at what changed from one recording to the next for each kind."""
+
+        def look(kind: str) -> list[list[Candidate]]:
             pool = [c for c in self.by_recording if c.kind == kind]
             chosen = choose(pool, lambda more: self.tester([*self.chosen, *more]), self.significant)
             chosen = [c for c in chosen if self._can_be(c, chosen)]
-            if chosen:
-                found += self._same_or_own(chosen)
-        return self._finals(found)
+            return self._same_or_own(chosen) if chosen else []
+
+        known = {c.kind for c in self.chosen if some_recordings(c)}
+        kinds = dict.fromkeys(c.kind for c in self.by_recording)
+        return [partial(look, kind) for kind in kinds if kind not in known]
 
     def _can_be(self, candidate: Candidate, chosen: Sequence[Candidate]) -> bool:
         """Whether a candidate's coefficients have a sign that its effect can have."""

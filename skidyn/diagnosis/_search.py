@@ -13,16 +13,15 @@ from skidyn.diagnosis._rule import Settings, variance_inflation
 from skidyn.evidence import Problem
 
 
-def search(
+def prepare_search(
     problem: Problem,
     kinds: Sequence[str],
     settings: Settings,
     *,
     nameless: bool = True,
     joints: Sequence[int] | None = None,
-    vibration: bool = True,
-) -> SearchResult:
-    """Find the missing effects.
+) -> _Search:
+    """Fit the model, and compute the columns of all that may be missing.
 
     Parameters
     ----------
@@ -36,21 +35,37 @@ def search(
         Whether nameless functions of the signals compete.
     joints : sequence of int, optional
         Joints, from 0, on which effects are tried; all by default.
-    vibration : bool, default=True
-        Whether waves in time are looked for, which a wrong clock makes by itself.
     """
     searcher = _Search(problem, kinds, settings, nameless)
-    searcher.vibration = vibration and nameless
     if joints is not None:
         searcher.pool = [c for c in searcher.pool if set(c.joints) <= set(joints)]
         searcher.nameless = False
-    return searcher.run()
+    return searcher
+
+
+def search(
+    problem: Problem,
+    kinds: Sequence[str],
+    settings: Settings,
+    *,
+    nameless: bool = True,
+    joints: Sequence[int] | None = None,
+) -> SearchResult:
+    """Find the missing effects.
+
+    Parameters
+    ----------
+    problem, kinds, settings, nameless, joints
+        As in :func:`prepare_search`.
+    """
+    return prepare_search(problem, kinds, settings, nameless=nameless, joints=joints).run()
 
 
 class _Search(ReconsideringSearch):
     """The loop: rank, accept, add, withdraw, reconsider."""
 
     def run(self) -> SearchResult:
+        """Add one finding after the other."""
         steps = []
         for _ in range(self.settings.max_findings):
             self.sigma = self.fit.noise

@@ -68,14 +68,21 @@ class SearchState:
         self.by_recording = recording_candidates(problem, self.kinds)
         self.n_tests = max(1, len(self.pool) + len(self.by_recording))
         self.whole_pool = self.pool
+        self._kept_target: tuple[tuple[Array | None, Array | None], list[Array]] = (None, None), []
         self.start = self.left = np.zeros(problem.n_joints)
         self._reconsidering = False
         self._kept_tester: tuple[list[Array], Tester | None] = ([], None)
 
     @property
     def target(self) -> list[Array]:
-        rows, torque = self.problem.rows, self.problem.torque - self.ripple
-        return [rows.average(torque[:, j], j) for j in range(self.problem.n_joints)]
+        """Averaged torque of every joint that is to be explained, lines of spectra taken off."""
+        made_of = self.problem.torque, self.ripple
+        kept, target = self._kept_target
+        if any(map(is_not, kept, made_of)):
+            rows, torque = self.problem.rows, self.problem.torque - self.ripple
+            target = [rows.average(torque[:, j], j) for j in range(self.problem.n_joints)]
+            self._kept_target = made_of, target
+        return target
 
     @property
     def blocks(self) -> list[dict[int, Array]]:

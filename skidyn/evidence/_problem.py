@@ -5,12 +5,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain, groupby
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import qr
 
+from skidyn._cores import each
 from skidyn._progress import tell
 from skidyn._signals import Array, Signals
 from skidyn.effects import Term, TermSum
@@ -137,15 +139,43 @@ class Problem:
         A window of a log at 1 kHz holds 125 samples. A function as smooth as these has the same
         mean over every seventh. What jumps, or swings, does not.
         """
-        clocked = self.signals.time is not None
-        step = int(self.motion.rate * WINDOW / ENOUGH_SAMPLES) if clocked else 1
-        if step < 2 or not term.effect.nameless or term in self._cache:
+        step = self._skipped(term)
+        if step < 2 or term in self._cache:
             return self.term_rows(term)
         index, few = self.signals.once(("every", step), lambda: self._every(step))
         if step not in self._thinned:
             self._thinned[step] = self.rows.thinned(index)
         columns = term.torque_columns(few)
         return {j: np.asarray(self._thinned[step][j] @ block) for j, block in columns.items()}
+
+    def _skipped(self, term: Term) -> int:
+        """Every how manieth sample tells enough of a term at first."""
+        if self.signals.time is None or not term.effect.nameless:
+            return 1
+        return int(self.motion.rate * WINDOW / ENOUGH_SAMPLES)
+
+    def prepare(self, terms: Sequence[Term], screening: bool = False) -> list[dict[int, Array]]:
+        """Rows of many terms, on all cores that may be used.
+
+        Parameters
+        ----------
+        terms : sequence of Term
+            What neighbours share, such as what kinds with the same needs ask for a joint, is
+            computed once.
+        screening : bool, default=False
+            Those of :meth:`screening_rows` instead of :meth:`term_rows`.
+
+        Returns
+        -------
+        list of dict of int to ndarray of shape (n_rows_j, n_coefficients)
+        """
+        of = self.screening_rows if screening else self.term_rows
+        new = [t for t in dict.fromkeys(terms) if t not in self._cache]
+        groups = [list(g) for _, g in groupby(new, key=lambda t: (t.effect.needs, t.places))]
+        found = each(lambda group: [of(term) for term in group], groups)
+        rows = dict(zip(chain(*groups), chain(*found), strict=True))
+        self._cache |= {t: r for t, r in rows.items() if not screening or self._skipped(t) < 2}
+        return [rows[t] if t in rows else self._cache[t] for t in terms]
 
     def _every(self, step: int) -> tuple[NDArray[np.int64], Signals]:
         parts = [np.arange(rows.start, rows.stop, step) for rows in self.signals.segments]

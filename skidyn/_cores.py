@@ -1,0 +1,241 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Independent pieces of work on several cores, with the same results to the last bit as on one.
+
+A forked process has all that was computed so far without a copy of it, and starts within
+milliseconds; what it computes comes back through a pipe. Pieces are handed out one by one, so that
+no process waits while another has several left. Every piece is computed by the same instructions
+wherever it runs. Forking is safe on Linux while linear algebra is held to one thread, as
+:func:`skidyn.diagnosis.diagnose` does; elsewhere all work is done in one process.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+import pickle
+import signal
+import struct
+import sys
+import warnings
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from io import BufferedReader
+from typing import Any, Generic, TypeVar
+
+from skidyn._progress import unheard
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+_CORES: ContextVar[int] = ContextVar("skidyn_cores", default=1)
+#: Processes at most: starting one takes some 20 ms, which many more would not earn back.
+MOST_PROCESSES = 8
+#: Numbers of pieces that surely fit into a pipe, of which a process takes one after the other.
+MOST_PIECES = 4096
+_NUMBER, _SIZE = struct.Struct("=I"), struct.Struct("=Q")
+
+
+@contextmanager
+def cores(n_jobs: int | None) -> Iterator[None]:
+    """Share what :func:`each` and :func:`aside` do inside the ``with`` block among processes.
+
+    Parameters
+    ----------
+    n_jobs : int or None
+        Processes as joblib counts them: None is 1 unless a ``joblib.parallel_config`` says
+        otherwise, -1 all cores; 1 inside a process of joblib. No more than 8 are used.
+
+    Raises
+    ------
+    ValueError
+        ``n_jobs`` is 0.
+
+    Examples
+    --------
+    >>> with cores(2):
+    ...     each(lambda x: x**2, range(4))
+    [0, 1, 4, 9]
+    """
+    from joblib import effective_n_jobs
+
+    if n_jobs == 0:
+        raise ValueError("n_jobs=0; expected the number of processes, -1 for all cores, or None")
+    token = _CORES.set(
+        min(effective_n_jobs(n_jobs), MOST_PROCESSES) if sys.platform == "linux" else 1
+    )
+    try:
+        yield
+    finally:
+        _CORES.reset(token)
+
+
+def alone() -> bool:
+    """Whether all work is done in this process."""
+    return _CORES.get() < 2
+
+
+def each(function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
+    """What a function returns for every item, in their order.
+
+    Parameters
+    ----------
+    function : callable
+        Of one item. What it returns is pickled where another process computed it; what it changes
+        is lost there.
+    items : iterable
+        Items; they need not be picklable.
+
+    Returns
+    -------
+    list
+
+    Raises
+    ------
+    Exception
+        What the function raises.
+    """
+    items = list(items)
+    size = -(-len(items) // MOST_PIECES)
+    pieces = [range(k, min(k + size, len(items))) for k in range(0, len(items), max(1, size))]
+    count = min(_CORES.get(), len(pieces))
+    if count < 2:
+        return [function(item) for item in items]
+    left, filled = os.pipe()
+    os.write(filled, b"".join(_NUMBER.pack(k) for k in range(len(pieces))))
+    os.close(filled)  # whoever finds the pipe empty is done
+
+    def work() -> dict[int, Result]:
+        done: dict[int, Result] = {}
+        while number := os.read(left, _NUMBER.size):
+            (k,) = _NUMBER.unpack(number)
+            done.update((i, function(items[i])) for i in pieces[k])
+        return done
+
+    children = [_Child(work) for _ in range(count - 1)]
+    token = _CORES.set(1)
+    try:
+        done = work()
+        for child in children:
+            done |= child.result() or {}
+        # a process that was killed, for its memory for example, takes its pieces with it
+        return [done[k] if k in done else function(item) for k, item in enumerate(items)]
+    finally:
+        _CORES.reset(token)
+        os.close(left)
+        for child in children:
+            child.end()
+
+
+@contextmanager
+def aside(function: Callable[[], Result]) -> Iterator[Callable[[], Result]]:
+    """Compute something while the ``with`` block does something else.
+
+    With one core it is computed at once, before the block.
+
+    Parameters
+    ----------
+    function : callable
+        Without arguments. What it returns must be picklable, and what it changes is lost.
+
+    Yields
+    ------
+    callable
+        Waits for the result and returns it, or raises what the function raised.
+    """
+    if alone():
+        value = function()
+        yield lambda: value
+        return
+    child = _Child(lambda: _Boxed(function()))
+    try:
+        kept: list[Result] = []
+
+        def result() -> Result:
+            if not kept:
+                box = child.result()
+                kept.append(function() if box is None else box.value)
+            return kept[0]
+
+        yield result
+    finally:
+        child.end()
+
+
+class _Boxed(Generic[Result]):
+    """A result that may be None."""
+
+    def __init__(self, value: Result) -> None:
+        self.value = value
+
+
+class _Child(Generic[Result]):
+    """A forked process that computes something."""
+
+    def __init__(self, function: Callable[[], Result]) -> None:
+        self._pipe, into = os.pipe()
+        with warnings.catch_warnings():
+            # Python 3.12 warns of any other thread, those of linear algebra that wait included.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            self._pid = os.fork()
+        if self._pid == 0:
+            os.close(self._pipe)
+            self._run(function, into)
+        os.close(into)
+
+    def _run(self, function: Callable[[], Result], into: int) -> None:
+        """Compute, write the result, end; nothing that the parent has opened is touched."""
+        try:
+            signal.signal(signal.SIGINT, signal.SIG_DFL)
+            gc.disable()  # a collection would copy every page that holds an object
+            _CORES.set(1)
+            with unheard():
+                try:
+                    outcome: tuple[bool, Any] = True, function()
+                except Exception as error:
+                    outcome = False, error
+            buffers: list[pickle.PickleBuffer] = []
+            head = pickle.dumps(outcome, 5, buffer_callback=buffers.append)
+            with open(into, "wb") as stream:
+                stream.write(_SIZE.pack(1 + len(buffers)))
+                for part in (memoryview(head), *(b.raw() for b in buffers)):
+                    stream.write(_SIZE.pack(len(part)))
+                    stream.write(part)
+        finally:
+            os._exit(0)
+
+    def result(self) -> Result | None:
+        """What was computed; None where the process is gone without an answer."""
+        with open(self._pipe, "rb") as stream:
+            self._pipe = -1
+            parts = _message(stream)
+        if parts is None:
+            return None
+        fine, value = pickle.loads(parts[0], buffers=parts[1:])
+        if not fine:
+            raise value
+        return value  # type: ignore[no-any-return]
+
+    def end(self) -> None:
+        """End the process, if it still runs, and forget it."""
+        if self._pipe >= 0:
+            os.close(self._pipe)
+            self._pipe = -1
+        if self._pid:
+            with suppress(ProcessLookupError, ChildProcessError):
+                os.kill(self._pid, signal.SIGKILL)
+                os.waitpid(self._pid, 0)
+            self._pid = 0
+
+
+def _message(stream: BufferedReader) -> list[bytearray] | None:
+    """Parts of a message; None where it ends too soon."""
+    count = stream.read(_SIZE.size)
+    parts = []
+    for _ in range(_SIZE.unpack(count)[0] if len(count) == _SIZE.size else 0):
+        size = stream.read(_SIZE.size)
+        part = bytearray(_SIZE.unpack(size)[0] if len(size) == _SIZE.size else 0)
+        if len(size) < _SIZE.size or stream.readinto(part) < len(part):
+            return None
+        parts.append(part)
+    return parts or None
