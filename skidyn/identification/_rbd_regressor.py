@@ -4,8 +4,7 @@
 from __future__ import annotations
 
 import os
-import warnings
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from copy import copy
 from numbers import Real
 from typing import Any, Literal
@@ -14,18 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin
 from sklearn.utils.metaestimators import available_if
-from sklearn.utils.validation import _check_sample_weight, check_is_fitted, validate_data
+from sklearn.utils.validation import _check_sample_weight, validate_data
 
 from skidyn._checks import warn_about_log
-from skidyn._columns import Columns, ColumnSpec, resolve_columns, trajectory_numbers
-from skidyn._exceptions import ColumnError
-from skidyn._order import has_one_motion, order_in_time
-from skidyn._signals import Array, Signals, signals_from
+from skidyn._columns import ColumnSpec
+from skidyn._signals import Array, Signals
 from skidyn.effects import Term, TermSum, make_terms
 from skidyn.evidence import (
     Evidence,
     Problem,
-    broken_notes,
     evidence_of_rows,
     evidence_of_signals,
     hysteresis_joints,
@@ -43,11 +39,12 @@ from skidyn.identification._every_sample import may_take_samples, predicts_bette
 from skidyn.identification._identifiability import condition_number
 from skidyn.identification._instrumental import instrument_rows
 from skidyn.identification._output_error import refine_by_simulation
-from skidyn.identification._recordings import named_recordings, recognise, remember
+from skidyn.identification._prediction import Prediction
+from skidyn.identification._recordings import remember
 from skidyn.identification._regression import Regression, Solution
 from skidyn.identification._results import Results
 from skidyn.identification._terms import find_terms
-from skidyn.identification._uncertainty import PredictionBands, find_bands
+from skidyn.identification._uncertainty import PredictionBands
 from skidyn.identification._weak_directions import keep_weak_directions
 from skidyn.robots import Robot, find_base_parameters
 
@@ -65,7 +62,7 @@ def _keeps_no_rows(model: RBDRegressor) -> bool:
     return True
 
 
-class RBDRegressor(Results, MultiOutputMixin, RegressorMixin, BaseEstimator):
+class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEstimator):
     """Inverse dynamics of a robot: rigid body plus effects, identified together.
 
     Parameters
@@ -231,7 +228,6 @@ class RBDRegressor(Results, MultiOutputMixin, RegressorMixin, BaseEstimator):
             state["evidence_"] = Evidence(columns, dict(factors), dict(counts))
         super().__setstate__(state)
 
-    # ------------------------------------------------------------------ public
     def fit(
         self,
         X: Any,
@@ -477,127 +473,6 @@ class RBDRegressor(Results, MultiOutputMixin, RegressorMixin, BaseEstimator):
         self.__dict__.pop("bands_", None)
         return self
 
-    def predict(self, X: Any, return_std: bool = False) -> Any:
-        """Torque of the model.
-
-        Effects of single recordings (an offset of one run, a payload in some) act in those
-        recordings, which are known again by their motion, and in no other.
-
-        Parameters
-        ----------
-        X : DataFrame or array of shape (n_samples, n_features)
-            Motion. Effects with memory run along each trajectory.
-        return_std : bool, default=False
-            Also return the standard deviation of a measured torque from the prediction: errors of
-            left-out folds, and what the spread of the coefficients makes of this motion.
-
-        Returns
-        -------
-        torque : ndarray of shape (n_samples, n_joints) or (n_samples,), N m or N
-            Predicted torque.
-        std : ndarray of the same shape, N m or N
-            If asked for.
-        """
-        signals, back = self._motion(X)
-        torque = self._shaped_like_y(self._torque(signals)[back])
-        if not return_std:
-            return torque
-        return torque, self._shaped_like_y(find_bands(self).std(self, signals)[back])
-
-    def predict_interval(self, X: Any, level: float = 0.95) -> tuple[Array, Array]:
-        """Band around the prediction that holds a share of the measured torques.
-
-        Parameters
-        ----------
-        X : DataFrame or array of shape (n_samples, n_features)
-            Motion.
-        level : float, default=0.95
-            Share of the samples, of motion and rest each, that lies in the band.
-
-        Returns
-        -------
-        low, high : ndarray of shape (n_samples, n_joints) or (n_samples,), N m or N
-            Borders of the band.
-
-        Raises
-        ------
-        SkidynError
-            The model was not fitted by ``fit``, so that no errors of left-out folds are known.
-        ValueError
-            ``level`` is not between 0 and 1.
-        """
-        signals, back = self._motion(X)
-        half = find_bands(self).half_width(self, signals, level)[back]
-        torque = self._torque(signals)[back]
-        return self._shaped_like_y(torque - half), self._shaped_like_y(torque + half)
-
-    def _motion(self, X: Any) -> tuple[Signals, NDArray[np.intp]]:
-        """Motion in the order of time, and where the rows of X are in it."""
-        check_is_fitted(self)
-        X = validate_data(self, X, reset=False, dtype=np.float64)
-        order = self._order(X)
-        signals = self._read(X[order])
-        if named_recordings(self.effect_terms_):
-            signals = recognise(signals, self.recordings_)
-        if self._smooths():
-            signals = smooth_motion(signals).signals
-        return signals.with_(robot=self.robot_), np.argsort(order)
-
-    def _order(self, X: Array) -> NDArray[np.intp]:
-        """Rows of X in the order of time."""
-        columns = self.columns_
-        time = None if columns.time is None else X[:, columns.time]
-        order = order_in_time(trajectory_numbers(X, columns), time)
-        return np.arange(len(X)) if order is None else order
-
-    def _shaped_like_y(self, torque: Array) -> Array:
-        return torque[:, 0] if self._one_output else torque
-
-    def _torque(self, signals: Signals) -> Array:
-        """Torque of all joints; exporters call it with symbols in place of numbers."""
-        torque = self.rigid_body_torque(signals.q, signals.dq, signals.ddq)
-        for _ in self._effects(signals, torque):
-            pass
-        return torque
-
-    def _effects(self, signals: Signals, torque: Array) -> Iterator[tuple[Term, dict[int, Array]]]:
-        """Columns of every effect, each seeing the torque of those before it.
-
-        Effects on the transmission see the rigid body's torque, given as ``torque``; those on the
-        sensor come last and see the model's. The torque of each is added to ``torque`` on the way.
-        """
-        order = sorted(self.effect_terms_, key=lambda term: term.effect.needs_fit)
-        on_sensor = any(term.effect.sees_model for term in order)
-        smooth = torque.copy()
-        signals = signals.with_(load=torque.copy(), inertial_parameters=self.inertial_parameters_)
-        for term in order:
-            state = signals
-            if term.effect.sees_model:
-                state = signals.with_(model_torque=torque.copy(), smooth_torque=smooth.copy())
-            blocks = term.torque_columns(state)
-            for j, block in blocks.items():
-                own = block @ self.effect_coefficients_[term]
-                torque[:, j] += own
-                if on_sensor and not term.is_dry:
-                    smooth[:, j] += own
-            yield term, blocks
-
-    def rigid_body_torque(self, q: Array, dq: Array, ddq: Array) -> Array:
-        """Torque of the identified rigid body alone.
-
-        Parameters
-        ----------
-        q, dq, ddq : ndarray of shape (n_samples, n_joints)
-            Position, velocity and acceleration, SI units.
-
-        Returns
-        -------
-        ndarray of shape (n_samples, n_joints), N m or N
-            Torque without the effects.
-        """
-        check_is_fitted(self)
-        return self.robot_.inverse_dynamics(q, dq, ddq, parameters=self.inertial_parameters_)
-
     def with_effects(self, effects: Iterable[Any]) -> RBDRegressor:
         """An unfitted copy with more effects; those it has already are not added twice.
 
@@ -615,27 +490,6 @@ class RBDRegressor(Results, MultiOutputMixin, RegressorMixin, BaseEstimator):
         parameters = self.get_params(deep=False) | {"effects": [*self.effects, *more]}
         return type(self)(**parameters)
 
-    # ------------------------------------------------------------------ hooks for tests
-    def _resolve(self, n_features: int) -> Columns:
-        names = getattr(self, "feature_names_in_", None)
-        return resolve_columns(
-            None if names is None else list(names),
-            n_features,
-            self.robot_.joint_names,
-            trajectory=self.trajectory,
-            time=self.time,
-            require_acceleration=self.smooth is False,
-        )
-
-    def _check_targets(self, torque: Array) -> None:
-        n = self.robot_.n_joints
-        if torque.shape[1] != n:
-            raise ColumnError(
-                f"y has {torque.shape[1]} column(s); the robot has {n} joints "
-                f"({', '.join(self.robot_.joint_names)})"
-            )
-
-    # ------------------------------------------------------------------ reading
     def _method(self) -> Estimator:
         """The estimator; parameters without a meaning are refused."""
         if self.parameters not in ("identified", "nominal"):
@@ -657,58 +511,6 @@ class RBDRegressor(Results, MultiOutputMixin, RegressorMixin, BaseEstimator):
             raise ValueError(f"prior_std={self.prior_std!r}; expected a number above 0, or None")
         return find_estimator(self.estimator)
 
-    def _begin(self, X: Any, y: Any, first: bool) -> tuple[Signals, Array, NDArray[np.intp]]:
-        """Motion and torque of validated data in the order of time, and that order."""
-        X, y = validate_data(
-            self, X, y, reset=first, multi_output=True, y_numeric=True, dtype=np.float64
-        )
-        if first:
-            self._one_output = y.ndim == 1
-            given = self.robot
-            self.robot_ = given if isinstance(given, Robot) else Robot.from_urdf(given)
-            self.columns_ = self._resolve(X.shape[1])
-        torque = y.reshape(len(y), -1)
-        self._check_targets(torque)
-        order = self._order(X)
-        signals, torque = self._read(X[order]), torque[order]
-        if signals.time is not None and np.any(np.diff(order) != 1):
-            _warn_of_leakage()
-            if not has_one_motion(signals.trajectory, signals.time):
-                # Recordings that nothing tells apart: no row has a neighbour.
-                signals = self._without_clock(signals)
-        if not first and named_recordings(self.effect_terms_):
-            signals = recognise(signals, self.recordings_)
-        notes = broken_notes(signals, torque, self.robot_.joint_names)
-        self._broken = bool(notes)
-        for note in notes:
-            warn_about_log(note)
-        return signals, torque, order
-
-    def _without_clock(self, signals: Signals) -> Signals:
-        if self._smooths():
-            raise ColumnError(
-                "rows of X at the same time belong to several recordings, so that accelerations "
-                "cannot be derived from them; number the recordings in a column 'trajectory', or "
-                "give ddq1.. and smooth=False"
-            )
-        return signals.with_(time=None)
-
-    def _smooths(self) -> bool:
-        if self.smooth is not None:
-            return self.smooth
-        return self.columns_.ddq is None
-
-    def _read(self, X: Array) -> Signals:
-        if self.columns_.ddq is None and self.columns_.time is None:
-            raise ColumnError(
-                "X has neither accelerations nor time to derive them from; add ddq1.. or time"
-            )
-        signals = signals_from(X, self.columns_, self.robot_, to_derive=True)
-        if self.columns_.ddq is not None:
-            return signals
-        return signals.with_(ddq=_differences(signals))
-
-    # ------------------------------------------------------------------ fitting
     def _store_evidence(self, evidence: Evidence, terms: Sequence[Term]) -> None:
         """Identify from evidence alone."""
         method = self._method()
@@ -757,27 +559,3 @@ class RBDRegressor(Results, MultiOutputMixin, RegressorMixin, BaseEstimator):
         self.condition_number_ = condition_number(rows[:, shown])
         for name, value in solution.attributes.items():
             setattr(self, name, value)
-
-
-def _differences(signals: Signals) -> Array:
-    """Accelerations by differences, for pieces that are too short for the smoother."""
-    ddq = np.zeros_like(signals.dq)
-    for rows in signals.segments:
-        if rows.stop - rows.start > 1:
-            times = signals.clock[rows]
-            if np.all(np.diff(times) > 0):
-                ddq[rows] = np.gradient(signals.dq[rows], times, axis=0)
-    return ddq
-
-
-def _warn_of_leakage() -> None:
-    from skidyn.model_selection import LeakageWarning
-
-    warnings.warn(
-        "the rows of X are not in the order of time, as after train_test_split or "
-        "KFold(shuffle=True). They are sorted by trajectory and time and the fit is valid, but a "
-        "score on the rows between them is too good. Hold out whole "
-        "trajectories: TrajectoryKFold, GroupKFold, or GroupShuffleSplit",
-        LeakageWarning,
-        stacklevel=4,
-    )

@@ -19,6 +19,7 @@ from skidyn.evidence import REST, RIDGE, window_rows
 from skidyn.robots import Robot
 
 if TYPE_CHECKING:
+    from skidyn.identification._prediction import Prediction
     from skidyn.identification._rbd_regressor import RBDRegressor
     from skidyn.identification._regression import Regression, Solution
 
@@ -218,7 +219,7 @@ class PredictionBands:
         rmse = _root_mean_squares(error, signals.take(rows), weight)
         return cls(regression.rigid_index, tuple(terms), spread, scale, ratios, rmse)
 
-    def std(self, model: RBDRegressor, signals: Signals) -> Array:
+    def std(self, model: Prediction, signals: Signals) -> Array:
         """Scale of the error of a prediction, shape (n_samples, n_joints), N m or N."""
         signals = _with_load(model, self.terms, signals)
         rows = np.arange(signals.n_samples)
@@ -233,7 +234,7 @@ class PredictionBands:
         std: Array = np.hypot(width, own)
         return std
 
-    def half_width(self, model: RBDRegressor, signals: Signals, level: float) -> Array:
+    def half_width(self, model: Prediction, signals: Signals, level: float) -> Array:
         """Half width of the band that holds a share of the measurements, N m or N."""
         if not 0 < level < 1:
             raise ValueError(f"level={level}; expected a share between 0 and 1, such as 0.95")
@@ -242,7 +243,7 @@ class PredictionBands:
         return self.std(model, signals) * wide
 
 
-def find_bands(model: RBDRegressor) -> PredictionBands:
+def find_bands(model: Prediction) -> PredictionBands:
     """Bands of a model.
 
     Raises
@@ -258,7 +259,7 @@ def find_bands(model: RBDRegressor) -> PredictionBands:
     return model.bands_
 
 
-def _with_load(model: RBDRegressor, terms: Iterable[Term], signals: Signals) -> Signals:
+def _with_load(model: Prediction, terms: Iterable[Term], signals: Signals) -> Signals:
     """Signals with the torques of the model, if some of the effects look at them."""
     if not any(term.effect.needs_fit for term in terms):
         return signals

@@ -45,7 +45,6 @@ class AnyColumns(RBDRegressor):
 EXPECTED = {
     "check_regressor_multioutput": "the robot and not y says how many outputs there are",
 }
-
 ROBUST = {
     "check_sample_weight_equivalence_on_dense_data": (
         "rows are judged by their weighted residual, which copies of a row do not change"
@@ -123,15 +122,6 @@ def test_folds_of_trajectories(log):
     one = cross_val_score(model, log.X, log.y, cv=GroupKFold(2), groups=groups)
     two = cross_val_score(model, log.X, log.y, cv=TrajectoryKFold(n_splits=2))
     assert min(one) > 0.8 and min(two) > 0.8
-
-
-def test_one_joint_may_have_flat_torque():
-    robot = Robot.from_urdf(ONE_JOINT)
-    X = np.random.default_rng(0).uniform(-1, 1, (300, 3))
-    y = robot.inverse_dynamics(X[:, :1], X[:, 1:2], X[:, 2:])[:, 0] + 0.4 * X[:, 1]
-    model = RBDRegressor(robot, ("viscous",)).fit(X, y)
-    assert model.predict(X).shape == y.shape
-    np.testing.assert_allclose(model.predict(X), y, atol=1e-6)
 
 
 def test_errors_name_what_is_wrong(log):

@@ -2,6 +2,7 @@
 """Made-up diagnoses for the tests of the report."""
 
 import importlib.util
+import re
 import shutil
 from pathlib import Path
 
@@ -18,6 +19,42 @@ def fakes():
     module = importlib.util.module_from_spec(specification)
     specification.loader.exec_module(module)
     return module
+
+
+def texts(page):
+    """Words of every section of a page, by the section's name."""
+    sections = re.findall(r'<section[^>]* id="([^"]+)".*?>(.*?)</section>', page, re.S)
+    return {name: " ".join(re.sub(r"<[^>]+>", " ", part).split()) for name, part in sections}
+
+
+@pytest.fixture(scope="session")
+def diagnosis_page(fakes):
+    """Words of the page of a diagnosis, by section."""
+    from skidyn.report import render_html, summarize
+
+    provenance = {"files": {"a.csv": "12"}}
+    return texts(render_html(summarize(fakes.make_diagnosis(), provenance=provenance)))
+
+
+@pytest.fixture(scope="session")
+def comparison_page(fakes):
+    """Words of the page of two logs, in the second of which the spring is gone."""
+    from skidyn.report import render_comparison, summarize_comparison
+
+    second = fakes.make_diagnosis(n_samples=1500)
+    second.findings = second.findings[:1]
+    both = fakes.make_diagnosis(), second
+    return texts(render_comparison(summarize_comparison(*both, names=("new", "worn"))))
+
+
+@pytest.fixture(scope="session")
+def fleet_page(fakes):
+    """Words of the page of a fleet, one robot of which deviates and one has changed."""
+    from skidyn.report import render_fleet, summarize_fleet
+
+    return texts(
+        render_fleet(summarize_fleet(fakes.make_fleet(), drift={"robot 3": fakes.make_drift()}))
+    )
 
 
 CHROMIUM = shutil.which("chromium")

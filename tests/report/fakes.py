@@ -9,8 +9,10 @@ import numpy as np
 from skidyn.diagnosis import REGIMES, Comparison, Diagnosis, Finding, Limit, error_map
 from skidyn.diagnosis._failures import find_failures, find_rest_errors
 from skidyn.effects import Signals, Term
+from skidyn.fleet import DriftReport, FleetComparison
 
 HOSTILE = "<img src=x onerror=alert(1)>"
+FLEET_COLUMNS = ("viscous.Fv[1]", "coulomb.Fc[2]")
 
 
 def fake_signals(n_samples=3000, n_joints=3, rate=100.0, n_trajectories=3, prismatic=()):
@@ -113,3 +115,20 @@ def make_diagnosis(verdict="missing", joint_names=("shoulder", "elbow", "slider"
     result.story = lambda: Diagnosis.story(result)
     result.to_dict = lambda: Diagnosis.to_dict(result)
     return result
+
+
+def make_fleet(hostile="robot 8"):
+    """Twenty robots, one of which deviates."""
+    names = tuple(f"robot {k}" if k != 8 else hostile for k in range(1, 21))
+    score = np.tile(np.linspace(-1.5, 1.5, 20)[:, None], (1, 2))
+    score[7, 0] = 12.0
+    q = np.where(score > 10, 1e-9, 0.9)
+    common = {"viscous.Fv[1]": 1.0, "coulomb.Fc[2]": 2.0}
+    return FleetComparison(names, FLEET_COLUMNS, common, 0.1 * score, score, q)
+
+
+def make_drift():
+    """A robot whose friction leaves its band."""
+    value = np.array([[5.0], [5.1], [9.0]])
+    low, high = np.array([[-np.inf], [4.0], [4.0]]), np.array([[np.inf], [6.0], [6.0]])
+    return DriftReport(("coulomb.Fc[2]",), ("2 May", "3 May", "4 May"), value, low, high)

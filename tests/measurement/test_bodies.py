@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Torque against what a robot with bodies and friction can have."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from skidyn.datasets import load_ur5, make_hidden_effect_log
+from skidyn.measurement import (
+    Measurement,
+    check_measurement,
+)
+
+
+def test_torque_in_newton_millimetres(signals, torque, found, only):
+    only(found(signals, 1e3 * torque), "torque_scale", "certain", "--units tau=Nmm")
+
+
+def test_currents(signals, torque, found):
+    told = [s for s in found(signals, torque * 0.05) if s.check == "torque_scale"]
+    assert told and "motor currents" in told[0].suspicion
+
+
+def test_torque_of_something_else(recorded, told_of):
+    wave = np.random.default_rng(4).normal(size=len(recorded.frame))
+    wave = np.convolve(wave, np.hanning(80), "same")
+    other = recorded.frame.assign(tau2=recorded.frame["tau2"].std() * wave / wave.std())
+    assert told_of(other)["unexplained"].joints == (2,)
+
+
+def test_stated_bodies_concern_only_those_who_keep_them(arm, signals, torque):
+    torque = torque.copy()
+    torque[:, 1] += 9 * np.cos(signals.q.sum(1))  # a weight that the description lacks
+
+    def certainty(identified):
+        names = ("shoulder", "elbow")
+        told = check_measurement(Measurement(signals, torque, arm, names, identified))
+        return next((s.certainty for s in told if s.check == "bodies"), None)
+
+    assert certainty(False) == "suspected"
+    assert certainty(None) == "noted"
+    assert certainty(True) is None
+
+
+@pytest.mark.parametrize("factor", [0.25, 4.0])
+def test_the_torque_of_one_joint_at_another_scale(factor, recorded, told_of):
+    told = told_of(recorded.frame.assign(tau2=factor * recorded.frame["tau2"]))["torque_scale"]
+    name, _, size = told.remedy.option.partition("=")
+    assert told.joints == (2,) and name == "--gain tau2"
+    assert float(size) == pytest.approx(1 / factor, rel=0.1)
+
+
+def test_a_torque_far_beyond_the_effort_limit(arm, recorded, told_of):
+    robot = replace(arm, effort_limits=2 * recorded.frame[["tau1", "tau2"]].abs().max().to_numpy())
+    assert "torque_scale" not in told_of(recorded.frame, robot)
+    told = told_of(recorded.frame.assign(tau2=1e3 * recorded.frame["tau2"]), robot)["torque_scale"]
+    assert told.joints == (2,) and told.remedy.option == "--gain tau2=0.001"
+
+
+@pytest.mark.parametrize("factor", [0.5, 4.0])
+def test_a_rate_that_is_wrong_in_clock_and_velocities(factor, told_of):
+    robot = load_ur5()
+    frame = make_hidden_effect_log(
+        robot, None, n_trajectories=4, duration=6.0, random_state=3
+    ).frame
+    velocities = {f"dq{k}": frame[f"dq{k}"] / factor for k in range(1, 7)}
+    told = told_of(frame.assign(time=factor * frame["time"], **velocities), robot)["torque_scale"]
+    assert told.suspicion.startswith("the clock runs at another rate")
+    words = dict(pair.split("=") for pair in told.remedy.option.split(" ")[1].split(","))
+    assert float(words["time"]) == pytest.approx(1 / factor, rel=0.1)
+    assert float(words["dq"]) == pytest.approx(factor, rel=0.1)

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Single channels: still, coarse, held, cut off, not enabled, without noise."""
+
+import numpy as np
+import pytest
+
+from skidyn.logs import check_log, read_log
+
+
+def test_saturation(signals, torque, found):
+    limit = 0.8 * np.abs(torque[:, 0]).max()
+    cut = np.column_stack([np.clip(torque[:, 0], -limit, limit), torque[:, 1]])
+    told = {s.check: s for s in found(signals, cut)}
+    assert told["clipped_torque"].joints == (1,)
+
+
+def test_still_joint(signals, torque, found):
+    still = signals.with_(q=signals.q * [1, 0], dq=signals.dq * [1, 0])
+    told = {s.check: s for s in found(still, torque)}
+    assert told["still_joint"].joints == (2,) and "elbow" in str(told["still_joint"])
+
+
+def test_torques_that_are_held(signals, torque, found, only):
+    held = torque[np.arange(len(torque)) // 4 * 4]
+    only(found(signals, held), "held_torque", "certain", "--drop-repeated")
+
+
+def test_torque_without_noise(arm, signals, found):
+    smooth = arm.inverse_dynamics(signals.q, signals.dq, signals.ddq) + 0.8 * signals.dq
+    assert "smooth_torque" in [s.check for s in found(signals, smooth, None)]
+    noisy = smooth + np.random.default_rng(0).normal(0, 1e-3, smooth.shape)
+    assert found(signals, noisy, None) == []
+
+
+def test_positions_in_half_precision(recorded, told_of):
+    short = {name: recorded.frame[name].astype(np.float16).astype(float) for name in ("q1", "q2")}
+    assert told_of(recorded.frame.assign(**short))["coarse_position"].joints == (1, 2)
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_torque_before_drives_are_enabled(backwards, arm, recorded, tmp_path):
+    frame = recorded.frame.copy()
+    for rows in frame.groupby("trajectory").groups.values():
+        frame.loc[rows[-40:] if backwards else rows[:40], ["tau1", "tau2"]] = 0.0
+    told = [s for s in check_log(frame, arm).checks if s.certainty != "noted"]
+    assert [s.check for s in told] == ["constant_torque"] and told[0].certainty == "certain"
+    assert "in 160 rows" in told[0].evidence and told[0].remedy.option == "--drop-repeated"
+    frame.to_parquet(tmp_path / "log.parquet")
+    kept = read_log(tmp_path / "log.parquet", robot=arm, drop_repeated=True)
+    assert len(kept) == len(frame) - 160 and (kept[["tau1", "tau2"]] != 0).all(axis=None)

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Units of time and positions, and positions that were wrapped."""
+
+import numpy as np
+import pytest
+
+
+def test_degrees_of_positions_alone(signals, torque, found, only):
+    degrees = signals.with_(q=np.rad2deg(signals.q))
+    only(found(degrees, torque), "position_unit", "certain", "--units q=deg")
+
+
+def test_milliseconds(signals, torque, found, only):
+    only(
+        found(signals.with_(time=signals.time * 1e3), torque),
+        *("clock_unit", "certain", "--units time=ms"),
+    )
+
+
+def test_wrapped_position(signals, torque, found):
+    far = signals.with_(q=signals.q + [np.pi, 0])
+    wrapped = far.with_(q=(far.q + np.pi) % (2 * np.pi) - np.pi)
+    told = found(wrapped, torque)
+    assert "--unwrap" in {s.remedy.option for s in told if s.check == "wrapped_position"}
+
+
+def test_clock_at_another_rate(signals, torque, found, only):
+    slow = found(signals.with_(time=2 * signals.time), torque)
+    only(slow, "clock_unit", slow[0].certainty, "--gain time=0.5")
+
+
+def test_positions_in_turns(signals, torque, found, only):
+    only(
+        found(signals.with_(q=signals.q / 2 / np.pi), torque),
+        *("position_unit", "certain", "--units q=rev"),
+    )
+
+
+def test_counts_of_an_encoder(signals, torque, found):
+    counts = np.round(signals.q * 4096 / 2 / np.pi)
+    told = found(signals.with_(q=counts), torque)[0]
+    assert (told.check, told.certainty) == ("position_unit", "certain")
+    name, size = told.remedy.option.split("=")
+    assert name == "--gain q" and float(size) == pytest.approx(2 * np.pi / 4096)
+
+
+def test_time_in_minutes(signals, torque, found):
+    told = found(signals.with_(time=signals.time / 60), torque)
+    assert told[0].suspicion == "time looks like minutes"
+    assert told[0].certainty == "certain" and told[0].remedy.option == "--units time=min"
+
+
+def test_row_numbers_in_the_place_of_time(recorded, told_of):
+    step = float(np.median(np.diff(recorded.frame["time"])))
+    told = told_of(recorded.frame.assign(time=np.round(recorded.frame["time"] / step)))[
+        "clock_unit"
+    ]
+    assert told.remedy.option == f"--gain time={step:g}"
