@@ -26,6 +26,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from spoils import SPOILS, Spoiled
+from spoils_of_channels import CHANNELS
 from spoils_of_clocks import CLOCKS
 from spoils_of_joints import JOINTS
 from spoils_of_owners import OWNERS
@@ -43,7 +44,7 @@ from skidyn.measurement import Suspicion
 from skidyn.robots import Robot
 
 ROBOTS = (load_panda, load_ur5, load_scara, load_planar_arm)
-MISTAKES = SPOILS | PARTS | CLOCKS | JOINTS | OWNERS
+MISTAKES = SPOILS | PARTS | CLOCKS | JOINTS | OWNERS | CHANNELS
 EFFECTS = (None, "stribeck", None, "payload", "torque_ripple", None, "spring", None)
 
 

@@ -8,7 +8,10 @@ from skidyn.evidence._streaming import evidence_from_parquet
 __all__ = ["Evidence", "evidence_from_motion", "evidence_from_parquet"]
 
 # For other packages of skidyn; no part of the public interface.
-from skidyn.evidence._broken import broken_notes as broken_notes
+from skidyn.evidence._broken import (
+    broken_notes as broken_notes,
+    without_broken_positions as without_broken_positions,
+)
 from skidyn.evidence._evidence import column_names as column_names
 from skidyn.evidence._folds import (
     RIDGE as RIDGE,

@@ -139,6 +139,32 @@ def _broken(signals: Signals, torque: Array) -> tuple[NDArray[np.bool_], NDArray
     return wrong if of is torque else find(), position
 
 
+def without_broken_positions(signals: Signals) -> Signals:
+    """Signals with lines through their neighbours in the place of broken positions.
+
+    Parameters
+    ----------
+    signals : Signals
+        Logged motion.
+
+    Returns
+    -------
+    Signals
+        The same object where no position is broken.
+    """
+    broken = signals.once("broken positions", lambda: leaps(signals.q, signals, POSITION_SHARE))
+    if not broken.any():
+        return signals
+    q = signals.q.copy()
+    for rows in signals.segments:
+        for k in np.flatnonzero(broken[rows].any(axis=0) & ~broken[rows].all(axis=0)):
+            bad, clock = broken[rows, k], signals.clock[rows]
+            q[rows.start + np.flatnonzero(bad), k] = np.interp(
+                clock[bad], clock[~bad], signals.q[rows, k][~bad]
+            )
+    return signals.with_(q=q)
+
+
 def broken_notes(signals: Signals, torque: Array, joint_names: tuple[str, ...]) -> list[str]:
     """What is to be said of broken samples.
 

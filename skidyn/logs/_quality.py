@@ -212,7 +212,12 @@ def check_log(frame: pd.DataFrame, robot: Robot | None = None) -> LogQuality:
     >>> quality.n_samples, round(quality.rate), quality.gaps
     (400, 100, 0)
     """
-    from skidyn.measurement import Measurement, check_measurement  # with them come the fits
+    from skidyn.measurement import (  # with them come the fits
+        Measurement,
+        check_measurement,
+        count_same_stamps,
+        regular_clock,
+    )
 
     n = count_joints(frame)
     if robot is not None and robot.n_joints != n:
@@ -242,7 +247,10 @@ def check_log(frame: pd.DataFrame, robot: Robot | None = None) -> LogQuality:
     if len(time) < 2:
         raise LogError(f"the log has {len(time)} finite row(s); at least two are needed.")
     unique = check_time_order(time, trajectory)
-    if not unique.all():
+    same_stamps = count_same_stamps(time, q, trajectory)
+    if same_stamps:
+        time = regular_clock(time, trajectory)  # what else is wrong shows with the remedy alone
+    elif not unique.all():
         messages.append(f"{int((~unique).sum())} row(s) repeat the time of the row before.")
         time, q, dq, tau, trajectory = (a[unique] for a in (time, q, dq, tau, trajectory))
     names = list(frame.attrs.get("joint_names", ())) if robot is None else list(robot.joint_names)
@@ -252,7 +260,7 @@ def check_log(frame: pd.DataFrame, robot: Robot | None = None) -> LogQuality:
     if robot is not None:
         prismatic = np.array([kind == "prismatic" for kind in robot.joint_types])
     motion = Signals(q, dq, np.zeros_like(q), trajectory, time, prismatic=prismatic)
-    measurement = Measurement(motion, tau, robot, names)
+    measurement = Measurement(motion, tau, robot, names, same_stamps=same_stamps)
     if len(measurement.steps) == 0:
         raise LogError("every trajectory of the log has a single row; nothing moves in it.")
     n_trajectories = len(np.unique(trajectory))

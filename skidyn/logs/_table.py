@@ -229,7 +229,7 @@ def _clean(
             )
     table["trajectory"] = number
     keep = check_time_order(time, number, source)
-    if not keep.all():
+    if not keep.all() and not _same_stamps(table, n, number, source, options):
         first = int(np.argmin(keep))
         warn_about_log(
             f"{source}: {int((~keep).sum())} of {len(keep)} rows repeat the time of the row before "
@@ -248,6 +248,23 @@ def _clean(
         match.notes.append(f"{source}: no velocities recorded; derived by central differences of q")
     require_columns(table, n, ("dq", *options.needed), source)
     return table
+
+
+def _same_stamps(
+    table: pd.DataFrame, n: int, number: np.ndarray, source: str, options: TableOptions
+) -> int:
+    """Rows that coarse stamps make look as if they repeated the one before."""
+    from skidyn.measurement import count_same_stamps
+
+    q = table[[f"q{k + 1}" for k in range(n)]].to_numpy()
+    same = count_same_stamps(table["time"].to_numpy(), q, number)
+    if same and options.remedies.clock != "regular":
+        raise LogError(
+            f"{source}: {same} of {len(table)} rows have the time of the row before although "
+            "joints have moved on: the time stamps are too coarse for the samples. If samples were "
+            "taken at even steps: --clock regular (in Python: clock='regular')."
+        )
+    return same
 
 
 def _split(

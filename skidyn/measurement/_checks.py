@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from skidyn._exceptions import LogError
+from skidyn.measurement._around_zero import DeadBand, TaredTorque
 from skidyn.measurement._bodies import (
     Bodies,
     ComputedTorque,
@@ -40,6 +41,7 @@ from skidyn.measurement._torque import Columns, TorqueDelay, UnsignedTorque
 from skidyn.measurement._units import ClockUnit, PositionUnit, WrappedPosition
 from skidyn.measurement._velocity import JoinedRecordings, Velocity, VelocityDelay
 
+TARED = TaredTorque()
 #: Nothing else in skidyn keeps a list of checks.
 CHECKS: tuple[Check, ...] = (
     LostRows(),
@@ -53,6 +55,8 @@ CHECKS: tuple[Check, ...] = (
     RepeatedRecordings(),
     ClockJitter(),
     InterpolatedRows(),
+    TARED,
+    DeadBand(),
     UnsignedTorque(),
     OddRecording(),
     Columns(),
@@ -63,8 +67,8 @@ CHECKS: tuple[Check, ...] = (
     VelocityDelay(),
     HeldTorque(),
     ComputedTorque(),
-    TorqueDelay(),
     SmoothedTorque(),
+    TorqueDelay(),
     Lengths(),
     ConstantTorque(),
     CopiedTorque(),
@@ -133,7 +137,6 @@ def check_measurement(measurement: Measurement) -> list[Suspicion]:
         found += told
         doubted = any(s.certainty != "noted" for s in told)
         measurement.scaled |= check.name == "torque_scale" and doubted
-        measurement.late |= check.name == "torque_delay" and doubted
         measurement.smoothed |= check.name == "smoothed_torque" and doubted
         if check in _UNITS and any(s.certainty == "certain" for s in told):
             misread = 1
@@ -147,7 +150,8 @@ def check_measurement(measurement: Measurement) -> list[Suspicion]:
 
 #: Checks whose certain suspicions make every fit of the robot meaningless, and those of which
 #: mere suspicions do.
-_UNITS, _SCALES = CHECKS[:5], CHECKS[1:3]
+_UNITS = CHECKS[:5]
+_SCALES = (*CHECKS[1:3], TARED)
 
 
 def names_in_doubt(found: list[Suspicion]) -> list[str]:

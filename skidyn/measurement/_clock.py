@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn._signals import Array, find_segments
+from skidyn._signals import Array, Signals, find_segments
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._measures import position_step
 from skidyn.measurement._suspicion import Suspicion
 
 #: Stamps nearer than this share of a step to a regular clock do not jitter.
@@ -25,23 +26,31 @@ WANDERING = 1.0
 #: Log-likelihood of the torque that even steps must gain for the stamps to do harm; share of a step
 #: by which stamps are off that do, where there is no robot to say so.
 HARM, OFF = 15.0, 0.02
+#: Share of the steps that are longer from which they may be those of rounded stamps, and how far
+#: these are from even ones, in steps: rows that are lost now and then take a clock farther away.
+MISSING, ROUNDED = 0.05, 1.5
 #: Share of rows that repeat, or lie on a line between their neighbours.
 REPEATED, ON_A_LINE = 0.02, 0.3
+#: Share of rows with the stamp of the row before from which the stamps are too coarse.
+SAME = 0.05
 #: Share of repeated rows from which accelerations, and with them findings, are wrong.
 MANY = 0.2
+#: Steps of a sensor that a position changes by at most where rows repeat because it is coarse.
+STEPS = 3.0
 
 
 def regular_clock(time: Array, trajectory: NDArray[np.int64]) -> Array:
     """Time of every row if the samples were taken at even steps.
 
     Rows are numbered by the recorded time where it leaves no doubt, so that a missing row stays
-    missing, and one after the other where stamps jitter by more than half a step. The straight
-    line through times over numbers is the clock.
+    missing, and one after the other where stamps jitter by more than half a step, or stay within a
+    step of even ones although many steps are twice as long as others: they were rounded. The
+    straight line through times over numbers is the clock.
 
     Parameters
     ----------
     time : ndarray of shape (n_samples,), s
-        Recorded clock.
+        Recorded clock; coarse stamps may repeat.
     trajectory : ndarray of shape (n_samples,)
         Trajectory of every row; gaps in time are kept.
 
@@ -64,13 +73,50 @@ def regular_clock(time: Array, trajectory: NDArray[np.int64]) -> Array:
             continue
         # every row, or with missing rows where the steps between stamps say so: the straighter
         step = _step(own)
-        missing = np.maximum(np.round(np.diff(own) / step), 1)
-        numbers = [np.arange(len(own)), np.r_[0, np.cumsum(missing)]]
-        lines = [np.polyval(np.polyfit(number, own, 1), number) for number in numbers]
-        regular[rows] = min(lines, key=lambda line: float(np.sum((line - own) ** 2)))
+        every = np.arange(len(own))
+        even = np.polyval(np.polyfit(every, own, 1), every)
+        missing = (
+            np.maximum(np.round(np.diff(own) / step), 1) if step > 0 else np.ones(len(own) - 1)
+        )
+        number = np.r_[0, np.cumsum(missing)]
+        longer = np.polyval(np.polyfit(number, own, 1), number)
+        rounded = np.mean(missing > 1) > MISSING and np.ptp(own - even) < ROUNDED * step
+        straighter = np.sum((even - own) ** 2) <= np.sum((longer - own) ** 2)
+        regular[rows] = even if rounded or straighter else longer
     if len(regular):
         regular += time[0] - regular[0]
     return regular
+
+
+def count_same_stamps(time: Array, q: Array, trajectory: NDArray[np.int64]) -> int:
+    """Rows with the stamp of the row before although joints have moved on; 0 where they are few.
+
+    Parameters
+    ----------
+    time : ndarray of shape (n_samples,), s
+        Recorded clock, before rows are left out.
+    q : ndarray of shape (n_samples, n_joints), rad or m
+        Recorded positions.
+    trajectory : ndarray of shape (n_samples,)
+        Trajectory of every row.
+
+    Returns
+    -------
+    int
+        Stamps that are rounded to more than a step of the samples are so many.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skidyn.measurement import count_same_stamps
+    >>> time = np.floor(np.arange(100) / 2) * 0.01
+    >>> count_same_stamps(time, np.sin(np.arange(100.0))[:, None], np.zeros(100, int))
+    50
+    """
+    same = (np.diff(time) == 0) & (trajectory[1:] == trajectory[:-1])
+    moved = np.any(q[1:] != q[:-1], axis=1)
+    count = int(np.sum(same & moved))
+    return count if count > SAME * len(time) else 0
 
 
 def _step(time: Array) -> float:
@@ -162,9 +208,18 @@ class ClockJitter(Check):
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         signals = measurement.signals
+        if measurement.same_stamps:
+            yield self.suspicion(
+                "the time stamps are too coarse for the samples",
+                f"{measurement.same_stamps} rows have the stamp of the row before although joints "
+                "have moved on",
+                "certain",
+                remedy=("--clock regular", "clock='regular'"),
+            )
+            return
         if len(measurement.steps) < 50 or np.any(measurement.steps <= 0):
             return
-        step = 1 / measurement.rate
+        step = float(np.mean(measurement.steps[measurement.steps < 2.5 / measurement.rate]))
         found = find_jitter(signals.clock, signals.q, signals.trajectory)
         if found.spread < REGULAR * step:
             return
@@ -252,8 +307,19 @@ class RepeatedRows(Check):
 
 
 def _coarse(measurement: Measurement) -> bool:
-    """Whether rows repeat because the position sensor is coarse: torque then goes on changing."""
+    """Whether rows repeat because the position sensor is coarse: torque then goes on changing.
+
+    What changes after a coarse step is a step or two; after rows that repeat, all that was missed.
+    """
     s = measurement.signals
+    sizes = []
+    for k in range(measurement.n_joints):
+        changes = np.abs(np.diff(s.q[:, k]))
+        step = position_step(s.q[:, k])
+        if np.isfinite(step) and changes.any():
+            sizes.append(float(np.median(changes[changes > 0])) / step)
+    if not sizes or np.median(sizes) > STEPS:
+        return False
     same = np.all(s.q[1:] == s.q[:-1], axis=1) & (s.trajectory[1:] == s.trajectory[:-1])
     other = np.any(measurement.torque[1:] != measurement.torque[:-1], axis=1)
     return bool(np.mean(other[same]) > 0.5) if same.any() else False
@@ -269,17 +335,7 @@ class InterpolatedRows(Check):
         s = measurement.signals
         if measurement.n_joints < 2:
             return
-        on_line, moving = 0, 0
-        for rows in s.segments:
-            q, time = s.q[rows], s.clock[rows]
-            if len(q) < 10:
-                continue
-            slope = np.diff(q, axis=0) / np.diff(time)[:, None]
-            moves = np.abs(slope[1:]) > 1e-3 * np.abs(slope).max(axis=0) + 1e-12
-            bend = np.abs(np.diff(slope, axis=0)) <= 1e-6 * np.abs(slope).max(axis=0)
-            both = moves.sum(axis=1) >= 2
-            moving += int(both.sum())
-            on_line += int((np.all(bend | ~moves, axis=1) & both).sum())
+        moving, on_line = _on_a_line(s, s.q)
         if moving > 50 and on_line > ON_A_LINE * moving:
             measurement.stale = True
             rate = float(f"{measurement.rate * (1 - on_line / moving):.3g}")
@@ -290,6 +346,31 @@ class InterpolatedRows(Check):
                 "certain",
                 remedy=(f"--resample {rate:g}", f"resample_rate={rate:g}"),
             )
+            return
+        moving, on_line = _on_a_line(s, measurement.torque)
+        if moving > 50 and on_line > ON_A_LINE * moving:
+            yield self.suspicion(
+                "torques were interpolated from a slower clock",
+                f"in {100 * on_line / moving:.0f} % of the rows all of them lie on straight lines "
+                "between their neighbours, and positions do not",
+                "noted",
+            )
+
+
+def _on_a_line(signals: Signals, values: Array) -> tuple[int, int]:
+    """Rows in which channels change, and those in which they lie between their neighbours."""
+    on_line, moving = 0, 0
+    for rows in signals.segments:
+        own, time = values[rows], signals.clock[rows]
+        if len(own) < 10:
+            continue
+        slope = np.diff(own, axis=0) / np.diff(time)[:, None]
+        moves = np.abs(slope[1:]) > 1e-3 * np.abs(slope).max(axis=0) + 1e-12
+        bend = np.abs(np.diff(slope, axis=0)) <= 1e-6 * np.abs(slope).max(axis=0)
+        both = moves.sum(axis=1) >= 2
+        moving += int(both.sum())
+        on_line += int((np.all(bend | ~moves, axis=1) & both).sum())
+    return moving, on_line
 
 
 class Gaps(Check):

@@ -50,9 +50,12 @@ class Measurement:
     identified : bool, optional
         Whether bodies are going to be identified, so that those of the description may be wrong; by
         default it is not known.
+    same_stamps : int, optional
+        Rows that had the stamp of the row before although joints moved on; ``signals`` then have
+        an even clock.
     unsigned, changes, delay, copies, late_position, readable, stale, lost, odd : optional
         What checks found that other checks use; filled in by them.
-    scaled, late, smoothed, computed, frictionless : bool, optional
+    scaled, smoothed, computed, frictionless : bool, optional
         What checks found that other checks use; filled in by them.
 
     Examples
@@ -70,6 +73,7 @@ class Measurement:
     robot: Robot | None
     joint_names: Sequence[str]
     identified: bool | None = None
+    same_stamps: int = 0
     unsigned: tuple[list[int], dict[int, float]] | None = field(default=None, repr=False)
     changes: list[Change] | None = field(default=None, repr=False)
     delay: Delay | None = field(default=None, repr=False)
@@ -80,7 +84,6 @@ class Measurement:
     lost: bool = field(default=False, repr=False)
     odd: bool = field(default=False, repr=False)
     scaled: bool = field(default=False, repr=False)
-    late: bool = field(default=False, repr=False)
     smoothed: bool = field(default=False, repr=False)
     computed: bool = field(default=False, repr=False)
     frictionless: bool = field(default=False, repr=False)
@@ -151,13 +154,22 @@ class Measurement:
         return np.asarray(self.steps[self.steps > 5 / self.rate])
 
     @cached_property
+    def whole(self) -> Signals:
+        """Motion without samples that leap away and back, which a diagnosis leaves out as well."""
+        from skidyn.evidence import without_broken_positions  # with it all columns of the evidence
+
+        return self.signals if self.signals.time is None else without_broken_positions(self.signals)
+
+    @cached_property
     def velocities(self) -> list[tuple[float, float]]:
         """Slope and correlation of integrated velocity on position, by joint."""
-        s = self.signals
+        s = self.whole
+        fresh = ~is_repeated(s.q, s.dq, s.trajectory)
+        s = s if fresh.all() else s.take(fresh)
         odd = list(self.odd_motion)
         parts = [rows for rows in s.segments if s.trajectory[rows.start] not in odd]
         return [
-            velocity_consistency(s.clock, self._unwrapped(k), s.dq[:, k], parts)
+            velocity_consistency(s.clock, self._unwrapped(k)[fresh], s.dq[:, k], parts)
             for k in range(self.n_joints)
         ]
 
@@ -173,7 +185,7 @@ class Measurement:
 
     def _unwrapped(self, k: int) -> Array:
         """Position without leaps by a turn, where it stays within one."""
-        q = self.signals.q[:, k].copy()
+        q = self.whole.q[:, k].copy()
         if not self.signals.prismatic[k] and np.ptp(q) < 1.1 * 2 * np.pi:
             for rows in self.signals.segments:
                 q[rows] = np.unwrap(q[rows])
@@ -223,8 +235,8 @@ class Measurement:
         if out.all():
             return None
         if not out.any():
-            return make_fits(self.signals, self.torque, self.robot)
-        return make_fits(self.signals.take(~out), self.torque[~out], self.robot)
+            return make_fits(self.whole, self.torque, self.robot)
+        return make_fits(self.whole.take(~out), self.torque[~out], self.robot)
 
     @cached_property
     def stuck(self) -> dict[int, list[int]]:

@@ -22,6 +22,7 @@ from skidyn.measurement._check import Check
 from skidyn.measurement._fits import student
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._suspicion import Suspicion
+from skidyn.measurement._torque import measured_delay
 
 #: Standard deviations of the smoothing that are tried, s, and ways of presliding, rad (a tenth in
 #: metres).
@@ -37,6 +38,8 @@ FAST = 0.03
 #: whose friction shows how it turns that must agree on a width, and at least how many; the shortest
 #: width that is no matter of samples, s.
 WORD, LEAST, AGREEING, JOINTS, SHORTEST = 2.0, 15.0, 0.6, 2, 0.05
+#: Delay of the torque, s, that smoothing does not make.
+LATE = 0.012
 
 
 @dataclass(frozen=True)
@@ -78,8 +81,11 @@ class SmoothedTorque(Check):
     misnames = True
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
-        if measurement.stale or measurement.lost or measurement.late or measurement.computed:
+        if measurement.stale or measurement.lost or measurement.computed:
             return
+        delay = measured_delay(measurement)
+        if delay is not None and delay.common > LATE:
+            return  # a filter that makes late is told as such
         found = {}
         motion = smooth_motion(measurement.signals).signals  # noise would blur when a joint turns
         for k in np.flatnonzero(measurement.excited).tolist():

@@ -341,7 +341,7 @@ class TorqueDelay(Check):
         found, fits = measured_delay(measurement), readable_fits(measurement)
         if found is None or fits is None or not np.isfinite(found.common):
             return
-        if measurement.stale or measurement.computed:
+        if measurement.stale or measurement.computed or measurement.smoothed:
             return  # held and interpolated values are late, or early, by themselves
         drift = found.late - found.early
         if abs(drift) > max(SMALLEST, DRIFTING * found.drift_error) and found.gain > LEAST:

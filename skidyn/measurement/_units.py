@@ -26,6 +26,8 @@ NEAR = 0.1
 MINUTES = 0.02
 #: How many times its limit a position reaches that is suspicious, and that is no position.
 FAR, DISTANT = 1.5, 4.0
+#: How many times its limit the position of a sliding joint reaches that is in millimetres.
+MILLIMETRES = 20.0
 #: Largest positions, rad, that would hardly be a motion if they were degrees.
 LEAST_DEGREES = 6.0
 #: How nearly a factor is a round number that it is taken for.
@@ -109,13 +111,17 @@ class ClockUnit(Check):
 
 
 class PositionUnit(Check):
-    """Positions of turning joints in degrees, turns, counts, or of the motors."""
+    """Positions in degrees, turns, counts or millimetres, or of the motors."""
 
     name = "position_unit"
-    suspects = "positions in degrees, turns or counts of an encoder, or of motors before the gears"
+    suspects = (
+        "positions in degrees, turns, millimetres or counts of an encoder, or of motors before the "
+        "gears"
+    )
     misnames = True
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        yield from self._sliding(measurement)
         slopes = [s for s, r in measurement.velocities if np.isfinite(s) and r > ALIKE]
         typical = float(np.median(slopes)) if slopes else 1.0
         for factor, unit in POSITIONS.items():
@@ -147,6 +153,27 @@ class PositionUnit(Check):
             yield from self._by_turns(measurement, both)
         elif _too_far(measurement, FAR).any():
             yield from self._beyond_limits(measurement, both)
+
+    def _sliding(self, measurement: Measurement) -> Iterator[Suspicion]:
+        """Sliding joints in millimetres."""
+        if measurement.robot is None:
+            return
+        largest = np.abs(measurement.signals.q).max(axis=0)
+        limits = np.abs(np.asarray(measurement.robot.position_limits)).max(axis=1)
+        for k in np.flatnonzero(measurement.signals.prismatic & np.isfinite(limits)).tolist():
+            if not MILLIMETRES * limits[k] < largest[k] < FAR * 1e3 * limits[k]:
+                continue
+            slope, likeness = measurement.velocities[k]
+            both = likeness > ALIKE and abs(slope - 1) < NEAR
+            gains = dict.fromkeys([f"q{k + 1}", f"dq{k + 1}"] if both else [f"q{k + 1}"], 1e-3)
+            words = ",".join(f"{name}={size:g}" for name, size in gains.items())
+            yield self.suspicion(
+                f"the position of {measurement.joint(k)} looks like millimetres",
+                f"it reaches {largest[k]:.4g} where the limit is {limits[k]:.3g} m",
+                "certain",
+                [k],
+                (f"--gain {words}", f"gain={gains}"),
+            )
 
     def _by_turns(self, measurement: Measurement, both: dict[str, str]) -> Iterator[Suspicion]:
         """Without a robot: positions that run over several turns."""

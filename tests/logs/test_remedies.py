@@ -153,3 +153,17 @@ def test_rows_that_hold_all_torques_are_left_out(read):
     mended = read(held, drop_repeated=True)
     assert len(mended) < 0.3 * len(LOG)
     assert mended["tau1"].isin(LOG["tau1"]).all()
+
+
+@pytest.mark.parametrize("unit", [0.015, 0.025])
+def test_stamps_that_are_coarser_than_the_samples(tmp_path, unit):
+    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=2, duration=2.0)
+    coarse = np.round(np.floor(log.frame["time"] / unit) * unit, 9)
+    path = tmp_path / "log.parquet"
+    log.frame.assign(time=coarse).to_parquet(path)
+    with pytest.raises(LogError, match="too coarse for the samples.*--clock regular"):
+        read_log(path, robot=log.robot)
+    mended = read_log(path, robot=log.robot, clock="regular")
+    assert len(mended) == len(log.frame)
+    for _, own in mended.groupby("trajectory"):
+        assert np.diff(own["time"]) == pytest.approx(0.01, rel=0.02)

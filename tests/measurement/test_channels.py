@@ -48,3 +48,10 @@ def test_torque_before_drives_are_enabled(backwards, arm, recorded, tmp_path):
     frame.to_parquet(tmp_path / "log.parquet")
     kept = read_log(tmp_path / "log.parquet", robot=arm, drop_repeated=True)
     assert len(kept) == len(frame) - 160 and (kept[["tau1", "tau2"]] != 0).all(axis=None)
+
+
+def test_positions_that_leap_to_zero_spoil_no_other_check(recorded, told_of):
+    frame = recorded.frame.copy()
+    lost = np.random.default_rng(0).random(len(frame)) < 0.005
+    frame.loc[lost, ["q1", "q2"]] = 0.0
+    assert {s.certainty for s in told_of(frame).values()} <= {"noted"}

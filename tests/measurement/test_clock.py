@@ -2,6 +2,7 @@
 """Time stamps that jitter, and rows that repeat."""
 
 import numpy as np
+import pytest
 
 from skidyn.datasets import make_hidden_effect_log
 from skidyn.effects import Signals
@@ -42,3 +43,33 @@ def test_stamps_are_certain_only_where_they_do_harm(arm, told_of):
     assert certainties[2e-5].certainty == "suspected"
     assert "little harm" in certainties[2e-5].evidence
     assert certainties[1e-3].certainty == "certain"
+
+
+def test_torques_of_a_slower_clock(recorded, told_of):
+    frame = recorded.frame.copy()
+    for rows in frame.groupby("trajectory").groups.values():
+        t = frame.loc[rows, "time"].to_numpy()
+        for name in ("tau1", "tau2"):
+            frame.loc[rows, name] = np.interp(t, t[::4], frame.loc[rows, name].to_numpy()[::4])
+    told = told_of(frame)["interpolated_rows"]
+    assert told.certainty == "noted" and told.suspicion.startswith("torques were interpolated")
+
+
+@pytest.mark.parametrize("unit", [0.007, 0.009, 0.0125, 0.025])
+def test_stamps_that_are_rounded(recorded, told_of, unit):
+    frame = recorded.frame
+    stamps = np.round(np.floor((frame["time"] + 1e-4) / unit) * unit, 9)
+    told = told_of(frame.assign(time=stamps))
+    assert told["clock_jitter"].certainty == "certain"
+    assert told["clock_jitter"].remedy.option == "--clock regular"
+
+
+def test_positions_that_are_reported_less_often_than_torque(recorded, told_of):
+    frame = recorded.frame.copy()
+    names = [f"{q}{k}" for q in ("q", "dq") for k in (1, 2)]
+    for rows in frame.groupby("trajectory").groups.values():
+        held = frame.loc[rows, names].to_numpy()
+        frame.loc[rows, names] = held[np.arange(len(rows)) // 4 * 4]
+    told = told_of(frame)
+    assert told["repeated_rows"].certainty == "certain"
+    assert not {"clock_unit", "velocity"} & set(told)

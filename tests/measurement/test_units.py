@@ -4,6 +4,9 @@
 import numpy as np
 import pytest
 
+from skidyn.datasets import load_scara, make_hidden_effect_log
+from skidyn.logs import check_log
+
 
 def test_degrees_of_positions_alone(signals, torque, found, only):
     degrees = signals.with_(q=np.rad2deg(signals.q))
@@ -56,3 +59,12 @@ def test_row_numbers_in_the_place_of_time(recorded, told_of):
         "clock_unit"
     ]
     assert told.remedy.option == f"--gain time={step:g}"
+
+
+def test_a_slider_in_millimetres():
+    robot = load_scara()
+    frame = make_hidden_effect_log(robot, None, n_trajectories=3, duration=4.0).frame
+    checks = check_log(frame.assign(q3=1e3 * frame["q3"], dq3=1e3 * frame["dq3"]), robot).checks
+    told = {s.check: s for s in checks}["position_unit"]
+    assert told.remedy.option == "--gain q3=0.001,dq3=0.001"
+    assert told.certainty == "certain" and told.joints == (3,)
