@@ -15,10 +15,9 @@ NOISE = 0.2
 
 
 @pytest.fixture(scope="module")
-def bare():
+def bare(complete):
     """A comparison of a planar arm whose residual is white noise."""
-    log = make_hidden_effect_log(load_planar_arm(), None)
-    comparison = diagnose(RBDRegressor(log.robot), log.X, log.y).comparison
+    comparison = complete.comparison
     noise = np.random.default_rng(0).normal(scale=NOISE, size=comparison.measured.shape)
     return replace(comparison, predicted=comparison.measured - noise)
 

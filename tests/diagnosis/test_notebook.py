@@ -3,18 +3,6 @@
 
 import dataclasses
 
-import pytest
-
-from skidyn.datasets import load_planar_arm, make_hidden_effect_log
-from skidyn.diagnosis import diagnose
-from skidyn.identification import RBDRegressor
-
-
-@pytest.fixture(scope="module")
-def missing():
-    log = make_hidden_effect_log(load_planar_arm(), "spring", joints=[2])
-    return diagnose(RBDRegressor(log.robot), log.X, log.y)
-
 
 def test_a_notebook_shows_it_escaped(missing):
     hostile = dataclasses.replace(missing, joint_names=("<script>", "elbow"))

@@ -4,24 +4,8 @@
 import dataclasses
 
 import numpy as np
-import pytest
 
-from skidyn.datasets import load_planar_arm, make_hidden_effect_log
-from skidyn.diagnosis import diagnose
 from skidyn.diagnosis._episodes import Episode
-from skidyn.identification import RBDRegressor
-
-
-@pytest.fixture(scope="module")
-def missing():
-    log = make_hidden_effect_log(load_planar_arm(), "spring", joints=[2])
-    return diagnose(RBDRegressor(log.robot), log.X, log.y)
-
-
-@pytest.fixture(scope="module")
-def complete():
-    log = make_hidden_effect_log(load_planar_arm(), None)
-    return diagnose(RBDRegressor(log.robot), log.X, log.y)
 
 
 def test_says_what_is_missing_and_where_in_the_headline(missing):

@@ -1,0 +1,18 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What is tried depends on the log and on the model."""
+
+from skidyn.diagnosis import catalogue_candidates
+
+
+def test_what_the_model_has_or_the_log_cannot_show_is_not_tried(missing):
+    kinds = ["viscous", "spring", "temperature_friction"]
+    candidates = catalogue_candidates(missing.problem, kinds)
+    assert {c.kind for c in candidates} == {"spring"}
+    assert {c.site for c in candidates} == {("spring", (0,)), ("spring", (1,))}
+
+
+def test_shapes_make_candidates_of_one_site(missing):
+    candidates = catalogue_candidates(missing.problem, ["stribeck"])
+    sites = [c.site for c in candidates]
+    assert len(sites) > len(set(sites)) == 2
+    assert all(c.n_shapes > 0 and c.width == len(c.signs) for c in candidates)

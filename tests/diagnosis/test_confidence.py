@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How sure a name is rises and falls with what speaks for it."""
+
+import pytest
+
+from skidyn.diagnosis import confidence
+
+
+def test_a_clear_name_is_sure_but_never_certain():
+    assert 0.9 < confidence(1.0, 1.0, 1.0) <= 0.98
+
+
+@pytest.mark.parametrize(
+    "against",
+    [
+        {"nameless": True},
+        {"whole_recordings": False},
+        {"alike": True},
+    ],
+)
+def test_what_speaks_against_a_name_lowers_it(against):
+    assert confidence(0.3, 1.0, 0.3, **against) < confidence(0.3, 1.0, 0.3)
+
+
+def test_margin_white_remainder_and_size_raise_it():
+    middle = confidence(0.3, 4.0, 0.05)
+    assert confidence(0.6, 4.0, 0.05) > middle
+    assert confidence(0.3, 2.0, 0.05) > middle
+    assert confidence(0.3, 4.0, 0.2) > middle

@@ -1,0 +1,275 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Hidden effects are named and sized, and what is wrong with the data is not taken for one."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from skidyn.datasets import load_planar_arm, load_ur5, make_hidden_effect_log
+from skidyn.diagnosis import diagnose
+from skidyn.exceptions import LogError, LogWarning
+from skidyn.explorer import Session
+from skidyn.identification import RBDRegressor
+
+ROBOTS = {"ur5": load_ur5, "planar arm": load_planar_arm}
+#: Parameter of the truth whose interval is checked.
+SIZE = {
+    "viscous": "Fv",
+    "coulomb": "Fc",
+    "offset": "tau0",
+    "asymmetric_friction": "dFv",
+    "stribeck": "dF",
+    "nonlinear_viscous": "power",
+    "load_dependent_friction": "mu",
+    "dahl": "presliding",
+    "rotor_inertia": "Ia",
+    "spring": "k",
+    "torque_ripple": "N",
+    "payload": "mass",
+    "time_delay": "delay",
+    "temperature_friction": "dFv_dT",
+}
+#: Kinds that act on all joints, or on the tool: the joints are not chosen.
+WHOLE = ("payload", "time_delay")
+HYSTERESIS = {"dahl", "lugre", "maxwell_slip"}
+
+
+def hidden_log(kind, robot, noise):
+    base = tuple(b for b in ("viscous", "coulomb") if b != kind)
+    # The inertia of the rotor of a UR's second joint is part of its link's: take one that shows.
+    joint = 4 if kind == "rotor_inertia" and robot == "ur5" else 2
+    joints = None if kind in (None, *WHOLE) else [joint]
+    log = make_hidden_effect_log(
+        ROBOTS[robot](), kind, joints=joints, noise=noise, base=base, random_state=11
+    )
+    return log, RBDRegressor(log.robot, base)
+
+
+@pytest.mark.parametrize("noise", ["low", "high"])
+@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("kind", SIZE)
+def test_hidden_effect_is_named_and_sized_and_the_error_falls(kind, robot, noise):
+    log, model = hidden_log(kind, robot, noise)
+
+    diagnosis = diagnose(model, log.X, log.y)
+
+    assert diagnosis.verdict == "missing"
+    assert len(diagnosis.findings) == 1, [f.sentence for f in diagnosis.findings]
+    finding = diagnosis.findings[0]
+    names = {finding.kind, *finding.rivals}
+    if kind in HYSTERESIS:  # members of the family need a special motion to be told apart
+        assert finding.kind in HYSTERESIS
+        assert kind in names
+    else:
+        assert finding.kind == kind
+    assert finding.joints == tuple(log.joints)
+    assert finding.q_value < 1e-3
+    if finding.kind == kind:
+        # The simulated temperature dependence is exponential, the fitted one a parabola.
+        spare = 0.25 if kind == "temperature_friction" else 0.01
+        _assert_inside(finding.parameters[SIZE[kind]], log.parameters[SIZE[kind]], spare)
+    # Noise of the simulated sensors, or what the model without an effect leaves: whichever is more.
+    floor = _error_without_effect(robot, noise)
+    reached = diagnosis.rmse_after / np.maximum(floor, log.noise_std)
+    limit = 2.0 if kind == "time_delay" else 1.5
+    assert np.all(reached < limit), reached
+    assert np.any(diagnosis.rmse_after < 0.99 * diagnosis.rmse_before)
+
+
+@pytest.mark.parametrize("noise", ["low", "high"])
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_nothing_is_found_where_nothing_is_hidden(robot, noise):
+    log, model = hidden_log(None, robot, noise)
+
+    diagnosis = diagnose(model, log.X, log.y)
+
+    assert diagnosis.verdict == "complete"
+    assert diagnosis.findings == []
+    assert diagnosis.limits, "what the data could still hide is stated"
+
+
+def test_backlash_and_elasticity_are_told_apart():
+    for kind in ("backlash", "joint_elasticity"):
+        log = make_hidden_effect_log(load_planar_arm(), kind, joints=[1], random_state=5)
+        found = diagnose(RBDRegressor(log.robot), log.X, log.y).findings
+        assert found[0].kind == kind
+
+
+def test_unknown_effect_is_reported_with_its_variables():
+    log = make_hidden_effect_log(load_ur5(), "unknown_cable", joints=[2, 3], random_state=2)
+
+    diagnosis = diagnose(RBDRegressor(log.robot), log.X, log.y)
+
+    assert diagnosis.verdict == "unknown"
+    assert diagnosis.unexplained["joints"] == [2, 3]
+    assert diagnosis.unexplained["variables"] == ["q2", "q3"]
+    assert diagnosis.rmse_after[1] < 0.5 * diagnosis.rmse_before[1]
+
+
+def _assert_inside(parameter, truth, spare):
+    value, low, high = (parameter[k] for k in ("value", "low", "high"))
+    truth = float(np.ravel(truth)[0])
+    # A 95 % interval misses once in twenty: a little more than itself must hold the truth.
+    margin = 0.5 * (high - low) + spare * abs(truth)
+    assert low - margin <= truth <= high + margin, (low, truth, high)
+    assert abs(value - truth) < (0.15 + spare) * abs(truth)
+
+
+_FLOORS: dict[tuple[str, str], np.ndarray] = {}
+
+
+def _error_without_effect(robot, noise):
+    if (robot, noise) not in _FLOORS:
+        log, model = hidden_log(None, robot, noise)
+        _FLOORS[robot, noise] = diagnose(model, log.X, log.y).rmse_before
+    return _FLOORS[robot, noise]
+
+
+@pytest.fixture(scope="module")
+def log():
+    return make_hidden_effect_log(load_planar_arm(), None, noise="high", random_state=8)
+
+
+def found(log, X, torque):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        diagnosis = diagnose(RBDRegressor(log.robot), X, torque)
+    said = " ".join([*diagnosis.warnings, *(str(w.message) for w in caught)])
+    return [(f.kind, f.joints) for f in diagnosis.findings], said
+
+
+def test_quantised_torque(log):
+    step = 0.5 * np.std(log.y, axis=0)
+
+    kinds, _ = found(log, log.X, np.round(log.y / step) * step)
+
+    assert kinds == []
+
+
+def test_a_few_broken_rows(log):
+    torque = np.array(log.y)
+    rng = np.random.default_rng(0)
+    rows = rng.choice(len(torque), 20, replace=False)
+    torque[rows] += 30 * rng.normal(size=(20, 2)) * np.std(torque, axis=0)
+
+    kinds, said = found(log, log.X, torque)
+
+    assert kinds == []
+    assert "leaps away and back" in said
+
+
+def test_rows_repeated_by_a_logger_that_polls_too_fast(log):
+    X, torque = log.X.copy(), np.array(log.y)
+    columns = ["q1", "q2", "dq1", "dq2"]
+    late = np.arange(4, len(X), 7)
+    X.loc[late, columns] = X.loc[late - 1, columns].to_numpy()
+    torque[late] = torque[late - 1]
+
+    kinds, said = found(log, X, torque)
+
+    assert kinds == []
+    assert "repeat" in said
+
+
+def test_a_torque_channel_that_lags(log):
+    torque = np.array(log.y)
+    for name in np.unique(log.X["trajectory"]):
+        rows = np.flatnonzero(log.X["trajectory"] == name)
+        torque[rows[2:]] = torque[rows[:-2]]
+
+    kinds, _ = found(log, log.X, torque)
+
+    assert [kind for kind, _ in kinds] == ["time_delay"]
+
+
+def test_torque_cut_off_at_a_limit_is_said(log):
+    limit = np.quantile(np.abs(log.y[:, 0]), 0.9)
+
+    kinds, said = found(log, log.X, np.clip(log.y, [-limit, -np.inf], [limit, np.inf]))
+
+    assert {kind for kind, _ in kinds} <= {"saturation"}
+    assert "saturated" in said
+
+
+def test_an_error_of_units_is_said_with_its_evidence(log):
+    X = log.X.copy()
+    X[["q1", "q2", "dq1", "dq2"]] = np.rad2deg(X[["q1", "q2", "dq1", "dq2"]])
+
+    with pytest.raises(LogError, match="degrees.*--units q=deg,dq=deg/s"):
+        found(log, X, log.y)
+
+
+def test_no_physics_is_named_while_a_unit_is_in_doubt():
+    arm = load_planar_arm()
+    log = make_hidden_effect_log(arm, "spring", n_trajectories=8, duration=6.0, random_state=3)
+    X = log.X.assign(time=1.5 * log.X["time"])  # the clock, or velocities at another scale
+
+    told = (
+        r"measurement is in doubt \(.*scale of the clock.*\), so that no physical effect is named"
+    )
+    with pytest.warns(LogWarning, match=told):
+        doubted = diagnose(RBDRegressor(arm, effects=["viscous", "coulomb"]), X, log.y)
+
+    assert {(check.check, check.certainty) for check in doubted.checks} == {
+        ("clock_unit", "suspected")
+    }
+    assert {finding.kind for finding in doubted.findings} == {"unknown"}
+
+
+def test_an_effect_is_found_beside_a_joint_that_rests():
+    robot, rng = load_planar_arm(), np.random.default_rng(0)
+    tables, torques = [], []
+    for trajectory in range(8):
+        t = np.arange(0, 8, 0.01)
+        a, w = rng.normal(size=(2, 3)), 2 * np.pi * np.array([0.2, 0.45, 0.7])
+        phase = np.outer(t, w)
+        q2 = 0.6 * (np.sin(phase) @ a[0] + np.cos(phase) @ a[1])
+        dq2 = 0.6 * (np.cos(phase) @ (a[0] * w) - np.sin(phase) @ (a[1] * w))
+        ddq2 = -0.6 * (np.sin(phase) @ (a[0] * w**2) + np.cos(phase) @ (a[1] * w**2))
+        still = np.zeros_like(q2)
+        q, dq, ddq = (np.column_stack([still, x]) for x in (q2, dq2, ddq2))
+        tau = robot.inverse_dynamics(q, dq, ddq)
+        tau[:, 1] += 0.4 * dq2 + 0.6 * np.tanh(dq2 / 0.01) + 1.5 * (q2 - 0.2)
+        tau += 0.02 * rng.normal(size=tau.shape)
+        frame = {"time": t, "trajectory": trajectory, "q1": q[:, 0], "q2": q2}
+        tables.append(pd.DataFrame(frame | {"dq1": still, "dq2": dq2}))
+        torques.append(tau)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # that it rests is said too
+        diagnosis = diagnose(RBDRegressor(robot), pd.concat(tables), np.vstack(torques))
+
+    assert [(f.kind, f.joints) for f in diagnosis.findings] == [("spring", (2,))]
+    assert np.isfinite(diagnosis.rmse_after).all()
+    assert 0 <= diagnosis.findings[0].q_value < 1e-6
+
+
+def test_a_robot_that_rests_is_refused_by_a_sentence():
+    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=4, duration=4.0)
+    X = log.X.copy()
+    moving = [c for c in X.columns if c[0] in "dq" and c[-1].isdigit()]
+    X[moving] = 0.0
+    y = 0.3 + 0.01 * np.random.default_rng(2).normal(size=np.shape(log.y))
+
+    with pytest.raises(ValueError, match="no joint slides long enough"):
+        diagnose(RBDRegressor(log.robot), X, y)
+
+
+@pytest.mark.parametrize(
+    ("load", "kind"), [(load_planar_arm, "load_dependent_friction"), (load_ur5, "torque_gain")]
+)
+def test_a_completed_model_is_complete(load, kind):
+    """Also where the effect's columns need the load or the torque of the model itself."""
+    log = make_hidden_effect_log(load(), kind, joints=[2])
+    model = RBDRegressor(log.robot, ("viscous", "coulomb"))
+    first = diagnose(model, log.X, log.y)
+    assert [(f.kind, f.joints) for f in first.findings] == [(kind, (2,))]
+    completed = model.with_effects(first.findings[0].terms)
+    second = diagnose(completed, log.X, log.y)
+    assert second.verdict == "complete"
+    assert second.rmse_before == pytest.approx(first.rmse_after, rel=0.1)
+    assert Session(completed, log.X, log.y).history[0]["rmse"] is not None

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A finding in numbers, words and curves."""
+
+import json
+
+import numpy as np
+
+from skidyn.diagnosis import notes
+
+
+def test_words_and_numbers_are_the_same(missing):
+    (finding,) = missing.findings
+    assert finding.sentence.startswith("Spring on joint 2: k = ")
+    assert f"removes {finding.error_drop:.0%} of the held-out squared error" in finding.sentence
+    assert finding.code == 'model = diagnosis.add("spring", joints=[2])'
+    told = json.loads(json.dumps(finding.to_dict()))
+    assert (told["kind"], told["joints"]) == ("spring", [2])
+
+
+def test_the_interval_holds_the_truth(missing, spring_log):
+    stiffness = missing.findings[0].parameters["k"]
+    assert stiffness["low"] < float(np.ravel(spring_log.parameters["k"])[0]) < stiffness["high"]
+    assert stiffness["unit"] == "N m/rad"
+
+
+def test_the_curve_is_that_of_a_spring(missing):
+    (curve,) = missing.findings[0].curves
+    assert (curve["variable"], curve["unit"]) == ("q2", "rad")
+    slope = np.polyfit(curve["x"], curve["effect"], 1)[0]
+    assert (
+        slope == np.float64(slope)
+        and abs(slope / missing.findings[0].parameters["k"]["value"] - 1) < 0.05
+    )
+    assert (curve["low"] <= curve["high"]).all()
+
+
+def test_a_mass_below_zero_is_explained():
+    assert "description has a load" in notes("payload", {"mass": {"value": -1.0}})[-1]

@@ -1,0 +1,12 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Held-out residuals are those of models that have not seen the sample."""
+
+import numpy as np
+
+
+def test_errors_of_data_left_out_are_no_smaller_than_those_of_the_fit(missing, spring_log):
+    inside = np.asarray(spring_log.y) - missing.model.predict(spring_log.X)
+    sliding = missing.comparison_after.sliding
+    fitted = np.sqrt(np.mean(inside[sliding] ** 2))
+    held = np.sqrt(np.mean(missing.comparison_after.residual[sliding] ** 2))
+    assert fitted < 1.02 * held < 1.2 * fitted

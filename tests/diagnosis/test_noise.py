@@ -1,0 +1,13 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Noise of the torque sensor from what changes faster than any motion."""
+
+import numpy as np
+
+
+def test_it_is_that_of_the_simulated_sensor(spring_log, missing):
+    ratio = missing.sensor_noise / spring_log.noise_std
+    assert (ratio > 0.8).all() and (ratio < 1.05).all()  # a lower bound
+
+
+def test_a_missing_effect_does_not_raise_it(missing, complete):
+    np.testing.assert_allclose(missing.sensor_noise, complete.sensor_noise, rtol=0.3)

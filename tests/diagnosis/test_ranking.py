@@ -1,0 +1,11 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Explanations in the order of what they do."""
+
+
+def test_the_first_of_a_ranking_was_added_and_rivals_score_less(missing):
+    step = missing.result.steps[0]
+    first, *others = step.ranking
+    assert first is step.added and first.kind == "spring"
+    assert all(other.kind != "spring" for other in others)
+    rivals = [h.score for h in others if h.joints == first.joints]
+    assert not rivals or max(rivals) < first.score

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What single recordings have is found in them."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.diagnosis import diagnose
+from skidyn.identification import RBDRegressor
+
+
+@pytest.fixture(scope="module")
+def log():
+    return make_hidden_effect_log(load_planar_arm(), None, noise="high", random_state=8)
+
+
+def found(log, X, torque):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        diagnosis = diagnose(RBDRegressor(log.robot), X, torque)
+    said = " ".join([*diagnosis.warnings, *(str(w.message) for w in caught)])
+    return [(f.kind, f.joints) for f in diagnosis.findings], said
+
+
+def test_a_sensor_zeroed_anew_before_each_recording(log):
+    shift = 0.6 * np.random.default_rng(1).normal(size=10)
+    torque = np.array(log.y)
+    torque[:, 1] += shift[log.X["trajectory"].to_numpy() - 1] * np.std(torque[:, 1])
+
+    kinds, _ = found(log, log.X, torque)
+
+    assert set(kinds) == {("offset", (2,))}  # one finding for every recording that differs
