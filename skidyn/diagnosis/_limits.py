@@ -16,7 +16,15 @@ from skidyn._text import inside
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._rule import Settings
 from skidyn.effects import get_effect, list_effects
-from skidyn.evidence import Normal, Problem, column_sizes
+from skidyn.evidence import (
+    Felt,
+    Normal,
+    Problem,
+    column_sizes,
+    felt_columns,
+    gram_of,
+    products_with,
+)
 
 #: Chance of finding an effect of the stated magnitude.
 POWER = 0.8
@@ -141,8 +149,8 @@ def find_limits(
     gates : Gates
         What an effect must remove to be a finding.
     """
-    design = [a / s for a, s in zip(problem.design(blocks), sigma, strict=True)]
-    gram = np.asarray(sum(a.T @ a for a in design))
+    felt, width = felt_columns(problem, blocks, sigma)
+    gram = gram_of(felt, width)
     model = Normal(gram, np.zeros(len(gram)), column_sizes(gram))
     power = [float(np.sum(t**2)) / s**2 for t, s in zip(problem.target, sigma, strict=True)]
     largest: dict[tuple[str, int], list[tuple[Candidate, float]]] = {}
@@ -152,7 +160,7 @@ def find_limits(
         if len(candidate.joints) != 1 or effect.nameless or share:
             continue
         joint = candidate.joints[0]
-        own, swept = _information(candidate, design, sigma, model)
+        own, swept = _information(candidate, felt, width, sigma, model)
         needed = gates.needed(joint, candidate.width + candidate.n_shapes, float(inflation[joint]))
         size = needed / np.sqrt(swept) if swept > NEW_SHARE * own else np.inf
         # More than all that the torque holds is no limit, nor a torque beyond its range, of which
@@ -201,11 +209,11 @@ def _hidden_shapes(tried: Sequence[tuple[Candidate, float]]) -> list[float]:
 
 
 def _information(
-    candidate: Candidate, design: Sequence[Array], sigma: Array, model: Normal
+    candidate: Candidate, felt: Sequence[Felt], width: int, sigma: Array, model: Normal
 ) -> tuple[float, float]:
     """Squared size of the first column before and after the model and the other columns."""
     z = {j: block / sigma[j] for j, block in candidate.rows.items()}
-    cross = np.asarray(sum(design[j].T @ block for j, block in z.items()))
+    cross = products_with(felt, z, width)
     own = np.asarray(sum(block.T @ block for block in z.values()))
     swept = own - cross.T @ model.solve(cross)
     if len(own) == 1:

@@ -11,7 +11,15 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
-from skidyn.evidence import RIDGE, Gain, Problem, refine_term, soft_prior, solve_left_out
+from skidyn.evidence import (
+    RIDGE,
+    Gain,
+    Problem,
+    felt_columns,
+    refine_term,
+    soft_prior,
+    solve_left_out,
+)
 
 #: Interleaved parts of a trajectory.
 QUARTERS = 4
@@ -52,17 +60,20 @@ def profile_error(
     -------
     ndarray of shape (n_folds, n_joints), (N m)^2 or N^2
     """
-    grams = _joint_grams(problem, blocks, target, within)
+    grams, width = _joint_grams(problem, blocks, target, within)
     counts = problem.rows.counts
-    errors = np.zeros(grams.shape[:2])
-    places = _places(blocks, soft, grams.shape[2] - 1)
+    errors = np.zeros((len(grams[0][1]), len(grams)))
+    places = _places(blocks, soft, width)
     for _ in range(passes):
-        weight = 1 / sigma**2
-        joined = np.tensordot(grams, weight, axes=(1, 0))
+        joined = np.zeros((len(errors), width + 1, width + 1))
+        for (own, gram), s in zip(grams, sigma, strict=True):
+            joined[:, own[:, None], own] += gram / s**2
         pull = soft_prior(joined[:, :-1, :-1].sum(0), places) if places else None
         _, left = solve_left_out(joined[:, :-1, :-1], joined[:, :-1, -1], pull, ridge=10 * RIDGE)
         b = np.column_stack([-left, np.ones(len(left))])
-        errors = np.sum(np.matmul(grams, b[:, None, :, None])[..., 0] * b[:, None], axis=2)
+        for j, (own, gram) in enumerate(grams):
+            part = b[:, own]
+            errors[:, j] = np.sum(np.matmul(gram, part[:, :, None])[:, :, 0] * part, axis=1)
         # A joint that rests has no rows; its weight is of no account but must be finite.
         sigma = np.where(counts > 0, np.sqrt(errors.sum(0) / np.maximum(counts, 1)) + 1e-100, 1.0)
     return errors
@@ -86,19 +97,25 @@ def _joint_grams(
     blocks: Sequence[dict[int, Array]],
     target: Sequence[Array],
     within: bool,
-) -> Array:
-    """Gram matrix of [columns | torque] of every fold and joint."""
-    design = problem.design(blocks)
-    p = design[0].shape[1] + 1
+) -> tuple[list[tuple[NDArray[np.int64], Array]], int]:
+    """Gram matrices of [columns | torque] by fold, as far as a joint feels the columns.
+
+    Returns
+    -------
+    grams : list of (ndarray of shape (k,), ndarray of shape (n_folds, k, k))
+        By joint, the places of what it feels, and the products.
+    width : int
+        Columns of the model, behind which the torque has its place.
+    """
+    felt, width = felt_columns(problem, blocks)
     labels = problem.rows.quarter if within else problem.fold
     n_folds = QUARTERS if within else problem.n_folds
-    grams = np.zeros((n_folds, problem.n_joints, p, p))
-    for j, (block, y) in enumerate(zip(design, target, strict=True)):
-        a = np.column_stack([block, y])
-        for f in range(n_folds):
-            part = a[labels[j] == f]
-            grams[f, j] = part.T @ part
-    return grams
+    grams = []
+    for own, y, label in zip(felt, target, labels, strict=True):
+        a = np.column_stack([own.rows, y])
+        parts = [a[label == f] for f in range(n_folds)]
+        grams.append((np.append(own.places, width), np.array([x.T @ x for x in parts])))
+    return grams, width
 
 
 def log_likelihood_gain(before: Array, after: Array, counts: NDArray[np.int64]) -> Array:

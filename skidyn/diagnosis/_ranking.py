@@ -29,7 +29,7 @@ from skidyn.diagnosis._rule import (
     RESOLVED,
     Tester,
 )
-from skidyn.diagnosis._screen import Screen
+from skidyn.diagnosis._screen import Model, Screen
 from skidyn.diagnosis._search_state import SearchState
 from skidyn.diagnosis._spectrum import Line, find_lines, find_vibrations
 from skidyn.diagnosis._split import split_effects
@@ -82,19 +82,18 @@ class RankingSearch(SearchState):
         screen = Screen(self.problem, self.sigma, self.pool, self.target)
         kinds = np.array([c.kind for c in self.pool])
         base_model = screen.model(self.blocks)
-        base = screen.held_out(base_model)
         first = screen.step(base_model)
         tester = self.tester(self.chosen)
         return [
-            partial(self._greedy, screen, kinds == kind, base, first, tester)
+            partial(self._greedy, screen, kinds == kind, base_model, first, tester)
             for kind in dict.fromkeys(kinds)
             if nameless or kind != UNKNOWN
         ]
 
     def _greedy(
-        self, screen: Screen, wanted: Mask, base: Array, first: Array, tester: Tester
+        self, screen: Screen, wanted: Mask, base: Model, first: Array, tester: Tester
     ) -> _Greedy:
-        pool, errors, now = wanted.copy(), first, base
+        pool, errors, model, now = wanted.copy(), first, base, base.errors
         index: list[int] = []
         chosen: list[Candidate] = []
         widths = np.array([c.width for c in self.pool])
@@ -118,10 +117,10 @@ class RankingSearch(SearchState):
             now = errors[found]
             pool &= self._still_open(candidate, chosen)
             if pool.any():
-                model = screen.model([*self.blocks, *(c.rows for c in chosen)])
+                model = screen.beside(model, candidate.rows)
                 errors = screen.step(model, pool)
                 tester = self.tester([*self.chosen, *chosen])
-        return index, float(base.sum() - now.sum())
+        return index, float(base.errors.sum() - now.sum())
 
     def _first_significant(self, drops: Array, order: Array, tester: Tester) -> int | None:
         """The first of the best few candidates that is large enough and more than chance."""

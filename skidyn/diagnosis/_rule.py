@@ -32,6 +32,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,7 +40,7 @@ from numpy.typing import NDArray
 from scipy.stats import f as fisher
 
 from skidyn._signals import Array
-from skidyn.evidence import RIDGE, Problem
+from skidyn.evidence import RIDGE, Felt, Problem, column_sizes, felt_columns, gram_of, products_with
 
 #: A block is at least so long in s, and at least so many correlation times of the residual.
 SHORTEST_BLOCK, CORRELATION_TIMES = 0.5, 8.0
@@ -247,19 +248,41 @@ class Tester:
         target: Sequence[Array],
     ) -> None:
         self.problem, self.sigma = problem, sigma
-        design = [a / s for a, s in zip(problem.design(blocks), sigma, strict=True)]
-        gram = np.asarray(sum(a.T @ a for a in design))
-        scale = np.sqrt(np.diag(gram))
-        scale[scale == 0] = 1.0
-        self._design = [a / scale for a in design]
-        normal = gram / scale[:, None] / scale + RIDGE * np.eye(len(scale))
-        self._inverse = np.linalg.inv(normal)
+        felt, width = felt_columns(problem, blocks, sigma)
         y = [t / s for t, s in zip(target, sigma, strict=True)]
-        right = np.asarray(sum(a.T @ t for a, t in zip(self._design, y, strict=True)))
-        solution = self._inverse @ right
-        self.residual = [t - a @ solution for a, t in zip(self._design, y, strict=True)]
         self._duration = _duration(problem)
-        self._free = max(1, int(problem.rows.counts.sum()) - len(scale))
+        self._fit(felt, gram_of(felt, width), products_with(felt, dict(enumerate(y)), width), y)
+
+    def _fit(self, felt: list[Felt], gram: Array, right: Array, target: list[Array]) -> None:
+        scale = column_sizes(gram)
+        normal = gram / scale[:, None] / scale + RIDGE * np.eye(len(scale))
+        self._felt, self._gram, self._right, self._target = felt, gram, right, target
+        self._inverse = np.linalg.inv(normal) / scale[:, None] / scale
+        solution = self._inverse @ right
+        self.residual = [t - f.rows @ solution[f.places] for f, t in zip(felt, target, strict=True)]
+        self._free = max(1, int(self.problem.rows.counts.sum()) - len(scale))
+
+    def beside(self, blocks: Sequence[dict[int, Array]]) -> Tester:
+        """Tests beside the same model with further columns.
+
+        Parameters
+        ----------
+        blocks : sequence of dict of int to ndarray of shape (n_rows_j, k)
+            Averaged columns, per joint they reach.
+        """
+        wider = copy(self)
+        felt, gram, right = list(self._felt), self._gram, self._right
+        for block in blocks:
+            scaled = {j: rows / self.sigma[j] for j, rows in block.items()}
+            cross = products_with(felt, scaled, len(gram))
+            own = np.asarray(sum(rows.T @ rows for rows in scaled.values()))
+            along = sum(rows.T @ self._target[j] for j, rows in scaled.items())
+            for j, rows in scaled.items():
+                felt[j] = felt[j].with_columns(len(gram), rows)
+            gram = np.block([[gram, cross], [cross.T, own]])
+            right = np.append(right, along)
+        wider._fit(felt, gram, right, self._target)
+        return wider
 
     def test(self, rows: dict[int, Array], zeros: NDArray[np.bool_] | None = None) -> Test:
         """Test the coefficients of some columns together.
@@ -328,12 +351,8 @@ class Tester:
     def _swept(self, rows: dict[int, Array]) -> list[Array]:
         """Columns less what the model can do of them, on the rows of every joint."""
         scaled = {j: b / self.sigma[j] for j, b in rows.items()}
-        cross = np.asarray(sum(self._design[j].T @ z for j, z in scaled.items()))
-        mimic = self._inverse @ cross
-        return [
-            (scaled[j] - a @ mimic) if j in scaled else -(a @ mimic)
-            for j, a in enumerate(self._design)
-        ]
+        mimic = self._inverse @ products_with(self._felt, scaled, len(self._inverse))
+        return [scaled.get(j, 0.0) - f.rows @ mimic[f.places] for j, f in enumerate(self._felt)]
 
     def _stationary(self, new: list[Array], left: list[Array], drop: float, k: int) -> float:
         """Chance of such a drop if the residual were stationary."""

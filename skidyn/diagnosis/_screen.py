@@ -9,7 +9,7 @@ elimination), so a candidate costs one small solve a fold.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -18,12 +18,22 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
-from skidyn.evidence import Normal, Problem, column_sizes, fold_slices
+from skidyn.evidence import (
+    RIDGE,
+    Felt,
+    Problem,
+    column_sizes,
+    felt_columns,
+    fold_slices,
+    solve_left_out,
+)
 
 #: Diagonal added to a candidate's swept block: what the model already spans brings nothing.
 CANDIDATE_RIDGE = 1e-6
 #: Share of the largest column's square that a column without any row counts as.
 TINY = 1e-9
+#: Columns of candidates that are swept at a time, about.
+MOST_COLUMNS = 256
 
 
 @dataclass(frozen=True)
@@ -96,78 +106,146 @@ class Screen:
             groups.append(_Group(np.array(index), rows, k, own, target, signs, limits, ridge))
         return groups
 
-    def model(self, blocks: Sequence[dict[int, Array]]) -> _Model:
+    def model(self, blocks: Sequence[dict[int, Array]]) -> Model:
         """Prepare the model with some blocks of columns added to the rigid body."""
-        design = [
-            block / s for block, s in zip(self.problem.design(blocks), self.sigma, strict=True)
-        ]
-        gram = sum(self._folded(a, a, j) for j, a in enumerate(design))
-        cross = sum(
-            self._folded(a, y[:, None], j)[:, :, 0]
-            for j, (a, y) in enumerate(zip(design, self.target, strict=True))
-        )
-        square = sum(
-            self._folded(y[:, None], y[:, None], j)[:, 0, 0] for j, y in enumerate(self.target)
-        )
-        return _Model(design, np.asarray(gram), np.asarray(cross), np.asarray(square))
+        felt, width = felt_columns(self.problem, blocks, self.sigma)
+        n_folds = self.problem.n_folds
+        gram, cross = np.zeros((n_folds, width, width)), np.zeros((n_folds, width))
+        square = np.zeros(n_folds)
+        for j, (own, y) in enumerate(zip(felt, self.target, strict=True)):
+            gram[:, own.places[:, None], own.places] += self._folded(own.rows, own.rows, j)
+            cross[:, own.places] += self._folded(own.rows, y[:, None], j)[:, :, 0]
+            square += self._folded(y[:, None], y[:, None], j)[:, 0, 0]
+        return Model(felt, gram, cross, square)
 
-    def held_out(self, model: _Model) -> Array:
-        """Squared error of every fold when it is left out, in units of the noise, (n_folds,)."""
-        return model.errors
+    def beside(self, model: Model, rows: dict[int, Array]) -> Model:
+        """The model with further columns.
 
-    def step(self, model: _Model, wanted: NDArray[np.bool_] | None = None) -> Array:
+        Parameters
+        ----------
+        model : Model
+            The model without them.
+        rows : dict of int to ndarray of shape (n_rows_j, k)
+            Averaged columns, per joint they reach.
+        """
+        felt, start = list(model.felt), model.cross.shape[1]
+        k = next(iter(rows.values())).shape[1]
+        gram = np.pad(model.gram, ((0, 0), (0, k), (0, k)))
+        cross = np.pad(model.cross, ((0, 0), (0, k)))
+        for j, block in rows.items():
+            scaled = block / self.sigma[j]
+            both = self._folded(felt[j].rows, scaled, j)
+            gram[:, felt[j].places, start:] += both
+            gram[:, start:, felt[j].places] += both.transpose(0, 2, 1)
+            gram[:, start:, start:] += self._folded(scaled, scaled, j)
+            cross[:, start:] += self._folded(scaled, self.target[j][:, None], j)[:, :, 0]
+            felt[j] = felt[j].with_columns(start, scaled)
+        return Model(felt, gram, cross, model.square)
+
+    def step(self, model: Model, wanted: NDArray[np.bool_] | None = None) -> Array:
         """Held-out error of every fold after each candidate is added, (n_candidates, n_folds).
 
         Candidates that are not ``wanted``, and those whose coefficients come out with a sign or a
         magnitude that physics forbids, get infinity.
         """
         errors = np.full((len(self.candidates), self.problem.n_folds), np.inf)
+        for some in self._in_parts(wanted):
+            ends = np.cumsum([len(columns) for _, _, columns in some])
+            cross = np.zeros((*model.cross.shape, ends[-1]))
+            for (group, _, columns), end in zip(some, ends, strict=True):
+                for j, block in group.rows.items():
+                    products = self._folded(model.felt[j].rows, block[:, columns], j)
+                    cross[:, model.felt[j].places, end - len(columns) : end] += products
+            swept = _Swept.of(model, cross)
+            bent = np.matmul(model.bends, swept.rest)
+            for (group, pick, columns), end in zip(some, ends, strict=True):
+                own, target = group.own[:, pick], group.target[:, columns]
+                ridge, place = group.ridge[pick], slice(end - len(columns), end)
+                part = swept.part(place)
+                errors[group.index[pick]] = part.errors(
+                    model, own, target, ridge, bent[:, :, place]
+                ).T
+                signs, limits = group.signs[pick], group.limits[pick]
+                if signs.any() or np.isfinite(limits).any():
+                    gain = _Swept.whole(model, part.cross).gain(
+                        own.sum(0, keepdims=True), target.sum(0, keepdims=True), ridge
+                    )[0]
+                    forbidden = (gain * signs < 0) | (np.abs(gain) > limits)
+                    errors[group.index[pick[forbidden.any(axis=1)]]] = np.inf
+        return errors
+
+    def _in_parts(self, wanted: NDArray[np.bool_] | None) -> Iterator[list[_Wanted]]:
+        """Wanted candidates of groups and their columns, some hundreds of columns at a time."""
+        some: list[_Wanted] = []
+        count = 0
         for group in self._groups:
             pick = np.arange(len(group.index))
             if wanted is not None:
                 pick = pick[wanted[group.index]]
-                if not len(pick):
-                    continue
+            if not len(pick):
+                continue
             columns = (pick[:, None] * group.width + np.arange(group.width)).ravel()
-            cross = np.asarray(
-                sum(
-                    self._folded(model.design[j], block[:, columns], j)
-                    for j, block in group.rows.items()
-                )
-            )
-            own, target = group.own[:, pick], group.target[:, columns]
-            ridge = group.ridge[pick]
-            errors[group.index[pick]] = _swept_errors(model, cross, own, target, ridge).T
-            signs, limits = group.signs[pick], group.limits[pick]
-            if signs.any() or np.isfinite(limits).any():
-                a, b, c = (x.sum(0, keepdims=True) for x in (cross, own, target))
-                gain = _gain([model.fitted], a, b, c, ridge)[0][0]
-                forbidden = (gain * signs < 0) | (np.abs(gain) > limits)
-                errors[group.index[pick[forbidden.any(axis=1)]]] = np.inf
-        return errors
+            some.append((group, pick, columns))
+            count += len(columns)
+            if count >= MOST_COLUMNS:
+                yield some
+                some, count = [], 0
+        if some:
+            yield some
+
+
+#: A group, which of its candidates, and their columns in it.
+_Wanted = tuple[_Group, NDArray[np.int64], NDArray[np.int64]]
 
 
 @dataclass(frozen=True)
-class _Model:
-    design: list[Array]
-    gram: Array  # (n_folds, p, p)
-    cross: Array  # (n_folds, p)
-    square: Array  # (n_folds,)
+class Model:
+    """Products of a model's columns by fold, as :class:`Screen` makes them.
 
-    @cached_property
-    def trained(self) -> list[Normal]:
-        """The model fitted without each fold in turn."""
-        return [self._fit(g, c) for g, c in zip(self.gram, self.cross, strict=True)]
+    Attributes
+    ----------
+    felt : list of Felt
+        The columns that each joint feels.
+    gram : ndarray of shape (n_folds, p, p)
+    cross : ndarray of shape (n_folds, p)
+        With the torque.
+    square : ndarray of shape (n_folds,)
+        Of the torque.
+    """
 
-    @cached_property
-    def fitted(self) -> Normal:
-        """The model fitted to all folds."""
-        return self._fit(0.0, 0.0)
+    felt: list[Felt]
+    gram: Array
+    cross: Array
+    square: Array
 
     @cached_property
     def solutions(self) -> Array:
         """Its coefficients without each fold in turn, shape (n_folds, p)."""
-        return np.array([train.solution for train in self.trained])
+        return self._solved[1]
+
+    @cached_property
+    def solution(self) -> Array:
+        """Its coefficients, shape (p,)."""
+        return self._solved[0]
+
+    @cached_property
+    def _solved(self) -> tuple[Array, Array]:
+        return solve_left_out(self.gram, self.cross)
+
+    @cached_property
+    def inverses(self) -> Array:
+        """Of the normal equations without each fold in turn, shape (n_folds, p, p)."""
+        return self._inverse(self.gram.sum(0) - self.gram)
+
+    @cached_property
+    def inverse(self) -> Array:
+        """Of the normal equations, shape (p, p)."""
+        return self._inverse(self.gram.sum(0))
+
+    @cached_property
+    def bends(self) -> Array:
+        """Products in the fold left out of what the model without it does, (n_folds, p, p)."""
+        return np.asarray(np.matmul(self.inverses, np.matmul(self.gram, self.inverses)))
 
     @cached_property
     def errors(self) -> Array:
@@ -176,9 +254,10 @@ class _Model:
         bent = np.matmul(self.gram, b[:, :, None])[:, :, 0]
         return np.asarray(self.square + np.sum(b * (bent - 2 * self.cross), axis=1))
 
-    def _fit(self, gram: Array | float, cross: Array | float) -> Normal:
-        total = self.gram.sum(0)
-        return Normal(total - gram, self.cross.sum(0) - cross, column_sizes(total))
+    def _inverse(self, gram: Array) -> Array:
+        scale = column_sizes(self.gram.sum(0))
+        normal = gram / scale[:, None] / scale + RIDGE * np.eye(len(scale))
+        return np.asarray(np.linalg.inv(normal) / scale[:, None] / scale)
 
 
 def _products(a: Array, b: Array, k: int) -> Array:
@@ -190,52 +269,91 @@ def _products(a: Array, b: Array, k: int) -> Array:
     return np.asarray(np.matmul(left.transpose(0, 1, 3, 2), right))
 
 
-def _gain(
-    trained: Sequence[Normal], cross: Array, own: Array, target: Array, ridge: Array
-) -> tuple[Array, Array]:
-    """Coefficients of every candidate beside fitted models, and how these mimic it.
+@dataclass(frozen=True)
+class _Swept:
+    """Candidates' columns beside a model fitted to some rows, and to others.
 
-    Parameters
+    Attributes
     ----------
-    trained : sequence of Normal
-        The model fitted to some rows, and to others.
-    cross : ndarray of shape (n_fits, p, n_candidates * width)
-        Products of the model's columns and the candidates' on the rows of each fit.
-    own : ndarray of shape (n_fits, n_candidates, width, width)
-        Gram matrix of each candidate.
-    target : ndarray of shape (n_fits, n_candidates * width)
-        Products of the candidates' columns and the torque.
-    ridge : ndarray of shape (n_candidates, width)
-        Added to the diagonal of the Gram matrices.
-
-    Returns
-    -------
-    gain : ndarray of shape (n_fits, n_candidates, width)
-    swept : ndarray of shape (n_fits, p, n_candidates * width)
+    cross : ndarray of shape (n_folds, p, m)
+        Products of the model's columns and the candidates' in the rows of every fold.
+    rest : ndarray of shape (n_fits, p, m)
+        The same in the rows of each fit.
+    mimic : ndarray of shape (n_fits, p, m)
+        The model's coefficients that come nearest to the columns there.
+    along : ndarray of shape (n_fits, m)
+        Products of the columns and what the model explains there.
     """
-    k = own.shape[2]
-    swept = np.array([train.solve(x) for train, x in zip(trained, cross, strict=True)])
-    solutions = np.array([train.solution for train in trained])
-    gradient = target - np.matmul(solutions[:, None], cross)[:, 0]
-    diagonal = np.einsum("fckk->fck", own)
-    size = diagonal.max(axis=2, keepdims=True)
-    size = np.where(size > 0, size, 1 / (CANDIDATE_RIDGE * TINY))  # no row at all here
-    added = CANDIDATE_RIDGE * (diagonal + TINY * size) + ridge
-    block = own - _products(cross, swept, k) + np.eye(k) * added[:, :, None, :]
-    return np.linalg.solve(block, gradient.reshape(*diagonal.shape, 1))[:, :, :, 0], swept
 
+    cross: Array
+    rest: Array
+    mimic: Array
+    along: Array
 
-def _swept_errors(model: _Model, cross: Array, own: Array, target: Array, ridge: Array) -> Array:
-    """Held-out error of every fold for the candidates of a group, (n_folds, n_candidates)."""
-    rest = [x.sum(0) - x for x in (cross, own, target)]
-    gain, swept = _gain(model.trained, rest[0], rest[1], rest[2], ridge)
-    # The same change judged on the fold left out.
-    b, k = model.solutions[:, :, None], own.shape[2]
-    remainder = model.cross[:, :, None] - np.matmul(model.gram, b)
-    slope = target - np.sum(cross * b, axis=1) - np.sum(swept * remainder, axis=1)
-    mixed = _products(swept, cross, k)
-    bent = _products(swept, np.matmul(model.gram, swept), k)
-    curve = own - mixed - mixed.transpose(0, 1, 3, 2) + bent
-    linear = np.sum(gain * slope.reshape(gain.shape), axis=2)
-    quadratic = np.sum(gain * np.matmul(curve, gain[:, :, :, None])[:, :, :, 0], axis=2)
-    return np.asarray(model.errors[:, None] - 2 * linear + quadratic)
+    @classmethod
+    def of(cls, model: Model, cross: Array) -> _Swept:
+        """Beside the fits without each fold in turn."""
+        rest = cross.sum(0) - cross
+        along = np.matmul(model.solutions[:, None], rest)[:, 0]
+        return cls(cross, rest, np.matmul(model.inverses, rest), along)
+
+    @classmethod
+    def whole(cls, model: Model, cross: Array) -> _Swept:
+        """Beside the fit to all folds."""
+        rest = cross.sum(0, keepdims=True)
+        along = np.matmul(model.solution, rest)
+        return cls(cross, rest, np.matmul(model.inverse, rest), along)
+
+    def part(self, place: slice) -> _Swept:
+        """Some of the columns."""
+        return _Swept(
+            self.cross[:, :, place],
+            self.rest[:, :, place],
+            self.mimic[:, :, place],
+            self.along[:, place],
+        )
+
+    def gain(self, own: Array, target: Array, ridge: Array) -> Array:
+        """Coefficients of every candidate beside the model, (n_fits, n_candidates, k).
+
+        Parameters
+        ----------
+        own : ndarray of shape (n_fits, n_candidates, k, k)
+            Gram matrix of each candidate.
+        target : ndarray of shape (n_fits, n_candidates * k)
+            Products of the candidates' columns and the torque.
+        ridge : ndarray of shape (n_candidates, k)
+            Added to the diagonal of the Gram matrices.
+        """
+        k = own.shape[2]
+        diagonal = np.einsum("fckk->fck", own)
+        size = diagonal.max(axis=2, keepdims=True)
+        size = np.where(size > 0, size, 1 / (CANDIDATE_RIDGE * TINY))  # no row at all here
+        added = CANDIDATE_RIDGE * (diagonal + TINY * size) + ridge
+        block = own - _products(self.rest, self.mimic, k) + np.eye(k) * added[:, :, None, :]
+        gradient = (target - self.along).reshape(*diagonal.shape, 1)
+        return np.asarray(np.linalg.solve(block, gradient)[:, :, :, 0])
+
+    def errors(self, model: Model, own: Array, target: Array, ridge: Array, bent: Array) -> Array:
+        """Held-out error of every fold for the candidates of a group, (n_folds, n_candidates).
+
+        Parameters
+        ----------
+        model : Model
+            The model.
+        own, target, ridge : ndarray
+            As in :meth:`gain`, by fold.
+        bent : ndarray of shape (n_folds, p, m)
+            What :attr:`Model.bends` makes of :attr:`rest`.
+        """
+        k, b = own.shape[2], model.solutions
+        gain = self.gain(own.sum(0) - own, target.sum(0) - target, ridge)
+        # The same change judged on the fold left out.
+        left = model.cross - np.matmul(model.gram, b[:, :, None])[:, :, 0]
+        slope = target - np.matmul(b[:, None], self.cross)[:, 0]
+        slope -= np.matmul(left[:, None], self.mimic)[:, 0]
+        mixed = _products(self.mimic, self.cross, k)
+        curve = own - mixed - mixed.transpose(0, 1, 3, 2) + _products(self.rest, bent, k)
+        linear = np.sum(gain * slope.reshape(gain.shape), axis=2)
+        quadratic = np.sum(gain * np.matmul(curve, gain[:, :, :, None])[:, :, :, 0], axis=2)
+        return np.asarray(model.errors[:, None] - 2 * linear + quadratic)

@@ -181,14 +181,17 @@ class SearchState:
         return self.tester(others).test(candidate.rows, candidate.zeros).chance
 
     def tester(self, others: Sequence[Candidate]) -> Tester:
-        """Tests beside the model and some candidates; the last one is kept for the next call."""
-        blocks = self.blocks_with(others)
+        """Tests beside the model and some candidates; those beside the model alone are kept."""
+        further = others[len(self.chosen) :]
+        if list(others[: len(self.chosen)]) != self.chosen:
+            return Tester(self.problem, self.blocks_with(others), self.sigma, self.target)
+        blocks = self.blocks
         made_of = [self.sigma, self.ripple, *(b[j] for b in blocks for j in b)]
         kept, tester = self._kept_tester
         if tester is None or len(kept) != len(made_of) or any(map(is_not, kept, made_of)):
             tester = Tester(self.problem, blocks, self.sigma, self.target)
             self._kept_tester = made_of, tester
-        return tester
+        return tester.beside([c.rows for c in further]) if further else tester
 
     def _left(self) -> Array:
         """Held-out squared error of every joint with all that was found so far."""

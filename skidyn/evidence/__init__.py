@@ -13,6 +13,12 @@ from skidyn.evidence._broken import (
     without_broken_positions as without_broken_positions,
 )
 from skidyn.evidence._evidence import column_names as column_names
+from skidyn.evidence._felt import (
+    Felt as Felt,
+    felt_columns as felt_columns,
+    gram_of as gram_of,
+    products_with as products_with,
+)
 from skidyn.evidence._folds import (
     RIDGE as RIDGE,
     Normal as Normal,

@@ -20,9 +20,7 @@ def log():
 
 @pytest.mark.skipif(sys.platform != "linux", reason="processes are forked on Linux only")
 def test_two_processes_give_the_same_report_to_the_last_bit(log):
-    one, two = (
-        diagnose(RBDRegressor(log.robot), log.X, log.y, n_jobs=n).to_dict() for n in (1, 2)
-    )
+    one, two = (diagnose(RBDRegressor(log.robot), log.X, log.y, n_jobs=n).to_dict() for n in (1, 2))
     assert json.dumps(one, default=str) == json.dumps(two, default=str)
     assert [e["kind"] for e in one["effects"]] == ["stribeck"]
 
