@@ -39,6 +39,7 @@ CLASSES = frozenset(
         "committee._elm.ELMCommittee",
         "diagnosis._correction.CorrectedRegressor",
         "diagnosis._effect_search.EffectSearchCV",
+        "diagnosis._faded.FadingCorrection",
         "dynamics._tree.KinematicTree",
         "effects._term.Term",
         "effects._transformer.FrictionTransformer",

@@ -80,7 +80,7 @@ class CorrectedRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, B
         if not hasattr(self.regressor, "fit"):
             return self.fit_effects(X, y, sample_weight)
         self.regressor_ = clone(self.regressor, safe=False)
-        self.regressor_.fit(X, y, **_weights(self.regressor_, sample_weight))
+        self.regressor_.fit(X, y, **weights_of_fit(self.regressor_, sample_weight))
         return self._fit_effects(X, y, sample_weight)
 
     def fit_effects(self, X: Any, y: Any, sample_weight: Any = None) -> CorrectedRegressor:
@@ -167,7 +167,7 @@ def is_physics(model: Any) -> bool:
     return takes_effects and not isinstance(model, CorrectedRegressor)
 
 
-def _weights(regressor: Any, sample_weight: Any) -> dict[str, Any]:
+def weights_of_fit(regressor: Any, sample_weight: Any) -> dict[str, Any]:
     """Keyword of fit for weights of samples; those of a Pipeline go to its last step.
 
     Where metadata is routed, the Pipeline sends them to the steps that request them.
@@ -237,7 +237,7 @@ def refitted_errors(
     for train, test in GroupKFold(n_folds).split(torque, groups=groups):
         weight = None if sample_weight is None else _safe_indexing(sample_weight, train)
         own = clone(regressor)
-        own.fit(_safe_indexing(X, train), _safe_indexing(y, train), **_weights(own, weight))
+        own.fit(_safe_indexing(X, train), _safe_indexing(y, train), **weights_of_fit(own, weight))
         for k, terms in enumerate(steps):
             model = CorrectedRegressor(own, robot, list(terms))
             model.fit_effects(_safe_indexing(X, train), torque[train], weight)

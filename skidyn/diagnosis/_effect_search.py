@@ -16,8 +16,9 @@ from skidyn._columns import column_names
 from skidyn._exceptions import SkidynError
 from skidyn._keys import keys_of
 from skidyn._signals import Array
-from skidyn.diagnosis._correction import is_physics, open_model
+from skidyn.diagnosis._correction import is_physics, open_model, weights_of_fit
 from skidyn.diagnosis._diagnosis import diagnose
+from skidyn.diagnosis._faded import FadingCorrection, step_scores
 from skidyn.diagnosis._result import Diagnosis
 from skidyn.diagnosis._rule import Settings
 from skidyn.effects import Term
@@ -43,6 +44,9 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
     out where effects are judged may bring nothing in a score that counts every sample.
     ``diagnosis_`` has all findings.
 
+    What was added fades out beyond the motion of the log: a function of the position that was
+    fitted to a part of the travel is no law of the rest.
+
     Parameters
     ----------
     estimator : RBDRegressor
@@ -62,6 +66,12 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
         Fit the best model to all rows.
     n_jobs : int or None, default=None
         Processes for the scores.
+    fade_out : bool, default=True
+        Let what was added fade out, in the scores as well, where the best model is less sure than
+        anywhere in the log. How sure it is tells the standard deviation of its prediction
+        (:meth:`~skidyn.identification.RBDRegressor.predict`) relative to that of the given model.
+        What was added counts in full up to the largest ratio in the log, or 1, and not at all at
+        twice that ratio. False predicts by ``best_estimator_`` alone.
 
     Attributes
     ----------
@@ -69,6 +79,9 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
         Everything that was found.
     best_estimator_ : estimator
         The given model with ``best_effects_`` added, fitted to all data; with ``refit=True``.
+    fading_ : FadingCorrection
+        The given model and the best one, both fitted to all data; where something was added that
+        fades out.
     best_params_ : dict
         The parameter ``effects`` of the best model, by its name in ``estimator``.
     best_effects_ : list of Term
@@ -127,6 +140,7 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
         cv: Any = 5,
         refit: bool = True,
         n_jobs: int | None = None,
+        fade_out: bool = True,
     ) -> None:
         self.estimator = estimator
         self.effects = effects
@@ -136,6 +150,7 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
         self.cv = cv
         self.refit = refit
         self.n_jobs = n_jobs
+        self.fade_out = fade_out
 
     def fit(self, X: Any, y: Any, sample_weight: Any = None, groups: Any = None) -> EffectSearchCV:
         """Search for missing effects and fit the best model.
@@ -157,8 +172,9 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
         EffectSearchCV
             The search itself.
         """
-        if not isinstance(self.refit, bool | np.bool_):
-            raise ValueError(f"refit={self.refit!r}; expected True or False")
+        for name in ("refit", "fade_out"):
+            if not isinstance(getattr(self, name), bool | np.bool_):
+                raise ValueError(f"{name}={getattr(self, name)!r}; expected True or False")
         array, torque = validate_data(
             self, X, y, multi_output=True, y_numeric=True, dtype=np.float64
         )
@@ -182,13 +198,17 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
             sample_weight=sample_weight,
         )
         prefix = "".join(f"{pipeline.steps[-1][0]}__" for pipeline in opened.outer)
-        weights = {} if sample_weight is None else {f"{prefix}sample_weight": sample_weight}
+        weights = weights_of_fit(self.estimator, sample_weight)
         self._score_steps(X, y, groups, weights, f"{prefix}effects", list(opened.model.effects))
+        self.__dict__.pop("fading_", None)
         if self.refit:
             self.best_estimator_ = self.diagnosis_.model
             if self.best_index_ < len(self.cv_results_["params"]) - 1:
                 best = clone(self.estimator).set_params(**self.best_params_)
                 self.best_estimator_ = best.fit(X, y, **weights)
+            if self.fade_out and self.best_effects_:
+                start = clone(self.estimator).fit(X, y, **weights)
+                self.fading_ = FadingCorrection(start, self.best_estimator_).fit(X)
         return self
 
     def _score_steps(
@@ -196,7 +216,8 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
     ) -> None:
         """Scores of the models along the history, as scikit-learn's searches hold them."""
         from sklearn.metrics import check_scoring
-        from sklearn.model_selection import check_cv, cross_val_score
+        from sklearn.model_selection import check_cv
+        from sklearn.utils.parallel import Parallel, delayed
 
         history, findings = self.diagnosis_.history, self.diagnosis_.findings
         # One model a step, with the effects found up to it; what was added in several at once last.
@@ -212,20 +233,13 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
         else:
             folds = list(check_cv(self.cv).split(X, y, groups))
         self.scorer_ = check_scoring(self.estimator, scoring=self.scoring)
-        scores = np.array(
-            [
-                cross_val_score(
-                    clone(self.estimator).set_params(**own),
-                    X,
-                    y,
-                    cv=folds,
-                    scoring=self.scorer_,
-                    n_jobs=self.n_jobs,
-                    params=weights,
-                )
-                for own in params
-            ]
+        of_fold = (
+            delayed(step_scores)(
+                self.estimator, params, X, y, fold, self.scorer_, weights, self.fade_out
+            )
+            for fold in folds
         )
+        scores = np.transpose(Parallel(n_jobs=self.n_jobs)(of_fold))
         rmse = np.array([step["rmse"] for step in history])
         mean = scores.mean(axis=1)
         rank = np.array([1 + np.sum(mean > own) for own in mean], dtype=np.int32)
@@ -247,7 +261,7 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
 
     @available_if(_refits)
     def predict(self, X: Any) -> Array:
-        """Torque of the best model.
+        """Torque of the best model; what was added fades out beyond the motion of the log.
 
         Parameters
         ----------
@@ -261,7 +275,8 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
         """
         check_is_fitted(self)
         array = validate_data(self, X, reset=False, dtype=np.float64)
-        return np.asarray(self.best_estimator_.predict(self._table(X, array)))
+        model = getattr(self, "fading_", self.best_estimator_)
+        return np.asarray(model.predict(self._table(X, array)))
 
     # The two hooks that the common tests replace: their rows are of any width, and no motion.
 

@@ -122,6 +122,7 @@ def test_the_gain_of_a_single_fold_keeps_nothing():
         ({"effects": "viscous"}, r"effects=\['viscous'\]"),
         ({"smooth": "x"}, "expected True or False"),
         ({"refit": "x"}, "expected True or False"),
+        ({"fade_out": "x"}, "expected True or False"),
         ({"settings": "x"}, r"expected Settings\(\.\.\.\)"),
     ],
 )

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Corrections that fade out beyond the motion to which they were fitted.
+
+A function of the position that was fitted to a part of the travel says little about the rest, and
+left-out recordings of the same part cannot show it. The coefficients can: their spread over the
+recordings makes the standard deviation of the corrected model's prediction grow there, and faster
+than that of the model without the correction.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from sklearn.base import BaseEstimator, RegressorMixin, clone
+from sklearn.exceptions import FitFailedWarning
+from sklearn.pipeline import Pipeline
+from sklearn.utils import _safe_indexing
+
+from skidyn._signals import Array
+from skidyn.identification import RBDRegressor
+
+
+class FadingCorrection(RegressorMixin, BaseEstimator):
+    """A fitted model and its correction, which fades out beyond the motion of the training rows.
+
+    How much less sure the corrected model is than the start is the ratio of the standard deviations
+    of their predictions. The correction counts in full up to the largest ratio among the training
+    rows, or 1, and not at all at twice that ratio.
+
+    Parameters
+    ----------
+    start, corrected : RBDRegressor
+        Fitted, alone or as the last step of a Pipeline. Corrections of other models, which know no
+        standard deviation, do not fade out.
+
+    Attributes
+    ----------
+    reach_ : ndarray of shape (n_joints,) or ()
+        The ratio up to which the correction counts in full.
+    """
+
+    def __init__(self, start: Any, corrected: Any) -> None:
+        self.start = start
+        self.corrected = corrected
+
+    def __getattr__(self, name: str) -> Any:
+        """What a scorer asks of the model itself, such as its effects."""
+        if name.startswith("__") or "corrected" not in self.__dict__:
+            raise AttributeError(f"{type(self).__name__} has no {name}")
+        return getattr(self.corrected, name)
+
+    def fit(self, X: Any, y: Any = None) -> FadingCorrection:
+        """Find how far the training rows reach.
+
+        Parameters
+        ----------
+        X : DataFrame or array of shape (n_samples, n_features)
+            Training rows.
+        y : object, default=None
+            Ignored.
+        """
+        both = (self.start, self.corrected)
+        if self.start is not self.corrected and all(_knows_its_std(m) for m in both):
+            self.reach_ = np.maximum(1.0, self._torques(X)[2].max(axis=0))
+        return self
+
+    def predict(self, X: Any) -> Array:
+        """Torque of the start, and of the correction as far as it is known.
+
+        Parameters
+        ----------
+        X : DataFrame or array of shape (n_samples, n_features)
+            Motion.
+
+        Returns
+        -------
+        ndarray of shape (n_samples, n_joints) or (n_samples,), N m or N
+            Predicted torque.
+        """
+        from skidyn.hybrid import fade
+
+        if "reach_" not in self.__dict__:
+            return np.asarray(self.corrected.predict(X))
+        before, after, ratio = self._torques(X)
+        torque: Array = after - (1.0 - fade(ratio / self.reach_)) * (after - before)
+        return torque
+
+    def _torques(self, X: Any) -> tuple[Array, Array, Array]:
+        """Torques of both models, and the ratio of their standard deviations."""
+        before, std_before = _with_std(self.start, X)
+        after, std_after = _with_std(self.corrected, X)
+        return before, after, std_after / std_before
+
+
+def _knows_its_std(model: Any) -> bool:
+    while isinstance(model, Pipeline):
+        model = model[-1]
+    return isinstance(model, RBDRegressor)
+
+
+def _with_std(model: Any, X: Any) -> tuple[Array, Array]:
+    """Prediction and standard deviation; a Pipeline would want requests for its routed metadata."""
+    while isinstance(model, Pipeline):
+        X = model[:-1].transform(X) if len(model) > 1 else X
+        model = model[-1]
+    torque, std = model.predict(X, return_std=True)
+    return torque, std
+
+
+def step_scores(
+    estimator: Any,
+    params: Sequence[dict[str, Any]],
+    X: Any,
+    y: Any,
+    fold: tuple[Any, Any],
+    scorer: Any,
+    weights: dict[str, Any],
+    fade_out: bool,
+) -> list[float]:
+    """Scores of several models on the held-out rows of one fold.
+
+    Parameters
+    ----------
+    estimator : estimator
+        To be cloned.
+    params : sequence of dict
+        Parameters of each model; the first is the start of all.
+    X, y : table and array
+        All rows.
+    fold : (array of int, array of int)
+        Training and test rows.
+    scorer : callable
+        What scores.
+    weights : dict of str to ndarray
+        Weights of all rows, by their keyword of ``fit``.
+    fade_out : bool
+        Score the torque that fades out.
+
+    Returns
+    -------
+    list of float
+        Score of every model; nan, with a warning, for one that this fold cannot fit.
+    """
+    train, test = fold
+    X_train, y_train = _safe_indexing(X, train), _safe_indexing(y, train)
+    own = {name: _safe_indexing(weight, train) for name, weight in weights.items()}
+    start: Any = None
+    scores = []
+    for parameters in params:
+        model = clone(estimator).set_params(**parameters)
+        try:
+            model.fit(X_train, y_train, **own)
+        except ValueError as error:
+            if start is None:
+                raise
+            warnings.warn(
+                f"{parameters} was not fitted in one fold: {error}", FitFailedWarning, stacklevel=2
+            )
+            scores.append(np.nan)
+            continue
+        start = model if start is None else start
+        scored = FadingCorrection(start, model).fit(X_train) if fade_out else model
+        scores.append(float(scorer(scored, _safe_indexing(X, test), _safe_indexing(y, test))))
+    return scores
