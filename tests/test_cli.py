@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The command line, as a user or a script runs it."""
 
+from __future__ import annotations
+
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
 
 import pytest
 
+import skidyn
 from skidyn import cli
 from skidyn._commands import COMMANDS
 
@@ -58,3 +63,25 @@ def test_every_command_teaches_with_an_example(capsys):
         text = capsys.readouterr().out
         assert stopped.value.code == 0
         assert f"  skidyn {name}" in text
+
+
+@pytest.mark.parametrize("how", ["python -m skidyn", "skidyn"])
+@pytest.mark.parametrize("module", ["skidyn.cli", "argparse", "numpy", "skidyn.identification"])
+def test_ctrl_c_while_modules_are_imported_is_one_line(module, how):
+    with open(Path(skidyn.__file__).parents[1] / "pyproject.toml", "rb") as file:
+        home, _, name = tomllib.load(file)["project"]["scripts"]["skidyn"].partition(":")
+    script = f"from {home} import {name}\nsys.exit({name}())\n"
+    module_run = "import runpy\nrunpy.run_module('skidyn', run_name='__main__')\n"
+    code = (
+        "import sys\n"
+        "class Stop:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        f"        if name == {module!r}: raise KeyboardInterrupt\n"
+        "sys.meta_path.insert(0, Stop())\n" + (script if how == "skidyn" else module_run)
+    )
+    words = ["compare", "log.csv", "--urdf", "arm.urdf"]
+    done = subprocess.run(
+        [sys.executable, "-c", code, *words], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == cli.STOPPED
+    assert done.stderr == "stopped; no file was left half written\n"

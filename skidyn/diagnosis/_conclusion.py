@@ -158,11 +158,15 @@ def _refitted(
     steps = [_found_terms(problem, found[:k]) for k in range(len(found) + 1)]
     again = refitted_errors(model, problem.robot, steps, *data) if found else None
     if again is None:
-        return errors, remark + "What an effect removes is of this very model, not refitted."
+        return (
+            errors,
+            remark + "What an effect removes was measured on this model as it is, not refitted.",
+        )
     return (
         [[float(e) for e in step] for step in again],
         remark
-        + "What an effect removes is what copies of it, refitted with it, show on rows left out.",
+        + "What an effect removes was measured on copies of the model that were refitted with it, "
+        "on rows left out.",
     )
 
 
@@ -445,5 +449,5 @@ def _fold_notes(problem: Problem) -> list[str]:
     count = "one trajectory" if len(names) == 1 else f"{len(names)} trajectories"
     return [
         f"The log has only {count}: errors are held out by {problem.n_folds} blocks of time with "
-        "a guard between them, not by whole trajectories, and may flatter the model."
+        "a guard between them, not by whole trajectories, and may come out too small."
     ]

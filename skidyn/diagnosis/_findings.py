@@ -45,7 +45,7 @@ class Finding:
     q_value : float
         False-discovery rate at which it was accepted: its chance times the number of candidates.
     rivals : tuple of str
-        Kinds this data cannot tell it from.
+        Kinds this data cannot separate it from.
     separating_motion : str
         Motion that would.
     sentence : str
@@ -261,7 +261,7 @@ def _sentence(
     what = next((_value(name, row) for name, row in parameters.items()), "")
     fall = f"Adding it removes {drop:.0%} of the held-out squared error."
     if drop <= 0:
-        fall = "A model refitted with it errs no less on data left out."
+        fall = "A model refitted with it has no smaller error on data left out."
     return f"{title} on {where}{what}. {fall}"
 
 

@@ -180,8 +180,8 @@ def _limit(problem: Problem, joint: int, tried: Sequence[tuple[Candidate, float]
     shown = [size for _, size in tried if np.isfinite(size)]
     if not shown:
         sentence = (
-            f"This data cannot tell {inside(effect.title)} of joint {joint + 1} from what the "
-            f"model has. It would show with {effect.separating_motion}."
+            f"This data cannot separate {inside(effect.title)} of joint {joint + 1} from what the "
+            f"model has; a recording with {effect.separating_motion} would."
         )
         return Limit(effect.kind, joint + 1, None, unit, sentence)
     most = f"{max(shown):.3g}{'' if unit == '1' else ' ' + unit}"
@@ -191,7 +191,7 @@ def _limit(problem: Problem, joint: int, tried: Sequence[tuple[Candidate, float]
     )
     if hidden := _hidden_shapes(tried):
         values = ", ".join(f"{value:.3g}" for value in hidden)
-        sentence += f"; with {effect.shapes[0].name} of {values} it would not show"
+        sentence += f", but not one with {effect.shapes[0].name} of {values}"
     return Limit(effect.kind, joint + 1, max(shown), unit, sentence + ".")
 
 

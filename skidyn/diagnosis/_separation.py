@@ -303,7 +303,7 @@ def _opponents(
     asked = f"finding {kind}" if kind else "finding"
     wanted = f"the rival {rival}" if rival else "a rival"
     raise EffectError(
-        f"no {asked} with {wanted}; the search has weighed: " + ("; ".join(known) or "nothing")
+        f"no {asked} with {wanted}; the search compared: " + ("; ".join(known) or "nothing")
     )
 
 

@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import json
+import os
+import shutil
 from importlib.resources import files
 
 import pytest
@@ -55,3 +57,19 @@ def run(capsys):
         return code, json.loads(out) if out.strip() else None
 
     return run_command
+
+
+@pytest.fixture(scope="session")
+def report(work, tmp_path_factory):
+    """A report, its log and its robot in one folder, by relative names."""
+    folder = tmp_path_factory.mktemp("reported")
+    for name in ("log.csv", "arm.urdf"):
+        shutil.copy(work / name, folder / name)
+    before = os.getcwd()
+    os.chdir(folder)
+    try:
+        words = ["diagnose", "log.csv", "--urdf", "arm.urdf", "--out", "report.json"]
+        assert cli.main(words) == cli.DONE
+    finally:
+        os.chdir(before)
+    return folder / "report.json"

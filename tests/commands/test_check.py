@@ -1,7 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """``skidyn check``."""
 
-from skidyn import cli
+import json
+from pathlib import Path
+
+import pytest
+
+from skidyn import cli, datasets
+from skidyn.cli import main
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 
 
 def test_check_judges_a_log_without_and_with_a_robot(capsys, run, arguments):
@@ -11,3 +18,51 @@ def test_check_judges_a_log_without_and_with_a_robot(capsys, run, arguments):
     code, quality = run("check", log, "--urdf", urdf)
     assert code == cli.DONE
     assert quality["gaps"] == 0 and quality["joints"][0]["name"] == "joint1"
+
+
+URDF = str(Path(datasets.__file__).parent / "robots" / "planar_arm.urdf")
+LOG = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=3, duration=4.0).frame
+
+
+@pytest.fixture
+def flipped(tmp_path):
+    path = tmp_path / "log.csv"
+    LOG.assign(dq2=-LOG["dq2"]).to_csv(path, index=False)
+    return str(path)
+
+
+def test_check_says_first_what_matters_with_the_command_that_fixes_it(flipped, capsys):
+    assert main(["check", flipped]) == 0
+    told = capsys.readouterr().out
+    assert told.startswith("!! the velocity of") and "--flip dq2" in told
+    assert f"skidyn check {flipped} --flip dq2" in told
+    assert main(["check", flipped, "--flip", "dq2", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["checks"] == []
+
+
+def test_the_command_that_fixes_a_log_keeps_its_options(tmp_path, capsys):
+    path = tmp_path / "log.csv"
+    motion = {name: 57.29578 * LOG[name] for name in ("q1", "q2", "dq1", "dq2")}
+    LOG.assign(**motion, time=1e3 * LOG["time"]).to_csv(path, index=False)
+    assert main(["check", str(path), "--urdf", URDF, "--units", "time=ms"]) == 0
+    mended = f"skidyn check {path} --urdf {URDF} --units time=ms,q=deg,dq=deg/s"
+    assert mended in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "option, words",
+    [
+        (["--flip", "elbow"], "flip: 'elbow' is neither"),
+        (["--zero", "q1"], "'q1' is not NAME=VALUE"),
+        (["--gain", "tau1=much"], "'much' is not a number"),
+        (["--order", "tau=1"], "is not an order of 2 joints"),
+    ],
+)
+def test_an_option_that_cannot_be_met_is_refused(flipped, capsys, option, words):
+    assert main(["check", flipped, *option]) == 2
+    assert words in capsys.readouterr().err
+
+
+def test_gravity_of_another_length_than_three_is_refused(flipped, capsys):
+    assert main(["check", flipped, "--urdf", URDF, "--gravity", "0,1"]) == 2
+    assert "gravity" in capsys.readouterr().err

@@ -7,10 +7,13 @@ import json
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
-from skidyn import cli
+from skidyn import cli, datasets
+from skidyn.cli import main
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import Diagnosis
 
 
@@ -76,3 +79,23 @@ def slow(*paths):
 os.replace = slow
 sys.exit(main(sys.argv[1:]))
 """
+URDF = str(Path(datasets.__file__).parent / "robots" / "planar_arm.urdf")
+LOG = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=3, duration=4.0).frame
+
+
+@pytest.fixture
+def flipped(tmp_path):
+    path = tmp_path / "log.csv"
+    LOG.assign(dq2=-LOG["dq2"]).to_csv(path, index=False)
+    return str(path)
+
+
+def test_diagnose_stops_with_the_remedy_unless_forced(flipped, tmp_path, capsys):
+    assert main(["diagnose", flipped, "--urdf", URDF]) == 2
+    assert "--flip dq2" in capsys.readouterr().err
+    out = str(tmp_path / "report.json")
+    assert main(["diagnose", flipped, "--urdf", URDF, "--force", "--out", out]) == 0
+    with open(out) as file:
+        report = json.load(file)
+    assert report["checks"][0]["certainty"] == "certain"
+    assert report["provenance"]["options"]["force"] is True

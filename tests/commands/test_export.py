@@ -82,3 +82,28 @@ def test_a_usd_layer_needs_a_stage(work, capsys):
 
     assert cli.main([*words, "--out", "new.usda"]) == cli.BAD_INPUT
     assert "--into is missing" in capsys.readouterr().err
+
+
+def test_formats_that_can_be_written_are_and_the_others_are_named(work, tmp_path, capsys):
+    (tmp_path / "model.py").mkdir()  # cannot be written
+    (tmp_path / "model.py").rmdir()
+    words = ["export", str(work / "log.csv"), "--urdf", str(work / "arm.urdf")]
+    out = ["--format", "c,urdf,python", "--out", str(tmp_path / "model"), "--json"]
+    from skidyn import export
+
+    def broken(model, path):
+        raise OSError(28, "No space left on device", str(path))
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(export, "write_urdf", broken)
+        assert cli.main([*words, *out]) == cli.BAD_INPUT
+    caught = capsys.readouterr()
+    assert sorted(name.rpartition("/")[2] for name in json.loads(caught.out)) == [
+        "model.c",
+        "model.py",
+    ]
+    assert "not written: urdf: " in caught.err and "No space left" in caught.err
+    assert sorted(f.name for f in tmp_path.iterdir() if "skidyn" not in f.name) == [
+        "model.c",
+        "model.py",
+    ]

@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What commands read: logs, models and reports."""
 
+from __future__ import annotations
+
 import json
+import shutil
+import zipfile
 
 import pytest
 
@@ -41,3 +45,76 @@ def test_currents_become_torques_by_drive_gains(diagnosed, tmp_path, run):
     code, result = run(*words, "--drive-gains", "[10, 5]")
     assert code == cli.DONE
     assert max(row["relative"] for row in result["table"]) < 0.5
+
+
+def test_a_report_is_read_from_another_folder(report, tmp_path, monkeypatch, run):
+    monkeypatch.chdir(tmp_path)
+    words = ("add", "--from", report, "--effect", "stribeck", "--joints", "2")
+    code, errors = run(*words)
+    assert code == cli.DONE and errors["before"]
+    code, _ = run("compare", report, report)
+    assert code == cli.DONE
+
+
+def test_a_report_away_from_its_files_finds_them_here_or_by_urdf(
+    report, tmp_path, monkeypatch, run, capsys
+):
+    (tmp_path / "reports").mkdir()
+    alone = shutil.copy(report, tmp_path / "reports" / "report.json")
+    words = ("add", "--from", alone, "--effect", "stribeck", "--joints", "2")
+    monkeypatch.chdir(report.parent)
+    assert run(*words)[0] == cli.DONE
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(report.parent / "log.csv", "log.csv")
+    assert cli.main([str(word) for word in words]) == cli.BAD_INPUT
+    assert "--urdf names the description" in capsys.readouterr().err
+    assert run(*words, "--urdf", report.parent / "arm.urdf")[0] == cli.DONE
+
+
+@pytest.mark.parametrize(("name", "value"), [("columns", "[1]"), ("units", '["deg"]')])
+def test_options_of_other_types_in_a_report_are_one_line(report, tmp_path, name, value, capsys):
+    content = json.loads(report.read_text())
+    content["provenance"]["options"][name] = value
+    crafted = report.with_name(f"crafted_{name}.json")
+    crafted.write_text(json.dumps(content))
+    words = ["add", "--from", str(crafted), "--effect", "dahl"]
+    assert cli.main(words) == cli.BAD_INPUT
+    assert f"{name} is" in capsys.readouterr().err
+
+
+@pytest.fixture
+def evil_model(tmp_path):
+    """A stored model that calls a function of skidyn which writes a file."""
+
+    def node(loader, module, name, content):
+        place = {"__loader__": loader, "__module__": module, "__class__": name}
+        return {**place, "content": content, "protocol": 2}
+
+    told = (str(tmp_path / "harm"), "harm")
+    words = [node("JsonNode", "builtins", "str", json.dumps(word)) for word in told]
+    given = node("TupleNode", "builtins", "tuple", words)
+    crafted = node("ConstructorFromReduceNode", "skidyn._writing", "write_text", given)
+    with zipfile.ZipFile(tmp_path / "evil.skops", "w") as archive:
+        archive.writestr("schema.json", json.dumps(crafted))
+    return tmp_path / "evil.skops"
+
+
+def test_a_model_that_names_a_function_is_refused_by_the_commands(work, report, evil_model, capsys):
+    words = ["compare", str(work / "log.csv"), "--urdf", str(work / "arm.urdf")]
+    assert cli.main([*words, "--model", str(evil_model)]) == cli.BAD_INPUT
+    assert "not trusted: skidyn._writing.write_text" in capsys.readouterr().err
+    content = json.loads(report.read_text())
+    content["provenance"]["options"]["model"] = str(evil_model)
+    crafted = report.with_name("evil.json")
+    crafted.write_text(json.dumps(content))
+    assert cli.main(["add", "--from", str(crafted), "--effect", "dahl"]) == cli.BAD_INPUT
+    assert "not trusted: skidyn._writing.write_text" in capsys.readouterr().err
+    assert not (evil_model.parent / "harm").exists()
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, '{"provenance": ' * 50_000, "NaN", "[1]", "\x00"])
+def test_what_is_no_report_is_one_line(tmp_path, text, capsys):
+    (tmp_path / "report.json").write_text(text)
+    words = ["add", "--from", str(tmp_path / "report.json"), "--effect", "dahl"]
+    assert cli.main(words) == cli.BAD_INPUT
+    assert capsys.readouterr().err.count("\n") == 1

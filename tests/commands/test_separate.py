@@ -35,5 +35,5 @@ def test_rivals_that_were_not_weighed(report, tmp_path, capsys):
     words = ["separate", "--from", report, "--out", out, "--effect", "payload"]
 
     assert cli.main([*map(str, words)]) == cli.BAD_INPUT
-    assert "the search has weighed" in capsys.readouterr().err
+    assert "the search compared" in capsys.readouterr().err
     assert not out.exists()

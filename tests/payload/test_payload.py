@@ -10,7 +10,7 @@ from importlib import resources
 import numpy as np
 import pytest
 
-from skidyn.datasets import load_planar_arm, load_ur5, make_hidden_effect_log
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.exceptions import SkidynError
 from skidyn.identification import RBDRegressor, is_consistent
 from skidyn.logs import load_recording
@@ -21,22 +21,6 @@ FRICTION = ("viscous", "coulomb")
 TOOL = """<link name="tool"/><joint name="tool_joint" type="fixed">
 <parent link="{last}"/><child link="tool"/><origin xyz="0.01 0.02 0.08" rpy="0.3 -0.2 0.5"/></joint>
 </robot>"""
-
-
-@pytest.fixture(scope="module")
-def runs():
-    """A log of a UR5 that carries a payload in some trajectories: loaded, unloaded, the truth."""
-    log = make_hidden_effect_log(
-        load_ur5(), "payload", base=FRICTION, n_trajectories=6, duration=8.0, random_state=3
-    )
-    carries = log.frame["trajectory"].isin(log.parameters["trajectories"])
-    return log, log.frame[carries], log.frame[~carries]
-
-
-@pytest.fixture(scope="module")
-def found(runs):
-    log, loaded, unloaded = runs
-    return identify_payload(log.robot, loaded, unloaded, effects=FRICTION)
 
 
 def test_mass_and_centre_of_mass(runs, found):
@@ -106,18 +90,6 @@ def test_what_the_motion_leaves_open_is_said():
     assert np.isnan(found.std[6])  # Ixz: a planar arm never turns about another axis
 
 
-def test_errors_name_what_is_wrong(runs):
-    log, loaded, unloaded = runs
-    with pytest.raises(SkidynError, match="no link 'tool'"):
-        identify_payload(log.robot, loaded, unloaded, link="tool")
-    with pytest.raises(SkidynError, match=r"lacks the torque column\(s\) tau4"):
-        identify_payload(log.robot, loaded.drop(columns="tau4"), unloaded)
-    with pytest.raises(SkidynError, match="loaded holds a ndarray"):
-        identify_payload(log.robot, [loaded.to_numpy()], unloaded)
-    with pytest.raises(SkidynError, match="no column time"):
-        identify_payload(log.robot, loaded.drop(columns="time"), unloaded)
-
-
 def test_real_payload(data_dir):
     """2.805 kg at the flange of a UR10e, with the calibrated drive gains."""
     gains = 0.91 * np.array([14.87, 13.26, 11.13, 10.62, 11.03, 11.47])
@@ -178,38 +150,3 @@ def test_joint_with_another_drive_gain_is_named(runs, found):
     wrong = identify_payload(log.robot, loaded, unloaded, effects=FRICTION)
     assert "estimated from single joints" in wrong.text
     assert any("drive gain" in note and "Joint" in note for note in wrong.notes)
-
-
-def test_recording_with_another_drive_gain_is_named(runs, found):
-    log, loaded, unloaded = runs
-    shares = found.by_recording
-    moved = np.isfinite(shares.values) & (shares.std < 0.005)
-    np.testing.assert_allclose(shares.values[moved], 1.0, atol=0.02)
-    assert "of what the other recordings" not in found.text
-    last = unloaded["trajectory"] == unloaded["trajectory"].iloc[-1]
-    changed = unloaded.assign(tau2=unloaded["tau2"].where(~last, 0.95 * unloaded["tau2"]))
-    other = identify_payload(log.robot, loaded, changed, effects=("viscous", "coulomb"))
-    name = shares.names[-1]
-    assert name.startswith("unloaded")
-    assert f"In {name}, shoulder_lift_joint measures 95" in other.text
-    assert other.to_dict()["by_recording"]["recordings"][-1] == name
-
-
-def test_one_loaded_recording_among_many_has_a_narrow_interval():
-    log = make_hidden_effect_log(
-        load_ur5(), "payload", base=FRICTION, n_trajectories=8, duration=4.0, random_state=5
-    )
-    number = log.frame["trajectory"]
-    carries = number.isin(log.parameters["trajectories"])
-    one = number == number[carries].iloc[0]
-    found = identify_payload(log.robot, log.frame[one], log.frame[~carries], effects=FRICTION)
-    low, high = found.mass_interval
-    assert low < log.parameters["mass"] < high and high - low < 0.2 * found.mass
-
-
-def test_the_only_recording_of_its_kind_is_compared_with_nothing(runs):
-    log, loaded, unloaded = runs
-    one = loaded[loaded["trajectory"] == loaded["trajectory"].iloc[0]]
-    found = identify_payload(log.robot, one, unloaded, effects=("viscous", "coulomb"))
-    assert np.isnan(found.by_recording.values[0]).all()
-    assert np.isfinite(found.by_recording.values[1:]).all()

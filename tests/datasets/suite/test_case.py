@@ -6,20 +6,16 @@ import pytest
 
 pytest.importorskip("mujoco", reason="the suite is simulated by MuJoCo")
 pytest.importorskip("pandas")
-from skidyn.datasets import SuiteCase, load_planar_arm
+from skidyn.datasets import load_planar_arm
 from skidyn.identification import RBDRegressor
 
 
-def planar_case(content, *kinds, tier="short"):
-    return SuiteCase("case_007", "planar_arm", tier, content, kinds, (3, 7))
-
-
 @pytest.fixture(scope="module")
-def empty():
+def empty(planar_case):
     return planar_case("nothing").make()
 
 
-def test_a_log_comes_out_the_same_again(empty):
+def test_a_log_comes_out_the_same_again(empty, planar_case):
     again = planar_case("nothing").make()
     np.testing.assert_array_equal(empty.frame.to_numpy(), again.frame.to_numpy())
 
@@ -47,16 +43,3 @@ def planar_motion(frame):
             parts.append(np.gradient(smooth.to_numpy(), run["time"].to_numpy()))
         out[f"ddq{j}"] = np.concatenate(parts)
     return out
-
-
-@pytest.mark.parametrize(
-    ("content", "kind"),
-    [("one", "spring"), ("nameless", "narrow_bump"), ("one", "viscous")],
-)
-def test_an_effect_stands_out_of_the_noise(content, kind):
-    truth = planar_case(content, kind).make().truth
-    (effect,) = truth["effects"]
-    assert effect["kind"] == ("unknown" if content == "nameless" else kind)
-    assert truth["detectable"]
-    assert set(effect["joints"]) <= {1, 2}
-    assert ("viscous" in truth["base_model"]) == (kind != "viscous")

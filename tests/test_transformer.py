@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
+"""Transformers of logs keep the contract of scikit-learn, names and outputs."""
+
 import numpy as np
 import pandas as pd
 import pytest

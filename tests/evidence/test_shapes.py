@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Shapes from the grid to the value that explains most."""
+
+import numpy as np
+import pytest
+
+from skidyn.datasets import load_planar_arm
+from skidyn.effects import Signals, Term, make_terms
+from skidyn.evidence import Gain, best_on_grid, make_problem, refine_term
+
+ROBOT = load_planar_arm()
+TRUTH = 0.031
+
+
+@pytest.fixture(scope="module")
+def problem():
+    t = np.tile(np.arange(0, 12, 0.01), 8)
+    run = np.repeat(np.arange(8), 1200)
+    speed = np.array([0.9, 1.3]) + 0.1 * run[:, None]
+    q, dq = np.sin(speed * t[:, None]), speed * np.cos(speed * t[:, None])
+    signals = Signals(q, dq, -(speed**2) * q, run, time=t, robot=ROBOT)
+    torque = ROBOT.inverse_dynamics(q, dq, -(speed**2) * q) + 0.5 * dq + 2.0 * np.sign(dq)
+    torque[:, 1] += 1.5 * np.exp(-((dq[:, 1] / TRUTH) ** 2)) * np.sign(dq[:, 1])
+    torque += 0.02 * np.random.default_rng(0).normal(size=torque.shape)
+    terms = make_terms(["viscous", "coulomb"], 2)
+    return make_problem(signals, torque, robot=ROBOT, rigid_body=True, terms=terms)
+
+
+def test_refined_shape_explains_more_than_any_of_the_grid(problem):
+    own = [problem.term_rows(t) for t in problem.terms]
+    gain = Gain(problem, own, problem.fit_own().noise, problem.target)
+    rough = best_on_grid(problem, "stribeck", (1,), gain)
+    fine = refine_term(problem, rough, gain)
+    value = [gain(problem.term_rows(t), t.signs) for t in (rough, fine)]
+    assert value[1] >= value[0] > 0
+    assert fine.shape["vs"] == pytest.approx(TRUTH, rel=0.5)
+
+
+def test_an_effect_without_a_shape_is_left_as_it_is(problem):
+    own = [problem.term_rows(t) for t in problem.terms]
+    gain = Gain(problem, own, problem.fit_own().noise, problem.target)
+    spring = Term("spring", (2,))
+    assert refine_term(problem, spring, gain) is spring
+
+
+def test_a_forbidden_sign_gains_nothing(problem):
+    own = [problem.term_rows(t) for t in problem.terms[:2]]
+    gain = Gain(problem, own, problem.fit_own().noise, problem.target)
+    rows = {j: -block for j, block in problem.term_rows(Term("coulomb", (2,))).items()}
+    assert gain(rows, np.ones(1)) == -np.inf

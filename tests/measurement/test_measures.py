@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Plain measures of recorded columns."""
+
+import numpy as np
+
+from skidyn.measurement import (
+    find_leaps,
+    is_held,
+    is_repeated,
+    position_step,
+    rest_share,
+    reversals,
+)
+
+TIME = np.arange(2000) * 0.01
+WAVE = np.sin(TIME)
+
+
+def test_the_step_of_a_coarse_sensor_is_found_and_none_is_made_up():
+    assert np.isclose(position_step(np.round(WAVE / 0.01) * 0.01), 0.01)
+    assert np.isnan(position_step(WAVE + 1e-4 * np.random.default_rng(0).normal(size=2000)))
+
+
+def test_rows_that_repeat_while_the_joint_moves():
+    held = WAVE[np.arange(2000) // 2 * 2][:, None]
+    again = is_repeated(held, np.cos(TIME)[:, None], np.zeros(2000))
+    assert again[1::2].mean() > 0.9 and not again[::2].any()
+
+
+def test_torques_that_are_held_together():
+    torque = np.random.default_rng(0).normal(size=(2000, 2))
+    assert not is_held(torque, np.ones(1999, dtype=bool)).any()
+    held = torque[np.arange(2000) // 4 * 4]
+    assert is_held(held, np.ones(1999, dtype=bool)).mean() > 0.7
+
+
+def test_rest_reversals_and_leaps():
+    assert rest_share(np.zeros(5)) == 1.0
+    assert rest_share(np.cos(TIME)) < 0.01
+    assert reversals(np.cos(TIME), [slice(0, 2000)]) == 6
+    leaping = WAVE[:, None].copy()
+    leaping[1200:] += 2.0
+    assert find_leaps(leaping, TIME, np.zeros(2000, dtype=int)).tolist() == [1200]
