@@ -30,7 +30,7 @@ def test_the_motion_and_its_worth(report, run, tmp_path):
     assert pd.read_csv(out)["time"].iloc[-1] < 10
 
 
-def test_rivals_that_were_not_weighed(report, tmp_path, capsys):
+def test_rivals_that_were_not_compared(report, tmp_path, capsys):
     out = tmp_path / "motion.csv"
     words = ["separate", "--from", report, "--out", out, "--effect", "payload"]
 

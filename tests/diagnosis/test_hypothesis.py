@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Explanations that a search has weighed."""
+"""Explanations that a search has compared."""
 
 
 def test_the_best_explanation_is_the_finding(missing):

@@ -74,6 +74,6 @@ def test_a_rival_that_contains_the_effect_cannot_be_told_from_it():
     assert motion.sentence.startswith("No motion of joint 2")
 
 
-def test_rivals_that_were_not_weighed_are_refused_with_those_that_were(diagnosis):
-    with pytest.raises(EffectError, match="has weighed: .* against .*dahl|has weighed: dahl"):
+def test_rivals_that_were_not_compared_are_refused_with_those_that_were(diagnosis):
+    with pytest.raises(EffectError, match="compared: .* against .*dahl|compared: dahl"):
         design_separating_motion(diagnosis, "payload", "dahl")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Every kind of the vocabulary is found in a log that another code path has made.
 
-The kinds of tests/diagnosis/test_hidden_effects.py are left out here. The simulator integrates
+The kinds of tests/diagnosis/test_diagnosis.py are left out here. The simulator integrates
 states and play at about 1 kHz and shares no code with the catalogue. What MuJoCo has natively is
 tested in test_mujoco.py.
 """
