@@ -67,6 +67,17 @@ def lengths(least: float, most: float) -> Spoil:
     return spoil
 
 
+def other_axis(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled | None:
+    """A description in which a joint turns about another axis of its frame."""
+    k = moved(log, robot, rng)
+    axes = np.array(robot.tree.axes)
+    axes[k] = np.roll(axes[k], int(rng.choice([1, 2]))) * rng.choice([-1.0, 1.0])
+    claimed = replace(robot, tree=replace(robot.tree, axes=axes))
+    if not felt(log, robot, claimed.gravity_torque(joints_of(log, "q", robot))):
+        return None
+    return Spoiled(log, claimed, ("axes",), "", (k + 1,))
+
+
 def before_the_gears(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled | None:
     """Motion and torque of the motors: inertia is smaller by the square of the ratio."""
     if any(kind != "revolute" for kind in robot.joint_types):
@@ -86,5 +97,6 @@ CLOCKS: dict[str, Spoil] = {
     "zero_of_a_run": zero_of_a_run,
     "small_zero": small_zero,
     "lengths": lengths(0.1, 0.3),
+    "other_axis": other_axis,
     "before_the_gears": before_the_gears,
 }

@@ -150,14 +150,25 @@ def two_zeros(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoi
 
 def absolute_angles(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled | None:
     """The angle of a link against the base in the place of that against the link before."""
-    if any(kind != "revolute" for kind in robot.joint_types) or robot.n_joints < 3:
+    tree = robot.tree
+    turning = [kind == "revolute" for kind in robot.joint_types]
+    along = {
+        k: float(tree.axes[k - 1] @ tree.rotations[k] @ tree.axes[k])
+        for k in range(1, robot.n_joints)
+        if turning[k - 1] and turning[k]
+    }
+    able_joints = [k for k, cosine in along.items() if abs(cosine) > 0.999]
+    if not able_joints:
         return None
-    quantities = [q for q in ("q", "dq", "ddq") if f"{q}3" in log.columns]
-    changes = {f"{q}3": log[f"{q}2"] + log[f"{q}3"] for q in quantities}
+    k = int(rng.choice(able_joints))
+    quantities = [q for q in ("q", "dq", "ddq") if f"{q}{k + 1}" in log.columns]
+    changes = {
+        f"{q}{k + 1}": log[f"{q}{k + 1}"] + np.round(along[k]) * log[f"{q}{k}"] for q in quantities
+    }
     changed = log.assign(**changes)
     if not felt(log, robot, robot.gravity_torque(joints_of(changed, "q", robot))):
         return None
-    return Spoiled(changed, robot, ("reading",), "", None, ("bodies", "lengths", "unexplained"))
+    return Spoiled(changed, robot, ("reading",), f"--summed q{k + 1}=", (k + 1,))
 
 
 def smoothed(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled:

@@ -145,6 +145,9 @@ def with_remedies(parser: Any) -> None:
     fix.add_argument(
         "--gain", metavar="tau3=0.02", help="multiply columns or quantities by factors"
     )
+    fix.add_argument(
+        "--summed", metavar="q3=q2", help="positions that hold that of another joint: q3=q2"
+    )
     fix.add_argument("--zero", metavar="q2=1.57", help="what positions read at the robot's zero")
     fix.add_argument("--late", metavar="tau=0.008", help="delays in s, to be taken out")
     fix.add_argument("--unwrap", action="store_true", help="remove jumps by whole turns")

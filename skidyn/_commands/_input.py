@@ -71,6 +71,7 @@ def reading(options: argparse.Namespace) -> dict[str, Any]:
         "order": order_option(said.get("order")),
         "flip": listed(said.get("flip")),
         "gain": pairs("gain", said.get("gain"), numbers=True),
+        "summed": pairs("summed", said.get("summed")),
         "zero": pairs("zero", said.get("zero"), numbers=True),
         "late": pairs("late", said.get("late"), numbers=True),
         "unwrap": said.get("unwrap"),

@@ -46,6 +46,7 @@ def read_log(
     order: Sequence[int] | Mapping[str, Sequence[int]] | None = None,
     flip: Sequence[str | int] = (),
     gain: Mapping[str, float] | None = None,
+    summed: Mapping[str, str] | None = None,
     zero: Mapping[str, float] | None = None,
     late: Mapping[str, float] | None = None,
     unwrap: bool = False,
@@ -101,6 +102,9 @@ def read_log(
         position with velocity and acceleration; ``"dq3"`` or ``"tau3"`` one column.
     gain : mapping, optional
         Factors of columns or quantities: ``{"tau3": 0.02}``.
+    summed : mapping of str to str, optional
+        Positions that hold that of another joint, as angles against the base do, which is taken
+        off with velocity and acceleration: ``{"q3": "q2"}``, or ``{"q3": "-q2"}``.
     zero : mapping of str to float, rad or m, optional
         What positions read at the robot's zero, which is taken off: ``{"q2": 1.5708}``.
     late : mapping of str to float, s, optional
@@ -176,6 +180,7 @@ def read_log(
             order=order,
             flip=flip,
             gain=gain,
+            summed=summed,
             zero=zero,
             unwrap=unwrap,
             torque_sign=torque_sign,

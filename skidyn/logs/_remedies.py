@@ -27,6 +27,7 @@ BELOW = 0.01
 REMEDIES = (
     "flip:",
     "gain:",
+    "summed:",
     "zero:",
     "clock:",
     "late:",
@@ -44,6 +45,7 @@ class Remedies:
     order: Sequence[int] | Mapping[str, Sequence[int]] | None = None
     flip: Sequence[str | int] = ()
     gain: Mapping[str, float] | None = None
+    summed: Mapping[str, str] | None = None
     zero: Mapping[str, float] | None = None
     unwrap: bool = False
     torque_sign: Literal["recorded", "command"] = "recorded"
@@ -57,7 +59,7 @@ class Remedies:
 def mend_columns(
     table: pd.DataFrame, n: int, joints: Sequence[str], remedies: Remedies, notes: list[str]
 ) -> pd.DataFrame:
-    """Order, sign, scale and zero of columns.
+    """Order, sign, scale, sums and zero of columns.
 
     Parameters
     ----------
@@ -76,7 +78,7 @@ def mend_columns(
     ------
     LogError
         A joint or column that the log lacks, an order that is none, a gain that is not finite or
-        zero, or no commanded positions to take the sign from.
+        zero, a position that holds itself, or no commanded positions to take the sign from.
     """
     table = table.copy()
     if remedies.order is not None:
@@ -97,6 +99,8 @@ def mend_columns(
             raise LogError(f"gain: {name} is to be multiplied by {value}; expected a number.")
         table[name] = value * table[name]
         notes.append(f"gain: {name} was multiplied by {value:g} in {_all(table)} rows")
+    if remedies.summed:
+        _take_apart(table, n, remedies.summed, notes)
     for name, value in _each(remedies.zero, table, "zero"):
         if not np.isfinite(value):
             raise LogError(f"zero: {name} is to read {value} at zero; expected a number.")
@@ -222,6 +226,26 @@ def _reorder(
     what = ", ".join(orders) if isinstance(order, Mapping) else "all signals"
     numbers = list(next(iter(orders.values())))
     notes.append(f"order: columns of {what} were put in the order {numbers}")
+
+
+def _take_apart(table: pd.DataFrame, n: int, summed: Mapping[str, str], notes: list[str]) -> None:
+    """Take the position of another joint, as it was recorded, off positions that hold it."""
+    recorded = table.copy()
+    for name, other in summed.items():
+        hit = re.fullmatch(r"q(\d+)", name), re.fullmatch(r"(-?)q(\d+)", str(other))
+        if not (hit[0] and hit[1]) or hit[0][1] == hit[1][2]:
+            raise LogError(
+                f"summed: {name}={other} is not a position and that of another joint which it "
+                "holds; expected such as q3=q2, or q3=-q2 where the other is taken off it."
+            )
+        joint, sign, before = hit[0][1], -1.0 if hit[1][1] else 1.0, hit[1][2]
+        if max(int(joint), int(before)) > n or min(int(joint), int(before)) < 1:
+            raise LogError(f"summed: {name}={other}: the log has q1 .. q{n}.")
+        for quantity in MOTION:
+            columns = f"{quantity}{joint}", f"{quantity}{before}"
+            if set(columns) <= set(table.columns):
+                table[columns[0]] = recorded[columns[0]] - sign * recorded[columns[1]]
+        notes.append(f"summed: {other} was taken off {name} in {_all(table)} rows")
 
 
 def _flipped(item: str | int, table: pd.DataFrame, joints: Sequence[str]) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from skidyn._exceptions import LogError
 from skidyn.measurement._around_zero import DeadBand, TaredTorque
+from skidyn.measurement._axes import Axes
 from skidyn.measurement._bodies import (
     Bodies,
     ComputedTorque,
@@ -58,6 +59,7 @@ CHECKS: tuple[Check, ...] = (
     TARED,
     DeadBand(),
     UnsignedTorque(),
+    Axes(),
     OddRecording(),
     Columns(),
     TorqueScale(),
@@ -94,7 +96,7 @@ def list_checks() -> tuple[Check, ...]:
     --------
     >>> from skidyn.measurement import list_checks
     >>> [check.name for check in list_checks() if check.stage == 1]
-    ['unsigned_torque', 'odd_recording', 'reading']
+    ['unsigned_torque', 'axes', 'odd_recording', 'reading']
     """
     return CHECKS
 

@@ -349,6 +349,7 @@ class InterpolatedRows(Check):
             return
         moving, on_line = _on_a_line(s, measurement.torque)
         if moving > 50 and on_line > ON_A_LINE * moving:
+            measurement.smoothed = True
             yield self.suspicion(
                 "torques were interpolated from a slower clock",
                 f"in {100 * on_line / moving:.0f} % of the rows all of them lie on straight lines "

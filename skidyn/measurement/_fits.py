@@ -58,6 +58,9 @@ class Reading:
         Joints, from 0, whose positions and velocities, or torques, have the other sign.
     order, torque_order : tuple of int or None
         Column that holds each joint: of all signals, and of the torque beside that.
+    summed : tuple of (int, int)
+        Joints whose position holds that of the joint before as well, and its sign: angles against
+        the base, as of arms whose links are driven by parallelograms.
     zero : tuple of (int, float)
         Joints and what their position reads at the robot's zero.
     gravity : tuple of float or None
@@ -70,6 +73,7 @@ class Reading:
     flip_torque: frozenset[int] = frozenset()
     order: tuple[int, ...] | None = None
     torque_order: tuple[int, ...] | None = None
+    summed: tuple[tuple[int, int], ...] = ()
     zero: tuple[tuple[int, float], ...] = ()
     gravity: tuple[float, float, float] | None = None
     size: float = 1.0
@@ -216,8 +220,11 @@ class Fits:
             zero[joint] = value
         s = self.signals
         faster = reading.stretch
+        apart = np.eye(self.n_joints)
+        for joint, before in reading.summed:
+            apart[joint - 1, joint] = -before
         q, dq, ddq = (
-            values[:, order] * (sign * faster**k / reading.size)
+            (values[:, order] * (sign * faster**k / reading.size)) @ apart
             for k, values in enumerate((s.q, s.dq, s.ddq))
         )
         return s.with_(q=q - zero, dq=dq, ddq=ddq)

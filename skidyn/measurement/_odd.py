@@ -72,8 +72,8 @@ class OddRecording(Check):
     stage = 1
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
-        if measurement.stale or measurement.lost:
-            return  # what is left is that of the clock
+        if measurement.stale or measurement.lost or measurement.odd:
+            return  # what is left is that of the clock, or of another robot
         seen = explained(measurement)
         if seen is None:
             return

@@ -13,6 +13,7 @@ import numpy as np
 from skidyn._signals import Array
 from skidyn.measurement._duel import fight
 from skidyn.measurement._fits import Fits, Outcome, Reading, friction
+from skidyn.robots import Robot
 
 #: Log-likelihood, after the likeness of neighbouring rows is taken off, that a change must gain.
 LEAST = 15.0
@@ -28,7 +29,7 @@ RIVALS = 0.2
 #: What a change must gain with identified bodies. Negative masses could take the place of torque
 #: with the other sign or of gravity that points up or is absent, so that these gain little.
 NEEDED = {
-    **dict.fromkeys(("motion_sign", "joint_sign", "order", "torque_order", "zero"), 10.0),
+    **dict.fromkeys(("motion_sign", "joint_sign", "order", "torque_order", "summed", "zero"), 10.0),
     **dict.fromkeys(("torque_sign", "gravity"), -3.0),
 }
 #: What a change must gain beside the one that gains most, as a share.
@@ -41,6 +42,8 @@ LEAST_DROP = 0.15
 GRAVITY, LEAST_ANGLE = 9.81, 20.0
 #: Cosine of the angle to an axis from which gravity is along that axis.
 UPRIGHT = 0.995
+#: Cosine of the angle between the axes of two joints from which their angles add up.
+PARALLEL = 0.999
 #: Offsets of a position that are tried, rad.
 OFFSETS = np.deg2rad([-135, -90, -45, -15, 15, 45, 90, 135, 180])
 #: What a reading may be instead if it gains little over bodies near those of the description.
@@ -59,7 +62,7 @@ class Change:
     ----------
     kind : str
         ``"torque_sign"``, ``"motion_sign"``, ``"joint_sign"`` (both), ``"order"``,
-        ``"torque_order"``, ``"gravity"``, ``"no_gravity"`` or ``"zero"``.
+        ``"torque_order"``, ``"summed"``, ``"gravity"``, ``"no_gravity"`` or ``"zero"``.
     joints : tuple of int
         Joints concerned, from 0.
     reading : Reading
@@ -300,6 +303,11 @@ def _alternatives(fits: Fits, reading: Reading, here: Outcome) -> Iterator[Chang
     every = replace(reading, flip_torque=frozenset(joints) ^ reading.flip_torque)
     yield Change("torque_sign", tuple(joints), every)
     yield from _orders(fits, reading)
+    told = {joint for joint, _ in reading.summed}
+    for j, sign in _parallel(fits.robot):
+        if j not in told:
+            summed = replace(reading, summed=(*reading.summed, (j, sign)))
+            yield Change("summed", (j,), summed)
     if reading.gravity is None:
         yield from _gravities(fits, reading, here)
     found = {joint for joint, _ in reading.zero}
@@ -308,6 +316,18 @@ def _alternatives(fits: Fits, reading: Reading, here: Outcome) -> Iterator[Chang
             if j not in found:
                 shifted = replace(reading, zero=(*reading.zero, (int(j), float(offset))))
                 yield Change("zero", (int(j),), shifted)
+
+
+def _parallel(robot: Robot) -> Iterator[tuple[int, int]]:
+    """Turning joints about an axis parallel to that before, and whether it points the same way."""
+    tree, turning = robot.tree, [kind == "revolute" for kind in robot.joint_types]
+    if len(tree.parents) != robot.n_joints:
+        return  # bodies that mimic others have no columns of their own
+    for j in range(1, robot.n_joints):
+        if turning[j] and turning[j - 1] and tree.parents[j] == j - 1:
+            along = float(tree.axes[j - 1] @ tree.rotations[j] @ tree.axes[j])
+            if abs(along) > PARALLEL:
+                yield j, 1 if along > 0 else -1
 
 
 def _orders(fits: Fits, reading: Reading) -> Iterator[Change]:

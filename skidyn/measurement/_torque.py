@@ -194,8 +194,8 @@ class Columns(Check):
 
     name = "reading"
     suspects = (
-        "the sign of single joints, their order, the zero of a position, the direction of gravity, "
-        "or torque from which gravity was taken off"
+        "the sign of single joints, their order, the zero of a position, angles against the base, "
+        "the direction of gravity, or torque from which gravity was taken off"
     )
     stage = 1
 
@@ -249,6 +249,16 @@ class Columns(Check):
             else:
                 what = f"the torques of {names} are exchanged"
                 remedy = (f"--order tau={words}", f"order={{'tau': {order}}}")
+        elif kind == "summed":
+            what = f"the position of {names} holds that of the joint before: its angle is against "
+            what += "another link than the one it turns on"
+            pairs = {
+                f"q{j + 1}": f"q{j}" if sign > 0 else f"-q{j}"
+                for j, sign in final.summed
+                if j in joints
+            }
+            words = ",".join(f"{name}={other}" for name, other in pairs.items())
+            remedy = (f"--summed {words}", f"summed={pairs}")
         elif kind == "zero":
             values = ", ".join(f"{np.rad2deg(v):.0f} deg" for j, v in final.zero if j in joints)
             what = f"the zero of {names} is off by about {values}"
@@ -277,6 +287,7 @@ _RIVALS = {
     "joint_sign": "position and torque with the other sign",
     "order": "another order of all columns",
     "torque_order": "another order of the torques",
+    "summed": "a position against another link",
     "zero": "another zero of a position",
     "gravity": "another direction of gravity",
     "no_gravity": "no gravity",

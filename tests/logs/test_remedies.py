@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.datasets import load_planar_arm, load_ur5, make_hidden_effect_log
 from skidyn.exceptions import LogError
 from skidyn.logs import check_log, read_log
 
@@ -167,3 +167,30 @@ def test_stamps_that_are_coarser_than_the_samples(tmp_path, unit):
     assert len(mended) == len(log.frame)
     for _, own in mended.groupby("trajectory"):
         assert np.diff(own["time"]) == pytest.approx(0.01, rel=0.02)
+
+
+def test_positions_that_hold_those_before_them(read):
+    log = make_hidden_effect_log(load_ur5(), None, n_trajectories=2, duration=2.0).frame
+    sums = {}
+    for quantity in ("q", "dq"):
+        sums[f"{quantity}3"] = log[f"{quantity}3"] + log[f"{quantity}2"]
+        sums[f"{quantity}4"] = log[f"{quantity}4"] + sums[f"{quantity}3"]
+        sums[f"{quantity}6"] = log[f"{quantity}6"] - log[f"{quantity}5"]
+    mended = read(log.assign(**sums), summed={"q3": "q2", "q4": "q3", "q6": "-q5"})
+    for name in sums:
+        np.testing.assert_allclose(mended[name], log[name], atol=1e-9)
+    assert sum(note.startswith("summed:") for note in mended.attrs["notes"]) == 3
+
+
+@pytest.mark.parametrize(
+    "summed, message",
+    [
+        ({"q3": "q2"}, "the log has q1 .. q2"),
+        ({"q2": "q2"}, "expected such as q3=q2"),
+        ({"q2": "elbow"}, "expected such as q3=q2"),
+        ({"tau2": "q1"}, "expected such as q3=q2"),
+    ],
+)
+def test_sums_that_cannot_be_taken_apart(read, summed, message):
+    with pytest.raises(LogError, match=message):
+        read(LOG, summed=summed)

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Check of the axes of joints: whether one of them turns about another axis of its frame.
+
+Descriptions of other variants of a robot, or written by hand, have a joint about another axis. No
+bodies make up for that. Every joint is tried about the other axes of its own frame; the other
+direction of its own axis is a sign, which another check tells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from skidyn._signals import Array
+from skidyn.measurement._bodies import explained
+from skidyn.measurement._check import Check
+from skidyn.measurement._duel import duel_of
+from skidyn.measurement._fits import Fits, Reading
+from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._near_bodies import NearBodies
+from skidyn.measurement._readings import DECISIVE, FEWEST_ROWS, HALF, MOST_ROWS
+from skidyn.measurement._suspicion import Suspicion
+from skidyn.measurement._torque import asked_changes
+from skidyn.robots import Robot
+
+#: Error of the stated bodies, as a share of a torque's spread, from which axes are tried.
+WORTH = 0.08
+#: Log-likelihood that another axis must gain with stated bodies, and beside any effect; the share
+#: of it that it must gain there; how many are looked at more closely.
+LEAST, SURE, BESIDE, FINALISTS = 15.0, 40.0, 0.3, 4
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Another axis of a joint, and what it explains."""
+
+    joint: int
+    direction: Array
+    fits: Fits
+    gain: float
+    confirmed: float
+    drop: float
+
+
+class Axes(Check):
+    """A joint that turns, or slides, along another axis than the description says."""
+
+    name = "axes"
+    suspects = "the axis of a joint in the description that is not that of the robot"
+    stage = 1
+    misnames = True
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        seen = None if measurement.stale or measurement.lost else explained(measurement)
+        if seen is None or seen.errors[0].max() < WORTH:
+            return
+        fits = seen.fits
+        found = find_axis(fits)
+        if found is None:
+            return
+        # a sign, an order or a zero may look like another axis, and the other way round
+        if sum(c.gain for c in asked_changes(measurement, fits) if not c.other) > found.gain:
+            return
+        gains = np.nan_to_num(found.fits.nominal(Reading()).gain)
+        inflation = np.maximum(seen.identified.inflation, 1.0)
+        here, there = (NearBodies(f, Reading(), gains, inflation) for f in (fits, found.fits))
+        duel = duel_of(here, there, range(fits.n_joints))
+        if duel.beside < max(LEAST, BESIDE * duel.gain):
+            return
+        measurement.odd = True
+        words = " ".join(f"{x:g}" for x in found.direction)
+        yield self.suspicion(
+            f"{measurement.joint(found.joint)} turns about another axis than in the description",
+            f'about <axis xyz="{words}"/> of its frame the robot\'s own torque explains the '
+            f"measured one better by {found.gain:.0f} (log-likelihood), that of identified bodies "
+            f"by {found.confirmed:.0f}, and leaves {100 * found.drop:.0f} % less of it; take the "
+            "description of this very robot, or correct the axis there",
+            "certain",
+            [found.joint],
+        )
+
+
+def turned(robot: Robot, body: int, direction: Array) -> Robot:
+    """A robot with a joint about another axis of its frame.
+
+    Parameters
+    ----------
+    robot : Robot
+        As described.
+    body : int
+        Body that the joint moves.
+    direction : ndarray of shape (3,)
+        Unit vector.
+
+    Returns
+    -------
+    Robot
+    """
+    axes = np.array(robot.tree.axes)
+    axes[body] = direction
+    return replace(robot, tree=replace(robot.tree, axes=axes))
+
+
+def find_axis(fits: Fits) -> Axis | None:
+    """The other axis of a joint that explains most, if bodies with it explain far more.
+
+    Parameters
+    ----------
+    fits : Fits
+        Rows.
+    """
+    robot, tree = fits.robot, fits.robot.tree
+    if len(tree.parents) != robot.n_joints:
+        return None  # bodies that mimic others have no columns of their own
+    few = fits.thinned(max(FEWEST_ROWS, MOST_ROWS // fits.n_joints))
+    rough = few.nominal(Reading(), 1)
+    every = np.vstack([np.eye(3), -np.eye(3)])
+    tried = []
+    for body, axis in enumerate(tree.axes):
+        for direction in every[np.abs(every @ axis) < 0.5]:
+            other = few.of(turned(robot, body, direction)).nominal(Reading(), 1)
+            tried.append((float(other.margin(rough).sum()), len(tried), body, direction))
+    here, before = fits.nominal(Reading()), fits.identified(Reading())
+    found = []
+    for rough_gain, _, body, direction in sorted(tried, reverse=True)[:FINALISTS]:
+        if rough_gain < LEAST:
+            break
+        other = fits.of(turned(robot, body, direction))
+        there = other.nominal(Reading())
+        margin = there.margin(here)
+        drop = float((1 - there.scale / here.scale)[int(np.argmax(margin))])
+        if margin.sum() < SURE or drop < HALF:
+            continue
+        confirmed = float(other.identified(Reading()).margin(before).sum())
+        if confirmed >= DECISIVE:
+            joint = int(tree.coordinates[body])
+            found.append(Axis(joint, direction, other, float(margin.sum()), confirmed, drop))
+    return max(found, key=lambda axis: axis.gain + axis.confirmed, default=None)
