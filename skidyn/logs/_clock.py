@@ -39,7 +39,7 @@ def seconds(table: pd.DataFrame, rate: float | None, source: str) -> np.ndarray:
     Raises
     ------
     LogError
-        No clock at all, or one that cannot be read.
+        No clock at all, one that cannot be read, or a rate that is none.
     """
     import pandas
 
@@ -49,6 +49,8 @@ def seconds(table: pd.DataFrame, rate: float | None, source: str) -> np.ndarray:
                 f"{source} has no time column. Name it with columns={{'time': ...}}, or pass rate= "
                 f"(Hz) if sampling is regular. It has: {', '.join(map(str, table.columns))}."
             )
+        if not (np.isfinite(rate) and rate > 0):
+            raise LogError(f"rate is {rate}; expected a rate in Hz above zero.")
         return np.arange(len(table)) / rate
     column = table["time"]
     if column.dtype.kind in "iu" and len(column) and abs(int(column.iloc[0])) > 2**53:
@@ -110,11 +112,13 @@ def align_channels(
     Raises
     ------
     LogError
-        A signal occurs in two channels, a clock starts anew in one of several channels, or the
-        channels do not overlap in time.
+        A rate that is none, a signal that occurs in two channels, a clock that starts anew in one
+        of several channels, or channels that do not overlap in time.
     """
     import pandas
 
+    if rate is not None and not (np.isfinite(rate) and rate > 0):
+        raise LogError(f"resample_rate is {rate}; expected a rate in Hz above zero.")
     if len(tables) == 1 and rate is None:
         return tables[0]
     for table, name in zip(tables, names, strict=True):

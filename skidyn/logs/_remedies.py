@@ -232,13 +232,13 @@ def _take_apart(table: pd.DataFrame, n: int, summed: Mapping[str, str], notes: l
     """Take the position of another joint, as it was recorded, off positions that hold it."""
     recorded = table.copy()
     for name, other in summed.items():
-        hit = re.fullmatch(r"q(\d+)", name), re.fullmatch(r"(-?)q(\d+)", str(other))
-        if not (hit[0] and hit[1]) or hit[0][1] == hit[1][2]:
+        own, held = re.fullmatch(r"q(\d+)", name), re.fullmatch(r"(-?)q(\d+)", str(other))
+        if own is None or held is None or own[1] == held[2]:
             raise LogError(
                 f"summed: {name}={other} is not a position and that of another joint which it "
                 "holds; expected such as q3=q2, or q3=-q2 where the other is taken off it."
             )
-        joint, sign, before = hit[0][1], -1.0 if hit[1][1] else 1.0, hit[1][2]
+        joint, sign, before = own[1], -1.0 if held[1] else 1.0, held[2]
         if max(int(joint), int(before)) > n or min(int(joint), int(before)) < 1:
             raise LogError(f"summed: {name}={other}: the log has q1 .. q{n}.")
         for quantity in MOTION:

@@ -117,11 +117,11 @@ def find_axis(fits: Fits) -> Axis | None:
     few = fits.thinned(max(FEWEST_ROWS, MOST_ROWS // fits.n_joints))
     rough = few.nominal(Reading(), 1)
     every = np.vstack([np.eye(3), -np.eye(3)])
-    tried = []
+    tried: list[tuple[float, int, int, Array]] = []
     for body, axis in enumerate(tree.axes):
         for direction in every[np.abs(every @ axis) < 0.5]:
-            other = few.of(turned(robot, body, direction)).nominal(Reading(), 1)
-            tried.append((float(other.margin(rough).sum()), len(tried), body, direction))
+            read = few.of(turned(robot, body, direction)).nominal(Reading(), 1)
+            tried.append((float(read.margin(rough).sum()), len(tried), body, direction))
     here, before = fits.nominal(Reading()), fits.identified(Reading())
     found = []
     for rough_gain, _, body, direction in sorted(tried, reverse=True)[:FINALISTS]:

@@ -252,13 +252,9 @@ class Columns(Check):
         elif kind == "summed":
             what = f"the position of {names} holds that of the joint before: its angle is against "
             what += "another link than the one it turns on"
-            pairs = {
-                f"q{j + 1}": f"q{j}" if sign > 0 else f"-q{j}"
-                for j, sign in final.summed
-                if j in joints
-            }
-            words = ",".join(f"{name}={other}" for name, other in pairs.items())
-            remedy = (f"--summed {words}", f"summed={pairs}")
+            others = {f"q{j + 1}": f"{'-' * (x < 0)}q{j}" for j, x in final.summed if j in joints}
+            words = ",".join(f"{name}={other}" for name, other in others.items())
+            remedy = (f"--summed {words}", f"summed={others}")
         elif kind == "zero":
             values = ", ".join(f"{np.rad2deg(v):.0f} deg" for j, v in final.zero if j in joints)
             what = f"the zero of {names} is off by about {values}"

@@ -194,3 +194,11 @@ def test_positions_that_hold_those_before_them(read):
 def test_sums_that_cannot_be_taken_apart(read, summed, message):
     with pytest.raises(LogError, match=message):
         read(LOG, summed=summed)
+
+
+@pytest.mark.parametrize("rate", [0.0, -5.0, np.nan, np.inf])
+def test_rates_that_are_none(read, rate):
+    with pytest.raises(LogError, match="above zero"):
+        read(LOG, resample_rate=rate)
+    with pytest.raises(LogError, match="above zero"):
+        read(LOG.drop(columns=["time", "trajectory"]), rate=rate)
