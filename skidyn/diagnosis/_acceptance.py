@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from skidyn._signals import Array
-from skidyn.diagnosis._candidates import Candidate
+from skidyn.diagnosis._candidates import Candidate, rows_together
 from skidyn.diagnosis._hypothesis import (
     UNKNOWN,
     Hypothesis,
@@ -24,7 +24,11 @@ class JudgingSearch(RankingSearch):
     """A search that picks and judges explanations."""
 
     def pick(self, ranking: list[Hypothesis]) -> Hypothesis | None:
-        """The best explanation, or a simpler one that is as good within its standard error."""
+        """The best explanation, or a simpler one that is as good.
+
+        It is where it falls behind by no more than the standard error and a small share of the
+        score; beside a further form, by whatever the error is if that form says nothing more.
+        """
         if not ranking:
             return None
         best = self._named(ranking)
@@ -42,9 +46,27 @@ class JudgingSearch(RankingSearch):
             behind = ((rival.errors - best.errors) / variance).sum(1)
             error = behind.std(ddof=1) * np.sqrt(len(behind))
             cap = self.settings.simpler_share * best.score
-            if behind.sum() < min(max(error, 6.0), cap):
+            near = behind.sum() < min(max(error, 6.0), cap)
+            if near or (behind.sum() < error and self._encompassed(best, rival)):
                 best = rival
         return self._simplest_of_family(best, ranking)
+
+    def _encompassed(self, best: Hypothesis, rival: Hypothesis) -> bool:
+        """Whether a further form says nothing beside a simpler explanation, which says it all [1]_.
+
+        Held-out errors of an effect that few recordings show differ by luck between two formulas
+        of which either would do.
+
+        References
+        ----------
+        .. [1] G. E. Mizon, J.-F. Richard (1986), The encompassing principle and its application to
+           testing non-nested hypotheses, Econometrica 54(3).
+        """
+        if not any(c.is_further_form for c in best.candidates):
+            return False
+        rows = rows_together(best.candidates, self.problem.rows.counts)
+        chance = self.tester([*self.chosen, *rival.candidates]).test(rows).chance
+        return chance > self.settings.member
 
     def _named(self, ranking: list[Hypothesis]) -> Hypothesis:
         """The first explanation, or one that says more whose formula is good enough beside it.
@@ -158,12 +180,7 @@ class JudgingSearch(RankingSearch):
         ]
         if not kept:
             return None
-        reached = sorted({j for c in kept for j in c.rows})
-        counts = self.problem.rows.counts
-        rows = {
-            j: np.hstack([c.rows.get(j, np.zeros((int(counts[j]), c.width))) for c in kept])
-            for j in reached
-        }
+        rows = rows_together(kept, self.problem.rows.counts)
         chance = self.tester(self.chosen).test(rows).chance
         if not self.significant(chance, kept[0]):
             return None

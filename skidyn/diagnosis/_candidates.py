@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -46,9 +46,9 @@ class Candidate:
         return self.term.width
 
     @cached_property
-    def signs(self) -> Array:
-        """1 for every coefficient that physics forbids to be negative, else 0."""
-        return self.term.signs
+    def lowest(self) -> Array:
+        """Smallest value of every coefficient that physics allows."""
+        return self.term.lowest
 
     @cached_property
     def zeros(self) -> NDArray[np.bool_]:
@@ -74,6 +74,24 @@ class Candidate:
     def site(self) -> tuple[str, tuple[int, ...]]:
         """Kind and joints: what can be added once."""
         return self.kind, self.term.places
+
+
+def rows_together(candidates: Sequence[Candidate], counts: NDArray[np.int64]) -> dict[int, Array]:
+    """Averaged columns of several candidates side by side, per joint that any of them reaches.
+
+    Parameters
+    ----------
+    candidates : sequence of Candidate
+        Terms.
+    counts : ndarray of shape (n_joints,)
+        Rows of every joint.
+    """
+    reached = sorted({j for c in candidates for j in c.rows})
+
+    def block(candidate: Candidate, joint: int) -> Array:
+        return candidate.rows.get(joint, np.zeros((int(counts[joint]), candidate.width)))
+
+    return {j: np.hstack([block(c, j) for c in candidates]) for j in reached}
 
 
 def catalogue_candidates(problem: Problem, kinds: Iterable[str]) -> list[Candidate]:

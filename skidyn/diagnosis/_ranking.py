@@ -294,7 +294,7 @@ class RankingSearch(SearchState):
         """Whether a candidate's coefficients have a sign that its effect can have."""
         others = [*self.chosen, *(c for c in chosen if c is not candidate)]
         coefficients = self.tester(others).test(candidate.rows).coefficients
-        return not np.any(coefficients * candidate.term.signs < 0)
+        return not np.any(coefficients < candidate.lowest)
 
     def _same_or_own(self, chosen: Sequence[Candidate]) -> list[list[Candidate]]:
         """Effects of few recordings by their name, those of many without one.

@@ -98,8 +98,8 @@ REVERSAL_FEWEST_ROWS, REVERSAL_AWAY = 20, 0.6
 #: Least share of a joint's squared error that hysteresis must remove there.
 REVERSAL_LEAST_SHARE = 0.06
 
-#: Windows, in s, in which swift effects are looked for (``_swift.py``): flights across a play
-#: of a few mrad take as long.
+#: Windows, in s, in which effects that move the link are looked for (``_swift.py``): flights
+#: across a play of a few mrad take as long.
 SHORT_WINDOW = 1 / 32
 
 

@@ -45,7 +45,7 @@ class _Group:
     width: int
     own: Array  # (n_folds, n_candidates, width, width)
     target: Array  # (n_folds, n_candidates * width)
-    signs: Array  # (n_candidates, width)
+    lowest: Array  # (n_candidates, width)
     limits: Array  # (n_candidates, width)
     ridge: Array  # (n_candidates, width)
 
@@ -99,11 +99,11 @@ class Screen:
                 for f, here in enumerate(self.folds[j]):
                     own[f] += _products(block[None, here], block[None, here], k)[0]
                     target[f] += self.target[j][here] @ block[here]
-            signs = np.array([self.candidates[i].signs for i in index])
+            lowest = np.array([self.candidates[i].lowest for i in index])
             limits = np.array([self.candidates[i].limits for i in index])
             soft = np.array([self.candidates[i].term.effect.softness for i in index])
             ridge = soft[:, None] * np.einsum("fckk->ck", own).max(1, keepdims=True)
-            groups.append(_Group(np.array(index), rows, k, own, target, signs, limits, ridge))
+            groups.append(_Group(np.array(index), rows, k, own, target, lowest, limits, ridge))
         return groups
 
     def model(self, blocks: Sequence[dict[int, Array]]) -> Model:
@@ -165,12 +165,12 @@ class Screen:
                 errors[group.index[pick]] = part.errors(
                     model, own, target, ridge, bent[:, :, place]
                 ).T
-                signs, limits = group.signs[pick], group.limits[pick]
-                if signs.any() or np.isfinite(limits).any():
+                lowest, limits = group.lowest[pick], group.limits[pick]
+                if np.isfinite(lowest).any() or np.isfinite(limits).any():
                     gain = _Swept.whole(model, part.cross).gain(
                         own.sum(0, keepdims=True), target.sum(0, keepdims=True), ridge
                     )[0]
-                    forbidden = (gain * signs < 0) | (np.abs(gain) > limits)
+                    forbidden = (gain < lowest) | (np.abs(gain) > limits)
                     errors[group.index[pick[forbidden.any(axis=1)]]] = np.inf
         return errors
 

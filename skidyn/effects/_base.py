@@ -151,10 +151,10 @@ class Effect:
         Whether the formula describes nothing but this effect, so that what it leaves is another
         one; other formulas leave traces of themselves.
     moves_link : bool
-        Whether it moves the link away from the position that the encoder logged.
-    is_swift : bool
-        Whether what it does is over within hundredths of a second, so that it is looked for in
-        short averages, too.
+        Whether it moves the link away from the position that the encoder logged. What it does may
+        be over within hundredths of a second, so that it is looked for in short averages, too.
+    is_slow : bool
+        Whether the formula holds for slow changes only, so that nothing swift is told beside it.
     simplicity : int
         Rank among rivals that explain the data equally well; the lower is named.
     rivals : tuple of str
@@ -201,7 +201,7 @@ class Effect:
     drawn: ClassVar[float] = 0.0
     is_exact: ClassVar[bool] = False
     moves_link: ClassVar[bool] = False
-    is_swift: ClassVar[bool] = False
+    is_slow: ClassVar[bool] = False
     simplicity: ClassVar[int] = 50
     rivals: ClassVar[tuple[str, ...]] = ()
     separating_motion: ClassVar[str] = ""
@@ -359,6 +359,21 @@ class Effect:
             True by default. A contact is one only if some samples touch and others do not.
         """
         return True
+
+    def least(self, shape: Mapping[str, Any]) -> float:
+        """Smallest value at which a coefficient that must not be negative goes with its shape.
+
+        Parameters
+        ----------
+        shape : mapping
+            Shape parameters.
+
+        Returns
+        -------
+        float
+            0 by default. A spring whose resonance is known cannot be of any stiffness.
+        """
+        return 0.0
 
     def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
         """Range over which a shape parameter with linear spacing moves, in its own unit.

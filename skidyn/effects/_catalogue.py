@@ -32,7 +32,7 @@ from skidyn.effects._springs import EndStop, GravityCompensator, NonlinearSpring
 from skidyn.effects._term import Term
 from skidyn.effects._thermal import FrictionDrift, TemperatureFriction, TemperatureOffset
 from skidyn.effects._tool import EnvironmentContact, ExternalWrench, Payload
-from skidyn.effects._transmission import Backlash, JointElasticity
+from skidyn.effects._transmission import AccelerationNoise, Backlash, JointElasticity
 
 _CLASSES: tuple[type[Effect], ...] = (
     Viscous,
@@ -68,7 +68,7 @@ _CLASSES: tuple[type[Effect], ...] = (
     ExternalWrench,
     EnvironmentContact,
 )
-for _cls in (*_CLASSES, *NAMELESS, *HISTORY, *COUPLED, Formula):
+for _cls in (*_CLASSES, *NAMELESS, *HISTORY, *COUPLED, AccelerationNoise, Formula):
     register_effect(_cls)
 
 #: What users may write for a term: a kind, a kind with joints counted from 1, or a Term.

@@ -49,6 +49,7 @@ class TimeDelay(Effect):
     # Beyond it the first-order expansion of a delay has nothing to do with a delay.
     coefficients = (Coefficient("delay", "s", limit=0.1),)
     needs = ("model_torque", "time")
+    is_slow = True
     simplicity = 6
     rivals = ("joint_elasticity", "rotor_inertia", "viscous")
     separating_motion = "fast motion with sharp changes of torque"

@@ -136,6 +136,11 @@ class Term:
         return np.array([c.sign for c in self.coefficients], dtype=float)
 
     @property
+    def lowest(self) -> Array:
+        """Smallest value of every coefficient that physics allows beside its shape, (width,)."""
+        return np.where(self.signs > 0, self.effect.least(self.shape), -np.inf)
+
+    @property
     def zeros(self) -> NDArray[np.bool_]:
         """Which coefficients only say where the effect is zero, (width,)."""
         return np.array([c.is_zero for c in self.coefficients], dtype=bool)

@@ -12,14 +12,19 @@ import numpy as np
 from skidyn._signals import Signals
 from skidyn.effects._base import Array, Coefficient, Effect, Shape
 from skidyn.effects._derivatives import smooth_derivatives
+from skidyn.effects._nameless import NamelessEffect
 from skidyn.effects._second_order import second_order_filter
 
 
-def _oscillator(load: Array, signals: Signals, resonance: float, damping: float) -> Array:
-    """Wind-up of a spring-mass under a load, times the stiffness.
+def _swing(
+    load: Array, signals: Signals, resonance: float, damping: float
+) -> tuple[Array, Array, Array]:
+    """Wind-up of a spring-mass under a load, times the stiffness, and its time derivatives.
 
     The link swings on its spring: far below the resonance the wind-up follows the load, near it the
-    wind-up is larger and late.
+    wind-up is larger and late, and above it the link stays behind. The derivatives come from the
+    same filter: what is differentiated afterwards has to be smoothed, which takes away most of a
+    swing of ten times a second.
 
     Parameters
     ----------
@@ -34,32 +39,40 @@ def _oscillator(load: Array, signals: Signals, resonance: float, damping: float)
 
     Returns
     -------
-    ndarray of shape (n_samples,), N m or N
+    tuple of 3 ndarray of shape (n_samples,), N m or N
+        The wind-up, and its derivatives per s and per s^2.
     """
     from scipy.signal import lfilter
 
     omega = 2 * np.pi * resonance
-    wind_up = np.zeros_like(load)
+    moves = tuple(np.zeros_like(load) for _ in range(3))
     for rows, step in zip(signals.segments, signals.steps, strict=True):
         if rows.stop - rows.start < 7:
             continue
         rate = 1.0 / step
         # The swing of a link faster than the sampling cannot be seen; it follows at once.
-        w = min(omega, rate)
-        b, a, settled = _swing(w, damping, rate)
-        wind_up[rows] = lfilter(b, a, load[rows], zi=settled * load[rows.start])[0]
-    return wind_up
+        filters = _swing_filters(min(omega, rate), damping, rate)
+        for move, (b, a, settled) in zip(moves, filters, strict=True):
+            move[rows] = lfilter(b, a, load[rows], zi=settled * load[rows.start])[0]
+    return moves  # type: ignore[return-value]
 
 
 @lru_cache(maxsize=256)
-def _swing(omega: float, damping: float, rate: float) -> tuple[Array, Array, Array]:
-    """Digital filter of a spring-mass at a sampling rate, and its state under a unit load."""
+def _swing_filters(omega: float, damping: float, rate: float) -> list[tuple[Array, Array, Array]]:
+    """Digital filters of a spring-mass for its way, speed and acceleration, settled at first."""
     from scipy.signal import lfilter_zi
 
-    b, a = second_order_filter((0.0, 0.0, omega**2), omega, damping, rate)
-    return b, a, lfilter_zi(b, a)
+    square = omega**2
+    tops = ((0.0, 0.0, square), (0.0, square, 0.0), (square, 0.0, 0.0))
+    filters = [second_order_filter(top, omega, damping, rate) for top in tops]
+    return [(b, a, lfilter_zi(b, a)) for b, a in filters]
 
 
+#: Frequency, Hz, above which accelerations are taken as noise, and fewest samples of a recording
+#: that can be split there.
+_FAST, _FEWEST = 4.0, 20
+#: Least compliance of a joint, as a share of what its resonance and the inertia of its link say.
+_LEAST_SHARE = 0.5
 #: Step of the difference quotients: they err by about this share, and round by a thousandth of it.
 _STEP = 1e-6
 
@@ -118,15 +131,18 @@ class _LinkSideEffect(Effect):
     needs = ("robot", "load", "time")
     moves_link = True
 
-    def displacement(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        """Displacement of the link for a unit coefficient, shape (n_samples,)."""
+    def moves(self, signals: Signals, joint: int, **shape: Any) -> tuple[Array, Array, Array]:
+        """Displacement of the link for a unit coefficient and its time derivatives.
+
+        Each of shape (n_samples,): in rad, rad/s and rad/s^2, or m, m/s and m/s^2.
+        """
         raise NotImplementedError
 
     def torque_columns(
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
         (joint,) = joints
-        moves = smooth_derivatives(self.displacement(signals, joint, **shape), signals)
+        moves = self.moves(signals, joint, **shape)
         slopes = _torque_slopes(signals, joint)
         columns = {}
         for j in range(signals.n_joints):
@@ -135,6 +151,43 @@ class _LinkSideEffect(Effect):
                 change -= slope[:, j] * move
             columns[j] = change[:, None]
         return columns
+
+
+class AccelerationNoise(NamelessEffect):
+    """What the noise of a position puts into the torques through its second derivative.
+
+    Not an effect of the robot. It stands beside what moves a link where averages are so short that
+    this noise passes them: far above its resonance a link stays behind as if the acceleration were
+    not its own, which is just what noise of the acceleration looks like.
+    """
+
+    kind = "acceleration_noise"
+    title = "Noise of the acceleration"
+    formula = r"M_{\cdot j}(q)\,\varepsilon(\ddot q_j)"
+    coefficients = (Coefficient("share", "1"),)
+    needs = ("robot", "load", "time")
+    search = "given"
+    depends_on = ("ddq_own",)
+
+    def torque_columns(
+        self, signals: Signals, joints: Sequence[int], **shape: Any
+    ) -> dict[int, Array]:
+        (joint,) = joints
+        fast = _fast_part(signals.ddq[:, joint], signals)
+        by_acceleration = _torque_slopes(signals, joint)[2]
+        return {j: (by_acceleration[:, j] * fast)[:, None] for j in range(signals.n_joints)}
+
+
+def _fast_part(values: Array, signals: Signals) -> Array:
+    """What changes faster than any robot moves on purpose, without a shift of its phase."""
+    from scipy.signal import butter, sosfiltfilt
+
+    fast = np.zeros_like(values)
+    for rows, step in zip(signals.segments, signals.steps, strict=True):
+        part = values[rows]
+        if len(part) > _FEWEST and 2 * _FAST * step < 1:
+            fast[rows] = sosfiltfilt(butter(2, 2 * _FAST * step, "high", output="sos"), part)
+    return fast
 
 
 class JointElasticity(_LinkSideEffect):
@@ -146,23 +199,46 @@ class JointElasticity(_LinkSideEffect):
     formula = r"\tau(q - \tau_\mathrm{load}/K) - \tau(q)"
     coefficients = (Coefficient("compliance", "rad/(N m)", sign=1),)
     shapes = (
-        Shape("resonance", "Hz", (25.0, 10.0, 6.5, 4.5, 3.2), 1.0, 100.0, scales=False),
-        Shape("damping", "1", (0.05,), 0.005, 1.0, scales=False),
+        Shape(
+            "resonance",
+            "Hz",
+            (100.0, 50.0, 25.0, 18.0, 13.0, 9.5, 7.0, 5.0, 3.5),
+            1.0,
+            100.0,
+            scales=False,
+        ),
+        # A light swing follows the noise of the accelerations at its resonance.
+        Shape("damping", "1", (0.2,), 0.005, 0.5, scales=False),
     )
     simplicity = 19
     rivals = ("time_delay", "rotor_inertia", "backlash", "base_tilt")
     separating_motion = "fast reversals with a heavy load, near the first resonance"
     reference = "Spong (1987), ASME JDSMC 109(4), 310-319."
 
-    def displacement(self, signals: Signals, joint: int, **shape: Any) -> Array:
+    def moves(self, signals: Signals, joint: int, **shape: Any) -> tuple[Array, Array, Array]:
         assert signals.load is not None
-        return _oscillator(signals.load[:, joint], signals, **shape)
+        load = signals.load[:, joint]
+        return _swing(load, signals, shape["resonance"], shape["damping"])
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        if signals.robot is None or signals.load is None:
+            return super().grid(signals, joints)
+        inertia = float(np.median(_link_inertia(signals, joints[0])))
+        return [shape | {"inertia": inertia} for shape in super().grid(signals, joints)]
+
+    def least(self, shape: Mapping[str, Any]) -> float:
+        # Resonance and inertia say how compliant the joint is. With less than half of that, the
+        # torque is explained better without any compliance than with all of it.
+        if "inertia" not in shape:
+            return 0.0
+        return float(_LEAST_SHARE / (shape["inertia"] * (2 * np.pi * shape["resonance"]) ** 2))
 
     def parameters(
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
     ) -> dict[str, Any]:
         compliance = float(coefficients[0])
-        return {"K": 1.0 / compliance if compliance else np.inf, **shape}
+        stiffness = 1.0 / compliance if compliance else np.inf
+        return {"K": stiffness, "resonance": shape["resonance"], "damping": shape["damping"]}
 
     def units(self, prismatic: bool = False) -> dict[str, str]:
         return {"K": "N/m" if prismatic else "N m/rad", "resonance": "Hz", "damping": "1"}
@@ -173,7 +249,6 @@ class Backlash(_LinkSideEffect):
 
     kind = "backlash"
     title = "Backlash"
-    is_swift = True
     drawn_against = "load"
     formula = r"\tau(q - g\,x) - \tau(q),\quad m\,\ddot x = \tau_\mathrm{load}/g,\ |x| \le 1/2"
     coefficients = (Coefficient("share", "1", sign=1, is_share=True),)
@@ -184,13 +259,13 @@ class Backlash(_LinkSideEffect):
     separating_motion = "slow motion through poses in which the load changes sign"
     reference = "Nordin, Gutman (2002), Automatica 38(10), 1633-1649."
 
-    def displacement(self, signals: Signals, joint: int, **shape: Any) -> Array:
+    def moves(self, signals: Signals, joint: int, **shape: Any) -> tuple[Array, Array, Array]:
         assert signals.load is not None
         free = signals.load[:, joint] / _link_inertia(signals, joint)
         position: Array = np.zeros_like(free)
         for rows, step in zip(signals.segments, signals.steps, strict=True):
             position[rows] = _flight(free[rows], step, shape["gap"] / 2)
-        return position
+        return smooth_derivatives(position, signals)
 
     def parameters(
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None

@@ -48,8 +48,8 @@ class Gain:
         self.model = Normal(gram, right, column_sizes(gram))
         self.residual = [t - a @ self.model.solution for a, t in zip(self.design, y, strict=True)]
 
-    def __call__(self, rows: dict[int, Array], signs: Array) -> float:
-        """Drop of squared error in units of the noise; -inf where a sign is forbidden."""
+    def __call__(self, rows: dict[int, Array], lowest: Array) -> float:
+        """Drop of squared error in units of the noise; -inf where a coefficient is too small."""
         z = {j: block / self.sigma[j] for j, block in rows.items()}
         cross = np.asarray(sum(self.design[j].T @ block for j, block in z.items()))
         own = np.asarray(sum(block.T @ block for block in z.values()))
@@ -57,7 +57,7 @@ class Gain:
         slope = sum(block.T @ self.residual[j] for j, block in z.items())
         swept = swept + (RIDGE * np.trace(own) + np.finfo(float).tiny) * np.eye(len(own))
         coefficients = np.linalg.solve(swept, slope)
-        if np.any(coefficients * signs < 0):
+        if np.any(coefficients < lowest):
             return -np.inf
         return float(slope @ coefficients)
 
@@ -66,7 +66,7 @@ def best_on_grid(problem: Problem, kind: str, joints: tuple[int, ...], gain: Gai
     """The term of a kind whose grid shape explains most."""
     grid = get_effect(kind).grid(problem.signals, joints)
     terms = [Term.at(kind, joints, shape) for shape in grid]
-    gains = [gain(problem.term_rows(t), t.signs) for t in terms]
+    gains = [gain(problem.term_rows(t), t.lowest) for t in terms]
     return terms[int(np.argmax(gains))] if terms else Term.at(kind, joints)
 
 
@@ -86,9 +86,8 @@ def refine_term(problem: Problem, term: Term, gain: Gain) -> Term:
     shapes = [s for s in effect.shapes if s.name in term.shape]
     if not shapes or effect.search != "grid":
         return term
-    signs = term.signs
     values: dict[str, Any] = dict(term.shape)
-    best = gain(problem.term_rows(term), signs)
+    best = gain(problem.term_rows(term), term.lowest)
     # The first parameters are visited again after the last has moved.
     for shape in [*shapes, *shapes[: len(shapes) - 1]]:
         low, high, step = _range(problem, term, shape)
@@ -102,8 +101,8 @@ def refine_term(problem: Problem, term: Term, gain: Gain) -> Term:
                 trial = {**values, shape.name: float(there)}
                 if not effect.admissible(problem.signals, term.places, trial):
                     continue
-                rows = problem.term_rows(term.with_shape(**trial))
-                value = gain(rows, signs)
+                other = term.with_shape(**trial)
+                value = gain(problem.term_rows(other), other.lowest)
                 if value > best:
                     best, values, improved = value, trial, True
             if not improved:

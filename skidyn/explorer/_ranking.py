@@ -272,7 +272,7 @@ class Ranking:
 
     def _allowed(self, candidate: int, gain: Array) -> bool:
         c = self.candidates[candidate]
-        return not bool(np.any((gain * c.signs < 0) | (np.abs(gain) > c.limits)))
+        return not bool(np.any((gain < c.lowest) | (np.abs(gain) > c.limits)))
 
 
 def _without(grams: Array, fold: int) -> Array:

@@ -15,4 +15,4 @@ def test_shapes_make_candidates_of_one_site(missing):
     candidates = catalogue_candidates(missing.problem, ["stribeck"])
     sites = [c.site for c in candidates]
     assert len(sites) > len(set(sites)) == 2
-    assert all(c.n_shapes > 0 and c.width == len(c.signs) for c in candidates)
+    assert all(c.n_shapes > 0 and c.width == len(c.lowest) for c in candidates)

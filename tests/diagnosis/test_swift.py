@@ -31,3 +31,19 @@ def test_noise_of_accelerations_in_short_windows_is_no_play(rate):
     diagnosis = diagnosis_of(load_scara(), None, noise="low", rate=rate, random_state=5002)
 
     assert diagnosis.verdict == "complete"
+
+
+def test_a_swing_too_small_for_long_windows_is_found_in_short_ones():
+    diagnosis = diagnosis_of(
+        load_planar_arm(),
+        "joint_elasticity",
+        joints=[1],
+        rate=250.0,
+        magnitude=0.05,
+        random_state=3,
+    )
+
+    (finding,) = diagnosis.findings
+    assert (finding.kind, finding.joints) == ("joint_elasticity", (1,))
+    stiffness = finding.parameters["K"]
+    assert stiffness["low"] < 4003.4 < stiffness["high"]  # as the simulation has it

@@ -14,7 +14,7 @@ def test_the_wind_up_of_an_elastic_joint_is_that_of_scipys_filter(signals, dampi
 
     omega = 2 * np.pi * 4.0
     effect = get_effect("joint_elasticity")
-    found = effect.displacement(signals, 0, resonance=4.0, damping=damping)
+    found, *_ = effect.moves(signals, 0, resonance=4.0, damping=damping)
     for rows, step in zip(signals.segments, signals.steps, strict=True):
         b, a = bilinear([1.0], [1 / omega**2, 2 * damping / omega, 1.0], 1 / step)
         load = signals.load[rows, 0]

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What lies between motor and link: how a link swings, and what only looks like it."""
+
+import numpy as np
+import pytest
+
+from skidyn.effects import Term, get_effect, list_effects, nameless_kinds
+
+
+def test_derivatives_of_a_swing_are_those_of_its_way_up_to_fast_swings(signals):
+    effect = get_effect("joint_elasticity")
+    rows = max(signals.segments, key=lambda part: part.stop - part.start)
+    frequency = 12.0
+    load = np.zeros_like(signals.q)
+    load[:, 0] = np.sin(2 * np.pi * frequency * signals.clock)
+
+    way, speed, acceleration = effect.moves(
+        signals.with_(load=load), 0, resonance=10.0, damping=0.2
+    )
+
+    settled = slice(rows.start + (rows.stop - rows.start) // 2, rows.stop)
+    omega = 2 * np.pi * frequency
+    step = float(np.median(np.diff(signals.clock[rows])))
+    # Tustin's substitution differentiates as if the frequency were this one.
+    warped = 2 / step * np.tan(omega * step / 2)
+    np.testing.assert_allclose(
+        acceleration[settled], -(warped**2) * way[settled], atol=0.02 * np.ptp(acceleration)
+    )
+    assert np.std(speed[settled]) == pytest.approx(warped * np.std(way[settled]), rel=0.02)
+
+
+def test_a_spring_is_not_stiffer_than_its_swing_says():
+    term = Term("joint_elasticity", (1,), {"resonance": 5.0, "damping": 0.1, "inertia": 2.0})
+
+    stiffness = 2.0 * (2 * np.pi * 5.0) ** 2
+    assert term.lowest == pytest.approx([0.5 / stiffness])
+
+
+def test_what_must_not_be_negative_may_be_as_small_as_it_likes():
+    assert list(Term("coulomb", (1,)).lowest) == [0.0]
+    assert list(Term("offset", (1,)).lowest) == [-np.inf]
+
+
+def test_noise_of_the_acceleration_is_neither_a_name_nor_a_function_to_try():
+    assert "acceleration_noise" not in list_effects()
+    assert "acceleration_noise" not in nameless_kinds()
+
+
+def test_noise_of_the_acceleration_reaches_all_joints_and_leaves_the_motion_alone(signals):
+    effect = get_effect("acceleration_noise")
+    noise = 0.1 * np.random.default_rng(0).normal(size=signals.ddq.shape)
+
+    quiet = effect.torque_columns(signals, [0])
+    noisy = effect.torque_columns(signals.with_(ddq=signals.ddq + noise), [0])
+
+    assert set(noisy) == {0, 1}
+    for joint, column in noisy.items():
+        assert np.std(quiet[joint]) < 0.1 * np.std(column)
