@@ -21,7 +21,7 @@ def work(tmp_path_factory):
     urdf = files("skidyn.datasets").joinpath("robots", "planar_arm.urdf").read_text("utf-8")
     (folder / "arm.urdf").write_text(urdf, encoding="utf-8")
     log = make_hidden_effect_log(
-        load_planar_arm(), "maxwell_slip", joints=[2], noise="high", random_state=5
+        load_planar_arm(), "maxwell_slip", joints=[2], noise="high", duration=6.0, random_state=5
     )
     log.frame.to_csv(folder / "log.csv", index=False)
     return folder
@@ -35,7 +35,9 @@ def diagnosed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("diagnosed")
     urdf = files("skidyn.datasets").joinpath("robots", "planar_arm.urdf").read_text("utf-8")
     (folder / "arm.urdf").write_text(urdf, encoding="utf-8")
-    log = make_hidden_effect_log(load_planar_arm(), "stribeck", joints=[2], n_trajectories=6)
+    log = make_hidden_effect_log(
+        load_planar_arm(), "stribeck", joints=[2], n_trajectories=6, duration=7.0
+    )
     log.frame.to_csv(folder / "log.csv", index=False)
     words = ["diagnose", str(folder / "log.csv"), "--urdf", str(folder / "arm.urdf")]
     written = ["--out", str(folder / "report.json"), "--html", str(folder / "report.html")]

@@ -12,7 +12,9 @@ from skidyn.identification import RBDRegressor
 
 @pytest.fixture(scope="session")
 def log():
-    return make_hidden_effect_log(load_planar_arm(), "spring", joints=[2], n_trajectories=8)
+    return make_hidden_effect_log(
+        load_planar_arm(), "spring", joints=[2], n_trajectories=8, duration=6.0
+    )
 
 
 @pytest.fixture

@@ -7,7 +7,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from skidyn.effects import Term
 from skidyn.exceptions import SkidynError
 from skidyn.export import BamModel, fit_bam, read_bam, write_bam
 from skidyn.robots import Robot
@@ -91,58 +90,6 @@ def test_friction_of_every_model_by_hand():
     driven += fade * (abs(-0.4 * 0.07 - 0.1 * 0.02) - abs(-0.4 * 0.07 - 0.6 * 0.02))
     assert servo("m6").friction(0.1, outside, speed) == pytest.approx(-driven)
     assert servo("m6").friction(0.6, -0.4, 0.0) == 0.0
-
-
-def test_a_fitted_model_is_written_as_the_simplest_that_holds_it(fit, load, tmp_path):
-    effects = ["viscous", "coulomb", "rotor_inertia", "offset"]
-    model = fit(load("scara"), effects, consistent=True)
-    left = write_bam(
-        model, tmp_path / "m1.json", joint="joint2", actuator="mx64", motor={"kt": 1.6}
-    )
-    assert left == ("offset of joint2",)
-    found = read_bam(tmp_path / "m1.json")
-    own = {t.kind: c[0] for t, c in model.effect_coefficients_.items() if t.joints == (2,)}
-    assert found.name == "m1" and found.actuator == "mx64"
-    assert found.parameters == {
-        "armature": own["rotor_inertia"],
-        "friction_base": own["coulomb"],
-        "friction_viscous": own["viscous"],
-        "kt": 1.6,
-    }
-    stribeck = Term("stribeck", (2,), {"vs": 0.1, "delta": 2.0})
-    model = fit(load("scara"), ["coulomb", stribeck], consistent=True)
-    model.effect_coefficients_[stribeck] = np.array([0.3])
-    assert write_bam(model, tmp_path / "m2.json", joint=2, actuator="mx64") == ()
-    found = read_bam(tmp_path / "m2.json")
-    assert found.name == "m2" and found.parameters["friction_stribeck"] == 0.3
-    q, dq, ddq = np.zeros((3, 9, model.robot_.n_joints))
-    dq[:, 1] = np.linspace(0.02, 0.4, 9)
-    moved = model.predict(np.hstack([q, dq, ddq])) - model.rigid_body_torque(q, dq, ddq)
-    np.testing.assert_allclose(found.friction(0.0, 0.0, dq[:, 1]), moved[:, 1], rtol=1e-4)
-
-
-@pytest.mark.parametrize("name", MODELS)
-def test_a_generated_log_shows_the_friction_it_was_made_with(name):
-    robot, own = Robot.from_urdf(PENDULUM), servo(name)
-    time = np.arange(0, 40, 0.005)
-    q = 1.2 * np.sin(1.1 * time) + 0.5 * np.sin(3.3 * time + 1) + 0.15 * np.sin(9.1 * time)
-    dq = np.gradient(q, time)
-    ddq = np.gradient(dq, time)
-    motion = [x[:, None] for x in (q, dq, ddq)]
-    need = robot.inverse_dynamics(*motion)[:, 0] + MOTOR["armature"] * ddq
-    outside = -robot.inverse_dynamics(motion[0], motion[1], 0 * motion[2])[:, 0]
-    motor = need.copy()
-    for _ in range(200):  # friction depends on the torque that it is part of
-        motor = need + own.friction(motor, outside, dq)
-    rng = np.random.default_rng(1)
-    X = pd.DataFrame({"time": time, "q1": q, "dq1": dq, "ddq1": ddq})
-    found = fit_bam(robot, X, motor + 0.002 * rng.normal(size=len(q)), name=name, actuator="xl330")
-    moves = np.abs(dq) > 0.1
-    truth = own.friction(motor, outside, dq)[moves]
-    wrong = found.friction(motor, outside, dq)[moves] - truth
-    assert np.std(wrong) < 0.02 * np.std(truth)
-    assert found.parameters["armature"] == pytest.approx(MOTOR["armature"], rel=0.1)
-    assert set(found.parameters) >= {"friction_base", "friction_viscous"}
 
 
 def test_wrong_files_and_arguments_are_refused_by_name(fit, load, tmp_path):

@@ -10,7 +10,6 @@ import pytest
 from skidyn.datasets import load_planar_arm
 from skidyn.exceptions import LogError, LogWarning
 from skidyn.logs import read_log
-from skidyn.simulation import Controller, servo_torque
 
 ROBOT = load_planar_arm()
 N = 200
@@ -260,21 +259,6 @@ def test_patterns_with_joint_and_index(tmp_path):
     assert_same(quiet_read(tmp_path / "log.csv", robot=ROBOT, columns=columns), table())
 
 
-def test_missing_velocity_is_derived_and_said(tmp_path):
-    source = table()
-    source.drop(columns=["dq1", "dq2"]).to_csv(tmp_path / "log.csv", index=False)
-    with pytest.warns(LogWarning, match="derived by central differences"):
-        frame = read_log(tmp_path / "log.csv", check=False)
-    np.testing.assert_allclose(frame["dq1"][1:-1], source["dq1"][1:-1], atol=5e-3)
-
-
-def test_further_columns_stay(tmp_path):
-    table().assign(volts=24.0, note="calm").to_csv(tmp_path / "log.csv", index=False)
-    with pytest.warns(LogWarning, match="without numbers left out: note"):
-        frame = read_log(tmp_path / "log.csv", check=False)
-    assert (frame["volts"] == 24).all()
-
-
 def test_dates_become_seconds(tmp_path):
     source = table()
     dated = source.assign(time=pd.to_datetime(source["time"] + 1.6e9, unit="s"))
@@ -307,16 +291,3 @@ def test_other_messages_by_topic_and_mapping(tmp_path):
     }
     frame = quiet_read(tmp_path / "bag", topics=["/drive"], columns=columns)
     assert_same(frame, source)
-
-
-def test_commands_may_stand_in_place_of_torque(tmp_path):
-    time = np.arange(20) * 0.01
-    table = pd.DataFrame({"time": time, "q1": np.sin(time), "q_ref1": np.sin(time) + 0.1})
-    table.to_csv(tmp_path / "run.csv", index=False)
-    with pytest.raises(LogError, match="lacks tau1"):
-        read_log(tmp_path / "run.csv")
-    with pytest.warns(LogWarning, match="no velocities recorded"):
-        frame = read_log(tmp_path / "run.csv", needs_torque=False)
-    assert frame.columns.tolist() == ["time", "trajectory", "q1", "dq1", "cmd1"]
-    torque = servo_torque(Controller(20.0), frame)
-    np.testing.assert_allclose(torque, 2.0)
