@@ -68,6 +68,12 @@ def look_at_swift(
         joints = [j for j in range(problem.n_joints) if j not in slowed]
         moved = search(short, family, gates, nameless=False, joints=joints)
         now = {j: h.kind for h in moved.findings for j in h.joints}
+        fastest = [
+            c.term.effect.fastest(c.term.shape) for h in moved.findings for c in h.candidates
+        ]
+        # Smoothing weakens what is faster, as if a link swung there.
+        if max(fastest, default=0.0) > problem.motion.cutoff:
+            return problem, result
         # A link that swings in the long windows, too, does not fly.
         if not now or not before.items() <= now.items():
             return problem, result

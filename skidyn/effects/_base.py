@@ -375,6 +375,21 @@ class Effect:
         """
         return 0.0
 
+    def fastest(self, shape: Mapping[str, Any]) -> float:
+        """Frequency, Hz, up to which the motion must be known for short averages to tell it.
+
+        Parameters
+        ----------
+        shape : mapping
+            Shape parameters.
+
+        Returns
+        -------
+        float
+            0 by default. A swing shows where it is resonant.
+        """
+        return 0.0
+
     def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
         """Range over which a shape parameter with linear spacing moves, in its own unit.
 

@@ -233,6 +233,9 @@ class JointElasticity(_LinkSideEffect):
             return 0.0
         return float(_LEAST_SHARE / (shape["inertia"] * (2 * np.pi * shape["resonance"]) ** 2))
 
+    def fastest(self, shape: Mapping[str, Any]) -> float:
+        return float(shape["resonance"])
+
     def parameters(
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
     ) -> dict[str, Any]:

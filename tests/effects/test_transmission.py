@@ -56,3 +56,8 @@ def test_noise_of_the_acceleration_reaches_all_joints_and_leaves_the_motion_alon
     assert set(noisy) == {0, 1}
     for joint, column in noisy.items():
         assert np.std(quiet[joint]) < 0.1 * np.std(column)
+
+
+def test_a_swing_asks_for_motion_as_fast_as_itself_and_a_spring_for_none():
+    assert get_effect("joint_elasticity").fastest({"resonance": 12.0}) == 12.0
+    assert get_effect("spring").fastest({}) == 0.0
