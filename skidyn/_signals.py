@@ -11,13 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn._columns import (
-    Columns,
-    ColumnSpec,
-    column_names,
-    resolve_columns,
-    trajectory_numbers,
-)
+from skidyn._columns import Columns, ColumnSpec, column_names, resolve_columns, trajectory_numbers
 from skidyn._exceptions import ColumnError, LogError
 
 if TYPE_CHECKING:

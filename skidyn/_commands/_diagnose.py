@@ -13,12 +13,7 @@ from typing import Any
 from skidyn._commands._arguments import JsonFile, Page, command, with_log
 from skidyn._commands._input import read_model_and_log
 from skidyn._commands._kept import Kept, noting
-from skidyn._commands._output import (
-    print_json,
-    provenance,
-    run_diagnosis,
-    working,
-)
+from skidyn._commands._output import print_json, provenance, run_diagnosis, working
 from skidyn._commands._story import answer_lines
 from skidyn._exceptions import LogWarning
 from skidyn._writing import write_json

@@ -19,12 +19,7 @@ from skidyn.datasets._robots import (
     load_ur10e,
 )
 from skidyn.datasets.hidden_effects import hidden_effect_kinds, make_hidden_effect_log
-from skidyn.datasets.suite import (
-    SuiteCase,
-    hidden_effect_suite,
-    score_answers,
-    wilson_interval,
-)
+from skidyn.datasets.suite import SuiteCase, hidden_effect_suite, score_answers, wilson_interval
 
 __all__ = [
     "SuiteCase",

@@ -14,13 +14,7 @@ from scipy.spatial.transform import Rotation
 from skidyn._exceptions import SkidynError
 from skidyn._optional import import_optional
 from skidyn.dynamics import transform_inertial
-from skidyn.export._bodies import (
-    CentralInertia,
-    about_origin,
-    central_inertia,
-    described,
-    numbers,
-)
+from skidyn.export._bodies import CentralInertia, about_origin, central_inertia, described, numbers
 from skidyn.export._edits import Edits, Element
 from skidyn.export._files import PathLike, write_files
 from skidyn.identification import RBDRegressor

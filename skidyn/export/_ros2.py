@@ -19,13 +19,7 @@ from skidyn.dynamics import Program
 from skidyn.effects import Term
 from skidyn.export._c import function_text, printable
 from skidyn.export._files import PathLike, write_files
-from skidyn.export._model import (
-    StaticModel,
-    is_carried,
-    random_signals,
-    static_model,
-    traced,
-)
+from skidyn.export._model import StaticModel, is_carried, random_signals, static_model, traced
 from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
 

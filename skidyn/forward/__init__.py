@@ -2,10 +2,7 @@
 """Motion of a model from its torque: implicit steps with set-valued friction, many at once."""
 
 # For other packages of skidyn; no part of the public interface.
-from skidyn.forward._controller import (
-    Controller as Controller,
-    fit_controller as fit_controller,
-)
+from skidyn.forward._controller import Controller as Controller, fit_controller as fit_controller
 from skidyn.forward._model import ForwardModel as ForwardModel
 from skidyn.forward._run import (
     STEP as STEP,

@@ -19,13 +19,7 @@ from sklearn.utils.validation import _check_sample_weight, check_is_fitted, vali
 from torch import nn
 
 from skidyn._columns import ColumnSpec
-from skidyn._compat import (
-    CallbackSupportMixin,
-    Interval,
-    StrOptions,
-    fit_context,
-    fit_progress,
-)
+from skidyn._compat import CallbackSupportMixin, Interval, StrOptions, fit_context, fit_progress
 from skidyn._keys import Keys, fitted_keys
 from skidyn._order import taken, time_order
 from skidyn.model_selection import order_of_log

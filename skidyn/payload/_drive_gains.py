@@ -15,14 +15,7 @@ from skidyn._exceptions import SkidynError
 from skidyn._signals import Array
 from skidyn.evidence import jackknife, linear_terms, without_each
 from skidyn.payload._by_recording import Shares, compare_recordings, differing
-from skidyn.payload._runs import (
-    FRICTION,
-    Runs,
-    interval_factor,
-    make_runs,
-    open_columns,
-    read_runs,
-)
+from skidyn.payload._runs import FRICTION, Runs, interval_factor, make_runs, open_columns, read_runs
 from skidyn.robots import Robot
 
 #: Rounds of weights, evaluations in each, and the relative change that ends them.

@@ -11,11 +11,7 @@ from numpy.typing import NDArray
 
 from skidyn._columns import ColumnSpec, _key_column
 from skidyn._compat import Interval, StrOptions
-from skidyn.preprocessing._signals import (
-    SignalTransformer,
-    _sampling_rate,
-    refuse_columns_there,
-)
+from skidyn.preprocessing._signals import SignalTransformer, _sampling_rate, refuse_columns_there
 from skidyn.preprocessing._smoothers import SMOOTHERS, Smoothed
 
 Array = NDArray[np.float64]

@@ -9,12 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn._columns import (
-    command_columns,
-    names_of_table,
-    resolve_columns,
-    trajectory_numbers,
-)
+from skidyn._columns import command_columns, names_of_table, resolve_columns, trajectory_numbers
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Array, Signals, signals_from
 from skidyn.evidence import smooth_motion

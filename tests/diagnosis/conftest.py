@@ -1,11 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Two diagnoses on which several tests look: a spring is missing, and nothing is."""
+"""Diagnoses on which several tests look: a spring is missing, nothing is, something unknown is."""
+
+from types import SimpleNamespace
 
 import pytest
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
 from skidyn.identification import RBDRegressor
+
+#: What the simulator hides, the signals it depends on, the formula of its torque, and its size.
+HIDDEN = {
+    "unknown_cross_drag": ({"dq1", "dq2"}, "dq1 * abs(dq2)", "c"),
+    "unknown_pose_friction": ({"dq1", "q2"}, "sin(q2) * sign(dq1)", "a"),
+    "unknown_cable": ({"q1", "q2"}, "cos(q1 - q2)", "a"),
+}
 
 
 @pytest.fixture(scope="session")
@@ -22,3 +31,17 @@ def missing(spring_log):
 def complete():
     log = make_hidden_effect_log(load_planar_arm(), None)
     return diagnose(RBDRegressor(log.robot), log.X, log.y)
+
+
+@pytest.fixture(scope="session", params=HIDDEN)
+def nameless(request):
+    """A torque that no name fits: its log, its diagnosis, its signals and its formula."""
+    log = make_hidden_effect_log(load_planar_arm(), request.param, random_state=5)
+    variables, formula, size = HIDDEN[request.param]
+    return SimpleNamespace(
+        log=log,
+        diagnosis=diagnose(RBDRegressor(log.robot), log.X, log.y),
+        variables=variables,
+        formula=formula,
+        size=log.parameters[size],
+    )

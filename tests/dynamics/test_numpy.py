@@ -4,12 +4,7 @@
 import numpy as np
 import pytest
 
-from skidyn.dynamics import (
-    BoundProgram,
-    Program,
-    Tape,
-    chunk_size,
-)
+from skidyn.dynamics import BoundProgram, Program, Tape, chunk_size
 
 
 @pytest.mark.parametrize("kinds", [("sin",), ("cos",), ("sin", "cos"), ("cos", "sin", "cos")])

@@ -6,9 +6,7 @@ import math
 import numpy as np
 
 from skidyn.datasets import load_scara
-from skidyn.dynamics import (
-    python_function,
-)
+from skidyn.dynamics import python_function
 
 
 def test_program_text_is_plain_python():

@@ -4,13 +4,7 @@
 import numpy as np
 import pytest
 
-from skidyn.dynamics import (
-    BoundProgram,
-    Program,
-    ScalarFunction,
-    Tape,
-    evaluate_torch,
-)
+from skidyn.dynamics import BoundProgram, Program, ScalarFunction, Tape, evaluate_torch
 
 
 def test_trivial_arithmetic_leaves_nothing_behind():

@@ -5,11 +5,7 @@ import numpy as np
 import pytest
 
 from skidyn.datasets import load_scara
-from skidyn.effects import (
-    Signals,
-    get_effect,
-    list_effects,
-)
+from skidyn.effects import Signals, get_effect, list_effects
 
 
 def test_units_of_sliders():

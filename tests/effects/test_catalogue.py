@@ -3,11 +3,7 @@
 
 import pytest
 
-from skidyn.effects import (
-    get_effect,
-    list_effects,
-    make_terms,
-)
+from skidyn.effects import get_effect, list_effects, make_terms
 from skidyn.exceptions import EffectError
 
 

@@ -5,10 +5,7 @@ import numpy as np
 import pytest
 
 from skidyn.datasets import load_scara
-from skidyn.effects import (
-    Signals,
-    get_effect,
-)
+from skidyn.effects import Signals, get_effect
 
 
 def test_couplings_act_on_both_joints(signals):

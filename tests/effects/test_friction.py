@@ -3,9 +3,7 @@
 
 import numpy as np
 
-from skidyn.effects import (
-    dahl_state,
-)
+from skidyn.effects import dahl_state
 
 
 def test_friction(signals, columns_of):

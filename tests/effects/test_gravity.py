@@ -3,9 +3,7 @@
 
 import numpy as np
 
-from skidyn.effects import (
-    get_effect,
-)
+from skidyn.effects import get_effect
 
 
 def test_tilt_is_a_change_of_gravity(signals, robot):

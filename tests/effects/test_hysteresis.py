@@ -3,11 +3,7 @@
 
 import numpy as np
 
-from skidyn.effects import (
-    dahl_state,
-    get_effect,
-    stop_state,
-)
+from skidyn.effects import dahl_state, get_effect, stop_state
 
 
 def test_dahl_by_small_steps(signals):

@@ -3,9 +3,7 @@
 
 import numpy as np
 
-from skidyn.effects import (
-    get_effect,
-)
+from skidyn.effects import get_effect
 
 
 def test_periodic_effects_name_amplitude_and_phase(signals):

@@ -3,12 +3,7 @@
 
 import numpy as np
 
-from skidyn.effects import (
-    Coefficient,
-    Effect,
-    register_effect,
-    unregister_effect,
-)
+from skidyn.effects import Coefficient, Effect, register_effect, unregister_effect
 
 
 def test_diagnosis_finds_a_users_effect(robot):

@@ -3,9 +3,7 @@
 
 import numpy as np
 
-from skidyn.effects import (
-    get_effect,
-)
+from skidyn.effects import get_effect
 
 
 def test_temperature(signals, columns_of):

@@ -3,10 +3,7 @@
 
 import numpy as np
 
-from skidyn.effects import (
-    Term,
-    get_effect,
-)
+from skidyn.effects import Term, get_effect
 
 
 def test_payload_is_a_heavier_last_link(signals, robot):

@@ -7,13 +7,7 @@ import pytest
 
 from skidyn.datasets import load_planar_arm
 from skidyn.effects import Term
-from skidyn.export import (
-    write_c,
-    write_mjcf,
-    write_onnx,
-    write_python,
-    write_urdf,
-)
+from skidyn.export import write_c, write_mjcf, write_onnx, write_python, write_urdf
 
 MEMORY = [
     Term("dahl", (1,), {"presliding": 0.02}),

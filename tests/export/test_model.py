@@ -6,10 +6,7 @@ import pytest
 
 from skidyn.datasets import load_planar_arm
 from skidyn.effects import Coefficient, Effect, Term, register_effect, unregister_effect
-from skidyn.export import (
-    python_source,
-    static_model,
-)
+from skidyn.export import python_source, static_model
 from skidyn.identification import RBDRegressor
 
 MEMORY = [

@@ -6,11 +6,7 @@ import pytest
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.identification import RBDRegressor
-from skidyn.simulation import (
-    Controller,
-    fit_controller,
-    simulation_errors,
-)
+from skidyn.simulation import Controller, fit_controller, simulation_errors
 
 
 @pytest.fixture(scope="module")

@@ -5,9 +5,7 @@ import numpy as np
 import pytest
 from sklearn.ensemble import ExtraTreesRegressor
 from sklearn.linear_model import LinearRegression
-from sklearn.model_selection import (
-    ShuffleSplit,
-)
+from sklearn.model_selection import ShuffleSplit
 from sklearn.neighbors import KNeighborsRegressor
 
 from skidyn.hybrid import HybridRegressor

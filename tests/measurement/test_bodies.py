@@ -7,10 +7,7 @@ import numpy as np
 import pytest
 
 from skidyn.datasets import load_ur5, make_hidden_effect_log
-from skidyn.measurement import (
-    Measurement,
-    check_measurement,
-)
+from skidyn.measurement import Measurement, check_measurement
 
 
 def test_torque_in_newton_millimetres(signals, torque, found, only):

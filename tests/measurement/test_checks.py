@@ -6,12 +6,7 @@ import pytest
 from skidyn.diagnosis import Settings, diagnose
 from skidyn.exceptions import LogError
 from skidyn.identification import RBDRegressor
-from skidyn.measurement import (
-    Remedy,
-    Suspicion,
-    list_checks,
-    refuse_certain,
-)
+from skidyn.measurement import Remedy, Suspicion, list_checks, refuse_certain
 
 
 def test_nothing_wrong(signals, torque, found):

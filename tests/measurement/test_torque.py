@@ -8,9 +8,7 @@ import pytest
 
 from skidyn.datasets import load_scara, load_ur5, make_hidden_effect_log
 from skidyn.logs import check_log
-from skidyn.measurement import (
-    _torque,
-)
+from skidyn.measurement import _torque
 from skidyn.measurement._fits import Reading
 from skidyn.measurement._readings import Change
 

@@ -4,9 +4,7 @@
 import numpy as np
 import pytest
 
-from skidyn.preprocessing import (
-    CurrentToTorque,
-)
+from skidyn.preprocessing import CurrentToTorque
 
 
 def test_current_becomes_torque_and_back():

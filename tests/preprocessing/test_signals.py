@@ -7,11 +7,7 @@ import polars as pl
 import pytest
 
 from skidyn.exceptions import ColumnError
-from skidyn.preprocessing import (
-    ButterworthFilter,
-    SignalScaler,
-    TimeDerivative,
-)
+from skidyn.preprocessing import ButterworthFilter, SignalScaler, TimeDerivative
 
 
 @pytest.fixture

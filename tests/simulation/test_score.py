@@ -12,11 +12,7 @@ from skidyn.effects import Coefficient, Effect, Term, register_effect, unregiste
 from skidyn.exceptions import SkidynError
 from skidyn.identification import RBDRegressor
 from skidyn.model_selection import TrajectoryKFold
-from skidyn.simulation import (
-    judge_by_simulation,
-    neg_simulation_error,
-    simulation_errors,
-)
+from skidyn.simulation import judge_by_simulation, neg_simulation_error, simulation_errors
 
 
 @pytest.fixture(scope="module")

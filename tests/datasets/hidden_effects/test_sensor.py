@@ -4,11 +4,7 @@
 import numpy as np
 import pytest
 
-from skidyn.datasets import (
-    load_planar_arm,
-    load_scara,
-    make_hidden_effect_log,
-)
+from skidyn.datasets import load_planar_arm, load_scara, make_hidden_effect_log
 
 PLANAR, SCARA = load_planar_arm(), load_scara()
 SHORT = {"n_trajectories": 4, "duration": 4.0}

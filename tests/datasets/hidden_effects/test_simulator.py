@@ -4,12 +4,7 @@
 import numpy as np
 import pytest
 
-from skidyn.datasets import (
-    hidden_effect_kinds,
-    load_planar_arm,
-    load_scara,
-    make_hidden_effect_log,
-)
+from skidyn.datasets import hidden_effect_kinds, load_planar_arm, load_scara, make_hidden_effect_log
 from skidyn.exceptions import SkidynError
 
 PLANAR, SCARA = load_planar_arm(), load_scara()

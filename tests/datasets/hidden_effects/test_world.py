@@ -3,10 +3,7 @@
 
 import numpy as np
 
-from skidyn.datasets import (
-    load_panda,
-    make_hidden_effect_log,
-)
+from skidyn.datasets import load_panda, make_hidden_effect_log
 
 SHORT = {"n_trajectories": 4, "duration": 4.0}
 
