@@ -82,7 +82,8 @@ def make_terms(specs: Iterable[TermSpec], n_joints: int) -> list[Term]:
     ----------
     specs : iterable of str, (str, joints) or Term
         ``"viscous"`` is viscous friction on every joint; ``("dahl", [1, 4])`` Dahl friction on
-        joints 1 and 4, counted from 1; a :class:`Term` stands for itself.
+        joints 1 and 4, counted from 1; a :class:`Term` stands for itself, completed by the shape
+        parameters that have one usual value.
     n_joints : int
         Number of joints of the robot.
 
@@ -110,11 +111,20 @@ def make_terms(specs: Iterable[TermSpec], n_joints: int) -> list[Term]:
         if isinstance(spec, Term):
             get_effect(spec.kind)  # refuses an unknown kind
             _check_joints(spec.kind, spec.places, n_joints)
-            terms.append(spec)
+            terms.append(_completed(spec))
             continue
         kind, joints = (spec, None) if isinstance(spec, str) else _kind_and_joints(spec)
         terms += _expand(kind, joints, n_joints)
     return terms
+
+
+def _completed(term: Term) -> Term:
+    """A term whose shape was given in part, with the parameters that have one usual value."""
+    if term.is_open:
+        return term
+    shapes = (s for s in term.effect.shapes if len(s.grid) == 1 and s.name not in term.shape)
+    usual = {shape.name: shape.grid[0] for shape in shapes}
+    return term.with_shape(**usual) if usual else term
 
 
 def _kind_and_joints(spec: Any) -> tuple[str, list[int]]:

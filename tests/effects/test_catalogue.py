@@ -3,7 +3,7 @@
 
 import pytest
 
-from skidyn.effects import get_effect, list_effects, make_terms
+from skidyn.effects import Term, get_effect, list_effects, make_terms
 from skidyn.exceptions import EffectError
 
 
@@ -30,3 +30,10 @@ def test_catalogue_is_complete():
 def test_terms_that_cannot_be(spec, words):
     with pytest.raises(EffectError, match=words):
         make_terms([spec], 2)
+
+
+def test_a_shape_that_is_given_in_part_gets_its_usual_values():
+    (term,) = make_terms([Term("stribeck", (2,), {"vs": 0.1})], 2)
+    assert term.shape == {"vs": 0.1, "delta": 2.0}
+    whole, open_ = Term("stribeck", (2,), {"vs": 0.1, "delta": 1.0}), Term("stribeck", (2,))
+    assert make_terms([whole, open_], 2) == [whole, open_]
