@@ -18,7 +18,7 @@ from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._profile import QUARTERS
 from skidyn.effects import Term, get_effect
-from skidyn.evidence import Problem, left_out_errors
+from skidyn.evidence import Felt, Problem, column_sizes, felt_columns, left_out_errors
 
 #: Largest gaps between the sorted estimates that are tried as the border of the split.
 CUTS = 3
@@ -65,7 +65,6 @@ def split_effects(
     names = np.unique(np.concatenate(problem.rows.trajectory))
     if problem.robot is None or len(names) < 2:
         return []
-    design = [a / s for a, s in zip(problem.design(blocks), sigma, strict=True)]
     y = [t / s for t, s in zip(target, sigma, strict=True)]
     found = []
     for kind in kinds:
@@ -74,10 +73,11 @@ def split_effects(
             continue
         term = Term.at(kind, tuple(range(problem.n_joints)))
         rows = {j: b / sigma[j] for j, b in problem.term_rows(term).items()}
-        own = _own_estimates(problem, design, y, rows, names, effect.leading or term.width)
+        products = _Products.of(problem, felt_columns(problem, blocks, sigma), y, rows, names)
+        own = products.own_estimates(effect.leading or term.width)
         best: tuple[Array, list[Any]] | None = None
         for chosen in _splits(effect.grows, own, names):
-            drop = _quarter_drop(problem, design, y, rows, chosen)
+            drop = products.drop(np.isin(names, chosen))
             if best is None or drop.sum() > best[0].sum():
                 best = drop, chosen
         if best is not None:
@@ -96,32 +96,91 @@ def _within(problem: Problem, term: Term, names: Iterable[Any]) -> dict[int, Arr
     }
 
 
-def _own_estimates(
-    problem: Problem,
-    design: list[Array],
-    y: list[Array],
-    rows: dict[int, Array],
-    names: NDArray[Any],
-    leading: int,
-) -> Array:
-    """The effect's leading coefficients, estimated for every trajectory with a common model."""
-    p = design[0].shape[1]
-    size = p + leading * len(names)
-    gram, cross = np.zeros((size, size)), np.zeros(size)
-    for j, block in rows.items():
-        for i, name in enumerate(names):
-            here = problem.rows.trajectory[j] == name
-            a = np.hstack([design[j][here], block[here, :leading]])
-            index = np.r_[np.arange(p), p + leading * i + np.arange(leading)]
-            gram[np.ix_(index, index)] += a.T @ a
-            cross[index] += a.T @ y[j][here]
-    scale = np.sqrt(np.diag(gram))
-    scale[scale == 0] = 1.0
-    # A payload in all trajectories is part of the arm: only differences can be estimated.
-    ridge = np.r_[np.full(p, 1e-9), np.full(size - p, 1e-4)]
-    scaled = np.linalg.solve(gram / scale[:, None] / scale + np.diag(ridge), cross / scale)
-    solution: Array = scaled / scale
-    return solution[p:].reshape(len(names), leading)
+@dataclass(frozen=True)
+class _Products:
+    """Products of the model's columns, an effect's and the torque.
+
+    An effect in some trajectories needs those of these trajectories alone, so that any choice of
+    them is a sum.
+
+    Attributes
+    ----------
+    gram : ndarray of shape (4, p + 1, p + 1)
+        Of [model | torque] by quarter.
+    cross : ndarray of shape (n_trajectories, 4, p + 1, k)
+        With the effect, by trajectory and quarter.
+    own : ndarray of shape (n_trajectories, 4, k, k)
+        Of the effect.
+    """
+
+    gram: Array
+    cross: Array
+    own: Array
+
+    @classmethod
+    def of(
+        cls,
+        problem: Problem,
+        model: tuple[Sequence[Felt], int],
+        y: Sequence[Array],
+        rows: dict[int, Array],
+        names: NDArray[Any],
+    ) -> _Products:
+        felt, p = model
+        k = next(iter(rows.values())).shape[1]
+        gram = np.zeros((QUARTERS, p + 1, p + 1))
+        cross = np.zeros((len(names), QUARTERS, p + 1, k))
+        own = np.zeros((len(names), QUARTERS, k, k))
+        for j, (columns, torque) in enumerate(zip(felt, y, strict=True)):
+            places = np.append(columns.places, p)
+            both = np.column_stack([columns.rows, torque])
+            quarter = problem.rows.quarter[j]
+            for f in range(QUARTERS):
+                part = both[quarter == f]
+                gram[f][np.ix_(places, places)] += part.T @ part
+            if j not in rows:
+                continue
+            cell = np.searchsorted(names, problem.rows.trajectory[j]) * QUARTERS + quarter
+            for c in np.unique(cell):
+                here = np.flatnonzero(cell == c)
+                i, f = divmod(int(c), QUARTERS)
+                block = rows[j][here]
+                cross[i, f, places] += both[here].T @ block
+                own[i, f] += block.T @ block
+        return cls(gram, cross, own)
+
+    def own_estimates(self, leading: int) -> Array:
+        """The effect's leading coefficients, estimated for every trajectory with a common model."""
+        p, n = self.gram.shape[1] - 1, len(self.own)
+        size = p + leading * n
+        gram, right = np.zeros((size, size)), np.zeros(size)
+        whole, cross = self.gram.sum(0), self.cross.sum(1)[:, :, :leading]
+        gram[:p, :p], right[:p] = whole[:p, :p], whole[:p, p]
+        gram[:p, p:] = cross[:, :p].transpose(1, 0, 2).reshape(p, -1)
+        gram[p:, :p] = gram[:p, p:].T
+        right[p:] = cross[:, p].ravel()
+        for i, own in enumerate(self.own.sum(1)):
+            place = slice(p + leading * i, p + leading * (i + 1))
+            gram[place, place] = own[:leading, :leading]
+        scale = column_sizes(gram)
+        # A payload in all trajectories is part of the arm: only differences can be estimated.
+        ridge = np.r_[np.full(p, 1e-9), np.full(size - p, 1e-4)]
+        scaled = np.linalg.solve(gram / scale[:, None] / scale + np.diag(ridge), right / scale)
+        solution: Array = scaled / scale
+        return solution[p:].reshape(n, leading)
+
+    def drop(self, chosen: NDArray[np.bool_]) -> Array:
+        """Held-out drop of squared error by quarter when chosen trajectories get the effect."""
+        p, k = self.gram.shape[1] - 1, self.own.shape[2]
+        place = np.append(np.arange(p), p + k)  # the torque comes last
+        effect = slice(p, p + k)
+        grams = np.zeros((QUARTERS, p + k + 1, p + k + 1))
+        grams[:, place[:, None], place] = self.gram
+        cross = self.cross[chosen].sum(0)
+        grams[:, place, effect] = cross
+        grams[:, effect, place] = cross.transpose(0, 2, 1)
+        grams[:, effect, effect] = self.own[chosen].sum(0)
+        return left_out_errors(self.gram) - left_out_errors(grams)
 
 
 def _splits(grows: bool, own: Array, names: NDArray[Any]) -> list[list[Any]]:
@@ -151,24 +210,3 @@ def _beyond_gaps(score: Array, names: NDArray[Any], sides: int) -> list[list[Any
         small = [list(g) for g in (above, below) if len(g) <= len(names) / 2]
         groups += [list(above)] if sides == 1 else small
     return groups
-
-
-def _quarter_drop(
-    problem: Problem,
-    design: list[Array],
-    y: list[Array],
-    rows: dict[int, Array],
-    chosen: Sequence[Any],
-) -> Array:
-    """Held-out drop of squared error by quarter when the chosen trajectories get the effect."""
-    p = design[0].shape[1]
-    k = next(iter(rows.values())).shape[1]
-    grams = np.zeros((QUARTERS, p + k + 1, p + k + 1))
-    for j in range(problem.n_joints):
-        inside = np.isin(problem.rows.trajectory[j], chosen).astype(float)[:, None]
-        a = np.column_stack([design[j], rows[j] * inside, y[j]])
-        for f in range(QUARTERS):
-            here = a[problem.rows.quarter[j] == f]
-            grams[f] += here.T @ here
-    without = np.r_[:p, p + k]
-    return left_out_errors(grams[:, without][:, :, without]) - left_out_errors(grams)

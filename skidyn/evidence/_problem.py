@@ -491,7 +491,9 @@ def regressor_rows(problem: Problem, index: NDArray[np.int64] | None = None) -> 
     weights = [w.tocsc() for w in problem.rows.weights]  # of which chunks of samples are taken
     for chunk, regressor in robot.iter_torque_regressor(signals.q, signals.dq, signals.ddq):
         for j, block in enumerate(rows):
-            block += weights[j][:, chunk] @ regressor[j][index].T
+            columns = regressor[j][index]
+            felt = np.flatnonzero(columns.any(axis=1))
+            block[:, felt] += weights[j][:, chunk] @ columns[felt].T
         tell("Computing the rigid body", chunk.stop / len(signals.q))
     return rows
 

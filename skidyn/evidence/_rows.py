@@ -93,6 +93,8 @@ class Rows:
 
     def average(self, values: Array, joint: int) -> Array:
         """Rows of a joint from values at every sample, shape (n_samples,) or (n_samples, k)."""
+        if values.ndim == 2 and values.shape[1] == 1:  # products with one vector are quicker
+            return np.asarray(self.weights[joint] @ values[:, 0])[:, None]
         return np.asarray(self.weights[joint] @ values)
 
     def thinned(self, index: NDArray[np.int64]) -> list[csr_matrix]:
