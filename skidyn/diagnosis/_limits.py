@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -153,6 +154,7 @@ def find_limits(
     gram = gram_of(felt, width)
     model = Normal(gram, np.zeros(len(gram)), column_sizes(gram))
     power = [float(np.sum(t**2)) / s**2 for t, s in zip(problem.target, sigma, strict=True)]
+    needed = cache(lambda joint, count: gates.needed(joint, count, float(inflation[joint])))
     largest: dict[tuple[str, int], list[tuple[Candidate, float]]] = {}
     for candidate in candidates:
         effect = candidate.term.effect
@@ -161,8 +163,8 @@ def find_limits(
             continue
         joint = candidate.joints[0]
         own, swept = _information(candidate, felt, width, sigma, model)
-        needed = gates.needed(joint, candidate.width + candidate.n_shapes, float(inflation[joint]))
-        size = needed / np.sqrt(swept) if swept > NEW_SHARE * own else np.inf
+        least = needed(joint, candidate.width + candidate.n_shapes)
+        size = least / np.sqrt(swept) if swept > NEW_SHARE * own else np.inf
         # More than all that the torque holds is no limit, nor a torque beyond its range, of which
         # the motion shows a vanishing part.
         beyond = effect.coefficients[0].unit == "N m" and size > np.ptp(problem.torque[:, joint])
