@@ -23,6 +23,7 @@ from skidyn.evidence._rows import (
     FEWEST_SAMPLES,
     WINDOW,
     Rows,
+    RowsInTime,
     every_sample,
     sliding_samples,
     window_rows,
@@ -488,12 +489,11 @@ def regressor_rows(problem: Problem, index: NDArray[np.int64] | None = None) -> 
     assert robot is not None
     index = np.arange(10 * robot.n_bodies) if index is None else index
     rows = [np.zeros((count, len(index))) for count in problem.rows.counts]
-    weights = [w.tocsc() for w in problem.rows.weights]  # of which chunks of samples are taken
+    in_time = [RowsInTime.of(weights) for weights in problem.rows.weights]
     for chunk, regressor in robot.iter_torque_regressor(signals.q, signals.dq, signals.ddq):
         for j, block in enumerate(rows):
-            columns = regressor[j][index]
-            felt = np.flatnonzero(columns.any(axis=1))
-            block[:, felt] += weights[j][:, chunk] @ columns[felt].T
+            here, weights = in_time[j].within(chunk)
+            block[here] += weights @ regressor[j][index].T
         tell("Computing the rigid body", chunk.stop / len(signals.q))
     return rows
 

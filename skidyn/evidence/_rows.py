@@ -148,6 +148,40 @@ class Rows:
         )
 
 
+@dataclass(frozen=True)
+class RowsInTime:
+    """Weights of a joint's rows in the order of time: those of a stretch of samples lie together.
+
+    Attributes
+    ----------
+    order : ndarray of shape (n_rows,) of int
+        The rows in the order of their first samples.
+    first, last : ndarray of shape (n_rows,) of int
+        Samples between which each of them lies.
+    weights : csr_matrix of shape (n_rows, n_samples)
+        Sorted alike.
+    """
+
+    order: NDArray[np.int64]
+    first: NDArray[np.int64]
+    last: NDArray[np.int64]
+    weights: csr_matrix
+
+    @classmethod
+    def of(cls, weights: csr_matrix) -> RowsInTime:
+        """Sort rows whose samples are sorted."""
+        first = weights.indices[weights.indptr[:-1]]
+        order = np.argsort(first, kind="stable")
+        last = weights.indices[weights.indptr[1:] - 1]
+        return cls(order, first[order], last[order], weights[order])
+
+    def within(self, samples: slice) -> tuple[NDArray[np.int64], csr_matrix]:
+        """Rows that hold some of the samples in a stretch, and their weights on these."""
+        start = int(np.searchsorted(self.last, samples.start))
+        stop = int(np.searchsorted(self.first, samples.stop))
+        return self.order[start:stop], self.weights[start:stop, samples]
+
+
 def _scaled(weights: csr_matrix, factor: Array) -> csr_matrix:
     """Weights whose rows are multiplied by a factor each."""
     data = weights.data * np.repeat(factor, np.diff(weights.indptr))
