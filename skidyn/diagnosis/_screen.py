@@ -12,6 +12,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,13 +42,11 @@ class _Group:
     """Candidates that reach the same joints with the same number of columns."""
 
     index: NDArray[np.int64]
-    rows: dict[int, Array]  # (n_rows_j, n_candidates * n_columns)
+    joints: tuple[int, ...]
     width: int
-    own: Array  # (n_folds, n_candidates, width, width)
-    target: Array  # (n_folds, n_candidates * width)
     lowest: Array  # (n_candidates, width)
     limits: Array  # (n_candidates, width)
-    ridge: Array  # (n_candidates, width)
+    soft: Array  # (n_candidates,)
 
 
 class Screen:
@@ -89,21 +88,10 @@ class Screen:
             members[tuple(sorted(candidate.rows)), candidate.width].append(i)
         groups = []
         for (joints, k), index in members.items():
-            rows = {
-                j: np.hstack([self.candidates[i].rows[j] for i in index]) / self.sigma[j]
-                for j in joints
-            }
-            own = np.zeros((self.problem.n_folds, len(index), k, k))
-            target = np.zeros((self.problem.n_folds, len(index) * k))
-            for j, block in rows.items():
-                for f, here in enumerate(self.folds[j]):
-                    own[f] += _products(block[None, here], block[None, here], k)[0]
-                    target[f] += self.target[j][here] @ block[here]
-            lowest = np.array([self.candidates[i].lowest for i in index])
-            limits = np.array([self.candidates[i].limits for i in index])
-            soft = np.array([self.candidates[i].term.effect.softness for i in index])
-            ridge = soft[:, None] * np.einsum("fckk->ck", own).max(1, keepdims=True)
-            groups.append(_Group(np.array(index), rows, k, own, target, lowest, limits, ridge))
+            own = [self.candidates[i] for i in index]
+            lowest, limits = np.array([c.lowest for c in own]), np.array([c.limits for c in own])
+            soft = np.array([c.term.effect.softness for c in own])
+            groups.append(_Group(np.array(index), joints, k, lowest, limits, soft))
         return groups
 
     def model(self, blocks: Sequence[dict[int, Array]]) -> Model:
@@ -150,52 +138,77 @@ class Screen:
         """
         errors = np.full((len(self.candidates), self.problem.n_folds), np.inf)
         for some in self._in_parts(wanted):
-            ends = np.cumsum([len(columns) for _, _, columns in some])
-            cross = np.zeros((*model.cross.shape, ends[-1]))
-            for (group, _, columns), end in zip(some, ends, strict=True):
-                for j, block in group.rows.items():
-                    products = self._folded(model.felt[j].rows, block[:, columns], j)
-                    cross[:, model.felt[j].places, end - len(columns) : end] += products
-            swept = _Swept.of(model, cross)
+            parts = [self._products_of(model, group, pick) for group, pick in some]
+            ends = np.cumsum([part.cross.shape[2] for part in parts])
+            swept = _Swept.of(model, np.concatenate([part.cross for part in parts], axis=2))
             bent = np.matmul(model.bends, swept.rest)
-            for (group, pick, columns), end in zip(some, ends, strict=True):
-                own, target = group.own[:, pick], group.target[:, columns]
-                ridge, place = group.ridge[pick], slice(end - len(columns), end)
-                part = swept.part(place)
-                errors[group.index[pick]] = part.errors(
-                    model, own, target, ridge, bent[:, :, place]
-                ).T
+            for (group, pick), part, end in zip(some, parts, ends.tolist(), strict=True):
+                own, target = part.own, part.target
+                place = slice(end - part.cross.shape[2], end)
+                ridge = np.einsum("fckk->ck", own).max(1, keepdims=True) * group.soft[pick, None]
+                ridge = np.broadcast_to(ridge, (len(pick), group.width))
+                beside = swept.part(place)
+                found = beside.errors(model, own, target, ridge, bent[:, :, place])
+                errors[group.index[pick]] = found.T
                 lowest, limits = group.lowest[pick], group.limits[pick]
                 if np.isfinite(lowest).any() or np.isfinite(limits).any():
-                    gain = _Swept.whole(model, part.cross).gain(
+                    gain = _Swept.whole(model, beside.cross).gain(
                         own.sum(0, keepdims=True), target.sum(0, keepdims=True), ridge
                     )[0]
                     forbidden = (gain < lowest) | (np.abs(gain) > limits)
                     errors[group.index[pick[forbidden.any(axis=1)]]] = np.inf
         return errors
 
+    def _products_of(self, model: Model, group: _Group, pick: NDArray[np.int64]) -> _Columns:
+        """Products of some candidates' columns, which are put side by side only meanwhile."""
+        k, n_folds = group.width, self.problem.n_folds
+        own = np.zeros((n_folds, len(pick), k, k))
+        target = np.zeros((n_folds, len(pick) * k))
+        cross = np.zeros((*model.cross.shape, len(pick) * k))
+        for j in group.joints:
+            rows = [self.candidates[i].rows[j] for i in group.index[pick]]
+            block = np.hstack(rows) / self.sigma[j]
+            felt = model.felt[j]
+            for f, here in enumerate(self.folds[j]):
+                part = block[here]
+                own[f] += _products(part[None], part[None], k)[0]
+                target[f] += self.target[j][here] @ part
+                cross[f, felt.places] += felt.rows[here].T @ part
+        return _Columns(cross, own, target)
+
     def _in_parts(self, wanted: NDArray[np.bool_] | None) -> Iterator[list[_Wanted]]:
-        """Wanted candidates of groups and their columns, some hundreds of columns at a time."""
+        """Wanted candidates by group, some hundreds of columns at a time."""
         some: list[_Wanted] = []
         count = 0
         for group in self._groups:
             pick = np.arange(len(group.index))
             if wanted is not None:
                 pick = pick[wanted[group.index]]
-            if not len(pick):
-                continue
-            columns = (pick[:, None] * group.width + np.arange(group.width)).ravel()
-            some.append((group, pick, columns))
-            count += len(columns)
-            if count >= MOST_COLUMNS:
-                yield some
-                some, count = [], 0
+            most = max(1, MOST_COLUMNS // group.width)
+            for start in range(0, len(pick), most):
+                some.append((group, pick[start : start + most]))
+                count += len(some[-1][1]) * group.width
+                if count >= MOST_COLUMNS:
+                    yield some
+                    some, count = [], 0
         if some:
             yield some
 
 
-#: A group, which of its candidates, and their columns in it.
-_Wanted = tuple[_Group, NDArray[np.int64], NDArray[np.int64]]
+#: A group, and which of its candidates.
+_Wanted = tuple[_Group, NDArray[np.int64]]
+
+
+class _Columns(NamedTuple):
+    """Products of candidates' columns by fold: with the model's, own ones, with the torque.
+
+    Shapes are (n_folds, p, n_candidates * k), (n_folds, n_candidates, k, k) and
+    (n_folds, n_candidates * k).
+    """
+
+    cross: Array
+    own: Array
+    target: Array
 
 
 @dataclass(frozen=True)
