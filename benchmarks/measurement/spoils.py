@@ -366,11 +366,14 @@ def joined(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled
     return Spoiled(log.assign(time=time, trajectory=0), robot, ("joined",), "--split-leaps")
 
 
-def wrapped(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled:
+def wrapped(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled | None:
     k = moved(log, robot, rng, turning=True)
     q = log[f"q{k + 1}"].to_numpy()
     middle = np.median(q)
     changed = log.assign(**{f"q{k + 1}": (q - middle) % (2 * np.pi)})
+    leaps = np.abs(np.diff(changed[f"q{k + 1}"])) > np.pi
+    if not leaps[log["trajectory"].diff().to_numpy()[1:] == 0].any():
+        return None  # recordings that are turns apart move alike
     return Spoiled(changed, robot, ("wrapped_position",), "--unwrap", (k + 1,), ("reading",))
 
 

@@ -120,7 +120,8 @@ def _without(torque: Array, pull: Array, parts: Sequence[Rows], runs: Sequence[R
         if np.median(np.abs(held[:, k])) > LEFT * np.median(np.abs(there[:, k])):
             return []
         pairs = [(pull[r, k] - pull[r, k].mean(), torque[r, k]) for r in runs]
-        size = sum(float(p @ p) for p, _ in pairs)
-        if size > 0 and sum(float(p @ t) for p, t in pairs) / size > FELT:
+        change = sum(float(p @ p) for p, _ in pairs)
+        seen = change > (HEAVY * torque[:, k].std()) ** 2 * sum(map(len, runs))
+        if seen and sum(float(p @ t) for p, t in pairs) > FELT * change:
             found.append(k)
     return found

@@ -59,5 +59,11 @@ def test_robots_that_hold_no_weight_start_from_zero():
     assert not {"tared_torque", "dead_band"} & set(told_of(log.frame, log.robot))
 
 
+def test_motor_torque_of_a_slider_was_not_tared():
+    log = make_hidden_effect_log(load_scara(), None, n_trajectories=3, duration=4.0)
+    small = {f"tau{k + 1}": log.frame[f"tau{k + 1}"] / 100 for k in range(4)}
+    assert "tared_torque" not in told_of(log.frame.assign(**small), log.robot)
+
+
 def test_no_effect_is_named_while_these_are_suspected():
     assert all(c.misnames for c in list_checks() if c.name in ("dead_band", "tared_torque"))
