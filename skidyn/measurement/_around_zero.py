@@ -17,10 +17,11 @@ from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import cut_columns
 
 Rows: TypeAlias = NDArray[np.intp]
-#: Share of rows with a torque of zero, in runs of at least so many, that is a dead band; how many
-#: times as often as values one step beside it, where the torque comes in steps; fewest values of a
-#: torque that is not so coarse that zero is one of few.
-BAND, RUN, OFTENER, FINE = 0.01, 4, 4.0, 50
+#: Share of rows with a torque of zero, in runs of at least so many and so often (drives that are
+#: switched off are so for long), that is a dead band; how many times as often as values one step
+#: beside it, where the torque comes in steps; fewest values of a torque that is not so coarse that
+#: zero is one of few.
+BAND, RUN, PASSES, OFTENER, FINE = 0.01, 4, 10, 4.0, 50
 #: Least speed of rows that count, as a share of the largest.
 FAST = 0.02
 #: Recordings at least; rows at the start of each; share of the spread that gravity has there; share
@@ -32,7 +33,7 @@ class DeadBand(Check):
     """Torque or current that is zero below some size."""
 
     name = "dead_band"
-    suspects = "torque or current that is reported as zero where it is small, or not measured"
+    suspects = "torque or current that is reported as zero where it is small"
     misnames = True
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
@@ -47,9 +48,9 @@ class DeadBand(Check):
             names = ", ".join(measurement.joint(k) for k in found)
             told_shares = ", ".join(f"{share:.1%}" for share in found.values())
             yield self.suspicion(
-                f"the torque of {names} is zero where it is small, or was not measured there",
-                f"it is exactly zero in {told_shares} of the rows, {RUN} or more after each other "
-                "although the joint moves, and no other value repeats so",
+                f"the torque of {names} is zero where it is small",
+                f"it is exactly zero in {told_shares} of the rows, in {PASSES} places or more for "
+                f"{RUN} rows or more, although the joint moves, and no other value repeats so",
                 "suspected",
                 list(found),
             )
@@ -60,10 +61,15 @@ def _zeros(measurement: Measurement, k: int) -> float:
     torque, speed = measurement.torque[:, k], np.abs(measurement.signals.dq[:, k])
     if torque.min() >= 0 or torque.max() <= 0 or len(np.unique(torque)) < FINE:
         return 0.0
-    zero = (torque == 0) & (speed > FAST * speed.max()) & ~measurement.idle
+    zero = (torque == 0) & ~measurement.idle
     edges = np.flatnonzero(np.diff(np.r_[0, zero.astype(int), 0]))
     lengths = edges[1::2] - edges[::2]
-    share = float(lengths[lengths >= RUN].sum()) / len(torque)
+    moves = np.r_[0, np.cumsum(speed > FAST * speed.max())]
+    moving = moves[edges[1::2]] - moves[edges[::2]] > lengths / 2
+    passes = lengths[(lengths >= RUN) & moving]
+    if len(passes) < PASSES:
+        return 0.0
+    share = float(passes.sum()) / len(torque)
     step = position_step(torque)
     if np.isfinite(step):  # steps of a sensor come as often beside zero as there
         beside = np.mean(np.abs(np.abs(torque) - step) < 0.1 * step) / 2

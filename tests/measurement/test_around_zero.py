@@ -35,6 +35,12 @@ def test_a_coarse_torque_that_passes_zero_has_no_dead_band():
     assert "dead_band" not in told_of(LOG.frame.assign(**coarse))
 
 
+def test_a_drive_that_is_switched_off_has_no_dead_band():
+    frame = LOG.frame.copy()
+    frame.loc[150:300, "tau1"] = 0.0
+    assert "dead_band" not in told_of(frame)
+
+
 @pytest.mark.parametrize(
     "change, words",
     [(lambda x: x - x.iloc[:5].mean(), "start of every"), (lambda x: x - x.mean(), "no mean")],
