@@ -105,14 +105,13 @@ def _cut(torque: Array) -> float:
 
 def cut_columns(measurement: Measurement) -> list[int]:
     """Columns of the torque of which one sign was lost: zero in its place."""
-    found = []
+    found, measured = [], ~measurement.idle
     for k in range(measurement.n_joints):
-        torque = measurement.torque[:, k]
-        rows = (
-            np.abs(measurement.signals.dq[:, k]) > 0.02 * np.abs(measurement.signals.dq[:, k]).max()
-        )
-        one_sided = torque.min() == 0 < torque.max() or torque.max() == 0 > torque.min()
-        if one_sided and rows.any() and _turns(measurement, k) >= TURNS:
+        torque = measurement.torque[measured, k]
+        speed = np.abs(measurement.signals.dq[measured, k])
+        rows = speed > 0.02 * speed.max(initial=0.0)
+        one_sided = rows.any() and 0 in (torque.min(), torque.max()) and np.ptp(torque) > 0
+        if one_sided and _turns(measurement, k) >= TURNS:
             values = np.abs(torque[rows])
             # a joint that is not driven has zeros alone
             if CUT < _cut(values) < 0.98 and len(np.unique(values)) > 50:

@@ -55,3 +55,13 @@ def test_positions_that_leap_to_zero_spoil_no_other_check(recorded, told_of):
     lost = np.random.default_rng(0).random(len(frame)) < 0.005
     frame.loc[lost, ["q1", "q2"]] = 0.0
     assert {s.certainty for s in told_of(frame).values()} <= {"noted"}
+
+
+def test_a_torque_of_one_sign_before_drives_are_enabled_is_not_cut(recorded, told_of):
+    frame = recorded.frame.copy()
+    frame["tau2"] = frame["tau2"].abs() + 1.0
+    for rows in frame.groupby("trajectory").groups.values():
+        frame.loc[rows[:40], ["tau1", "tau2"]] = 0.0
+    told = told_of(frame)
+    assert told["constant_torque"].certainty == "certain"
+    assert "is cut at zero" not in str(told.get("unsigned_torque", ""))
