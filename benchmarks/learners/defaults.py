@@ -130,7 +130,7 @@ def main() -> None:
                 errors = held_out_errors(log, make)
                 spent = time.process_time() - start
                 own = " ".join(f"{e:.3f}" for e in errors) + " | " if options.joints else ""
-                print(f"| {title} | {errors.mean():.3f} | {own}{spent:.0f} |", flush=True)
+                print(f"| {title} | {errors.mean():.4f} | {own}{spent:.0f} |", flush=True)
 
 
 if __name__ == "__main__":
