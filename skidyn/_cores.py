@@ -112,7 +112,8 @@ def each(function: Callable[[Item], Result], items: Iterable[Item]) -> list[Resu
             done.update((i, function(items[i])) for i in pieces[k])
         return done
 
-    children = [_Child(work) for _ in range(count - 1)]
+    started = (_started(work) for _ in range(count - 1))
+    children = [child for child in started if child is not None]
     token = _CORES.set(1)
     try:
         done = work()
@@ -143,11 +144,11 @@ def aside(function: Callable[[], Result]) -> Iterator[Callable[[], Result]]:
     callable
         Waits for the result and returns it, or raises what the function raised.
     """
-    if alone():
+    child = None if alone() else _started(lambda: _Boxed(function()))
+    if child is None:
         value = function()
         yield lambda: value
         return
-    child = _Child(lambda: _Boxed(function()))
     try:
         kept: list[Result] = []
 
@@ -177,7 +178,12 @@ class _Child(Generic[Result]):
         with warnings.catch_warnings():
             # Python 3.12 warns of any other thread, those of linear algebra that wait included.
             warnings.simplefilter("ignore", DeprecationWarning)
-            self._pid = os.fork()
+            try:
+                self._pid = os.fork()
+            except OSError:
+                os.close(self._pipe)
+                os.close(into)
+                raise
         if self._pid == 0:
             os.close(self._pipe)
             self._run(function, into)
@@ -226,6 +232,14 @@ class _Child(Generic[Result]):
                 os.kill(self._pid, signal.SIGKILL)
                 os.waitpid(self._pid, 0)
             self._pid = 0
+
+
+def _started(function: Callable[[], Result]) -> _Child[Result] | None:
+    """A process that computes something; None where the system gives no further one."""
+    try:
+        return _Child(function)
+    except OSError:
+        return None
 
 
 def _message(stream: BufferedReader) -> list[bytearray] | None:

@@ -106,6 +106,17 @@ def test_nothing_runs_on_after_an_error_in_the_block():
         os.kill(pid, 0)
 
 
+@several
+def test_a_system_that_gives_no_further_process_is_enough(monkeypatch):
+    def refuses():
+        raise BlockingIOError("no more processes")
+
+    monkeypatch.setattr(os, "fork", refuses)
+    with cores(3), aside(lambda: 42) as answer:
+        assert each(lambda k: 2 * k, range(5)) == [0, 2, 4, 6, 8]
+        assert answer() == 42
+
+
 def test_no_processes_at_all_is_refused():
     with pytest.raises(ValueError, match="n_jobs=0"), cores(0):
         pass
