@@ -18,10 +18,10 @@ def test_a_refined_shape_explains_more_and_is_nearer_the_truth():
     own, target = [problem.term_rows(t) for t in problem.terms], problem.target
     gain = Gain(problem, own, fit.noise, target)
     pool = [c for c in catalogue_candidates(problem, ["stribeck"]) if c.joints == (1,)]
-    rough = max(pool, key=lambda c: gain(c.rows, c.signs))
+    rough = max(pool, key=lambda c: gain(c.rows, c.term.lowest))
 
     (fine,) = refine(problem, own, [rough], fit.noise, target)
 
-    assert gain(fine.rows, fine.signs) >= gain(rough.rows, rough.signs)
+    assert gain(fine.rows, fine.term.lowest) >= gain(rough.rows, rough.term.lowest)
     true = float(np.ravel(log.parameters["vs"])[0])
     assert abs(np.log(fine.term.shape["vs"] / true)) < 0.5

@@ -31,7 +31,7 @@ def test_refined_shape_explains_more_than_any_of_the_grid(problem):
     gain = Gain(problem, own, problem.fit_own().noise, problem.target)
     rough = best_on_grid(problem, "stribeck", (1,), gain)
     fine = refine_term(problem, rough, gain)
-    value = [gain(problem.term_rows(t), t.signs) for t in (rough, fine)]
+    value = [gain(problem.term_rows(t), t.lowest) for t in (rough, fine)]
     assert value[1] >= value[0] > 0
     assert fine.shape["vs"] == pytest.approx(TRUTH, rel=0.5)
 
@@ -47,4 +47,4 @@ def test_a_forbidden_sign_gains_nothing(problem):
     own = [problem.term_rows(t) for t in problem.terms[:2]]
     gain = Gain(problem, own, problem.fit_own().noise, problem.target)
     rows = {j: -block for j, block in problem.term_rows(Term("coulomb", (2,))).items()}
-    assert gain(rows, np.ones(1)) == -np.inf
+    assert gain(rows, np.zeros(1)) == -np.inf
