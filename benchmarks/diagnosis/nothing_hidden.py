@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """False alarms: simulated logs that hide nothing must be called complete.
 
-    python benchmarks/diagnosis/nothing_hidden.py [--logs 200] [--jobs 2]
+    python benchmarks/diagnosis/nothing_hidden.py [--logs 200] [--first 0] [--jobs 2]
 
-Robots, noise, motion and true parameters change from log to log.
+Robots, noise, rate, motion and true parameters change from log to log.
 """
 
 from __future__ import annotations
@@ -32,17 +32,21 @@ def alarm(seed: int) -> list[str]:
     warnings.simplefilter("ignore")
     robot = ROBOTS[seed % len(ROBOTS)]()
     noise = ("low", "high")[seed // len(ROBOTS) % 2]
-    log = make_hidden_effect_log(robot, None, noise=noise, random_state=1000 + seed)
+    rate = (100.0, 250.0, 500.0)[seed // 10 % 3]  # the last two are looked at in short windows, too
+    log = make_hidden_effect_log(robot, None, noise=noise, rate=rate, random_state=1000 + seed)
     found = diagnose(RBDRegressor(robot), log.X, log.y).findings
-    return [f"{robot.name}, {noise} noise, seed {seed}: {f.sentence}" for f in found]
+    return [f"{robot.name}, {noise} noise, {rate:g} Hz, seed {seed}: {f.sentence}" for f in found]
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--logs", type=int, default=200)
+    parser.add_argument("--first", type=int, default=0, help="seed of the first log")
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args()
-    results = Parallel(n_jobs=options.jobs)(delayed(alarm)(k) for k in range(options.logs))
+    results = Parallel(n_jobs=options.jobs)(
+        delayed(alarm)(options.first + k) for k in range(options.logs)
+    )
     for sentence in (s for found in results for s in found):
         print(sentence)
     complete = sum(not found for found in results)

@@ -94,7 +94,9 @@ def rows_together(candidates: Sequence[Candidate], counts: NDArray[np.int64]) ->
     return {j: np.hstack([block(c, j) for c in candidates]) for j in reached}
 
 
-def catalogue_candidates(problem: Problem, kinds: Iterable[str]) -> list[Candidate]:
+def catalogue_candidates(
+    problem: Problem, kinds: Iterable[str], bounded: bool = False
+) -> list[Candidate]:
     """Terms on the grid of every kind that this data can show and the model lacks.
 
     Parameters
@@ -103,6 +105,8 @@ def catalogue_candidates(problem: Problem, kinds: Iterable[str]) -> list[Candida
         With the load and model torque of the current fit.
     kinds : iterable of str
         Kinds of the catalogue.
+    bounded : bool, default=False
+        Whether coefficients must go with their shapes.
     """
     present = {(term.kind, term.places) for term in problem.terms}
     terms: list[Term] = []
@@ -121,7 +125,10 @@ def catalogue_candidates(problem: Problem, kinds: Iterable[str]) -> list[Candida
             # An effect of the whole robot shows as soon as one joint shows it.
             if (kind, joints) in present or all(hidden) or (len(joints) < 3 and any(hidden)):
                 continue
-            terms += [Term.at(kind, joints, s) for s in effect.grid(problem.signals, joints)]
+            grid = effect.grid(problem.signals, joints)
+            if bounded:
+                grid = [effect.bounded(problem.signals, joints, shape) for shape in grid]
+            terms += [Term.at(kind, joints, shape) for shape in grid]
     # What kinds with the same needs share for a joint is kept for one joint at a time.
     ordered = sorted(terms, key=lambda term: (term.effect.needs, term.places))
     tell("Preparing effects")

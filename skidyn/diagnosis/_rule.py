@@ -169,6 +169,9 @@ class Settings:
         Kinds compared with noise re-estimated.
     refined : int
         So many of them with their shape parameters refined.
+    bounded : bool
+        Whether coefficients must go with their shapes (:meth:`Effect.bounded`). Where averages are
+        so short that noise passes them, it has the form of an effect, but not its size.
     repeated : int
         Times a fit is repeated at most whose columns follow it, as that of a saturation.
 
@@ -201,6 +204,7 @@ class Settings:
     max_findings: int = 4
     finalists: int = 8
     refined: int = 4
+    bounded: bool = False
     repeated: int = 6
 
 

@@ -360,6 +360,27 @@ class Effect:
         """
         return True
 
+    def bounded(
+        self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]
+    ) -> dict[str, Any]:
+        """Shape parameters with those that bound the coefficients, see :meth:`least`.
+
+        Parameters
+        ----------
+        signals : Signals
+            Motion.
+        joints : sequence of int
+            Places of the term's joints in arrays.
+        shape : mapping
+            Shape parameters of the grid.
+
+        Returns
+        -------
+        dict
+            The same by default.
+        """
+        return dict(shape)
+
     def least(self, shape: Mapping[str, Any]) -> float:
         """Smallest value at which a coefficient that must not be negative goes with its shape.
 

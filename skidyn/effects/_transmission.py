@@ -220,11 +220,10 @@ class JointElasticity(_LinkSideEffect):
         load = signals.load[:, joint]
         return _swing(load, signals, shape["resonance"], shape["damping"])
 
-    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        if signals.robot is None or signals.load is None:
-            return super().grid(signals, joints)
-        inertia = float(np.median(_link_inertia(signals, joints[0])))
-        return [shape | {"inertia": inertia} for shape in super().grid(signals, joints)]
+    def bounded(
+        self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]
+    ) -> dict[str, Any]:
+        return {**shape, "inertia": float(np.median(_link_inertia(signals, joints[0])))}
 
     def least(self, shape: Mapping[str, Any]) -> float:
         # Resonance and inertia say how compliant the joint is. With less than half of that, the

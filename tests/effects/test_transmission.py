@@ -36,6 +36,15 @@ def test_a_spring_is_not_stiffer_than_its_swing_says():
     assert term.lowest == pytest.approx([0.5 / stiffness])
 
 
+def test_the_inertia_that_bounds_a_compliance_is_that_of_the_link(signals, robot):
+    effect = get_effect("joint_elasticity")
+
+    shape = effect.bounded(signals, [1], {"resonance": 5.0, "damping": 0.1})
+
+    last = robot.mass_matrix(np.zeros((1, 2)))[0, 1, 1]
+    assert shape == {"resonance": 5.0, "damping": 0.1, "inertia": pytest.approx(last)}
+
+
 def test_what_must_not_be_negative_may_be_as_small_as_it_likes():
     assert list(Term("coulomb", (1,)).lowest) == [0.0]
     assert list(Term("offset", (1,)).lowest) == [-np.inf]
