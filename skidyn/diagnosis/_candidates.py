@@ -95,7 +95,7 @@ def rows_together(candidates: Sequence[Candidate], counts: NDArray[np.int64]) ->
 
 
 def catalogue_candidates(
-    problem: Problem, kinds: Iterable[str], bounded: bool = False
+    problem: Problem, kinds: Iterable[str], size_share: float = 0.0
 ) -> list[Candidate]:
     """Terms on the grid of every kind that this data can show and the model lacks.
 
@@ -105,8 +105,8 @@ def catalogue_candidates(
         With the load and model torque of the current fit.
     kinds : iterable of str
         Kinds of the catalogue.
-    bounded : bool, default=False
-        Whether coefficients must go with their shapes.
+    size_share : float, default=0
+        Least size of a coefficient, as a share of what its shape says.
     """
     present = {(term.kind, term.places) for term in problem.terms}
     terms: list[Term] = []
@@ -126,8 +126,8 @@ def catalogue_candidates(
             if (kind, joints) in present or all(hidden) or (len(joints) < 3 and any(hidden)):
                 continue
             grid = effect.grid(problem.signals, joints)
-            if bounded:
-                grid = [effect.bounded(problem.signals, joints, shape) for shape in grid]
+            if size_share:
+                grid = [effect.bounded(problem.signals, joints, s, size_share) for s in grid]
             terms += [Term.at(kind, joints, shape) for shape in grid]
     # What kinds with the same needs share for a joint is kept for one joint at a time.
     ordered = sorted(terms, key=lambda term: (term.effect.needs, term.places))

@@ -169,9 +169,13 @@ class Settings:
         Kinds compared with noise re-estimated.
     refined : int
         So many of them with their shape parameters refined.
-    bounded : bool
-        Whether coefficients must go with their shapes (:meth:`Effect.bounded`). Where averages are
-        so short that noise passes them, it has the form of an effect, but not its size.
+    size_share : float
+        Least size of a coefficient, as a share of what its shape says (:meth:`Effect.bounded`):
+        noise may have the form of an effect, but not its size. Joints that swing together have a
+        third of the size that each would have by itself, or less.
+    size_share_short : float
+        The same in short windows, which more noise passes. With less than half of its size, the
+        torque is explained better without the effect than with all of it.
     repeated : int
         Times a fit is repeated at most whose columns follow it, as that of a saturation.
 
@@ -204,7 +208,8 @@ class Settings:
     max_findings: int = 4
     finalists: int = 8
     refined: int = 4
-    bounded: bool = False
+    size_share: float = 0.2
+    size_share_short: float = 0.5
     repeated: int = 6
 
 

@@ -60,7 +60,7 @@ class SearchState:
         self.findings: list[Hypothesis] = []
         base = problem.fit_own()
         self.fit, self.sigma = base, base.noise
-        self.pool = catalogue_candidates(problem, self.kinds, settings.bounded)
+        self.pool = catalogue_candidates(problem, self.kinds, settings.size_share)
         self.nameless = nameless and bool(settings.max_findings)
         if self.nameless:
             self._followed = problem.torque - problem.explained(base)

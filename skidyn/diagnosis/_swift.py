@@ -64,7 +64,8 @@ def look_at_swift(
         # What smoothing leaves is as large in short windows, and tells in as many more of them.
         more = short.rows.counts.sum() / problem.rows.counts.sum()
         least = more * settings.least_gain
-        gates = replace(settings, max_findings=room, least_gain=least, bounded=True)
+        size = settings.size_share_short
+        gates = replace(settings, max_findings=room, least_gain=least, size_share=size)
         slowed = {j for h in slow for c in h.candidates if c.term.effect.is_slow for j in c.joints}
         joints = [j for j in range(problem.n_joints) if j not in slowed]
         moved = search(short, family, gates, nameless=False, joints=joints)

@@ -361,7 +361,7 @@ class Effect:
         return True
 
     def bounded(
-        self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]
+        self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any], share: float
     ) -> dict[str, Any]:
         """Shape parameters with those that bound the coefficients, see :meth:`least`.
 
@@ -373,6 +373,8 @@ class Effect:
             Places of the term's joints in arrays.
         shape : mapping
             Shape parameters of the grid.
+        share : float
+            Least size of a coefficient, as a share of what the shape says.
 
         Returns
         -------

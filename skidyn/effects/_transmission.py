@@ -71,8 +71,6 @@ def _swing_filters(omega: float, damping: float, rate: float) -> list[tuple[Arra
 #: Frequency, Hz, above which accelerations are taken as noise, and fewest samples of a recording
 #: that can be split there.
 _FAST, _FEWEST = 4.0, 20
-#: Least compliance of a joint, as a share of what its resonance and the inertia of its link say.
-_LEAST_SHARE = 0.5
 #: Step of the difference quotients: they err by about this share, and round by a thousandth of it.
 _STEP = 1e-6
 
@@ -221,16 +219,16 @@ class JointElasticity(_LinkSideEffect):
         return _swing(load, signals, shape["resonance"], shape["damping"])
 
     def bounded(
-        self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]
+        self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any], share: float
     ) -> dict[str, Any]:
-        return {**shape, "inertia": float(np.median(_link_inertia(signals, joints[0])))}
+        inertia = float(np.median(_link_inertia(signals, joints[0])))
+        return {**shape, "inertia": inertia, "share": share}
 
     def least(self, shape: Mapping[str, Any]) -> float:
-        # Resonance and inertia say how compliant the joint is. With less than half of that, the
-        # torque is explained better without any compliance than with all of it.
+        # Resonance and inertia say how compliant a joint is that swings by itself.
         if "inertia" not in shape:
             return 0.0
-        return float(_LEAST_SHARE / (shape["inertia"] * (2 * np.pi * shape["resonance"]) ** 2))
+        return float(shape["share"] / (shape["inertia"] * (2 * np.pi * shape["resonance"]) ** 2))
 
     def fastest(self, shape: Mapping[str, Any]) -> float:
         return float(shape["resonance"])

@@ -30,7 +30,8 @@ def test_derivatives_of_a_swing_are_those_of_its_way_up_to_fast_swings(signals):
 
 
 def test_a_spring_is_not_stiffer_than_its_swing_says():
-    term = Term("joint_elasticity", (1,), {"resonance": 5.0, "damping": 0.1, "inertia": 2.0})
+    shape = {"resonance": 5.0, "damping": 0.1, "inertia": 2.0, "share": 0.5}
+    term = Term("joint_elasticity", (1,), shape)
 
     stiffness = 2.0 * (2 * np.pi * 5.0) ** 2
     assert term.lowest == pytest.approx([0.5 / stiffness])
@@ -39,10 +40,11 @@ def test_a_spring_is_not_stiffer_than_its_swing_says():
 def test_the_inertia_that_bounds_a_compliance_is_that_of_the_link(signals, robot):
     effect = get_effect("joint_elasticity")
 
-    shape = effect.bounded(signals, [1], {"resonance": 5.0, "damping": 0.1})
+    shape = effect.bounded(signals, [1], {"resonance": 5.0, "damping": 0.1}, 0.5)
 
     last = robot.mass_matrix(np.zeros((1, 2)))[0, 1, 1]
-    assert shape == {"resonance": 5.0, "damping": 0.1, "inertia": pytest.approx(last)}
+    bound = {"inertia": pytest.approx(last), "share": 0.5}
+    assert shape == {"resonance": 5.0, "damping": 0.1} | bound
 
 
 def test_what_must_not_be_negative_may_be_as_small_as_it_likes():
