@@ -23,7 +23,7 @@ from contextvars import ContextVar
 from io import BufferedReader
 from typing import Any, Generic, TypeVar
 
-from skidyn._progress import unheard
+from skidyn._progress import tell, track, unheard
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -75,7 +75,7 @@ def alone() -> bool:
     return _CORES.get() < 2
 
 
-def each(function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
+def each(function: Callable[[Item], Result], items: Iterable[Item], text: str = "") -> list[Result]:
     """What a function returns for every item, in their order.
 
     Parameters
@@ -85,6 +85,8 @@ def each(function: Callable[[Item], Result], items: Iterable[Item]) -> list[Resu
         is lost there.
     items : iterable
         Items; they need not be picklable.
+    text : str, default=""
+        What is being done, to be reported with the share of it that is done.
 
     Returns
     -------
@@ -100,7 +102,7 @@ def each(function: Callable[[Item], Result], items: Iterable[Item]) -> list[Resu
     pieces = [range(k, min(k + size, len(items))) for k in range(0, len(items), max(1, size))]
     count = min(_CORES.get(), len(pieces))
     if count < 2:
-        return [function(item) for item in items]
+        return [function(item) for item in (track(items, text) if text else items)]
     left, filled = os.pipe()
     os.write(filled, b"".join(_NUMBER.pack(k) for k in range(len(pieces))))
     os.close(filled)  # whoever finds the pipe empty is done
@@ -109,6 +111,8 @@ def each(function: Callable[[Item], Result], items: Iterable[Item]) -> list[Resu
         done: dict[int, Result] = {}
         while number := os.read(left, _NUMBER.size):
             (k,) = _NUMBER.unpack(number)
+            if text:
+                tell(text, k / len(pieces))
             done.update((i, function(items[i])) for i in pieces[k])
         return done
 
@@ -119,6 +123,8 @@ def each(function: Callable[[Item], Result], items: Iterable[Item]) -> list[Resu
         done = work()
         for child in children:
             done |= child.result() or {}
+        if text:
+            tell(text, 1.0)
         # a process that was killed, for its memory for example, takes its pieces with it
         return [done[k] if k in done else function(item) for k, item in enumerate(items)]
     finally:

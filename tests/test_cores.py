@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from skidyn._cores import alone, aside, cores, each
+from skidyn._progress import listening
 
 LINUX = sys.platform == "linux"
 several = pytest.mark.skipif(not LINUX, reason="processes are forked on Linux only")
@@ -18,6 +19,16 @@ several = pytest.mark.skipif(not LINUX, reason="processes are forked on Linux on
 def test_results_come_in_the_order_of_the_items(n_jobs, count):
     with cores(n_jobs):
         assert each(lambda k: 2 * k, range(count)) == [2 * k for k in range(count)]
+
+
+@pytest.mark.parametrize("n_jobs", [1, 2])
+def test_the_share_that_is_done_grows_to_all_of_it(n_jobs):
+    told = []
+    with cores(n_jobs), listening(lambda text, share: told.append((text, share))):
+        each(lambda k: k, range(50), "Counting")
+    shares = [share for _, share in told]
+    assert {text for text, _ in told} == {"Counting"}
+    assert shares == sorted(shares) and shares[-1] == 1.0
 
 
 @several

@@ -10,7 +10,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn._progress import tell
 from skidyn._signals import Array
 from skidyn.effects import Term, get_effect
 from skidyn.evidence import Problem
@@ -131,8 +130,7 @@ def catalogue_candidates(
             terms += [Term.at(kind, joints, shape) for shape in grid]
     # What kinds with the same needs share for a joint is kept for one joint at a time.
     ordered = sorted(terms, key=lambda term: (term.effect.needs, term.places))
-    tell("Preparing effects")
-    problem.prepare(ordered)
+    problem.prepare(ordered, text="Preparing effects")
     return [Candidate(t.kind, t, problem.term_rows(t), n_shapes=_refined(t)) for t in terms]
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._cores import each
-from skidyn._progress import tell, track
+from skidyn._progress import track
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._hypothesis import (
@@ -44,10 +44,10 @@ class RankingSearch(SearchState):
 
     def rank(self) -> list[Hypothesis]:
         """Explanations of the residual, best first."""
-        tell(f"{self._round}: screening effects")
         screening, recordings = self._screening(), self._by_kind_of_recording()
         looks: list[Callable[[], Any]] = [self._lines, self._splits, *screening, *recordings]
-        lines, splits, *found = each(lambda look: look(), looks)
+        text = f"{self._round}: screening effects"
+        lines, splits, *found = each(lambda look: look(), looks, text)
         rough = sorted(self._found(found[: len(screening)]) + splits, key=lambda item: item[1])
         ranking = self._finals([candidates for candidates, _ in rough[: self.settings.finalists]])
         ranking += [self._against_functions(h, ranking) for h in lines]

@@ -155,7 +155,9 @@ class Problem:
             return 1
         return int(self.motion.rate * WINDOW / ENOUGH_SAMPLES)
 
-    def prepare(self, terms: Sequence[Term], screening: bool = False) -> list[dict[int, Array]]:
+    def prepare(
+        self, terms: Sequence[Term], screening: bool = False, text: str = ""
+    ) -> list[dict[int, Array]]:
         """Rows of many terms, on all cores that may be used.
 
         Parameters
@@ -165,6 +167,8 @@ class Problem:
             computed once.
         screening : bool, default=False
             Those of :meth:`screening_rows` instead of :meth:`term_rows`.
+        text : str, default=""
+            What is being done, to be reported with the share of it that is done.
 
         Returns
         -------
@@ -173,7 +177,7 @@ class Problem:
         of = self.screening_rows if screening else self.term_rows
         new = [t for t in dict.fromkeys(terms) if t not in self._cache]
         groups = [list(g) for _, g in groupby(new, key=lambda t: (t.effect.needs, t.places))]
-        found = each(lambda group: [of(term) for term in group], groups)
+        found = each(lambda group: [of(term) for term in group], groups, text)
         rows = dict(zip(chain(*groups), chain(*found), strict=True))
         self._cache |= {t: r for t, r in rows.items() if not screening or self._skipped(t) < 2}
         return [rows[t] if t in rows else self._cache[t] for t in terms]

@@ -12,9 +12,7 @@ from skidyn.identification import RBDRegressor
 
 @pytest.fixture(scope="session")
 def log():
-    return make_hidden_effect_log(
-        load_planar_arm(), "spring", joints=[2], n_trajectories=8, duration=6.0
-    )
+    return make_hidden_effect_log(load_planar_arm(), "spring", joints=[2], n_trajectories=8)
 
 
 @pytest.fixture
