@@ -12,18 +12,19 @@ from __future__ import annotations
 
 import gc
 import os
-import pickle
 import signal
 import struct
 import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from contextvars import ContextVar
-from io import BufferedReader
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from skidyn._progress import tell, track, unheard
+from skidyn._progress import listening, tell, track
+
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -33,7 +34,7 @@ _CORES: ContextVar[int] = ContextVar("skidyn_cores", default=1)
 MOST_PROCESSES = 8
 #: Numbers of pieces that surely fit into a pipe, of which a process takes one after the other.
 MOST_PIECES = 4096
-_NUMBER, _SIZE = struct.Struct("=I"), struct.Struct("=Q")
+_NUMBER = struct.Struct("=I")
 
 
 @contextmanager
@@ -180,64 +181,50 @@ class _Child(Generic[Result]):
     """A forked process that computes something."""
 
     def __init__(self, function: Callable[[], Result]) -> None:
-        self._pipe, into = os.pipe()
-        with warnings.catch_warnings():
-            # Python 3.12 warns of any other thread, those of linear algebra that wait included.
-            warnings.simplefilter("ignore", DeprecationWarning)
-            try:
-                self._pid = os.fork()
-            except OSError:
-                os.close(self._pipe)
-                os.close(into)
-                raise
-        if self._pid == 0:
-            os.close(self._pipe)
-            self._run(function, into)
-        os.close(into)
+        from multiprocessing import get_context
 
-    def _run(self, function: Callable[[], Result], into: int) -> None:
-        """Compute, write the result, end; nothing that the parent has opened is touched."""
+        fork = get_context("fork")
+        self._pipe, into = fork.Pipe(duplex=False)
+        self._process = fork.Process(target=_answer, args=(function, into), daemon=True)
         try:
-            signal.signal(signal.SIGINT, signal.SIG_DFL)
-            gc.disable()  # a collection would copy every page that holds an object
-            _CORES.set(1)
-            with unheard():
-                try:
-                    outcome: tuple[bool, Any] = True, function()
-                except Exception as error:
-                    outcome = False, error
-            buffers: list[pickle.PickleBuffer] = []
-            head = pickle.dumps(outcome, 5, buffer_callback=buffers.append)
-            with open(into, "wb") as stream:
-                stream.write(_SIZE.pack(1 + len(buffers)))
-                for part in (memoryview(head), *(b.raw() for b in buffers)):
-                    stream.write(_SIZE.pack(len(part)))
-                    stream.write(part)
+            with warnings.catch_warnings():
+                # Python 3.12 warns of any other thread, those of linear algebra that wait included.
+                warnings.simplefilter("ignore", DeprecationWarning)
+                self._process.start()
+        except OSError:
+            self._pipe.close()
+            raise
         finally:
-            os._exit(0)
+            into.close()
 
     def result(self) -> Result | None:
         """What was computed; None where the process is gone without an answer."""
-        with open(self._pipe, "rb") as stream:
-            self._pipe = -1
-            parts = _message(stream)
-        if parts is None:
+        try:
+            fine, value = self._pipe.recv()
+        except (EOFError, OSError):  # before an answer, or within one
             return None
-        fine, value = pickle.loads(parts[0], buffers=parts[1:])
         if not fine:
             raise value
         return value  # type: ignore[no-any-return]
 
     def end(self) -> None:
         """End the process, if it still runs, and forget it."""
-        if self._pipe >= 0:
-            os.close(self._pipe)
-            self._pipe = -1
-        if self._pid:
-            with suppress(ProcessLookupError, ChildProcessError):
-                os.kill(self._pid, signal.SIGKILL)
-                os.waitpid(self._pid, 0)
-            self._pid = 0
+        self._pipe.close()
+        self._process.kill()
+        self._process.join()
+
+
+def _answer(function: Callable[[], Result], into: Connection) -> None:
+    """What a child process does: compute, and send the result or what was raised."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    gc.disable()  # a collection would copy every page that holds an object
+    _CORES.set(1)
+    with listening(None):
+        try:
+            outcome: tuple[bool, Any] = True, function()
+        except Exception as error:
+            outcome = False, error
+    into.send(outcome)
 
 
 def _started(function: Callable[[], Result]) -> _Child[Result] | None:
@@ -246,16 +233,3 @@ def _started(function: Callable[[], Result]) -> _Child[Result] | None:
         return _Child(function)
     except OSError:
         return None
-
-
-def _message(stream: BufferedReader) -> list[bytearray] | None:
-    """Parts of a message; None where it ends too soon."""
-    count = stream.read(_SIZE.size)
-    parts = []
-    for _ in range(_SIZE.unpack(count)[0] if len(count) == _SIZE.size else 0):
-        size = stream.read(_SIZE.size)
-        part = bytearray(_SIZE.unpack(size)[0] if len(size) == _SIZE.size else 0)
-        if len(size) < _SIZE.size or stream.readinto(part) < len(part):
-            return None
-        parts.append(part)
-    return parts or None

@@ -51,19 +51,9 @@ def track(items: Iterable[Item], text: str) -> Iterator[Item]:
 
 
 @contextmanager
-def listening(listener: Listener) -> Iterator[None]:
-    """Pass what is reported inside the ``with`` block to a function."""
+def listening(listener: Listener | None) -> Iterator[None]:
+    """Pass what is reported inside the ``with`` block to a function, or to nobody."""
     token = _LISTENER.set(listener)
-    try:
-        yield
-    finally:
-        _LISTENER.reset(token)
-
-
-@contextmanager
-def unheard() -> Iterator[None]:
-    """Pass on nothing of what is reported inside the ``with`` block."""
-    token = _LISTENER.set(None)
     try:
         yield
     finally:

@@ -29,3 +29,14 @@ def data_dir() -> Path:
     if folder is None:
         pytest.skip("real recordings not found; set SKIDYN_DATA to their folder")
     return folder
+
+
+@pytest.fixture
+def saved(tmp_path):
+    """Writes a table as CSV and returns its path."""
+
+    def save(frame, name="log.csv"):
+        frame.to_csv(tmp_path / name, index=False)
+        return tmp_path / name
+
+    return save

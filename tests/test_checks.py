@@ -13,17 +13,6 @@ ROBOT = load_planar_arm()
 LOG = make_hidden_effect_log(ROBOT, None, n_trajectories=3, duration=4.0).frame
 
 
-@pytest.fixture
-def saved(tmp_path):
-    """Writes a table as CSV and returns its path."""
-
-    def save(frame, name="log.csv"):
-        frame.to_csv(tmp_path / name, index=False)
-        return tmp_path / name
-
-    return save
-
-
 @pytest.mark.parametrize(
     "lost, message",
     [

@@ -62,7 +62,7 @@ class JudgingSearch(RankingSearch):
         .. [1] G. E. Mizon, J.-F. Richard (1986), The encompassing principle and its application to
            testing non-nested hypotheses, Econometrica 54(3).
         """
-        if not any(c.is_further_form for c in best.candidates):
+        if not best.is_further_form:
             return False
         rows = rows_together(best.candidates, self.problem.rows.counts)
         chance = self.tester([*self.chosen, *rival.candidates]).test(rows).chance

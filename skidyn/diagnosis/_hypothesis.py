@@ -66,6 +66,11 @@ class Hypothesis:
         return tuple(sorted({j for c in self.candidates for j in c.joints}))
 
     @property
+    def is_further_form(self) -> bool:
+        """Whether a term of it is a further form of its effect: less simple than any plain one."""
+        return any(c.is_further_form for c in self.candidates)
+
+    @property
     def variables(self) -> tuple[str, ...]:
         """Signals of nameless functions."""
         return tuple(sorted({v for c in self.candidates for v in c.variables}))
@@ -183,9 +188,7 @@ def simplicity_of(hypothesis: Hypothesis) -> int:
     """Rank of its kind among rivals that explain as much; the lower is named."""
     if hypothesis.kind == UNKNOWN:
         return 100
-    # A further form is less simple than any plain one.
-    further = any(c.is_further_form for c in hypothesis.candidates)
-    return get_effect(hypothesis.kind).simplicity + 50 * further
+    return get_effect(hypothesis.kind).simplicity + 50 * hypothesis.is_further_form
 
 
 def uses_the_fit(candidate: Candidate) -> bool:

@@ -187,7 +187,7 @@ class RankingSearch(SearchState):
             count = self._n_parameters(candidates)
             price = 2 * self._price(candidates)
             score = float(gain.sum()) - price * count
-            if any(c.is_further_form for c in candidates):
+            if hypothesis.is_further_form:
                 score -= self.settings.least_gain
             if kind == UNKNOWN:
                 # The error held out has paid for its coefficients already.

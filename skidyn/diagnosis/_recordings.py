@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from skidyn.diagnosis._candidates import Candidate
+from skidyn.diagnosis._candidates import Candidate, rows_together
 from skidyn.diagnosis._rule import Tester
 from skidyn.effects import Term, get_effect
 from skidyn.evidence import Problem
@@ -120,8 +120,7 @@ def _zeroed_anew(
         own = [c for c in candidates if c.joints == joints and len(c.term.trajectories or ()) == 1]
         if not 1 < len(own) <= MOST_TERMS or own[0].width > 1:
             continue
-        rows = {j: np.hstack([c.rows[j] for c in own]) for j in own[0].rows}
-        together, alone = tester.test_each(rows)
+        together, alone = tester.test_each(rows_together(own, tester.problem.rows.counts))
         if not significant(together.chance):
             continue
         # One that does nearly all of it stands out by itself.

@@ -16,17 +16,6 @@ ROBOT = load_planar_arm()
 LOG = make_hidden_effect_log(ROBOT, None, n_trajectories=3, duration=4.0).frame
 
 
-@pytest.fixture
-def saved(tmp_path):
-    """Writes a table as CSV and returns its path."""
-
-    def save(frame, name="log.csv"):
-        frame.to_csv(tmp_path / name, index=False)
-        return tmp_path / name
-
-    return save
-
-
 def test_absent_unknown_and_empty_files(tmp_path):
     with pytest.raises(LogError, match="no such file"):
         read_log(tmp_path / "log.csv")

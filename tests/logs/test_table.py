@@ -58,17 +58,6 @@ def test_commands_may_stand_in_place_of_torque(tmp_path):
     np.testing.assert_allclose(torque, 2.0)
 
 
-@pytest.fixture
-def saved(tmp_path):
-    """Writes a table as CSV and returns its path."""
-
-    def save(frame, name="log.csv"):
-        frame.to_csv(tmp_path / name, index=False)
-        return tmp_path / name
-
-    return save
-
-
 def quiet_read(*args, **options):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", LogWarning)
