@@ -1,11 +1,25 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The robot as a chain of pytorch-kinematics: batched, differentiable kinematics in torch."""
+"""The robot as a chain of pytorch-kinematics, and a robot of such a chain."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from skidyn._exceptions import RobotDescriptionError
+from skidyn._text import suggest
+from skidyn.dynamics import inertial_parts, skew
+from skidyn.robots._description import (
+    Description,
+    Joint,
+    Link,
+    fixed_joint,
+    link_of,
+    unit_axis,
+)
 
 if TYPE_CHECKING:
     from pytorch_kinematics.chain import Chain
@@ -17,8 +31,8 @@ def build_chain(robot: Robot) -> Chain:
     """Chain of all bodies and of the links fixed to them, in float64 on the CPU.
 
     Built from what was read already and not by the parsers of pytorch-kinematics: these carry
-    offsets through float32 (frames of the Panda are off by 2e-8 m), take z for an axis that is
-    missing, and know no locked joints.
+    offsets through float32, whatever torch's default is (frames of the bundled robots are off by
+    1e-8 to 3e-7 m), take z for an axis that is missing, and know no locked joints.
 
     Parameters
     ----------
@@ -31,7 +45,7 @@ def build_chain(robot: Robot) -> Chain:
     """
     import torch
     from pytorch_kinematics.chain import Chain
-    from pytorch_kinematics.frame import Frame, Joint, Link
+    from pytorch_kinematics.frame import Frame, Joint as ChainJoint, Link as ChainLink
     from pytorch_kinematics.transforms import Transform3d
 
     def offset(rotation: np.ndarray, translation: np.ndarray) -> Any:
@@ -41,13 +55,13 @@ def build_chain(robot: Robot) -> Chain:
 
     tree = robot.tree
     root = next(name for name, link in robot.links.items() if link.body < 0)
-    base = Frame(root, Link(root), Joint(dtype=torch.float64))
+    base = Frame(root, ChainLink(root), ChainJoint(dtype=torch.float64))
     frames = []
     for body, name in enumerate(robot.body_names):
         lower, upper = robot.position_limits[tree.coordinates[body]]
         independent = tree.multipliers[body] == 1.0 and tree.offsets[body] == 0.0
         bounded = independent and np.isfinite(lower) and np.isfinite(upper)
-        joint = Joint(
+        joint = ChainJoint(
             robot.body_joints[body],
             offset=offset(tree.rotations[body], tree.translations[body]),
             joint_type="prismatic" if tree.prismatic[body] else "revolute",
@@ -55,15 +69,146 @@ def build_chain(robot: Robot) -> Chain:
             dtype=torch.float64,
             limits=(float(lower), float(upper)) if bounded else None,
         )
-        frames.append(Frame(name, Link(name), joint))
+        frames.append(Frame(name, ChainLink(name), joint))
         parent = tree.parents[body]
         (frames[parent] if parent >= 0 else base).add_child(frames[-1])
     for name, link in robot.links.items():
         if name == root or name in robot.body_names:
             continue
-        fixed = Joint(
+        fixed = ChainJoint(
             f"{name}_fixed", offset=offset(link.rotation, link.translation), dtype=torch.float64
         )
         carrier = frames[link.body] if link.body >= 0 else base
-        carrier.add_child(Frame(name, Link(name), fixed))
+        carrier.add_child(Frame(name, ChainLink(name), fixed))
     return Chain(base, dtype=torch.float64)
+
+
+def describe_chain(
+    chain: Chain, links: Mapping[str, Link], joints: Mapping[str, Joint]
+) -> Description:
+    """What a chain says of frames and joints, with the inertia of its links beside it.
+
+    Parameters
+    ----------
+    chain : Chain
+    links : mapping of str to Link
+        Inertia of links, in the frames of the chain; those that are not in it have no mass.
+    joints : mapping of str to Joint
+        Joints as a file has them: limits, what follows another joint, and whether turns are
+        endless. The others have the limits of the chain.
+
+    Raises
+    ------
+    RobotDescriptionError
+        The chain has a name twice, or lacks a link that has a mass.
+    """
+    names = chain.get_frame_names(exclude_fixed=False)
+    found = dict.fromkeys(names, Link("", np.zeros(10)))
+    moved: dict[str, Joint] = {}
+    root = "world"
+    while root in found:
+        root += "_"
+    stack = [(root, chain.find_frame(names[0]))]
+    seen: set[str] = set()
+    while stack:
+        parent, frame = stack.pop()
+        if frame.name in seen:
+            raise RobotDescriptionError(
+                f"The chain has two frames {frame.name!r}; rename one of them in its description."
+            )
+        seen.add(frame.name)
+        joint = _joint_of(frame, parent, joints)
+        if joint.name in moved:
+            raise RobotDescriptionError(
+                f"The chain has two joints {joint.name!r}; rename one of them in its description."
+            )
+        moved[joint.name] = joint
+        stack.extend((frame.name, child) for child in reversed(frame.children))
+    first = moved[next(iter(moved))]
+    if first.kind == "fixed" and _stands_still(first):
+        del moved[first.name]  # the first frame is the base
+    else:
+        found = {root: Link(root, np.zeros(10)), **found}
+    for name in links:
+        if name not in found and np.any(links[name].parameters):
+            raise RobotDescriptionError(
+                f"The link {name!r} has a mass and the chain has no such frame"
+                f"{suggest(name, names)}. Build the chain of the whole robot and lock joints by "
+                "joints=, or give the inertia of its links as a mapping."
+            )
+    return Description("chain", {n: replace(links.get(n, found[n]), name=n) for n in found}, moved)
+
+
+def _joint_of(frame: Any, parent: str, joints: Mapping[str, Joint]) -> Joint:
+    """The joint that carries a frame of a chain."""
+    pose = np.eye(4)
+    for offset in (frame.link.offset, frame.joint.offset):
+        if offset is not None:
+            pose = pose @ offset.get_matrix()[0].detach().cpu().numpy().astype(np.float64)
+    # The nearest rotation: a matrix that went through float32 is one to seven digits only.
+    left, _, right = np.linalg.svd(pose[:3, :3])
+    placed = (left @ right, pose[:3, 3])
+    own = frame.joint
+    if own.joint_type == "fixed":
+        return fixed_joint(f"{frame.name}_fixed", parent, frame.name, placed)
+    name = str(own.name)
+    slides, known = own.joint_type == "prismatic", joints.get(name)
+    kinds = ("prismatic",) if slides else ("revolute", "continuous")
+    if known is not None and known.kind not in kinds:
+        raise RobotDescriptionError(
+            f"The joint {name!r} is {kinds[0]} in the chain and {known.kind} in the description; "
+            "was the chain built from it?"
+        )
+    lower, upper = own.limits if own.limits is not None else (-np.inf, np.inf)
+    plain = replace(
+        known or fixed_joint(name, parent, frame.name, placed),
+        parent=parent,
+        child=frame.name,
+        rotation=placed[0],
+        translation=placed[1],
+        axis=unit_axis(own.axis.detach().cpu().numpy().astype(np.float64), f"joint {name!r}"),
+    )
+    return (
+        plain
+        if known is not None
+        else replace(
+            plain,
+            kind="prismatic" if slides else "continuous" if own.limits is None else "revolute",
+            position_limits=(float(lower), float(upper)),
+            velocity_limit=_largest(own, "velocity_limits"),
+            effort_limit=_largest(own, "effort_limits"),
+        )
+    )
+
+
+def _largest(joint: Any, limit: str) -> float:
+    """Larger of a joint's two limits of speed or effort; infinite where it has none."""
+    pair = getattr(joint, limit, None)  # since pytorch-kinematics 0.7.5
+    return np.inf if pair is None else float(np.max(np.abs(pair)))
+
+
+def _stands_still(joint: Joint) -> bool:
+    return bool(np.all(joint.rotation == np.eye(3)) and not np.any(joint.translation))
+
+
+def links_of(inertials: Mapping[str, Any]) -> dict[str, Link]:
+    """Links of inertial parameters about the origins of their frames, ten each.
+
+    Raises
+    ------
+    RobotDescriptionError
+        They are not ten finite numbers, or no body has such an inertia.
+    """
+    links = {}
+    for name, values in inertials.items():
+        parameters = np.asarray(values, dtype=np.float64).ravel()
+        if parameters.shape != (10,) or not np.isfinite(parameters).all():
+            raise RobotDescriptionError(
+                f"The inertia of link {name!r} has to be ten finite numbers: m, mcx, mcy, mcz, "
+                "Ixx, Ixy, Ixz, Iyy, Iyz, Izz."
+            )
+        mass, moment, inertia = inertial_parts(parameters)
+        center = moment / mass if mass > 0 else np.zeros(3)
+        arm = skew(center)
+        links[name] = link_of(name, float(mass), inertia + mass * arm @ arm, np.eye(3), center)
+    return links

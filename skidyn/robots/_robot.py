@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from html import escape
 from typing import TYPE_CHECKING, Any
@@ -15,13 +15,16 @@ import numpy as np
 from skidyn._exceptions import RobotDescriptionError
 from skidyn.dynamics import KinematicTree
 from skidyn.robots._assembly import LinkPlacement, assemble
-from skidyn.robots._chain import build_chain
+from skidyn.robots._chain import build_chain, describe_chain, links_of
 from skidyn.robots._description import Description
 from skidyn.robots._dynamics import PARAMETER_SYMBOLS, RigidBodyDynamics
 from skidyn.robots._mjcf import parse_mjcf
 from skidyn.robots._sdf import parse_sdf
 from skidyn.robots._urdf import parse_urdf
 from skidyn.robots._xml import first_element, parse_robot_element, read_description
+
+#: By how much frames of a chain may differ from its description, m: it went through float32.
+_SINGLE_PRECISION = 1e-5
 
 if TYPE_CHECKING:
     import torch
@@ -34,8 +37,8 @@ if TYPE_CHECKING:
 class Robot(RigidBodyDynamics):
     """A robot arm or tree: joints, limits, inertial parameters and rigid-body dynamics.
 
-    Made by :meth:`from_urdf`, :meth:`from_sdf` or :meth:`from_mjcf`. A robot never changes; it can
-    be pickled and shared between threads.
+    Made by :meth:`from_urdf`, :meth:`from_sdf`, :meth:`from_mjcf` or :meth:`from_chain`. A robot
+    never changes; it can be pickled and shared between threads.
 
     Links that are fixed to each other are one body; its frame is that of the link whose joint moves
     it. All methods take joint positions ``q`` (rad, m), velocities ``dq`` and accelerations ``ddq``
@@ -310,6 +313,78 @@ class Robot(RigidBodyDynamics):
         return cls._from_description(description, joints, own if gravity is None else gravity)
 
     @classmethod
+    def from_chain(
+        cls,
+        chain: Chain,
+        inertials: str | bytes | os.PathLike[str] | Mapping[str, Any],
+        *,
+        joints: Sequence[str] | None = None,
+        gravity: Sequence[float] | None = None,
+    ) -> Robot:
+        """Make a robot of a chain of pytorch-kinematics; frames and joints are the chain's.
+
+        A chain holds no inertia, so it is read beside it. The robot computes in float64: offsets
+        are as exact as the chain's, which the parsers of pytorch-kinematics carry through float32
+        (1e-8 to 3e-7 m on the bundled robots), with the nearest rotation in place of a rounded one.
+        :attr:`chain` is the chain of these numbers.
+
+        Parameters
+        ----------
+        chain : pytorch_kinematics.Chain
+            Of any precision, on any device. It is not changed.
+        inertials : str, bytes, path or mapping of str to array-like of shape (10,)
+            The URDF, SDF or MJCF that the chain was built from; limits and mimic joints are read
+            from it, too. Or the inertial parameters of its links, in the frames of the chain (m, m
+            cx, m cy, m cz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz; kg, kg m, kg m^2); links that are not
+            named have no mass.
+        joints : sequence of str, default=None
+            Joints that the logs cover, as in :meth:`from_urdf`.
+        gravity : sequence of 3 floats, default=None
+            Gravitational acceleration in the base frame, m/s^2. None: (0, 0, -9.81), or what an
+            MJCF says.
+
+        Returns
+        -------
+        Robot
+
+        Raises
+        ------
+        RobotDescriptionError
+            A frame of the chain is not where the description has it (parsers of pytorch-kinematics
+            0.10 take z for a missing axis in a URDF and turn poses of an SDF in another order), or
+            a link that has a mass is not in the chain.
+
+        Examples
+        --------
+        >>> from pytorch_kinematics import build_chain_from_urdf
+        >>> from skidyn.robots import Robot
+        >>> urdf = '''
+        ...   <robot name="pendulum"><link name="base"/>
+        ...     <link name="rod"><inertial>
+        ...       <origin xyz="0 0 -0.5"/><mass value="2"/>
+        ...       <inertia ixx="0.1" iyy="0.1" izz="0.01" ixy="0" ixz="0" iyz="0"/>
+        ...     </inertial></link>
+        ...     <joint name="swing" type="continuous">
+        ...       <parent link="base"/><child link="rod"/><axis xyz="1 0 0"/>
+        ...     </joint>
+        ...   </robot>'''
+        >>> robot = Robot.from_chain(build_chain_from_urdf(urdf), urdf)
+        >>> robot.gravity_torque([[1.5707963267948966]]).round(2)
+        array([[9.81]])
+        """
+        if isinstance(inertials, Mapping):
+            description = describe_chain(chain, links_of(inertials), {})
+            given = (0.0, 0.0, -9.81) if gravity is None else gravity
+            return cls._from_description(description, joints, given)
+        written, own = _read(inertials)
+        given = own if gravity is None else gravity
+        robot = cls._from_description(
+            describe_chain(chain, written.links, written.joints), joints, given
+        )
+        _refuse_displaced(robot, cls._from_description(written, joints, given))
+        return replace(robot, name=written.name)
+
+    @classmethod
     def _from_description(
         cls, description: Description, joints: Sequence[str] | None, gravity: Any
     ) -> Robot:
@@ -340,7 +415,8 @@ class Robot(RigidBodyDynamics):
 
         A new one at every access, because ``chain.to(dtype=..., device=...)`` changes it. Its
         joints are :attr:`body_joints` in their order; where no joint mimics another, its positions
-        are ``q``. ``SerialChain(robot.chain, link)`` gives the Jacobian of a link.
+        are ``q``. ``SerialChain(robot.chain, link, dtype=torch.float64)`` gives the Jacobian of a
+        link.
 
         Examples
         --------
@@ -434,6 +510,47 @@ class Robot(RigidBodyDynamics):
             Joint torque per unit of every inertial parameter.
         """
         return self._torch.torque_regressor(q, dq, ddq)
+
+
+def _read(source: str | bytes | os.PathLike[str]) -> tuple[Description, Any]:
+    """Description of a robot, and the gravity that it states or the usual one."""
+    data = read_description(source)
+    kind = first_element(data)
+    if kind == "mujoco":
+        return parse_mjcf(source)
+    usual = (0.0, 0.0, -9.81)
+    if kind == "sdf":
+        return parse_sdf(data, None), usual
+    return parse_urdf(parse_robot_element(data)), usual
+
+
+def _refuse_displaced(robot: Robot, described: Robot) -> None:
+    """Stop where a frame of a chain is elsewhere than its description says."""
+    if robot.joint_names != described.joint_names:
+        raise RobotDescriptionError(
+            f"The chain has the joints {list(robot.joint_names)}, the description "
+            f"{list(described.joint_names)}; was the chain built from it?"
+        )
+    q = np.random.default_rng(0).uniform(-1.0, 1.0, (5, robot.n_joints))
+    for name, link in robot.links.items():
+        if name not in described.links:
+            continue
+        poses = [one.forward_kinematics(q, name) for one in (robot, described) if link.body >= 0]
+        poses += [
+            (one.links[name].translation, one.links[name].rotation)
+            for one in (robot, described)
+            if link.body < 0
+        ]
+        (place, turn), (its_place, its_turn) = poses
+        away, turned = np.abs(place - its_place).max(), np.abs(turn - its_turn).max()
+        if not max(away, turned) < _SINGLE_PRECISION:
+            raise RobotDescriptionError(
+                f"The frame {name!r} of the chain is up to {away:.2g} m away from where its "
+                f"description has it, and turned by {turned:.2g}. Parsers of pytorch-kinematics "
+                "take z for a missing <axis> (URDF), turn poses in another order (SDF) and move "
+                "bodies to the anchors of their joints (MJCF). Use Robot.from_file, or give the "
+                "inertia of the links in the frames of the chain, as a mapping."
+            )
 
 
 def _frozen(values: Any) -> np.ndarray:

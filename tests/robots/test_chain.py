@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from skidyn.datasets import load_panda, load_scara, load_ur10e
+from skidyn.exceptions import RobotDescriptionError
 from skidyn.robots import Robot
 
 torch = pytest.importorskip("torch")
@@ -150,3 +151,110 @@ def test_dynamics_on_the_chain_equal_those_of_numpy(name):
     first = torch.autograd.grad(loss, few, create_graph=True)
     second = torch.autograd.grad(sum(g.square().sum() for g in first), few)
     assert all(torch.isfinite(g).all() for g in second)
+
+
+def urdf_of(name):
+    return (resources.files("skidyn.datasets") / "robots" / f"{name}.urdf").read_bytes()
+
+
+#: With all that the parser of pytorch-kinematics asks for, and poses without rotations.
+PLAIN_SDF = """
+<sdf version="1.9"><model name="arm"><link name="base"><pose>0 0 1 0 0 0</pose>{0}</link>
+ <link name="upper"><pose>0.1 0 1.5 0 0 0</pose>{0}</link>
+ <link name="rod"><pose>0.4 0 1.5 0 0 0</pose>{0}</link>
+ <joint name="turn" type="revolute"><parent>base</parent><child>upper</child>
+  <axis><xyz>0 1 1</xyz><limit><lower>-1</lower><upper>2</upper></limit></axis></joint>
+ <joint name="slide" type="prismatic"><parent>upper</parent><child>rod</child>
+  <axis><xyz>0 0 1</xyz><limit><lower>-1</lower><upper>2</upper></limit></axis></joint>
+</model></sdf>
+""".format(
+    "<inertial><pose>0.1 0 0.2 0 0 0</pose><mass>2</mass><inertia><ixx>0.3</ixx><ixy>0</ixy>"
+    "<ixz>0</ixz><iyy>0.3</iyy><iyz>0</iyz><izz>0.3</izz></inertia></inertial>"
+)
+
+
+@pytest.mark.parametrize("name", ["panda", "ur10e", "scara", "srs_arm", "sdf"])
+def test_a_robot_of_a_chain_of_pytorch_kinematics(name):
+    import pytorch_kinematics
+
+    data = PLAIN_SDF if name == "sdf" else urdf_of(name)
+    build = getattr(pytorch_kinematics, f"build_chain_from_{'sdf' if name == 'sdf' else 'urdf'}")
+    chain = build(data)
+    robot, described = Robot.from_chain(chain, data), Robot.from_file(data)
+    assert chain.dtype == torch.float32  # not changed
+    assert robot.joint_names == tuple(chain.get_joint_parameter_names())
+    assert robot.joint_types == described.joint_types and robot.name == described.name
+    np.testing.assert_array_equal(robot.effort_limits, described.effort_limits)
+    motion = np.random.default_rng(0).uniform(-1.5, 1.5, (3, 20, robot.n_joints))
+    q = torch.tensor(motion[0])
+    mine, theirs = robot.chain, chain.to(dtype=torch.float64)
+    for link, pose in theirs.forward_kinematics(q).items():
+        own = mine.forward_kinematics(q)[link].get_matrix()
+        assert (own - pose.get_matrix()).abs().max() < 1e-6  # in single precision
+        if robot.links[link].body >= 0:
+            place, turn = robot.forward_kinematics(motion[0], link)
+            assert np.abs(own[:, :3, 3].numpy() - place).max() < 1e-9
+            assert np.abs(own[:, :3, :3].numpy() - turn).max() < 1e-9
+    torque = robot.inverse_dynamics(*motion)
+    in_torch = robot.inverse_dynamics_torch(*map(torch.tensor, motion)).numpy()
+    np.testing.assert_allclose(in_torch, torque, atol=1e-9)
+    np.testing.assert_allclose(torque, described.inverse_dynamics(*motion), atol=1e-4)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_a_chain_in_double_precision_is_taken_as_it_is(name):
+    robot = ROBOTS[name]()
+    inertials = dict(zip(robot.body_names, robot.inertial_parameters, strict=True))
+    motion = np.random.default_rng(0).uniform(-1.5, 1.5, (3, 20, robot.n_joints))
+    again = Robot.from_chain(robot.chain, inertials, gravity=robot.gravity)
+    place = [again.joint_names.index(joint) for joint in robot.body_joints]
+    # Without a description nothing follows: every joint of the chain is one of its own.
+    signals = [np.zeros((20, again.n_joints)) for _ in motion]
+    factors = robot.tree.multipliers
+    for signal, values, offset in zip(signals, motion, (robot.tree.offsets, 0.0, 0.0), strict=True):
+        signal[:, place] = values[:, robot.tree.coordinates] * factors + offset
+    torque = np.zeros((20, robot.n_joints))
+    for body, column in enumerate(place):
+        joint = robot.tree.coordinates[body]
+        torque[:, joint] += factors[body] * again.inverse_dynamics(*signals)[:, column]
+    np.testing.assert_allclose(torque, robot.inverse_dynamics(*motion), atol=1e-9)
+
+
+def test_limits_and_followers_are_read_beside_a_chain():
+    data = BRANCHED.encode()
+    robot = Robot.from_urdf(data)
+    again = Robot.from_chain(robot.chain, data)
+    assert again.joint_names == robot.joint_names == ("j1", "j2")
+    np.testing.assert_array_equal(again.position_limits, robot.position_limits)
+    locked = Robot.from_chain(robot.chain, data, joints=["j2"], gravity=(0, 0, -1.62))
+    expected = Robot.from_urdf(data, joints=["j2"], gravity=(0, 0, -1.62))
+    np.testing.assert_allclose(
+        locked.forward_kinematics([[0.3]], "tip")[0], expected.forward_kinematics([[0.3]], "tip")[0]
+    )
+    alone = Robot.from_chain(robot.chain, {"b": [2, 0, 0, 0, 1, 0, 0, 1, 0, 1]})
+    assert alone.joint_types == ("revolute", "prismatic", "continuous")
+    np.testing.assert_array_equal(alone.position_limits[:2], robot.position_limits)
+
+
+def test_a_chain_that_is_not_its_description_is_refused():
+    import pytorch_kinematics
+    from pytorch_kinematics.chain import SerialChain
+
+    data = BRANCHED.encode()
+    with pytest.raises(RobotDescriptionError, match="'b' of the chain is up to 1.* missing <axis>"):
+        Robot.from_chain(pytorch_kinematics.build_chain_from_urdf(data), data)
+    robot = Robot.from_urdf(data)
+    with pytest.raises(RobotDescriptionError, match="'wrong' has a mass .* no such frame"):
+        Robot.from_chain(robot.chain, {"wrong": [1, 0, 0, 0, 1, 0, 0, 1, 0, 1]})
+    with pytest.raises(RobotDescriptionError, match="'b' has to be ten finite numbers"):
+        Robot.from_chain(robot.chain, {"b": [1, 0, 0, 0]})
+    with pytest.raises(RobotDescriptionError, match="'j2' is prismatic in the chain and fixed in"):
+        Robot.from_chain(robot.chain, data.replace(b'"prismatic"', b'"fixed"'))
+    part = SerialChain(robot.chain, "a", dtype=torch.float64)
+    with pytest.raises(RobotDescriptionError, match=r"has the joints \['j1'\], the description"):
+        Robot.from_chain(part, data)
+    assert Robot.from_chain(part, data, joints=["j1"]).n_joints == 1
+    twice = robot.chain
+    twice.find_frame("b").name = "a"
+    with pytest.raises(RobotDescriptionError, match="two frames 'a'"):
+        Robot.from_chain(twice, {})
