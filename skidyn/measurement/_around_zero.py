@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.measurement._check import Check
+from skidyn.measurement._fits import SAMPLES, Fits, Reading
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import position_step
 from skidyn.measurement._suspicion import Suspicion
-from skidyn.measurement._torque import cut_columns
+from skidyn.measurement._torque import cut_columns, readable_fits
 
 Rows: TypeAlias = NDArray[np.intp]
 #: Share of rows with a torque of zero, in runs of at least so many and so often (drives that are
@@ -95,10 +96,14 @@ class TaredTorque(Check):
             return
         if min(map(len, runs)) < 4 * ROWS:
             return
+        fits = readable_fits(measurement)
+        if fits is None:
+            return
         pull, torque = robot.gravity_torque(s.q), measurement.torque
         parts = ("start", [rows[:ROWS] for rows in runs]), ("mean", runs)
         for what, rows in parts:
-            joints = _without(torque, pull, rows, runs)
+            joints = _without(torque, pull, rows)
+            joints = [k for k in joints or () if _felt(fits, k)]
             if joints:
                 how = (
                     "was set to zero at the start of every recording"
@@ -116,18 +121,25 @@ class TaredTorque(Check):
                 return
 
 
-def _without(torque: Array, pull: Array, parts: Sequence[Rows], runs: Sequence[Rows]) -> list[int]:
-    """Joints whose torque lacks the gravity of some rows but not its changes; none unless all."""
+def _without(torque: Array, pull: Array, parts: Sequence[Rows]) -> list[int]:
+    """Joints whose torque lacks the gravity of some rows of recordings; none unless all do."""
     there = np.array([pull[rows].mean(axis=0) for rows in parts])
     held = np.array([torque[rows].mean(axis=0) for rows in parts])
-    heavy = np.sqrt(np.mean(there**2, axis=0)) > HEAVY * torque.std(axis=0)
-    found = []
-    for k in np.flatnonzero(heavy).tolist():
-        if np.median(np.abs(held[:, k])) > LEFT * np.median(np.abs(there[:, k])):
-            return []
-        pairs = [(pull[r, k] - pull[r, k].mean(), torque[r, k]) for r in runs]
-        change = sum(float(p @ p) for p, _ in pairs)
-        seen = change > (HEAVY * torque[:, k].std()) ** 2 * sum(map(len, runs))
-        if seen and sum(float(p @ t) for p, t in pairs) > FELT * change:
-            found.append(k)
-    return found
+    heavy = np.flatnonzero(np.sqrt(np.mean(there**2, axis=0)) > HEAVY * torque.std(axis=0))
+    there, held = (np.median(np.abs(x[:, heavy]), axis=0) for x in (there, held))
+    return [] if np.any(held > LEFT * there) else heavy.tolist()
+
+
+def _felt(fits: Fits, joint: int) -> bool:
+    """Whether the torque of a joint follows changes of gravity, beside inertia and friction."""
+    torque, counts = fits.mean_torque(joint)
+    still, pulls = fits.gravity_parts(Reading())
+    pull = np.tensordot(fits.robot.gravity, pulls, 1)
+    _, speed, sign, _ = fits.columns(Reading()).transpose(1, 0, 2)
+    table = np.column_stack([torque, *(x[:, joint] for x in (pull, still, speed, sign))])[counts]
+    runs = fits.signals.trajectory[::SAMPLES][counts]
+    for run in np.unique(runs):
+        table[runs == run] -= table[runs == run].mean(axis=0)
+    if table[:, 1].std() < HEAVY * torque.std():
+        return False
+    return bool(np.linalg.lstsq(table[:, 1:], table[:, 0], rcond=None)[0][0] > FELT)
