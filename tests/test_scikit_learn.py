@@ -92,6 +92,13 @@ TRANSFORMERS = [
     SignalScaler(),
     CurrentToTorque(101, 0.125),
 ]
+#: Steps that look at neighbours in time.
+SEQUENTIAL = (ButterworthFilter, TimeDerivative, SmoothDerivatives)
+# Every transformer as a step before a regressor of scikit-learn.
+REGRESSORS |= {
+    type(step).__name__: (make_pipeline(step, Ridge()), {"ridge__alpha": [0.1, 100.0]})
+    for step in TRANSFORMERS
+}
 SCORERS = {
     "r2": r2_score,
     "neg_mean_absolute_error": lambda y, p: -mean_absolute_error(y, p),
@@ -124,8 +131,18 @@ PAST = X[["trajectory", "time"]].assign(q1=BEFORE)
 
 def table_of(model):
     """Log of the kind that an estimator reads."""
-    forecasts = isinstance(model, AutoregressiveRegressor | PersistenceRegressor)
-    return PAST if forecasts else X
+    if isinstance(model, AutoregressiveRegressor | PersistenceRegressor):
+        return PAST
+    derives = isinstance(model, Pipeline) and isinstance(
+        model[0], TimeDerivative | SmoothDerivatives
+    )
+    return X.drop(columns="ddq1") if derives else X
+
+
+def needs_order(model):
+    """Whether rows must stand in the order of time."""
+    first = model[0] if isinstance(model, Pipeline) else model
+    return isinstance(first, (EffectSearchCV, AutoregressiveRegressor, *SEQUENTIAL))
 
 
 @pytest.fixture(params=REGRESSORS)
@@ -193,9 +210,7 @@ def test_searches(model, grid):
     limits = {"min_resources": 2, "max_resources": 4} if epochs else {"min_resources": len(X) // 2}
     resource = "max_epochs" if epochs else "n_samples"
     halving = HalvingGridSearchCV(model, grid, resource=resource, factor=2, **limits, **every)
-    if isinstance(
-        model, EffectSearchCV | AutoregressiveRegressor
-    ):  # it draws single rows, in which no motion is left
+    if needs_order(model):  # it draws single rows, in which no motion is left
         with pytest.raises(ValueError, match=r"(?s)not in the order of time.*HalvingGridSearchCV"):
             halving.fit(X, Y)
         return
@@ -240,7 +255,8 @@ def test_bagging(model):
             named[name] = at[key]
     bag = BaggingRegressor(clone(model).set_params(**named), 2, random_state=0)
     table = table_of(model).to_numpy()
-    if isinstance(model, AutoregressiveRegressor):  # it takes no weights, so that rows are drawn
+    weighs = isinstance(model, EffectSearchCV)
+    if needs_order(model) and not weighs:  # it takes no weights, so that rows are drawn
         with pytest.raises(LogError, match="not in the order of time.*BaggingRegressor"):
             bag.fit(table, Y)
         return
@@ -251,12 +267,16 @@ def test_bagging(model):
 def test_inspection(model):
     X = table_of(model)
     model.fit(X, Y)
-    found = permutation_importance(model, X, Y, n_repeats=1, random_state=0).importances[:, 0]
-    seed, order = np.random.RandomState(0).randint(2**31), np.arange(len(X))
-    np.random.RandomState(seed).shuffle(order)
-    shuffled = [X.assign(**{name: X[name].to_numpy()[order]}) for name in X]
-    expected = [model.score(X, Y) - model.score(table, Y) for table in shuffled]
-    np.testing.assert_allclose(found, expected, **SAME)
+    if isinstance(model, Pipeline) and needs_order(model):  # it shuffles the time as well
+        with pytest.raises(LogError, match="not in the order of time"):
+            permutation_importance(model, X, Y, n_repeats=1, random_state=0)
+    else:
+        found = permutation_importance(model, X, Y, n_repeats=1, random_state=0).importances[:, 0]
+        seed, order = np.random.RandomState(0).randint(2**31), np.arange(len(X))
+        np.random.RandomState(seed).shuffle(order)
+        shuffled = [X.assign(**{name: X[name].to_numpy()[order]}) for name in X]
+        expected = [model.score(X, Y) - model.score(table, Y) for table in shuffled]
+        np.testing.assert_allclose(found, expected, **SAME)
     found = partial_dependence(model, X, ["q1"], grid_resolution=3)
     expected = [model.predict(X.assign(q1=value)).mean() for value in found["grid_values"][0]]
     np.testing.assert_allclose(found["average"][0], expected, **SAME)
@@ -267,7 +287,7 @@ def test_inspection(model):
 def test_shuffled_rows(model):
     X = table_of(model)
     train, test, y_train, _ = train_test_split(X, Y, random_state=0)
-    if isinstance(model, EffectSearchCV | AutoregressiveRegressor):
+    if needs_order(model):
         with pytest.raises(LogError, match="not in the order of time, as after train_test_split"):
             model.fit(train, y_train)
         return
