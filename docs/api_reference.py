@@ -148,10 +148,13 @@ PAGES: tuple[Page, ...] = (
         "skidyn.simulation",
         "Fitted models run forward: their motion, and how far it is from that of the robot.",
         (
-            Section("Classes", ("Controller", "SimulationErrors", "SimulationVerdict")),
+            Section(
+                "Classes", ("Controller", "ServoFinding", "SimulationErrors", "SimulationVerdict")
+            ),
             Section(
                 "Functions",
                 (
+                    "explain_servo_motion",
                     "fit_bam_servo",
                     "fit_controller",
                     "fit_servo",

@@ -8,8 +8,10 @@ holds commands and encoder positions at 100 Hz. In ``--logs`` of them one joint 
 its gear, backlash, stiction or friction that grows with its load, or all commands arrive late.
 Elasticity and play lie behind the encoder, which sits on the motor; a motor on such a joint is a
 coordinate of its own here. The user knows the servo's gains: the torque is its gain times its error
-(``servo_torque``), and ``diagnose`` reads the log as any other. Counted is a log whose effect is
-named on its joint, and one without whose diagnosis names nothing.
+(``servo_torque``), and ``diagnose`` reads the log as any other; ``explain_servo_motion`` then
+looks at the motion of joints that got no name, and what it names takes the place of what was said
+there without a name or of hysteresis. Counted is a log whose effect is named on its joint, and one
+without in which nothing is claimed.
 """
 
 from __future__ import annotations
@@ -165,11 +167,11 @@ def make_log(robot, kind, seed):
 def said(robot, log, servo):
     """Findings by kind and joints, and what is doubted of the measurement."""
     torque = servo_torque(servo.gains, log)
-    motion = log[[c for c in log if not c.startswith("q_ref")]]
     model = RBDRegressor(robot, ("viscous", "coulomb", "rotor_inertia"))
-    diagnosis = diagnose(model, motion, torque)
+    diagnosis = diagnose(model, log, torque)
     found = [(f.kind, tuple(f.joints)) for f in diagnosis.findings]
-    return found, [check.check for check in diagnosis.checks]
+    named = [(f.kind, (f.joint,)) for f in diagnosis.explain_servo_motion(servo.gains)]
+    return found + named, [check.check for check in diagnosis.checks]
 
 
 def main():

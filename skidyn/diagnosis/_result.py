@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
+from sklearn.base import clone
 
 from skidyn._exceptions import EffectError, SkidynError
 from skidyn._signals import Array
@@ -23,11 +24,19 @@ from skidyn.diagnosis._remainder import Remainder
 from skidyn.diagnosis._simulated import of_finding, report_of, simulated
 from skidyn.diagnosis._story import story
 from skidyn.diagnosis._unknown import UnknownTorque
-from skidyn.effects import Term, make_terms
+from skidyn.effects import Term, get_effect, make_terms
 from skidyn.evidence import Problem
 from skidyn.identification import RBDRegressor
 from skidyn.measurement import Suspicion
-from skidyn.simulation import HORIZON, Controller, InTurn, SimulationVerdict, judge_in_turn
+from skidyn.simulation import (
+    HORIZON,
+    Controller,
+    InTurn,
+    ServoFinding,
+    SimulationVerdict,
+    explain_servo_motion,
+    judge_in_turn,
+)
 
 #: How the sentence on a finding begins that the model for simulation is without.
 _VETO = "Not in the completed model, because it worsens the simulated motion:"
@@ -279,6 +288,47 @@ class Diagnosis:
                 self.warnings.append(f"{_VETO} {finding.title} of {where}. {verdict.text}")
         self.__dict__.pop("model", None)
         return verdicts
+
+    def explain_servo_motion(self, controller: Controller) -> list[ServoFinding]:
+        """Name what the motion of position servos lacks where the torque does not say it.
+
+        A torque that was made from a servo's error hides what lasts hundredths of a second. Joints
+        that have no finding with a name yet, or one of the hysteresis family, are simulated in
+        their loops (:func:`skidyn.simulation.explain_servo_motion`). What is named there takes the
+        place of nameless functions and hysteresis on its joint; :attr:`findings` stay as they are.
+
+        Parameters
+        ----------
+        controller : Controller
+            Gains, delay and limit of the servos; X must hold the commands ``q_ref1..`` or
+            ``cmd1..``.
+
+        Returns
+        -------
+        list of ServoFinding
+            One or none.
+
+        Raises
+        ------
+        SkidynError
+            The model is no RBDRegressor, the log has no commands, or it is too short.
+        """
+        if not isinstance(self.base_model, RBDRegressor):
+            raise SkidynError(
+                f"the model is {type(self.base_model).__name__}; a simulation needs the inertia of "
+                "an RBDRegressor"
+            )
+        named = {
+            j
+            for f in self.findings
+            if f.kind not in ("unknown", "offset") and get_effect(f.kind).family != "hysteresis"
+            for j in f.joints
+        }
+        joints = [j + 1 for j in range(len(self.joint_names)) if j + 1 not in named]
+        if not joints:
+            return []
+        model = clone(self.base_model).fit(*self.data)
+        return explain_servo_motion(model, self.data[0], controller, joints=joints)
 
     @property
     def simulation(self) -> SimulationVerdict | None:

@@ -3,6 +3,7 @@
 
 # For other packages of skidyn; no part of the public interface.
 from skidyn.forward._controller import Controller as Controller, fit_controller as fit_controller
+from skidyn.forward._joint_loop import JointLoop as JointLoop
 from skidyn.forward._model import ForwardModel as ForwardModel
 from skidyn.forward._run import (
     STEP as STEP,

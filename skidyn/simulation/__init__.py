@@ -13,12 +13,15 @@ from skidyn.simulation._score import (
     simulation_errors,
 )
 from skidyn.simulation._servo import fit_servo, servo_torque
+from skidyn.simulation._servo_motion import ServoFinding, explain_servo_motion
 from skidyn.simulation._simulate import simulate
 
 __all__ = [
     "Controller",
+    "ServoFinding",
     "SimulationErrors",
     "SimulationVerdict",
+    "explain_servo_motion",
     "fit_bam_servo",
     "fit_controller",
     "fit_servo",

@@ -1,0 +1,334 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""One joint alone in its servo loop, many sets of parameters at once.
+
+A position servo keeps its joint so near to the logged motion that the other joints may be taken as
+logged. What is left is one equation for the motor, and a second one for the link where the gear
+gives way or has play:
+
+.. math:: J \dot v = \mathrm{servo}(q, v) - F_v v + \tau_0 - f - T, \qquad
+          (M - J) \dot w = T - b(t)
+
+with the torque :math:`T` of the gear, the inertia :math:`M` and the torque :math:`b` that the link
+needs beside its own acceleration, both along the logged motion, and dry friction :math:`f` that
+holds where it can. Steps are trapezoidal; dry friction is implicit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
+
+from skidyn._signals import Array
+from skidyn.forward._run import Task
+
+#: Longest step, s.
+STEP = 5e-3
+#: Share of the largest torque above which the servo may be at its limit: it steers no longer, and
+#: the joint is put back on the log there. The start and what follows do not count so long, in s.
+AT_LIMIT, SETTLING = 0.97, 0.25
+#: Least share of the inertia that a link keeps beside its motor.
+LEAST_LINK = 0.05
+#: Damping ratio of a gear that has none of its own.
+USUAL_DAMPING = 0.05
+#: What divides must not be zero.
+TINY = 1e-12
+#: Error, rad or m, above which a motion counts as lost.
+LOST = 1.0
+
+_ALL = (
+    "viscous", "coulomb", "offset", "inertia", "weight", "dF", "vs", "mu", "dFc", "square",
+    "presliding", "late", "compliance", "damping", "gap", "motor",
+)  # fmt: skip
+
+
+@dataclass
+class JointLoop:
+    """A joint with its servo along pieces of a log.
+
+    Attributes
+    ----------
+    q : ndarray of shape (n_samples, n_pieces)
+        Logged positions, rad or m.
+    valid : ndarray of shape (n_samples, n_pieces) of bool
+        Samples whose error counts.
+    inertia : ndarray of shape (n_samples, n_pieces)
+        Of everything that turns with the joint, kg m^2 or kg.
+    """
+
+    q: Array
+    dq: Array
+    time: Array
+    valid: NDArray[np.bool_]
+    held: NDArray[np.bool_]
+    command: Array
+    rate: Array
+    inertia: Array
+    bias: Array
+    load: Array
+    torque: Array
+    stiffness: float
+    damping: float
+    limit: float
+    deadband: float
+    delay: float
+
+    @classmethod
+    def of(cls, task: Task, joint: int, inertia: Array, bias: Array, load: Array) -> JointLoop:
+        """Loop of a joint.
+
+        Parameters
+        ----------
+        task : Task
+            Pieces of a log that a controller drives.
+        joint : int
+            Joint, from 0.
+        inertia, bias, load : ndarray of shape (n_log,)
+            Inertia of motor and link, torque beside the one that this inertia needs, and torque of
+            the rigid body.
+        """
+        controller, windows, signals = task.controller, task.windows, task.signals
+        assert controller is not None and task.reference is not None and task.rate is not None
+        wanted, rate = task.reference[:, joint], task.rate[:, joint]
+        if not controller.follows_velocity:
+            rate = np.zeros_like(rate)
+        gains = [float(np.atleast_1d(getattr(controller, name))[joint]) for name in
+                 ("stiffness", "damping", "limit", "deadband", "offset")]  # fmt: skip
+        stiffness, damping, limit, deadband, offset = gains
+        q, dq = signals.q[:, joint], signals.dq[:, joint]
+        # The limit is told from the log, with the command as it has reached the servo.
+        arrived = wanted.copy()
+        for own in signals.segments:
+            clock = signals.clock[own]
+            arrived[own] = np.interp(clock - controller.delay, clock, wanted[own])
+        torque = stiffness * (arrived - q) + damping * (rate - dq)
+        beyond = np.abs(torque) > AT_LIMIT * limit
+        torque = np.clip(torque, -limit, limit)
+        rows = windows.rows
+        beyond = maximum_filter1d(beyond[rows].T.astype(np.uint8), 5, axis=0) > 0
+        steps = np.diff(windows.time, axis=1)
+        wait = max(1, round(SETTLING / float(np.median(steps))))
+        after = beyond.copy()
+        for k in range(1, wait + 1):
+            after[k:] |= beyond[:-k]
+        valid = windows.valid.T & ~after
+        valid[:wait] = False
+
+        def along(values: Array) -> Array:
+            return np.ascontiguousarray(values[rows].T)
+
+        return cls(
+            q=along(q),
+            dq=along(dq),
+            time=windows.time.T,
+            valid=valid,
+            held=beyond,
+            command=along(wanted),
+            rate=along(rate),
+            inertia=along(inertia),
+            bias=along(bias - offset),
+            load=along(load),
+            torque=along(torque),
+            stiffness=stiffness,
+            damping=damping,
+            limit=limit,
+            deadband=deadband,
+            delay=float(controller.delay),
+        )
+
+    def only(self, pieces: NDArray[np.int64]) -> JointLoop:
+        """The same with some of the pieces."""
+        tables: dict[str, Any] = {
+            k: v[:, pieces] for k, v in vars(self).items() if isinstance(v, np.ndarray)
+        }
+        return replace(self, **tables)
+
+    @property
+    def size(self) -> float:
+        """Usual inertia, kg m^2 or kg."""
+        return float(np.median(self.inertia))
+
+    def errors(self, parameters: Mapping[str, Array]) -> Array:
+        """Simulated minus logged positions, shape (n_models, n_samples, n_pieces), rad or m."""
+        error = self.run(parameters) - self.q
+        error = np.clip(np.where(np.isfinite(error), error, LOST), -LOST, LOST)
+        return np.asarray(error * self.valid)
+
+    def run(self, parameters: Mapping[str, Array]) -> Array:
+        """Positions of the motor.
+
+        Parameters
+        ----------
+        parameters : dict of str to ndarray of shape (n_models,)
+            ``viscous``, ``coulomb``, ``offset`` in N m and s/rad (N, m); ``inertia`` and
+            ``weight``, by which share inertia and torque of the link are larger than given. Of
+            effects: ``dF`` and ``vs`` (Stribeck), ``mu`` (load), ``dFc`` (direction), ``square``
+            (viscous friction that grows with the speed), ``presliding`` (stiffness of a Dahl
+            model), ``late`` (s); ``compliance`` and ``damping`` (ratio) of the gear, ``gap`` (half
+            of its play), with ``motor``, the share of the inertia that is the motor's.
+
+        Returns
+        -------
+        ndarray of shape (n_models, n_samples, n_pieces)
+        """
+        given = {k: np.asarray(v, dtype=float)[:, None] for k, v in parameters.items()}
+        n_models = len(next(iter(given.values())))
+        p = {k: given.get(k, np.zeros((n_models, 1))) for k in _ALL}
+        command = _Command(self, self.delay + p["late"][:, 0])
+        n_samples, n_pieces = self.q.shape
+        q = np.tile(self.q[0], (n_models, 1))
+        v = np.tile(self.dq[0], (n_models, 1))
+        gear = _Gear(self, p) if "compliance" in given else None
+        dahl = "presliding" in given
+        bent = np.sign(v) * p["coulomb"]
+        if gear is not None:
+            gear.hang(0, q, v, True)
+        result = np.empty((n_models, n_samples, n_pieces))
+        held = np.asarray(self.held.any(axis=1))
+        parts = np.ceil(np.diff(self.time, axis=0).max(axis=1) / STEP - 1e-9).astype(int)
+        for i in range(n_samples):
+            if held[i]:
+                back: NDArray[np.bool_] = self.held[i]
+                q, v = np.where(back, self.q[i], q), np.where(back, self.dq[i], v)
+                bent = np.where(back, np.sign(v) * p["coulomb"], bent)
+                if gear is not None:
+                    gear.hang(i, q, v, back)
+            result[:, i] = q
+            if i == n_samples - 1:
+                break
+            n_parts = max(1, int(parts[i]))
+            h = (self.time[i + 1] - self.time[i]) / n_parts
+            half = h / 2
+            for part in range(n_parts):
+                a, b = part / n_parts, (part + 1) / n_parts
+                (r0, d0), (r1, d1) = command.at(i, a), command.at(i, b)
+                bias = (1 + p["weight"]) * (self._at(self.bias, i, a) + self._at(self.bias, i, b))
+                m = self._at(self.inertia, i, a) + p["inertia"] * self.size
+                drag = p["viscous"] + p["square"] * np.abs(v)
+                servo = self._servo(r0 - q) + self.damping * (d0 - v)
+                drive = np.clip(servo, -self.limit, self.limit) - drag * v + 2 * p["offset"]
+                if gear is None:
+                    push, mass = m * v + half * (drive - bias), m + half * drag
+                else:
+                    push, mass = gear.push(half, q, v, m, bias)
+                    push, mass = push + half * drive, mass + half * drag
+                dry = h * self._dry(i, v, r1 - q, p)
+                if dahl:
+                    dry = 0.0 * dry
+                    yields = 1 - bent * np.sign(v) / np.maximum(p["coulomb"], TINY)
+                    push = push - h * bent
+                    mass = mass + h * half * p["presliding"] * np.maximum(yields, 0.0)
+                # The servo at the end of the step, without its damping and what moves until then.
+                error = r1 - q - half * v
+                pull = push + half * (self._servo(error) + self.damping * d1)
+                stiffer = half * (self.damping + half * self._slope(error))
+                new = _held(pull, dry) / (mass + stiffer)
+                servo = self._servo(error - half * new) + self.damping * (d1 - new)
+                beyond = np.abs(servo) > self.limit
+                if beyond.any():
+                    most = np.clip(servo, -self.limit, self.limit)
+                    new = np.where(beyond, _held(push + half * most, dry) / mass, new)
+                if gear is not None:
+                    gear.move(half, new)
+                way = half * (v + new)
+                if dahl:
+                    turn = np.abs(way) * bent / np.maximum(p["coulomb"], TINY)
+                    bent = bent + p["presliding"] * (way - turn)
+                    bent = np.clip(bent, -p["coulomb"], p["coulomb"])
+                q, v = q + way, new
+        return result
+
+    @staticmethod
+    def _at(values: Array, i: int, share: float) -> Array:
+        """Values at a share of the way from sample i to the next."""
+        return np.asarray((1 - share) * values[i] + share * values[i + 1])
+
+    def _dry(self, i: int, v: Array, ahead: Array, p: Mapping[str, Array]) -> Array:
+        """Level of dry friction; at rest its direction is that in which the servo pulls."""
+        level = p["coulomb"] + p["mu"] * np.abs(self.load[i])
+        if p["dF"].any():
+            level = level + p["dF"] * np.exp(-((v / np.maximum(p["vs"], TINY)) ** 2))
+        if p["dFc"].any():
+            level = level + p["dFc"] * np.sign(np.where(v == 0, ahead, v))
+        return np.asarray(np.maximum(level, 0.0) + np.zeros_like(v))
+
+    def _servo(self, error: Array) -> Array:
+        """Torque of an error of position."""
+        if self.deadband:
+            error = np.sign(error) * np.maximum(np.abs(error) - self.deadband, 0.0)
+        return self.stiffness * error
+
+    def _slope(self, error: Array) -> Array:
+        return np.asarray(self.stiffness * (np.abs(error) >= self.deadband))
+
+
+class _Gear:
+    """A gear with a spring and play, and the link behind it."""
+
+    def __init__(self, loop: JointLoop, p: Mapping[str, Array]) -> None:
+        self.loop, self.gap, self.weight = loop, p["gap"], 1 + p["weight"]
+        self.motor = p["motor"] * loop.size
+        self.spring = 1.0 / np.maximum(p["compliance"], TINY)
+        ratio = np.where(p["damping"] > 0, p["damping"], USUAL_DAMPING)
+        self.damper = 2.0 * ratio * np.sqrt(self.spring * self.motor)
+        shape = (len(self.gap), loop.q.shape[1])
+        self.y, self.w = np.zeros(shape), np.zeros(shape)
+
+    def hang(self, i: int, q: Array, v: Array, where: Any) -> None:
+        """Let the link hang on its gear under the load of a sample."""
+        load = self.weight * self.loop.bias[i]
+        y = q - load / self.spring - np.sign(load) * self.gap
+        self.y, self.w = np.where(where, y, self.y), np.where(where, v, self.w)
+
+    def push(self, half: Array, q: Array, v: Array, m: Array, bias: Array) -> tuple[Array, Array]:
+        """Impulse and mass of the motor by itself and by the gear, the link eliminated."""
+        link = np.maximum(m - self.motor, LEAST_LINK * m)
+        twist, rate = q - self.y, v - self.w
+        ahead = twist + 2 * half * rate
+        on = (np.abs(ahead) >= self.gap) * 1.0
+        side = np.sign(ahead) * self.gap
+        before = on * (self.spring * (twist - side) + self.damper * rate)
+        now = on * self.spring * (twist + half * rate - side)
+        self.stiff = on * (self.spring * half + self.damper)
+        self.heavy = link + half * self.stiff
+        self.way_on = link * self.w + half * (before + now - bias)
+        push = self.motor * v - half * (before + now - self.stiff * self.way_on / self.heavy)
+        return push, self.motor + half * self.stiff * (1 - half * self.stiff / self.heavy)
+
+    def move(self, half: Array, new: Array) -> None:
+        """Move the link along with the motor's new velocity."""
+        moved = (self.way_on + half * self.stiff * new) / self.heavy
+        self.y, self.w = self.y + half * (self.w + moved), moved
+
+
+def _held(push: Array, dry: Array) -> Array:
+    """What is left of an impulse that dry friction takes away, or holds."""
+    return np.asarray(np.sign(push) * np.maximum(np.abs(push) - dry, 0.0))
+
+
+class _Command:
+    """Command and its velocity between samples, as they reach the servo."""
+
+    def __init__(self, loop: JointLoop, late: Array) -> None:
+        self.loop = loop
+        self.late = late
+        self.shifted = bool(np.any(late))
+        if self.shifted:
+            shape = (len(late), *loop.q.shape)
+            self.command, self.rate = np.empty(shape), np.empty(shape)
+            for k in range(loop.q.shape[1]):
+                time = loop.time[:, k]
+                for m, lag in enumerate(late):
+                    self.command[m, :, k] = np.interp(time - lag, time, loop.command[:, k])
+                    self.rate[m, :, k] = np.interp(time - lag, time, loop.rate[:, k])
+        else:
+            self.command, self.rate = loop.command[None], loop.rate[None]
+
+    def at(self, i: int, share: float) -> tuple[Array, Array]:
+        """At a share of the way from sample i to the next."""
+        both = (self.command, self.rate)
+        return tuple(x[:, i] + share * (x[:, i + 1] - x[:, i]) for x in both)  # type: ignore[return-value]
