@@ -38,6 +38,7 @@ from skidyn.diagnosis._rule import (
     EPISODE_LEAST_HELD,
     EPISODE_LEAST_NOISE,
     EPISODE_LEAST_RANGE,
+    GUESS,
     false_discovery_rate,
 )
 from skidyn.diagnosis._search_state import replace_torque
@@ -80,6 +81,28 @@ def conclude(
     data : tuple
         X and torque as given.
     """
+    while True:
+        diagnosis = _concluded(
+            problem, result, limits, sliding, torque, notes, least_drop, model, data
+        )
+        guess = _guess(diagnosis)
+        if guess is None:
+            return diagnosis
+        result = _without(problem, diagnosis.result, *guess)
+
+
+def _concluded(
+    problem: Problem,
+    result: SearchResult,
+    limits: list[Limit],
+    sliding: NDArray[np.bool_],
+    torque: Array,
+    notes: list[str],
+    least_drop: float,
+    model: Any,
+    data: tuple[Any, ...],
+) -> Diagnosis:
+    """As :func:`conclude`, also with what is no more than a guess."""
     robot = problem.robot
     assert robot is not None
     while True:
@@ -245,6 +268,21 @@ def _vague(
             ]
             if found and all(low <= 0 <= high for _, low, high in found):
                 terms.append(candidate)
+        if terms:
+            return hypothesis, terms
+    return None
+
+
+def _guess(diagnosis: Diagnosis) -> tuple[Hypothesis, list[Candidate]] | None:
+    """The last finding with terms that are more likely wrong than right, and these terms.
+
+    One that another explanation equals is one of two, of which the user is told.
+    """
+    sure = {
+        t: f.alike or (f.confidence or 1.0) >= GUESS for f in diagnosis.findings for t in f.terms
+    }
+    for hypothesis in reversed(diagnosis.result.findings):
+        terms = [c for c in hypothesis.candidates if not sure.get(c.term, True)]
         if terms:
             return hypothesis, terms
     return None

@@ -15,7 +15,7 @@ from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._episodes import Episode
 from skidyn.diagnosis._hypothesis import UNKNOWN, Hypothesis, Step
 from skidyn.diagnosis._unknown import UnknownTorque
-from skidyn.effects import Term, get_effect
+from skidyn.effects import NamelessEffect, Term, get_effect
 from skidyn.evidence import Problem
 
 #: Another kind with at least this share of the best one's score is a rival.
@@ -172,7 +172,10 @@ def make_finding(
     parameters = {} if unknown else _parameters(problem, candidate, intervals)
     tested = tuple(sorted({v for u in unknowns for v in u.variables}))
     variables = tested or candidate.variables
-    title = f"Something that depends on {' and '.join(variables)}" if unknown else effect.title
+    title = effect.title
+    if unknown:
+        own = effect.words(term.shape) if isinstance(effect, NamelessEffect) else ""
+        title = own or f"Something that depends on {' and '.join(variables)}"
     relatives = [k for k in rivals if k != UNKNOWN and get_effect(k).family == effect.family]
     if effect.family and relatives:
         title = f"{effect.family.capitalize()}, best described by {title}"

@@ -26,7 +26,10 @@ from skidyn.diagnosis._hypothesis import (
 from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
 from skidyn.diagnosis._recordings import choose
 from skidyn.diagnosis._rule import (
+    MASKED,
+    NEGLIGIBLE,
     RESOLVED,
+    ROUNDS,
     Tester,
 )
 from skidyn.diagnosis._screen import Model, Screen
@@ -179,10 +182,18 @@ class RankingSearch(SearchState):
             kind = candidates[0].kind
             candidates = [replace(c, rows=self.problem.term_rows(c.term)) for c in candidates]
             within = any(some_recordings(c) for c in candidates)
-            if i < self.settings.refined:
-                candidates = refine(self.problem, self.blocks, candidates, self.sigma, self.target)
             hypothesis = Hypothesis(kind, tuple(candidates), np.zeros(0), 0.0, 0)
-            after = self._errors(hypothesis, within)
+            if i < self.settings.refined and any(c.n_shapes for c in candidates):
+                candidates, after = self._refined(candidates, within)
+                hypothesis = replace(hypothesis, candidates=tuple(candidates))
+                beside = [[o for o in candidates if o is not c] for c in candidates]
+                if not all(
+                    self.can_be(c, [*self.chosen, *rest])
+                    for c, rest in zip(candidates, beside, strict=True)
+                ):
+                    continue
+            else:
+                after = self._errors(hypothesis, within)
             gain = log_likelihood_gain(before[within], after, self.problem.rows.counts)
             count = self._n_parameters(candidates)
             price = 2 * self._price(candidates)
@@ -194,6 +205,22 @@ class RankingSearch(SearchState):
                 score = float(gain.sum()) - price * min(count, self.settings.nameless_price)
             ranking.append(Hypothesis(kind, tuple(candidates), gain, score, count, errors=after))
         return [h for h in ranking if h.score > self.settings.least_gain]
+
+    def _refined(self, candidates: list[Candidate], within: bool) -> tuple[list[Candidate], Array]:
+        """Candidates with their shapes refined, and the held-out errors with them.
+
+        What takes most of a joint's error away is refined again with the noise that it leaves:
+        until then the joint had the weight of a bad one.
+        """
+        sigma, reached = self.sigma.copy(), sorted({j for c in candidates for j in c.rows})
+        for _ in range(ROUNDS):
+            candidates = refine(self.problem, self.blocks, candidates, sigma, self.target)
+            errors = self._errors(Hypothesis("", tuple(candidates), np.zeros(0), 0.0, 0), within)
+            left = errors.sum(0)[reached] / np.maximum(self.problem.rows.counts[reached], 1)
+            if np.all(left > (1 - MASKED) * sigma[reached] ** 2):
+                break
+            sigma[reached] = np.sqrt(left) + 1e-100
+        return candidates, errors
 
     def _lines(self) -> list[Hypothesis]:
         """Torque ripple and vibration, judged on the residual at the full rate."""
@@ -283,18 +310,28 @@ class RankingSearch(SearchState):
         def look(kind: str) -> list[list[Candidate]]:
             pool = [c for c in self.by_recording if c.kind == kind]
             chosen = choose(pool, lambda more: self.tester([*self.chosen, *more]), self.significant)
-            chosen = [c for c in chosen if self._can_be(c, chosen)]
+            chosen = [
+                c
+                for c in chosen
+                if self.can_be(c, [*self.chosen, *(o for o in chosen if o is not c)])
+            ]
             return self._same_or_own(chosen) if chosen else []
 
         known = {c.kind for c in self.chosen if some_recordings(c)}
         kinds = dict.fromkeys(c.kind for c in self.by_recording)
         return [partial(look, kind) for kind in kinds if kind not in known]
 
-    def _can_be(self, candidate: Candidate, chosen: Sequence[Candidate]) -> bool:
-        """Whether a candidate's coefficients have a sign that its effect can have."""
-        others = [*self.chosen, *(c for c in chosen if c is not candidate)]
+    def can_be(self, candidate: Candidate, others: Sequence[Candidate]) -> bool:
+        """Whether a candidate's coefficients, beside others, are such as its effect can have."""
         coefficients = self.tester(others).test(candidate.rows).coefficients
-        return not np.any(coefficients < candidate.lowest)
+        if not candidate.term.effect.can_be(coefficients, candidate.term.shape):
+            return False
+        # what is nothing beside the rest of the effect has either sign
+        size = sum(np.sqrt(np.sum(rows**2, axis=0)) for rows in candidate.rows.values())
+        nothing = NEGLIGIBLE * float(np.abs(coefficients * size).max())
+        bounded = np.isfinite(candidate.lowest)
+        short = (candidate.lowest - coefficients)[bounded] * size[bounded]
+        return not np.any(short > nothing)
 
     def _same_or_own(self, chosen: Sequence[Candidate]) -> list[list[Candidate]]:
         """Effects of few recordings by their name, those of many without one.

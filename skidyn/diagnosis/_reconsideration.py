@@ -66,7 +66,7 @@ class ReconsideringSearch(JudgingSearch):
             kept = self._state()
             self.add(first)
             self.refit()
-            self.sigma = self.fit.noise
+            self.sigma = self.weights()
             known = sorted(self._greedy_by_kind(nameless=False), key=lambda item: item[1])
             second = [
                 h
@@ -110,7 +110,7 @@ class ReconsideringSearch(JudgingSearch):
         taken = {c.site for c in self.chosen}
         self.pool = [c for c in self.whole_pool if c.site not in taken]
         self.refit()
-        self.sigma, self.left = self.fit.noise, self._left()
+        self.sigma, self.left = self.weights(), self._left()
         self._reconsidering = True
         ranking = self.rank()
         best = self.accepted(ranking)
@@ -127,7 +127,7 @@ class ReconsideringSearch(JudgingSearch):
         self.add(best)
         self.findings.insert(place, self.findings.pop())
         self.refit()
-        self.sigma, self.left = self.fit.noise, self._left()
+        self.sigma, self.left = self.weights(), self._left()
         return Step([best, *(h for h in ranking if h.kind != best.kind)], best)
 
     def _name_in_place(
@@ -173,7 +173,7 @@ class ReconsideringSearch(JudgingSearch):
                     self.findings = [h for h in self.findings if h is not shadow]
                     self.chosen = [c for c in self.chosen if c not in shadow.candidates]
                     self.refit()
-                    self.sigma, self.left = self.fit.noise, self._left()
+                    self.sigma, self.left = self.weights(), self._left()
                     for found in self._finals([list(shadow.candidates)]):
                         return self.judged(found)
             self._restore(kept)
@@ -199,6 +199,7 @@ class ReconsideringSearch(JudgingSearch):
                 if (chance := self.chance(c, [o for o in self.chosen if o is not c]))
                 <= self.settings.member
                 and (together or self.significant(chance, c))
+                and self.can_be(c, [o for o in self.chosen if o is not c])
             )
             if kept and newest is not None and self._needless(old, without):
                 kept = ()

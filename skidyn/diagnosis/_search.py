@@ -68,7 +68,7 @@ class _Search(ReconsideringSearch):
         """Add one finding after the other."""
         steps = []
         for _ in range(self.settings.max_findings):
-            self.sigma = self.fit.noise
+            self.sigma = self.weights()
             self.left = self._left()
             self.start = np.maximum(self.start, self.left)
             if self.findings:
@@ -85,7 +85,7 @@ class _Search(ReconsideringSearch):
             self.refit()
             best = self._settled(best, steps)
             self.reconsider(best, steps)
-        self.sigma = self.fit.noise
+        self.sigma = self.weights()
         self.withdraw()
         everywhere = range(self.problem.n_joints)
         inflation = variance_inflation(self.problem, self.fit.residual, everywhere)

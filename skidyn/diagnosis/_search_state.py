@@ -111,6 +111,12 @@ class SearchState:
             if np.allclose(self.fit.noise, before, rtol=0.01):
                 break
 
+    def weights(self) -> Array:
+        """Noise by which joints are weighted in tests: that of the fit, or of each by itself."""
+        problem = replace_torque(self.problem, self.problem.torque - self.ripple)
+        terms = (*self.problem.terms, *(c.term for c in self.chosen))
+        return np.minimum(self.fit.noise, problem.own_noise(terms))
+
     @property
     def _round(self) -> str:
         return f"Round {len(self.findings) + 1}"

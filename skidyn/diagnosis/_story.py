@@ -11,6 +11,7 @@ import numpy as np
 from skidyn._text import digits, fall, give_or_take, inside, joints_told, listed, raised, times
 from skidyn.diagnosis._failures import FAILS
 from skidyn.diagnosis._findings import rival_title
+from skidyn.diagnosis._rule import GUESS
 
 if TYPE_CHECKING:
     from skidyn.diagnosis._findings import Finding
@@ -18,8 +19,8 @@ if TYPE_CHECKING:
 
 #: An error that changes by less than this share is the same.
 SAME = 0.02
-#: Confidence below which a name is doubtful, and below which it is a guess.
-SURE, GUESS = 0.9, 0.5
+#: Confidence below which a name is doubtful.
+SURE = 0.9
 #: Parameters in one line, by the number of joints that have their own.
 TOLD = {1: 3, 2: 2, 3: 1}
 #: Joints whose sizes stand in one line.

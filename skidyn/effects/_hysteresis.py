@@ -277,7 +277,7 @@ class LuGre(PathMemory):
     drawn_against = "dq"
     title = "LuGre friction"
     formula = r"\left(F_c + \Delta F\,e^{-(\dot q/v_s)^2}\right) h,\quad h\ \text{as in Dahl}"
-    coefficients = (Coefficient("F", "N m", sign=1), Coefficient("dF", "N m"))
+    coefficients = (Coefficient("F", "N m", sign=1), Coefficient("dF", "N m", sign=1))
     shapes = (
         Shape(
             "presliding",

@@ -48,6 +48,16 @@ class NamelessEffect(Effect):
     #: Signals it depends on: ``own`` joint, the ``other`` joint or time.
     depends_on: ClassVar[tuple[str, ...]] = ()
 
+    def words(self, shape: Mapping[str, Any]) -> str:
+        """What to call it with some shape, where the signals it depends on do not say it.
+
+        Parameters
+        ----------
+        shape : mapping
+            Shape parameters.
+        """
+        return ""
+
     def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
         """Names of the signals, joints counted from 1.
 

@@ -29,6 +29,8 @@ _PLAYS, _LAGGING = (0.03, 0.06, 0.1, 0.15, 0.22, 0.33, 0.5), 16
 _RELAXATION = (0.1, 0.3, 1.0, 3.0)
 #: Recordings at least over which a torque may drift.
 _DRIFTING = 5
+#: Moments that are tried.
+_MOMENTS = 32
 #: Times since the start of a recording over which a torque may fade, as shares of its length.
 _FADING = (0.05, 0.15, 0.5)
 
@@ -81,6 +83,38 @@ class FunctionOfTime(NamelessEffect):
         # Beyond the log nobody knows how it drifts: it stays.
         share = np.clip((signals.clock - shape["low"]) / (shape["high"] - shape["low"]), 0.0, 1.0)
         return legvander(2 * share - 1, len(self.coefficients) - 1)
+
+
+class SuddenOffset(NamelessEffect):
+    """A torque that sets in at some moment and stays, as after a collision or a slip."""
+
+    kind = "sudden_offset"
+    drawn_against = "time"
+    title = "Torque that sets in at some moment"
+    formula = r"\tau_0\,[t \geq t_0]"
+    coefficients = unnamed_coefficients(1)
+    shapes = (Shape("moment", "s", (), -np.inf, np.inf, spacing="linear", scales=False),)
+    depends_on = ("time",)
+    needs = ("time",)
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        order = np.sort(signals.clock)
+        places = np.linspace(0, len(order), _MOMENTS + 2)[1:-1].astype(int)
+        return [{"moment": float(moment)} for moment in np.unique(order[places])]
+
+    def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
+        since = float(np.mean(signals.clock >= shape["moment"]))
+        return 1 / _MOMENTS < since < 1 - 1 / _MOMENTS
+
+    def words(self, shape: Mapping[str, Any]) -> str:
+        return f"A torque that sets in at {shape['moment']:.6g} s"
+
+    def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
+        # a recording's length: moments between recordings are all alike
+        return float(np.median([np.ptp(signals.clock[rows]) for rows in signals.segments]))
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        return np.asarray(signals.clock >= shape["moment"], dtype=float)[:, None]
 
 
 class FrictionSinceReversal(NamelessEffect):
@@ -354,6 +388,7 @@ def _since_start(signals: Signals) -> Array:
 
 HISTORY: tuple[type[NamelessEffect], ...] = (
     FunctionOfTime,
+    SuddenOffset,
     FunctionOfTimeSinceStart,
     FrictionSinceReversal,
     FunctionOfWaySinceReversal,

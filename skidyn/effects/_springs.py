@@ -13,6 +13,10 @@ from skidyn.effects._base import Array, Coefficient, Effect, Shape
 
 #: Shares of the samples between which a contact is one: with more it is a spring.
 FEWEST_TOUCHING, MOST_TOUCHING = 0.001, 0.6
+#: A piece of a spring without stiffness comes out negative by less than this share of the stiffest.
+SLACK = 0.1
+#: A piece over a smaller share of the travel is a step of the torque and no spring.
+NARROW = 0.1
 
 
 class Offset(Effect):
@@ -61,11 +65,14 @@ class Spring(Effect):
 
 
 class NonlinearSpring(Effect):
-    """Spring that stiffens or softens: a cubic in position, or pieces of different stiffness.
+    """Spring that stiffens or softens: a power of position, or pieces of different stiffness.
 
-    A spring of pieces has ``low`` and ``high`` in its shape, the positions between which its
-    stiffness is ``k1``; below it is ``k2`` and above ``k3``, all in N m/rad. Springs with two
-    rates, with slack, or that yield beyond some torque are of this form.
+    The plain form is a cubic about the middle of the travel. One with a ``power`` in its shape has
+    another than the third power of the distance from ``rest``, in units of 1 rad or 1 m, so that
+    units stay. A spring of pieces has ``low`` and ``high`` in its shape, the positions between
+    which its stiffness is ``k1``; below it is ``k2`` and above ``k3``, all in N m/rad, and none of
+    them negative. Springs with two rates, with slack, or that yield beyond some torque are of this
+    form.
     """
 
     kind = "nonlinear_spring"
@@ -80,9 +87,17 @@ class NonlinearSpring(Effect):
     shapes = (
         Shape("low", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
         Shape("high", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
+        Shape("rest", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
+        Shape("power", "", (), 2.0, 9.0, scales=False),
     )
-    #: Quantiles of the position at which the search for the pieces starts.
-    forms = ({"low": 0.2, "high": 0.8}, {"low": 0.4, "high": 0.6})
+    #: Positions, as quantiles, at which the search starts, and a power.
+    forms = (
+        {"low": 0.2, "high": 0.8},
+        {"low": 0.4, "high": 0.6},
+        {"rest": 0.3, "power": 5.0},
+        {"rest": 0.5, "power": 5.0},
+        {"rest": 0.7, "power": 5.0},
+    )
     simplicity = 29
     rivals = ("spring", "gravity_compensator", "end_stop")
     separating_motion = "slow motion over the whole travel"
@@ -91,15 +106,21 @@ class NonlinearSpring(Effect):
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
         # Powers of the distance from the middle of the travel keep the columns well conditioned.
         q = signals.q[:, joints[0]]
-        pieces = [{k: float(np.quantile(q, share)) for k, share in f.items()} for f in self.forms]
-        return [{"q_middle": float((q.min() + q.max()) / 2)}, *pieces]
+        forms = [
+            {name: x if name == "power" else float(np.quantile(q, x)) for name, x in form.items()}
+            for form in self.forms
+        ]
+        return [{"q_middle": float((q.min() + q.max()) / 2)}, *forms]
 
     def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
+        q = signals.q[:, joints[0]]
+        if "rest" in shape:
+            return bool(q.min() < shape["rest"] < q.max())
         if "low" not in shape:
             return True
-        q = signals.q[:, joints[0]]
         least = float(np.mean(q < shape["low"])), float(np.mean(q > shape["high"]))
-        return bool(shape["low"] < shape["high"]) and min(least) > FEWEST_TOUCHING
+        wide = shape["high"] - shape["low"] > NARROW * (q.max() - q.min())
+        return bool(wide) and min(least) > FEWEST_TOUCHING
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         q = signals.q[:, joint]
@@ -107,8 +128,15 @@ class NonlinearSpring(Effect):
             low, high = shape["low"], shape["high"]
             pieces = [np.clip(q, low, high), np.minimum(q - low, 0.0), np.maximum(q - high, 0.0)]
             return np.column_stack([*pieces, np.ones_like(q)])
-        x = q - shape["q_middle"]
-        return np.column_stack([x, x**2, x**3, np.ones_like(x)])
+        x = q - (shape["rest"] if "rest" in shape else shape["q_middle"])
+        power = np.sign(x) * np.abs(x) ** shape.get("power", 3.0)
+        return np.column_stack([x, x**2, power, np.ones_like(x)])
+
+    def can_be(self, coefficients: Array, shape: Mapping[str, Any]) -> bool:
+        if "low" not in shape:
+            return True
+        stiffness = coefficients[:3]
+        return bool(stiffness.min() > -SLACK * stiffness.max())
 
     def units(self, prismatic: bool = False) -> dict[str, str]:
         length = "m" if prismatic else "rad"

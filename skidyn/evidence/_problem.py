@@ -238,6 +238,21 @@ class Problem:
             fit = _weighted(terms, design, target, fit.noise)
         return fit
 
+    def own_noise(self, terms: Iterable[Term]) -> Array:
+        """Noise of one row of every joint, each fitted by itself, (n_joints,).
+
+        What a joint lacks makes its residual in the fit of all joints large, so that the fit
+        attends to it less and the residual grows: by itself it is as small as the model allows.
+
+        Parameters
+        ----------
+        terms : iterable of Term
+            Every effect of the model.
+        """
+        design = self.design([self.term_rows(t) for t in terms])
+        pairs = zip(design, self.target, strict=True)
+        return np.array([own_noise(a, y, max(1, len(y) - a.shape[1])) for a, y in pairs])
+
     def sample_folds(self, joint: int, rows: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
         """Fold of samples, that of the nearest averaged row of a joint.
 
