@@ -46,7 +46,11 @@ class JudgingSearch(RankingSearch):
             behind = ((rival.errors - best.errors) / variance).sum(1)
             error = behind.std(ddof=1) * np.sqrt(len(behind))
             cap = self.settings.simpler_share * best.score
-            near = behind.sum() < min(max(error, 6.0), cap)
+            # What a parameter must gain for another model (G. Schwarz 1978, Annals of Statistics
+            # 6), with what is left as correlated as it is.
+            least = np.log(self.problem.rows.counts[list(best.joints)].sum())
+            least *= self._price(best.candidates)
+            near = behind.sum() < min(max(error, least), cap)
             if near or (behind.sum() < error and self._encompassed(best, rival)):
                 best = rival
         return self._simplest_of_family(best, ranking)
@@ -203,9 +207,13 @@ class JudgingSearch(RankingSearch):
     def _tolerance(self, beside: Hypothesis) -> Array:
         """Share of the squared error removed so far that formulas may have left, by joint.
 
-        How a link swings is a formula of first order: it leaves a nameless function more.
+        How a link swings is a formula of first order: it leaves more to a nameless function, and
+        to a delay, which is the first order of any lag.
         """
         settings = self.settings
+        first_order = beside.kind == UNKNOWN or any(
+            c.term.effect.is_slow for c in beside.candidates
+        )
         shares = np.full(self.problem.n_joints, settings.exact_tolerance)
         for h in self.findings:
             if h.kind == UNKNOWN and h.torque is not None:
@@ -214,7 +222,7 @@ class JudgingSearch(RankingSearch):
             for c in h.candidates:
                 if c.term.effect.is_exact:
                     continue
-                swings = c.term.effect.moves_link and beside.kind == UNKNOWN
+                swings = c.term.effect.moves_link and first_order
                 loose = nameless or swings
                 share = settings.nameless_tolerance if loose else settings.form_tolerance
                 reached = list(c.rows)

@@ -276,11 +276,13 @@ def _vague(
 def _guess(diagnosis: Diagnosis) -> tuple[Hypothesis, list[Candidate]] | None:
     """The last finding with terms that are more likely wrong than right, and these terms.
 
-    One that another explanation equals is one of two, of which the user is told.
+    Where another explanation on other joints equals it, one of the two is right, and both are told.
     """
-    sure = {
-        t: f.alike or (f.confidence or 1.0) >= GUESS for f in diagnosis.findings for t in f.terms
-    }
+
+    def is_sure(finding: Finding) -> bool:
+        return (finding.confidence or 1.0) * (2 if finding.alike else 1) >= GUESS
+
+    sure = {term: is_sure(f) for f in diagnosis.findings for term in f.terms}
     for hypothesis in reversed(diagnosis.result.findings):
         terms = [c for c in hypothesis.candidates if not sure.get(c.term, True)]
         if terms:

@@ -324,8 +324,6 @@ class RankingSearch(SearchState):
     def can_be(self, candidate: Candidate, others: Sequence[Candidate]) -> bool:
         """Whether a candidate's coefficients, beside others, are such as its effect can have."""
         coefficients = self.tester(others).test(candidate.rows).coefficients
-        if not candidate.term.effect.can_be(coefficients, candidate.term.shape):
-            return False
         # what is nothing beside the rest of the effect has either sign
         size = sum(np.sqrt(np.sum(rows**2, axis=0)) for rows in candidate.rows.values())
         nothing = NEGLIGIBLE * float(np.abs(coefficients * size).max())

@@ -398,23 +398,6 @@ class Effect:
         """
         return 0.0
 
-    def can_be(self, coefficients: Array, shape: Mapping[str, Any]) -> bool:
-        """Whether coefficients are those of such a thing, beyond the sign of each by itself.
-
-        Parameters
-        ----------
-        coefficients : ndarray of shape (n_coefficients,)
-            Fitted values.
-        shape : mapping
-            Shape parameters.
-
-        Returns
-        -------
-        bool
-            True by default.
-        """
-        return True
-
     def fastest(self, shape: Mapping[str, Any]) -> float:
         """Frequency, Hz, up to which the motion must be known for short averages to tell it.
 

@@ -104,7 +104,8 @@ class SuddenOffset(NamelessEffect):
 
     def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
         since = float(np.mean(signals.clock >= shape["moment"]))
-        return 1 / _MOMENTS < since < 1 - 1 / _MOMENTS
+        least = 1 / (_MOMENTS + 2)
+        return least < since < 1 - least
 
     def words(self, shape: Mapping[str, Any]) -> str:
         return f"A torque that sets in at {shape['moment']:.6g} s"

@@ -13,8 +13,6 @@ from skidyn.effects._base import Array, Coefficient, Effect, Shape
 
 #: Shares of the samples between which a contact is one: with more it is a spring.
 FEWEST_TOUCHING, MOST_TOUCHING = 0.001, 0.6
-#: A piece of a spring without stiffness comes out negative by less than this share of the stiffest.
-SLACK = 0.1
 #: A piece over a smaller share of the travel is a step of the torque and no spring.
 NARROW = 0.1
 
@@ -70,9 +68,8 @@ class NonlinearSpring(Effect):
     The plain form is a cubic about the middle of the travel. One with a ``power`` in its shape has
     another than the third power of the distance from ``rest``, in units of 1 rad or 1 m, so that
     units stay. A spring of pieces has ``low`` and ``high`` in its shape, the positions between
-    which its stiffness is ``k1``; below it is ``k2`` and above ``k3``, all in N m/rad, and none of
-    them negative. Springs with two rates, with slack, or that yield beyond some torque are of this
-    form.
+    which its stiffness is ``k1``; below it is ``k2`` and above ``k3``, all in N m/rad. Springs with
+    two rates, with slack, or that yield beyond some torque are of this form.
     """
 
     kind = "nonlinear_spring"
@@ -131,12 +128,6 @@ class NonlinearSpring(Effect):
         x = q - (shape["rest"] if "rest" in shape else shape["q_middle"])
         power = np.sign(x) * np.abs(x) ** shape.get("power", 3.0)
         return np.column_stack([x, x**2, power, np.ones_like(x)])
-
-    def can_be(self, coefficients: Array, shape: Mapping[str, Any]) -> bool:
-        if "low" not in shape:
-            return True
-        stiffness = coefficients[:3]
-        return bool(stiffness.min() > -SLACK * stiffness.max())
 
     def units(self, prismatic: bool = False) -> dict[str, str]:
         length = "m" if prismatic else "rad"

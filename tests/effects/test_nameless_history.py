@@ -52,3 +52,13 @@ def test_a_drift_over_the_log_needs_several_recordings_and_stays_beyond_it(signa
     np.testing.assert_allclose(columns[[0, -1], 1], [-1.0, 1.0])
     later = effect.columns(signals, 0, low=shape["low"], high=shape["low"] + 1.0)
     assert np.all(later[signals.clock > shape["low"] + 1.0] == later[-1])
+
+
+def test_an_offset_that_sets_in_stays_and_is_called_by_its_moment(signals):
+    effect = get_effect("sudden_offset")
+    grid = effect.grid(signals, (0,))
+    assert all(effect.admissible(signals, (0,), shape) for shape in grid)
+    moment = grid[len(grid) // 2]["moment"]
+    column = effect.columns(signals, 0, moment=moment)[:, 0]
+    np.testing.assert_array_equal(column, signals.clock >= moment)
+    assert f"{moment:.6g} s" in effect.words({"moment": moment})

@@ -3,6 +3,7 @@
 
 import numpy as np
 
+from skidyn._signals import Signals
 from skidyn.effects import Term, get_effect
 
 
@@ -52,3 +53,17 @@ def test_a_spring_of_pieces_is_continuous(signals, columns_of):
     q = signals.q[:, 0]
     np.testing.assert_allclose(pieces[q > 0.3], 1.1 + q[q > 0.3] - 0.3)
     np.testing.assert_allclose(pieces[q < -0.2], 0.1 + 5 * (q[q < -0.2] + 0.2))
+
+
+def test_a_spring_of_another_power_than_the_third(signals, columns_of):
+    q = signals.q[:, 0]
+    fifth = columns_of("nonlinear_spring", signals, rest=0.1, power=5.0) @ [0.0, 0.0, 2.0, 0.0]
+    np.testing.assert_allclose(fifth, 2 * (q - 0.1) ** 5)
+
+
+def test_a_step_of_the_torque_is_no_piece_of_a_spring():
+    spring = get_effect("nonlinear_spring")
+    q = np.linspace(-1, 1, 500)[:, None]
+    travel = Signals(q, 0 * q, 0 * q, np.zeros(500, dtype=int))
+    assert spring.admissible(travel, (0,), {"low": -0.2, "high": 0.3})
+    assert not spring.admissible(travel, (0,), {"low": 0.0, "high": 0.05})

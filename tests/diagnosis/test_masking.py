@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What dominates a joint does not hide itself: in few short recordings it is named as well."""
+
+import numpy as np
+import pytest
+
+from skidyn.datasets import load_panda, make_hidden_effect_log
+from skidyn.diagnosis import diagnose
+from skidyn.identification import RBDRegressor
+
+MODEL = ("viscous", "coulomb", "rotor_inertia")
+
+
+@pytest.fixture(scope="module")
+def log():
+    return make_hidden_effect_log(
+        load_panda(), None, noise="low", n_trajectories=6, duration=4.0, random_state=0
+    )
+
+
+def test_friction_that_another_joint_modulates(log):
+    q, dq = log.X[["q3", "dq5"]].to_numpy().T
+    torque = np.array(log.y)
+    torque[:, 4] += 8 * np.std(torque[:, 4]) * np.sin(q) * np.sign(dq)
+
+    found = diagnose(RBDRegressor(log.robot, MODEL), log.X, torque).findings
+
+    assert [(f.kind, f.joints, set(f.variables)) for f in found] == [
+        ("unknown", (5,), {"q3", "dq5"})
+    ]
+
+
+def test_a_torque_that_sets_in_is_told_with_its_moment(log):
+    since = log.X["time"] - log.X.groupby("trajectory")["time"].transform("min")
+    late = (log.X["trajectory"] > 4) | ((log.X["trajectory"] == 4) & (since > 1.5))
+    torque = np.array(log.y)
+    torque[late, 1] += 2 * np.std(torque[:, 1])
+
+    found = diagnose(RBDRegressor(log.robot, MODEL), log.X, torque).findings
+
+    assert [(f.kind, f.joints, f.variables) for f in found] == [("unknown", (2,), ("time",))]
+    moment = log.X["time"][late].min()
+    told = float(found[0].title.split(" at ")[1].removesuffix(" s"))
+    assert told == pytest.approx(moment, abs=0.2)
