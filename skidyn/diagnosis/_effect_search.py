@@ -24,8 +24,8 @@ from skidyn.diagnosis._rule import Settings
 from skidyn.effects import Term
 from skidyn.model_selection import held_out_folds
 
-#: Chance that a normal error exceeds one standard error.
-ONE_STANDARD_ERROR = 0.1587
+#: Largest chance at which a gain over the folds counts as one.
+LEVEL = 0.05
 
 
 def _refits(search: EffectSearchCV) -> bool:
@@ -88,9 +88,9 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
         What was added: the findings up to the last that raised the score.
     best_index_ : int
         Row of ``cv_results_`` of the best model: the last that scores higher than the best before
-        it, in the mean and by the signed ranks of the differences over the folds [2]_, at the level
-        of one standard error [1]_ (one-sided, 0.16; in all folds where there are two). A single
-        fold can carry the mean of its differences and their standard error alike, not their ranks.
+        it, in the mean and by the signed ranks of the differences over the folds [1]_, at the level
+        of 5 % (one-sided): in all folds where there are five or fewer. A single fold can carry the
+        mean of its differences and their standard error alike, not their ranks.
     best_score_ : float
         Its mean score on held-out folds.
     cv_results_ : dict of str to ndarray
@@ -112,9 +112,7 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
 
     References
     ----------
-    .. [1] L. Breiman, J. Friedman, C. Stone, R. Olshen, "Classification and Regression Trees",
-       Wadsworth, 1984, section 3.4.3 (the rule of one standard error).
-    .. [2] F. Wilcoxon, "Individual comparisons by ranking methods", Biometrics Bulletin 1, 1945.
+    .. [1] F. Wilcoxon, "Individual comparisons by ranking methods", Biometrics Bulletin 1, 1945.
 
     Examples
     --------
@@ -299,6 +297,6 @@ def _best_step(scores: Array) -> int:
         if gain.mean() > 0:
             differing = gain[gain != 0]
             chance = wilcoxon(differing, alternative="greater").pvalue
-            # two folds can come to 1/4 at best, one to 1/2
-            best = k if chance <= max(ONE_STANDARD_ERROR, 0.5 ** len(differing)) else best
+            # four folds can come to 1/16 at best, two to 1/4
+            best = k if chance <= max(LEVEL, 0.5 ** len(differing)) else best
     return best

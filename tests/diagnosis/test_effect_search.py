@@ -109,7 +109,8 @@ def test_the_gain_of_a_single_fold_keeps_nothing():
     search = EffectSearchCV(RBDRegressor(log.robot), effects=("spring",), cv=folds)
     for gains, kept in (
         ((0.001, -0.01, -0.02, 0.003, 9.0), 0),
-        ((0.01, 0.001, -0.002, 0.003, 9.0), 1),
+        ((0.01, 0.001, 0.002, 0.003, 9.0), 1),
+        ((0.01, 0.001, -0.002, 0.003, 9.0), 0),
         ((0.01, 0.01, 0.02, 0.02, -9.0), 0),
     ):
         search.set_params(scoring=in_folds(*gains)).fit(log.X, log.y)
