@@ -294,8 +294,9 @@ class Diagnosis:
 
         A torque that was made from a servo's error hides what lasts hundredths of a second. Joints
         that have no finding with a name yet, or one of the hysteresis family, are simulated in
-        their loops (:func:`skidyn.simulation.explain_servo_motion`). What is named there takes the
-        place of nameless functions and hysteresis on its joint; :attr:`findings` stay as they are.
+        their loops (:func:`skidyn.simulation.explain_servo_motion`), beside those whose gear is
+        known to give way. What is named there takes the place of nameless functions and hysteresis
+        on its joint; :attr:`findings` stay as they are.
 
         Parameters
         ----------
@@ -318,17 +319,21 @@ class Diagnosis:
                 f"the model is {type(self.base_model).__name__}; a simulation needs the inertia of "
                 "an RBDRegressor"
             )
-        named = {
-            j
-            for f in self.findings
-            if f.kind not in ("unknown", "offset") and get_effect(f.kind).family != "hysteresis"
-            for j in f.joints
-        }
-        joints = [j + 1 for j in range(len(self.joint_names)) if j + 1 not in named]
-        if not joints:
+        named: set[int] = set()
+        gears: set[int] = set()
+        for finding in self.findings:
+            effect = None if finding.kind == "unknown" else get_effect(finding.kind)
+            if effect is None or finding.kind == "offset" or effect.family == "hysteresis":
+                continue
+            named |= set(finding.joints)
+            gears |= set(finding.joints) if effect.moves_link else set()
+        # A link that moves by itself is felt by other joints, which must not be told to do so.
+        joints = [j for j in range(1, len(self.joint_names) + 1) if j in gears or j not in named]
+        if not set(joints) - gears:
             return []
         model = clone(self.base_model).fit(*self.data)
-        return explain_servo_motion(model, self.data[0], controller, joints=joints)
+        found = explain_servo_motion(model, self.data[0], controller, joints=joints)
+        return [f for f in found if f.joint not in gears]
 
     @property
     def simulation(self) -> SimulationVerdict | None:
