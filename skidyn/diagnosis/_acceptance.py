@@ -33,8 +33,8 @@ class JudgingSearch(RankingSearch):
             return None
         best = self._named(ranking)
         for rival in ranking[1:]:
-            if best.errors is None or rival.errors is None:
-                continue
+            if best.errors is None or rival.errors is None or rival.kind == best.kind:
+                continue  # forms of one kind have one name: the best fit is taken
             if rival.n_parameters > best.n_parameters or simplicity_of(rival) >= simplicity_of(
                 best
             ):

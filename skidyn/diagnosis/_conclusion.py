@@ -28,7 +28,7 @@ from skidyn.diagnosis._findings import (
     rivals_of,
 )
 from skidyn.diagnosis._floor import predictable_share
-from skidyn.diagnosis._held_out import held_out_residual
+from skidyn.diagnosis._held_out import folds_alone, held_out_residual
 from skidyn.diagnosis._hypothesis import UNKNOWN, Hypothesis, SearchResult
 from skidyn.diagnosis._intervals import parameter_intervals
 from skidyn.diagnosis._limits import Limit
@@ -110,7 +110,7 @@ def _concluded(
         terms = [*problem.terms, *_found_terms(problem, result.findings)]
         fixed = parameter_intervals(problem, terms, result.fit.noise, shapes=False)
         useless = _useless(result.findings, comparisons, history, least_drop)
-        useless = useless or _vague(result.findings, fixed)
+        useless = useless or _vague(problem, result.findings, fixed)
         if useless is None:
             break
         result = _without(problem, result, *useless)
@@ -246,7 +246,7 @@ def _useless(
 
 
 def _vague(
-    findings: Sequence[Hypothesis], intervals: dict[Term, dict[str, Any]]
+    problem: Problem, findings: Sequence[Hypothesis], intervals: dict[Term, dict[str, Any]]
 ) -> tuple[Hypothesis, list[Candidate]] | None:
     """The last finding with terms whose coefficient may be zero when folds are left out."""
     for hypothesis in reversed(findings):
@@ -254,8 +254,8 @@ def _vague(
             continue  # a line is judged on samples, which averaged rows may not show
         terms = []
         for candidate in hypothesis.candidates:
-            if candidate.term.trajectories is not None and len(candidate.term.trajectories) == 1:
-                continue  # no fold but its own recording tells of it
+            if folds_alone(problem, candidate.term).any():
+                continue  # without the fold that tells of it, it may be anything
             effect = candidate.term.effect
             sizes = [c for c in effect.coefficients if not c.is_zero]
             if len(sizes) > 1:
@@ -277,10 +277,12 @@ def _guess(diagnosis: Diagnosis) -> tuple[Hypothesis, list[Candidate]] | None:
     """The last finding with terms that are more likely wrong than right, and these terms.
 
     Where another explanation on other joints equals it, one of the two is right, and both are told.
+    What removes most of an error is the best that can be said of it.
     """
 
     def is_sure(finding: Finding) -> bool:
-        return (finding.confidence or 1.0) * (2 if finding.alike else 1) >= GUESS
+        likely = (finding.confidence or 1.0) * (2 if finding.alike else 1)
+        return max(likely, finding.error_drop) >= GUESS
 
     sure = {term: is_sure(f) for f in diagnosis.findings for term in f.terms}
     for hypothesis in reversed(diagnosis.result.findings):

@@ -6,10 +6,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.effects import Term, TermSum
 from skidyn.evidence import Problem, left_out_coefficients
+
+#: Share of the squares of a term's columns from which on a fold tells it alone.
+ALONE = 0.5
 
 
 def held_out_residual(
@@ -51,14 +55,38 @@ def held_out_residual(
     torque = {}
     wanted = set(keep)
     for term, place in TermSum(terms).slices(len(problem.rigid_index)):
+        # What only one fold can tell is not held out with it.
+        held = left[:, place].copy()
+        held[folds_alone(problem, term)] = whole[place]
         own = np.zeros_like(problem.torque) if term in wanted else None
         for j, block in term.torque_columns(problem.signals).items():
-            # What one recording alone can tell is not held out with it.
-            own_only = term.trajectories is not None and len(term.trajectories) == 1
-            coefficients = whole[None, place] if own_only else left[fold, place]
-            prediction[:, j] += (block * coefficients).sum(1)
+            prediction[:, j] += (block * held[fold]).sum(1)
             if own is not None:
                 own[:, j] += block @ whole[place]
         if own is not None:
             torque[term] = own
     return problem.torque - prediction, torque
+
+
+def folds_alone(problem: Problem, term: Term) -> NDArray[np.bool_]:
+    """Folds that alone can tell a term, such as that of the recording that touches a stop.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows and folds.
+    term : Term
+        An effect of the model.
+
+    Returns
+    -------
+    ndarray of shape (n_folds,) of bool
+    """
+    if term.trajectories is not None and len(term.trajectories) == 1:
+        return np.ones(problem.n_folds, dtype=bool)
+    if term.effect.nameless:
+        return np.zeros(problem.n_folds, dtype=bool)
+    energy = np.zeros(problem.n_folds)
+    for j, rows in problem.term_rows(term).items():
+        energy += np.bincount(problem.fold[j], np.sum(rows**2, axis=1), problem.n_folds)
+    return np.asarray(energy > ALONE * energy.sum())

@@ -36,10 +36,13 @@ from skidyn.diagnosis._screen import Model, Screen
 from skidyn.diagnosis._search_state import SearchState
 from skidyn.diagnosis._spectrum import Line, find_lines, find_vibrations
 from skidyn.diagnosis._split import split_effects
+from skidyn.effects import get_effect
 
 Mask = NDArray[np.bool_]
 #: Places in the pool of what is added, and by how much the held-out error falls.
 _Greedy = tuple[list[int], float]
+#: Names of which other forms are tried.
+FORMS_TRIED = 2
 
 
 class RankingSearch(SearchState):
@@ -55,10 +58,42 @@ class RankingSearch(SearchState):
         ranking = self._finals([candidates for candidates, _ in rough[: self.settings.finalists]])
         ranking += [self._against_functions(h, ranking) for h in lines]
         ranking += self._finals([own for of_kind in found[len(screening) :] for own in of_kind])
+        ranking += self._other_forms(ranking)
         # What says least comes last: differences between recordings, and vibration.
         return sorted(
             ranking, key=lambda h: (says_little(h) or self._holds_in_all(h, ranking), -h.score)
         )
+
+    def _other_forms(self, ranking: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Other forms of the best names, where what these leave is no noise.
+
+        On the grid, the form of a kind that screens best need not be the one that fits best.
+        """
+        names = [h for h in ranking if h.kind != UNKNOWN and not within_recordings(h)]
+        found: list[list[Candidate]] = []
+        for h in sorted(names, key=lambda h: -h.score)[:FORMS_TRIED]:
+            forms = get_effect(h.kind).forms
+            if h.torque is None and forms and self._price(h.candidates) > self.settings.white:
+                found += self._in_other_forms(h)
+        return self._finals(found)
+
+    def _in_other_forms(self, hypothesis: Hypothesis) -> list[list[Candidate]]:
+        """The terms of a hypothesis, all of them in each other form of its kind."""
+        names = get_effect(hypothesis.kind).form_names
+        best: dict[frozenset[str], dict[tuple[int, ...], int]] = {}
+        sites = {c.joints: names & set(c.term.shape) for c in hypothesis.candidates}
+        for i, other in enumerate(self.pool):
+            if other.kind != hypothesis.kind or other.joints not in sites:
+                continue
+            form = names & set(other.term.shape)
+            at = best.setdefault(form, {})
+            if other.joints not in at or self._drops[i] > self._drops[at[other.joints]]:
+                at[other.joints] = i
+        return [
+            [self.pool[at[joints]] for joints in sites]
+            for form, at in best.items()
+            if set(at) == set(sites) and any(form != own for own in sites.values())
+        ]
 
     def _holds_in_all(self, own: Hypothesis, ranking: Sequence[Hypothesis]) -> bool:
         """Whether what differs between many recordings is nearly had by what is alike in all."""
@@ -86,6 +121,7 @@ class RankingSearch(SearchState):
         kinds = np.array([c.kind for c in self.pool])
         base_model = screen.model(self.blocks)
         first = screen.step(base_model)
+        self._drops = base_model.errors.sum() - first.sum(1)
         tester = self.tester(self.chosen)
         return [
             partial(self._greedy, screen, kinds == kind, base_model, first, tester)
@@ -165,11 +201,19 @@ class RankingSearch(SearchState):
         if any(c.term.effect.search == "trajectories" for c in self.chosen):
             return []
         splits = split_effects(self.problem, self.kinds, self.blocks, self.sigma, self.target)
-        return [
+        found = [
             ([s.candidate], -float(s.drop.sum()) + 2 * s.candidate.width)
             for s in splits
             if s.drop.sum() > 0
         ]
+        return [*found, *((self._each_by_itself(own[0]), rough) for own, rough in found)]
+
+    def _each_by_itself(self, candidate: Candidate) -> list[Candidate]:
+        """What some recordings have, of another size in each of them."""
+        terms = [
+            candidate.term.with_shape(trajectories=(k,)) for k in candidate.term.trajectories or ()
+        ]
+        return [replace(candidate, term=t, rows=self.problem.term_rows(t)) for t in terms]
 
     def _finals(self, rough: list[list[Candidate]]) -> list[Hypothesis]:
         """Compare the best kinds with their shape refined and the noise re-estimated."""

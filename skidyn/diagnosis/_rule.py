@@ -61,8 +61,8 @@ NEGLIGIBLE = 0.05
 #: it leaves, found in so many rounds.
 MASKED, SURE, ROUNDS = 0.3, 1e-9, 3
 
-#: What is less likely right than this is no finding, unless another name equals it: one of two
-#: (``_conclusion.py``; ``confidence.py``).
+#: What is less likely right than this, and removes a smaller share of the error, is no finding,
+#: unless another name equals it: one of two (``_conclusion.py``; ``confidence.py``).
 GUESS = 0.5
 
 # Torques that come and go (``_episodes.py``); no false one: ``nothing_hidden.py``.

@@ -14,7 +14,9 @@ from skidyn.effects._base import Array, Coefficient, Effect
 class LoadDependentFriction(Effect):
     """Gear friction that grows with the transmitted torque, or with another ``power`` of it.
 
-    The power is 1 where the shape has none; the torque is in units of 1 N m then.
+    The power is 1 where the shape has none; the torque is in units of 1 N m then. One that is
+    ``driving`` acts only while the joint moves its load, and not while the load moves the joint, as
+    the efficiency of many gears does.
 
     The gear transmits what the bodies need at the joint; the torque that accelerates the rotor is
     spent before it, and is no part of the load.
@@ -25,7 +27,7 @@ class LoadDependentFriction(Effect):
     title = "Load-dependent friction"
     formula = r"\mu\,|\tau_\mathrm{load}|^p\,\mathrm{sign}(\dot q)"
     coefficients = (Coefficient("mu", "1", sign=1),)
-    forms = ({"power": 0.5},)
+    forms = ({"power": 0.5}, {"power": 2.0}, {"driving": 1.0})
     needs = ("load",)
     simplicity = 7
     rivals = ("coulomb", "position_dependent_friction", "torque_gain")
@@ -39,4 +41,6 @@ class LoadDependentFriction(Effect):
         assert signals.load is not None
         load = np.abs(signals.load[:, joint]) ** shape.get("power", 1.0)
         friction: Array = load * signals.sign[:, joint]
+        if "driving" in shape:
+            friction = friction * (signals.load[:, joint] * signals.dq[:, joint] > 0)
         return friction[:, None]

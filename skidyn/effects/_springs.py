@@ -13,8 +13,9 @@ from skidyn.effects._base import Array, Coefficient, Effect, Shape
 
 #: Shares of the samples between which a contact is one: with more it is a spring.
 FEWEST_TOUCHING, MOST_TOUCHING = 0.001, 0.6
-#: A piece over a smaller share of the travel is a step of the torque and no spring.
-NARROW = 0.1
+#: A piece over a smaller share of the travel is a step of the torque and no spring; a spring whose
+#: rest is nearer to an end of the travel than this share of it is a stop.
+NARROW, ONE_SIDED = 0.1, 0.15
 
 
 class Offset(Effect):
@@ -67,9 +68,11 @@ class NonlinearSpring(Effect):
 
     The plain form is a cubic about the middle of the travel. One with a ``power`` in its shape has
     another than the third power of the distance from ``rest``, in units of 1 rad or 1 m, so that
-    units stay. A spring of pieces has ``low`` and ``high`` in its shape, the positions between
-    which its stiffness is ``k1``; below it is ``k2`` and above ``k3``, all in N m/rad. Springs with
-    two rates, with slack, or that yield beyond some torque are of this form.
+    units stay; one with a ``scale``, in rad or m, its third power times the hyperbolic sine of the
+    distance over it, as rubber stiffens. A spring of pieces has ``low`` and ``high`` in its shape,
+    the positions between which its stiffness is ``k1``; below it is ``k2`` and above ``k3``, all
+    in N m/rad. Springs with two rates, with slack, or that yield beyond some torque are of this
+    form.
     """
 
     kind = "nonlinear_spring"
@@ -85,7 +88,8 @@ class NonlinearSpring(Effect):
         Shape("low", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
         Shape("high", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
         Shape("rest", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
-        Shape("power", "", (), 2.0, 9.0, scales=False),
+        Shape("power", "", (), 2.0, 6.0, scales=False),
+        Shape("scale", "rad", (), 0.05, 2.0),
     )
     #: Positions, as quantiles, at which the search starts, and a power.
     forms = (
@@ -94,6 +98,7 @@ class NonlinearSpring(Effect):
         {"rest": 0.3, "power": 5.0},
         {"rest": 0.5, "power": 5.0},
         {"rest": 0.7, "power": 5.0},
+        {"rest": 0.5, "scale": 0.3},
     )
     simplicity = 29
     rivals = ("spring", "gravity_compensator", "end_stop")
@@ -104,15 +109,24 @@ class NonlinearSpring(Effect):
         # Powers of the distance from the middle of the travel keep the columns well conditioned.
         q = signals.q[:, joints[0]]
         forms = [
-            {name: x if name == "power" else float(np.quantile(q, x)) for name, x in form.items()}
+            {name: self._start(name, x, signals, joints[0]) for name, x in form.items()}
             for form in self.forms
         ]
         return [{"q_middle": float((q.min() + q.max()) / 2)}, *forms]
 
+    @staticmethod
+    def _start(name: str, value: float, signals: Signals, joint: int) -> float:
+        if name == "power":
+            return value
+        if name == "scale":
+            return float(value * signals.unit[joint])
+        return float(np.quantile(signals.q[:, joint], value))
+
     def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
         q = signals.q[:, joints[0]]
         if "rest" in shape:
-            return bool(q.min() < shape["rest"] < q.max())
+            share = (shape["rest"] - q.min()) / (q.max() - q.min())
+            return bool(ONE_SIDED < share < 1 - ONE_SIDED)
         if "low" not in shape:
             return True
         least = float(np.mean(q < shape["low"])), float(np.mean(q > shape["high"]))
@@ -126,6 +140,9 @@ class NonlinearSpring(Effect):
             pieces = [np.clip(q, low, high), np.minimum(q - low, 0.0), np.maximum(q - high, 0.0)]
             return np.column_stack([*pieces, np.ones_like(q)])
         x = q - (shape["rest"] if "rest" in shape else shape["q_middle"])
+        if "scale" in shape:
+            last = shape["scale"] ** 3 * np.sinh(x / shape["scale"])
+            return np.column_stack([x, x**2, last, np.ones_like(x)])
         power = np.sign(x) * np.abs(x) ** shape.get("power", 3.0)
         return np.column_stack([x, x**2, power, np.ones_like(x)])
 
