@@ -8,7 +8,8 @@ them in windows as short as the sampling allows.
 
 The noise of the accelerations passes short windows, and looks like a link that swings slower than
 it. It has a column of its own there for every joint, beside which a swing must be more than chance:
-what is left to it is how it turns from following the load to staying behind.
+what is left to it is how it turns from following the load to staying behind. Where the noise of the
+positions makes more torque than the torque sensor's own, no swing is looked for in short windows.
 """
 
 from __future__ import annotations
@@ -16,7 +17,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from skidyn.diagnosis._hypothesis import Hypothesis, SearchResult, terms_on_rows
+from skidyn.diagnosis._noise import sensor_noise
+from skidyn.diagnosis._remainder import position_noise
 from skidyn.diagnosis._rule import SHORT_WINDOW, Settings
 from skidyn.diagnosis._search import search
 from skidyn.effects import TermSum, get_effect, make_terms
@@ -46,7 +51,11 @@ def look_at_swift(
     result : SearchResult
         With the findings of both looks.
     """
-    family = [k for k in kinds if get_effect(k).moves_link]
+    residual = problem.torque - problem.explained(result.fit)
+    sensor = np.nan_to_num(sensor_noise(problem.signals, residual))
+    coarse = bool(np.any(position_noise(problem) > sensor))
+    effects = map(get_effect, kinds)
+    family = [e.kind for e in effects if e.moves_link and not (coarse and e.follows_acceleration)]
     clocked = problem.signals.time is not None and problem.robot is not None
     if not family or not clocked or problem.motion.rate * SHORT_WINDOW < FEWEST_SAMPLES:
         return problem, result

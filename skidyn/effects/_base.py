@@ -153,6 +153,9 @@ class Effect:
     moves_link : bool
         Whether it moves the link away from the position that the encoder logged. What it does may
         be over within hundredths of a second, so that it is looked for in short averages, too.
+    follows_acceleration : bool
+        Whether the noise of accelerations looks like it in short averages, so that it is not looked
+        for there where positions are coarse.
     is_slow : bool
         Whether the formula holds for slow changes only, so that nothing swift is told beside it.
     simplicity : int
@@ -201,6 +204,7 @@ class Effect:
     drawn: ClassVar[float] = 0.0
     is_exact: ClassVar[bool] = False
     moves_link: ClassVar[bool] = False
+    follows_acceleration: ClassVar[bool] = False
     is_slow: ClassVar[bool] = False
     simplicity: ClassVar[int] = 50
     rivals: ClassVar[tuple[str, ...]] = ()

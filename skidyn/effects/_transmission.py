@@ -208,6 +208,7 @@ class JointElasticity(_LinkSideEffect):
         # A light swing follows the noise of the accelerations at its resonance.
         Shape("damping", "1", (0.2,), 0.005, 0.5, scales=False),
     )
+    follows_acceleration = True
     simplicity = 19
     rivals = ("time_delay", "rotor_inertia", "backlash", "base_tilt")
     separating_motion = "fast reversals with a heavy load, near the first resonance"

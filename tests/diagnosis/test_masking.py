@@ -42,3 +42,17 @@ def test_a_torque_that_sets_in_is_told_with_its_moment(log):
     moment = log.X["time"][late].min()
     told = float(found[0].title.split(" at ")[1].removesuffix(" s"))
     assert told == pytest.approx(moment, abs=0.2)
+
+
+def test_a_stop_that_one_recording_touches(log):
+    q = log.X["q2"].to_numpy()
+    stop = float(log.X.groupby("trajectory")["q2"].max().sort_values().iloc[-2])
+    torque = np.array(log.y)
+    pressed = np.maximum(0.0, q - stop)
+    torque[:, 1] += 2 * np.std(torque[:, 1]) * pressed / pressed.max()
+
+    found = diagnose(RBDRegressor(log.robot, MODEL), log.X, torque).findings
+
+    assert [(f.kind, f.joints) for f in found] == [("end_stop", (2,))]
+    assert found[0].parameters["q_lim"]["value"] == pytest.approx(stop, abs=0.05)
+    assert found[0].error_drop > 0.5

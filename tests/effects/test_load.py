@@ -10,3 +10,10 @@ def test_it_is_the_size_of_the_load_against_the_motion(signals, columns_of):
     expected = np.abs(signals.load[:, 0]) * np.sign(signals.dq[:, 0])
     np.testing.assert_allclose(column[moving], expected[moving])
     assert np.all(np.abs(column) <= np.abs(signals.load[:, 0]))
+
+
+def test_a_gear_that_loses_only_while_it_drives(signals, columns_of):
+    plain = columns_of("load_dependent_friction", signals)[:, 0]
+    driving = columns_of("load_dependent_friction", signals, driving=1.0)[:, 0]
+    drives = signals.load[:, 0] * signals.dq[:, 0] > 0
+    np.testing.assert_array_equal(driving, np.where(drives, plain, 0.0))

@@ -67,3 +67,9 @@ def test_a_step_of_the_torque_is_no_piece_of_a_spring():
     travel = Signals(q, 0 * q, 0 * q, np.zeros(500, dtype=int))
     assert spring.admissible(travel, (0,), {"low": -0.2, "high": 0.3})
     assert not spring.admissible(travel, (0,), {"low": 0.0, "high": 0.05})
+
+
+def test_a_spring_that_stiffens_exponentially(signals, columns_of):
+    x = signals.q[:, 0] - 0.1
+    rubber = columns_of("nonlinear_spring", signals, rest=0.1, scale=0.2) @ [0.0, 0.0, 3.0, 0.0]
+    np.testing.assert_allclose(rubber, 3 * 0.2**3 * np.sinh(x / 0.2))
