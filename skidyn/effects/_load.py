@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,9 +15,10 @@ from skidyn.effects._base import Array, Coefficient, Effect
 class LoadDependentFriction(Effect):
     """Gear friction that grows with the transmitted torque, or with another ``power`` of it.
 
-    The power is 1 where the shape has none; the torque is in units of 1 N m then. One that is
-    ``driving`` acts only while the joint moves its load, and not while the load moves the joint, as
-    the efficiency of many gears does.
+    The power is 1 where the shape has none. Another one is of the load over a ``reference`` in N m,
+    1 N m where the shape has none, so that ``mu`` is the share that is lost of a load of this size.
+    One that is ``driving`` acts only while the joint moves its load, and not while the load moves
+    the joint, as the efficiency of many gears does.
 
     The gear transmits what the bodies need at the joint; the torque that accelerates the rotor is
     spent before it, and is no part of the load.
@@ -25,7 +27,7 @@ class LoadDependentFriction(Effect):
     kind = "load_dependent_friction"
     drawn_against = "load"
     title = "Load-dependent friction"
-    formula = r"\mu\,|\tau_\mathrm{load}|^p\,\mathrm{sign}(\dot q)"
+    formula = r"\mu\,\tau_r\,|\tau_\mathrm{load}/\tau_r|^p\,\mathrm{sign}(\dot q)"
     coefficients = (Coefficient("mu", "1", sign=1),)
     forms = ({"power": 0.5}, {"power": 2.0}, {"driving": 1.0})
     needs = ("load",)
@@ -37,10 +39,23 @@ class LoadDependentFriction(Effect):
         "Duclusaud et al. (2024), Extended friction models for servo actuators."
     )
 
+    #: The plain form needs no search, although there are others.
+    has_shape = False
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        assert signals.load is not None
+        typical = float(np.sqrt(np.mean(signals.load[:, joints[0]] ** 2)))
+        reference = {"reference": typical} if typical > 0 else {}
+        return [{}, *({**f, **(reference if "power" in f else {})} for f in self.forms)]
+
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         assert signals.load is not None
-        load = np.abs(signals.load[:, joint]) ** shape.get("power", 1.0)
+        reference = shape.get("reference", 1.0)
+        load = reference * np.abs(signals.load[:, joint] / reference) ** shape.get("power", 1.0)
         friction: Array = load * signals.sign[:, joint]
         if "driving" in shape:
             friction = friction * (signals.load[:, joint] * signals.dq[:, joint] > 0)
         return friction[:, None]
+
+    def units(self, prismatic: bool = False) -> dict[str, str]:
+        return super().units(prismatic) | {"reference": "N" if prismatic else "N m"}
