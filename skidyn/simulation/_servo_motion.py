@@ -43,7 +43,7 @@ MARGIN = 0.15
 class ServoFinding:
     """An effect without which the motion of a servo cannot be simulated.
 
-    Attributes
+    Parameters
     ----------
     kind : str
         Kind of the catalogue.
@@ -55,9 +55,15 @@ class ServoFinding:
         Root mean square error of the simulated position without and with it, on pieces that were
         left out of the fit, rad or m.
     rival : str
-        The next best explanation of this joint, and
+        The next best explanation of this joint.
     beside : float
-        the error that it leaves.
+        Error that the next best explanation leaves, rad or m.
+
+    Examples
+    --------
+    >>> found = ServoFinding("coulomb", 2, {"Fc": 0.31}, 0.012, 0.002, "viscous", 0.009)
+    >>> found.sentence.split(":")[0]
+    'Coulomb friction of joint 2 (Fc 0.31)'
     """
 
     kind: str
