@@ -81,28 +81,6 @@ def conclude(
     data : tuple
         X and torque as given.
     """
-    while True:
-        diagnosis = _concluded(
-            problem, result, limits, sliding, torque, notes, least_drop, model, data
-        )
-        guess = _guess(diagnosis)
-        if guess is None:
-            return diagnosis
-        result = _without(problem, diagnosis.result, *guess)
-
-
-def _concluded(
-    problem: Problem,
-    result: SearchResult,
-    limits: list[Limit],
-    sliding: NDArray[np.bool_],
-    torque: Array,
-    notes: list[str],
-    least_drop: float,
-    model: Any,
-    data: tuple[Any, ...],
-) -> Diagnosis:
-    """As :func:`conclude`, also with what is no more than a guess."""
     robot = problem.robot
     assert robot is not None
     while True:
@@ -115,10 +93,10 @@ def _concluded(
             break
         result = _without(problem, result, *useless)
     intervals = parameter_intervals(problem, terms, result.fit.noise)
-    shown = [entry["rmse"] for entry in history]
+    shown, remarks = [entry["rmse"] for entry in history], list(notes)
     if not is_physics(model):
         shown, remark = _refitted(problem, result, model, data, shown)
-        notes = [*notes, remark]
+        remarks.append(remark)
     rivals = {s.added.kind: rivals_of(s) for s in result.steps if s.added is not None}
     unknowns = _unknowns(problem, result, terms)
     findings = []
@@ -147,7 +125,7 @@ def _concluded(
     if episodes:
         findings.append(_episodic(episodes, inside, result.fit.residual))
     findings = [_sure(f, findings, parts, problem.whole_trajectories) for f in findings]
-    return Diagnosis(
+    diagnosis = Diagnosis(
         _verdict(findings, parts),
         robot.joint_names,
         findings,
@@ -157,7 +135,7 @@ def _concluded(
         parts.noise,
         _unexplained(findings, unknowns, parts, rmse),
         limits,
-        notes + _fold_notes(problem),
+        remarks + _fold_notes(problem),
         model,
         data,
         problem,
@@ -166,6 +144,11 @@ def _concluded(
         unknowns,
         parts=parts,
     )
+    guess = _guess(diagnosis)
+    if guess is None:
+        return diagnosis
+    rest = _without(problem, result, *guess)
+    return conclude(problem, rest, limits, sliding, torque, notes, least_drop, model, data)
 
 
 def _refitted(

@@ -70,6 +70,8 @@ class SearchState:
         self.whole_pool = self.pool
         self._kept_target: tuple[tuple[Array | None, Array | None], list[Array]] = (None, None), []
         self.start = self.left = np.zeros(problem.n_joints)
+        #: What each candidate of the pool removes, held out, as screened last.
+        self._drops = np.zeros(0)
         self._reconsidering = False
         self._kept_tester: tuple[list[Array], Tester | None] = ([], None)
 

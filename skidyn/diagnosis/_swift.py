@@ -51,13 +51,15 @@ def look_at_swift(
     result : SearchResult
         With the findings of both looks.
     """
-    residual = problem.torque - problem.explained(result.fit)
-    sensor = np.nan_to_num(sensor_noise(problem.signals, residual))
-    coarse = bool(np.any(position_noise(problem) > sensor))
-    effects = map(get_effect, kinds)
-    family = [e.kind for e in effects if e.moves_link and not (coarse and e.follows_acceleration)]
+    family = [k for k in kinds if get_effect(k).moves_link]
     clocked = problem.signals.time is not None and problem.robot is not None
     if not family or not clocked or problem.motion.rate * SHORT_WINDOW < FEWEST_SAMPLES:
+        return problem, result
+    residual = problem.torque - problem.explained(result.fit)
+    sensor = np.nan_to_num(sensor_noise(problem.signals, residual))
+    if np.any(position_noise(problem) > sensor):  # coarse positions
+        family = [k for k in family if not get_effect(k).follows_acceleration]
+    if not family:
         return problem, result
     noise = make_terms(["acceleration_noise"], problem.n_joints)
     before = {j: h.kind for h in result.findings if h.kind in family for j in h.joints}

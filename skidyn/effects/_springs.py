@@ -91,7 +91,7 @@ class NonlinearSpring(Effect):
         Shape("power", "", (), 2.0, 6.0, scales=False),
         Shape("scale", "rad", (), 0.05, 2.0),
     )
-    #: Positions, as quantiles, at which the search starts, and a power.
+    #: Where the search starts: positions as quantiles, powers, scales in units of the joint.
     forms = (
         {"low": 0.2, "high": 0.8},
         {"low": 0.4, "high": 0.6},

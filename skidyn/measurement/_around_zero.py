@@ -103,7 +103,7 @@ class TaredTorque(Check):
         parts = ("start", [rows[:ROWS] for rows in runs]), ("mean", runs)
         for what, rows in parts:
             joints = _without(torque, pull, rows)
-            joints = [k for k in joints or () if _felt(fits, k)]
+            joints = [k for k in joints if _felt(fits, k)]
             if joints:
                 how = (
                     "was set to zero at the start of every recording"
