@@ -99,8 +99,7 @@ def resolve_columns(
     if names is not None:
         names = [str(name) for name in names]
         _refuse_duplicates(names)
-    key_trajectory = _key_column("trajectory", trajectory, names, n_features)
-    key_time = _key_column("time", time, names, n_features)
+    key_trajectory, key_time = key_columns(names, n_features, trajectory, time)
     if names is not None and _looks_named(names):
         q, dq = (_by_name(names, prefix, joint_names, True) for prefix in ("q", "dq"))
         ddq = _by_name(names, "ddq", joint_names, require_acceleration)
@@ -132,6 +131,30 @@ def _refuse_duplicates(names: Sequence[str]) -> None:
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise ColumnError(f"X has the column(s) {', '.join(twice)} more than once; keep one each.")
+
+
+def key_columns(
+    names: Sequence[str] | None, n_features: int, trajectory: ColumnSpec, time: ColumnSpec
+) -> tuple[int | None, int | None]:
+    """Positions of the trajectory number and of the time, None where there is no such column.
+
+    Raises
+    ------
+    ColumnError
+        There is no such column, or both are the same one.
+    """
+    found = (
+        _key_column("trajectory", trajectory, names, n_features),
+        _key_column("time", time, names, n_features),
+    )
+    if found[0] is not None and found[0] == found[1]:
+        which = found[0] if names is None else repr(names[found[0]])
+        raise ColumnError(
+            f"trajectory={trajectory!r} and time={time!r} are both the column {which} of X. A "
+            "trajectory is one recording, numbered 0, 1, ..; give the columns of the two apart, "
+            "or None for what X does not have."
+        )
+    return found
 
 
 def _key_column(

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn._columns import ColumnSpec, _key_column, column_names
+from skidyn._columns import ColumnSpec, column_names, key_columns
 from skidyn._exceptions import ColumnError
 from skidyn._signals import find_segments
 
@@ -97,10 +97,7 @@ def resolve_keys(
     Keys(trajectory=None, time=0, features=(1, 2))
     """
     names = None if names is None else [str(name) for name in names]
-    found = [
-        _key_column(what, spec, names, n_features)
-        for what, spec in (("trajectory", trajectory), ("time", time))
-    ]
+    found = key_columns(names, n_features, trajectory, time)
     features = tuple(i for i in range(n_features) if i not in found)
     if not features:
         raise ColumnError(

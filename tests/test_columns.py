@@ -35,6 +35,8 @@ def test_by_position_around_the_keys():
         ([*STATE, "q_elbow"], 7, {}, "more than once"),
         (["q1", "q2", "dq1", "qd2"], 4, {}, "lacks the column.*dq2.*did you mean"),
         (STATE[:4], 4, {}, "ddq"),
+        (None, 7, {"trajectory": 0, "time": -7}, "both the column 0 of X"),
+        ([*STATE, "t"], 7, {"trajectory": "t", "time": "t"}, "both the column 't' of X"),
     ],
 )
 def test_errors_say_what_is_wrong(names, n, keys, words):

@@ -17,6 +17,11 @@ def test_names_and_positions_give_the_same_keys():
     assert by_name == by_position and by_name.features == (0,)
 
 
+def test_a_column_has_one_meaning():
+    with pytest.raises(ColumnError, match="trajectory='time' and time='auto' .* column 'time'"):
+        resolve_keys(["q1", "time"], 2, trajectory="time")
+
+
 def test_segments_end_with_the_trajectory_and_where_time_goes_back():
     X = np.c_[[1, 1, 1, 2, 2], [0.0, 0.1, 0.05, 0.0, 0.1], np.arange(5)]
     keys = resolve_keys(None, 3, trajectory=0, time=1)

@@ -134,7 +134,8 @@ class Rows:
         """
         shares = [abs(w) for w in self.weights]
         mean = [np.asarray((s @ weight) / (s @ np.ones_like(weight))) for s in shares]
-        unit = float(np.concatenate(mean)[np.concatenate(mean) > 0].mean())
+        counted = np.concatenate(mean)[np.concatenate(mean) > 0]
+        unit = float(counted.mean()) if len(counted) else 1.0
         keep = [np.flatnonzero(m > 0) for m in mean]
         return Rows(
             [

@@ -48,6 +48,8 @@ class Reading:
         self._check_targets(torque)
         order = self._order(X)
         signals, torque = self._read(X[order]), torque[order]
+        if self.columns_.trajectory is not None:
+            self._doubt_trajectories(signals.trajectory, self.columns_.trajectory)
         if signals.time is not None and np.any(np.diff(order) != 1):
             _warn_of_leakage()
             if not has_one_motion(signals.trajectory, signals.time):
@@ -60,6 +62,21 @@ class Reading:
         for note in notes:
             warn_about_log(note)
         return signals, torque, order
+
+    def _doubt_trajectories(self, numbers: NDArray[Any], column: int) -> None:
+        """Warn where the column of trajectories looks like another signal."""
+        fractions = np.any(numbers != np.round(numbers))
+        alone = len(numbers) > 2 and len(np.unique(numbers)) == len(numbers)
+        if fractions or alone:
+            names = getattr(self, "feature_names_in_", None)
+            which = column if names is None else repr(str(names[column]))
+            holds = "numbers that are not whole" if fractions else "another number in every row"
+            warn_about_log(
+                f"the column {which} of X, which is declared as that of the trajectories, holds "
+                f"{holds}. Rows follow each other only within a trajectory, so that hardly any "
+                "row has a neighbour and nothing is averaged. Give the column that numbers the "
+                "recordings (0, 1, ..), or trajectory=None; a clock goes to time="
+            )
 
     def _without_clock(self, signals: Signals) -> Signals:
         if self._smooths():

@@ -46,3 +46,9 @@ def test_without_a_clock_every_sample_is_a_row(signals):
     rows = every_sample(signals)
     np.testing.assert_array_equal(rows.average(signals.q, 0), signals.q)
     assert rows.counts.tolist() == [800]
+
+
+def test_no_rows_can_be_weighted():
+    short = Signals(*np.zeros((3, 4, 1)), np.arange(4), time=np.arange(4.0))
+    rows = window_rows(short, np.ones((4, 1), dtype=bool))
+    assert rows.counts.tolist() == rows.weighted(np.ones(4)).counts.tolist() == [0]

@@ -15,7 +15,7 @@ from sklearn.model_selection import (
 )
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
-from skidyn.exceptions import LogWarning
+from skidyn.exceptions import ColumnError, LogWarning
 from skidyn.identification import RBDRegressor
 from skidyn.model_selection import LeakageWarning, TrajectoryKFold
 
@@ -121,3 +121,27 @@ def test_folds_of_trajectories_are_no_shuffled_rows():
     with warnings.catch_warnings():
         warnings.simplefilter("error", LeakageWarning)
         cross_val_score(RBDRegressor(ROBOT), LOG.X, LOG.y, cv=TrajectoryKFold(4))
+
+
+def test_a_clock_as_the_column_of_trajectories_is_named():
+    with pytest.raises(ColumnError, match="trajectory='time' and time='auto' .* column 'time'"):
+        RBDRegressor(ROBOT, trajectory="time").fit(FULL, LOG.y)
+    array = FULL[[c for c in FULL if c[0] != "t" or c == "time"]].to_numpy()
+    with pytest.raises(ColumnError, match="trajectory=0 and time=0 are both the column 0"):
+        RBDRegressor(ROBOT, trajectory=0, time=0).fit(array, LOG.y)
+    named = FULL.drop(columns="trajectory")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        with pytest.warns(LogWarning, match="column 'time' of X.* not whole") as caught:
+            RBDRegressor(ROBOT, trajectory="time", time=None).fit(named, LOG.y)
+        assert [w.category for w in caught] == [LogWarning]
+        counted = FULL.assign(trajectory=np.arange(len(FULL)))
+        with pytest.warns(LogWarning, match="column 'trajectory' of X.* in every row"):
+            RBDRegressor(ROBOT).fit(counted, LOG.y)
+
+
+def test_few_rows_bring_no_bare_warnings_of_numpy():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        with pytest.warns(LogWarning, match="5 samples make"):
+            RBDRegressor(ROBOT).fit(FULL[:5], LOG.y[:5])

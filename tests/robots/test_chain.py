@@ -173,18 +173,44 @@ PLAIN_SDF = """
 )
 
 
-@pytest.mark.parametrize("name", ["panda", "ur10e", "scara", "srs_arm", "sdf"])
-def test_a_robot_of_a_chain_of_pytorch_kinematics(name):
+#: One joint on a body, at its origin: what the parser of pytorch-kinematics places correctly.
+PLAIN_MJCF = """
+<mujoco model="arm"><compiler angle="radian"/><option gravity="0 0 -1.62"/><worldbody>
+ <body name="base" pos="0 0 0.2"><geom size="0.1" mass="1"/>
+  <body name="upper" pos="0.1 0 0.3" euler="0.4 0.2 0">
+   <joint name="turn" axis="0 1 1" range="-2 2"/><geom type="box" size="0.1 0.2 0.3" mass="2"/>
+   <body name="rod" pos="0.3 0.1 0" euler="0 0 1">
+    <joint name="slide" type="slide" axis="1 0 0.5" range="-1 1" actuatorfrcrange="-9 9"/>
+    <geom size="0.1" mass="1.5" pos="0.1 0 0.2"/><site name="tip" pos="0 0.3 0"/>
+   </body></body></body></worldbody></mujoco>
+"""
+
+
+def chain_of_mjcf(monkeypatch):
+    """As the user guide says: kinds of joints of MuJoCo 4.0 equal no numbers of NumPy."""
+    pytest.importorskip("mujoco")
+    mjcf = pytest.importorskip("pytorch_kinematics.mjcf")
+    kinds = {int(kind): name for kind, name in mjcf.JOINT_TYPE_MAP.items()}
+    monkeypatch.setattr(mjcf, "JOINT_TYPE_MAP", kinds)
+    return mjcf.build_chain_from_mjcf(PLAIN_MJCF)
+
+
+@pytest.mark.parametrize("name", ["panda", "ur10e", "scara", "srs_arm", "sdf", "mjcf"])
+def test_a_robot_of_a_chain_of_pytorch_kinematics(name, monkeypatch):
     import pytorch_kinematics
 
-    data = PLAIN_SDF if name == "sdf" else urdf_of(name)
-    build = getattr(pytorch_kinematics, f"build_chain_from_{'sdf' if name == 'sdf' else 'urdf'}")
-    chain = build(data)
+    if name == "mjcf":
+        data, chain = PLAIN_MJCF, chain_of_mjcf(monkeypatch)
+    elif name == "sdf":
+        data, chain = PLAIN_SDF, pytorch_kinematics.build_chain_from_sdf(PLAIN_SDF)
+    else:
+        data, chain = urdf_of(name), pytorch_kinematics.build_chain_from_urdf(urdf_of(name))
     robot, described = Robot.from_chain(chain, data), Robot.from_file(data)
     assert chain.dtype == torch.float32  # not changed
     assert robot.joint_names == tuple(chain.get_joint_parameter_names())
     assert robot.joint_types == described.joint_types and robot.name == described.name
     np.testing.assert_array_equal(robot.effort_limits, described.effort_limits)
+    np.testing.assert_array_equal(robot.gravity, described.gravity)
     motion = np.random.default_rng(0).uniform(-1.5, 1.5, (3, 20, robot.n_joints))
     q = torch.tensor(motion[0])
     mine, theirs = robot.chain, chain.to(dtype=torch.float64)
