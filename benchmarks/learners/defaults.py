@@ -70,7 +70,7 @@ def boosting() -> Any:
 
 
 def models(log: Log) -> dict[str, Callable[[], Any]]:
-    """Every estimator with its defaults."""
+    """Every estimator with its defaults, and a rigid body that takes the data's word for all."""
     alone: dict[str, Callable[[], Any]] = {
         "HistGradientBoosting": boosting,
         "LSTM": lambda: LSTMRegressor(random_state=0),
@@ -87,6 +87,7 @@ def models(log: Log) -> dict[str, Callable[[], Any]]:
     return {
         "Ridge on columns": lambda: RidgeOnColumns(log),
         "RBD": rbd,
+        "RBD without trust in the URDF": lambda: rbd().set_params(prior_std=np.inf),
         "effect search": lambda: EffectSearchCV(rbd()),
         "SDL(RBD)": lambda: SDLRegressor(rbd(), random_state=0),
         "hybrid, own joints": lambda: HybridRegressor(rbd()),

@@ -11,6 +11,7 @@ a grid search over hand-picked effects, both judged on trajectories that neither
 # The log hides Stribeck friction in joint 2. Two of ten trajectories are for the judgement.
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 from sklearn.model_selection import GridSearchCV, GroupKFold, GroupShuffleSplit
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
@@ -25,8 +26,7 @@ X, y = log.X.iloc[train], log.y[train]
 # %%
 # The search looks at the whole catalogue and stops where nothing more helps on held-out motion.
 search = EffectSearchCV(RBDRegressor(log.robot)).fit(X, y)
-for added, error in zip(search.cv_results_["added"], search.cv_results_["rmse"], strict=True):
-    print(f"{added or 'start':12s} held-out RMSE by joint {np.round(error, 4)} N m")
+print(pd.DataFrame(search.cv_results_)[["added", "mean_test_score", "rmse1", "rmse2"]].round(4))
 
 # %%
 # A grid search compares what it is given. Folds are whole trajectories: with random rows nearly

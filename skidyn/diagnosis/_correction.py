@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from sklearn.base import BaseEstimator, MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, clone
 from sklearn.exceptions import NotFittedError
-from sklearn.utils import _safe_indexing
+from sklearn.utils import _safe_indexing, get_tags
 from sklearn.utils.validation import check_is_fitted
 
 from skidyn._columns import column_names
@@ -277,14 +277,17 @@ def _with_steps(pipeline: Pipeline, steps: list[tuple[str, Any]]) -> Pipeline:
     return pipeline.__class__(**{**pipeline.get_params(deep=False), "steps": steps})
 
 
-def _fitted(steps: Pipeline, X: Any, y: Any) -> Pipeline:
-    if not len(steps):
-        return steps
+def _fitted(step: Any, X: Any, y: Any) -> Any:
+    """A step itself where it is fitted, else a fitted copy.
+
+    A step without a state counts as fitted before it has seen the names of its columns.
+    """
     try:
-        check_is_fitted(steps)
+        check_is_fitted(step)
     except NotFittedError:
-        return clone(steps).fit(X, y)
-    return steps
+        return clone(step).fit(X, y)
+    stateless = not get_tags(step).requires_fit and not hasattr(step, "n_features_in_")
+    return clone(step).fit(X, y) if stateless else step
 
 
 def open_model(model: Any, X: Any, y: Any) -> Opened:
@@ -323,9 +326,13 @@ def open_model(model: Any, X: Any, y: Any) -> Opened:
             # A rigid body is identified from torque in N m, whatever the target was made of.
             inner = inner.regressor
         elif isinstance(inner, Pipeline):
-            steps = _fitted(inner[:-1], table, y)
-            outer.append(_with_steps(inner, [*steps.steps, inner.steps[-1]]))
-            table = steps.transform(table) if len(steps) else table
+            steps = []
+            for name, step in inner.steps[:-1]:
+                if step is not None and step != "passthrough":
+                    step = _fitted(step, table, y)
+                    table = step.transform(table)
+                steps.append((name, step))
+            outer.append(_with_steps(inner, [*steps, inner.steps[-1]]))
             inner = inner.steps[-1][1]
         else:
             break

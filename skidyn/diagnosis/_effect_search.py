@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterable
 from numbers import Integral
 from typing import Any
@@ -94,13 +95,18 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
     best_score_ : float
         Its mean score on held-out folds.
     cv_results_ : dict of str to ndarray
-        One entry per step: ``params`` (list of dict), ``split<k>_test_score``, ``mean_test_score``,
-        ``std_test_score``, ``rank_test_score``; ``added``, ``rmse`` of every joint (N m or N, held
-        out, on the samples judged) and ``mean_rmse``.
+        One entry per step, as scikit-learn's searches have them: ``params`` (list of dict),
+        ``param_<name>``, ``split<k>_test_score``, ``mean_test_score``, ``std_test_score``,
+        ``rank_test_score`` and the times to fit and score, s. Beside these ``added``, ``rmse1`` ..
+        of every joint (N m or N, held out, on the samples judged) and ``mean_rmse``.
     n_splits_ : int
         Number of folds.
     scorer_ : callable
         What scores.
+    multimetric_ : bool
+        False: there is one score.
+    refit_time_ : float
+        Time to fit the best model to all rows, s; with ``refit=True``.
     n_features_in_ : int
         Number of columns of X.
     feature_names_in_ : ndarray of str
@@ -186,6 +192,14 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
                 f"{type(self.estimator).__name__} takes no effects; give an RBDRegressor, alone or "
                 "as the last step of a Pipeline. diagnose(model, ...) judges any fitted regressor"
             )
+        name = "".join(f"{pipeline.steps[-1][0]}__" for pipeline in opened.outer) + "effects"
+        if name not in model.get_params():
+            raise SkidynError(
+                f"{type(self.estimator).__name__} hides the parameter effects of the "
+                f"{type(opened.model).__name__} inside, which this search sets; give that model, "
+                "alone or as the last step of a Pipeline, and put other searches and transformed "
+                "targets around the EffectSearchCV"
+            )
         self.diagnosis_: Diagnosis = diagnose(
             model,
             X,
@@ -195,11 +209,11 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
             settings=self.settings,
             sample_weight=sample_weight,
         )
-        prefix = "".join(f"{pipeline.steps[-1][0]}__" for pipeline in opened.outer)
         weights = weights_of_fit(self.estimator, sample_weight)
-        self._score_steps(X, y, groups, weights, f"{prefix}effects", list(opened.model.effects))
+        self._score_steps(X, y, groups, weights, name, list(opened.model.effects))
         self.__dict__.pop("fading_", None)
         if self.refit:
+            begun = time.perf_counter()
             self.best_estimator_ = self.diagnosis_.model
             if self.best_index_ < len(self.cv_results_["params"]) - 1:
                 best = clone(self.estimator).set_params(**self.best_params_)
@@ -207,6 +221,7 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
             if self.fade_out and self.best_effects_:
                 start = clone(self.estimator).fit(X, y, **weights)
                 self.fading_ = FadingCorrection(start, self.best_estimator_).fit(X)
+            self.refit_time_ = time.perf_counter() - begun
         return self
 
     def _score_steps(
@@ -237,19 +252,29 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
             )
             for fold in folds
         )
-        scores = np.transpose(Parallel(n_jobs=self.n_jobs)(of_fold))
+        # each of shape (n_steps, n_folds)
+        scores, *times = np.transpose(Parallel(n_jobs=self.n_jobs)(of_fold), (2, 1, 0))
         rmse = np.array([step["rmse"] for step in history])
         mean = scores.mean(axis=1)
         rank = np.array([1 + np.sum(mean > own) for own in mean], dtype=np.int32)
-        self.n_splits_ = len(folds)
+        self.n_splits_, self.multimetric_ = len(folds), False
+        column = np.empty(len(params), dtype=object)
+        for k, own in enumerate(params):
+            column[k] = tuple(own[name])
         self.cv_results_ = {
+            **{
+                f"{kind}_{what}_time": reduce(spent, axis=1)
+                for what, spent in zip(("fit", "score"), times, strict=True)
+                for kind, reduce in (("mean", np.mean), ("std", np.std))
+            },
+            f"param_{name}": column,
             "params": params,
             **{f"split{k}_test_score": scores[:, k] for k in range(len(folds))},
             "mean_test_score": mean,
             "std_test_score": scores.std(axis=1),
             "rank_test_score": rank,
             "added": np.array([step["added"] for step in history], dtype=object),
-            "rmse": rmse,
+            **{f"rmse{j}": of_joint for j, of_joint in enumerate(rmse.T, 1)},
             "mean_rmse": rmse.mean(1),
         }
         self.best_index_ = _best_step(scores)

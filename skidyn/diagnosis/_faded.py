@@ -9,6 +9,7 @@ than that of the model without the correction.
 
 from __future__ import annotations
 
+import time
 import warnings
 from collections.abc import Sequence
 from typing import Any
@@ -119,8 +120,8 @@ def step_scores(
     scorer: Any,
     weights: dict[str, Any],
     fade_out: bool,
-) -> list[float]:
-    """Scores of several models on the held-out rows of one fold.
+) -> list[tuple[float, float, float]]:
+    """Scores of several models on the held-out rows of one fold, with the time that they took.
 
     Parameters
     ----------
@@ -141,8 +142,9 @@ def step_scores(
 
     Returns
     -------
-    list of float
-        Score of every model; nan, with a warning, for one that this fold cannot fit.
+    list of (float, float, float)
+        Score of every model; nan, with a warning, for one that this fold cannot fit. Time to fit
+        and to score it, s.
     """
     train, test = fold
     X_train, y_train = _safe_indexing(X, train), _safe_indexing(y, train)
@@ -151,6 +153,7 @@ def step_scores(
     scores = []
     for parameters in params:
         model = clone(estimator).set_params(**parameters)
+        begun = time.perf_counter()
         try:
             model.fit(X_train, y_train, **own)
         except ValueError as error:
@@ -159,9 +162,11 @@ def step_scores(
             warnings.warn(
                 f"{parameters} was not fitted in one fold: {error}", FitFailedWarning, stacklevel=2
             )
-            scores.append(np.nan)
+            scores.append((np.nan, time.perf_counter() - begun, 0.0))
             continue
         start = model if start is None else start
         scored = FadingCorrection(start, model).fit(X_train) if fade_out else model
-        scores.append(float(scorer(scored, _safe_indexing(X, test), _safe_indexing(y, test))))
+        fitted = time.perf_counter()
+        score = float(scorer(scored, _safe_indexing(X, test), _safe_indexing(y, test)))
+        scores.append((score, fitted - begun, time.perf_counter() - fitted))
     return scores

@@ -83,7 +83,9 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
         ``"output_error"`` (for simulation: refined until the simulated motion is that of the log).
     prior_std : float or None, default=None
         How far the true bodies may be from those of the URDF, relative, for ``"ridge"`` and
-        ``"entropic"``: 0.3 is 30 %. None takes what predicts left-out folds best.
+        ``"entropic"``: 0.3 is 30 %. None takes what predicts left-out folds best. The others weigh
+        what the log hardly shows against the URDF; ``numpy.inf`` takes the data's word for all that
+        it shows, as plain least squares does.
     consistent : bool or BodyConstraints, default=False
         Demand bodies that can exist (positive definite pseudo-inertia), coefficients without
         forbidden signs, and what else is known about the bodies.
@@ -380,7 +382,7 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
         solution = method.solve(shown, self.prior_std)
         if "row_weights_" in solution.attributes:
             every = every.weighted(solution.attributes["row_weights_"])
-        return keep_weak_directions(solution, kept, every)
+        return keep_weak_directions(solution, kept, every, trusted=self.prior_std != np.inf)
 
     def _fit_samples(
         self,

@@ -58,7 +58,7 @@ MOST_PULL = 1e12
 
 
 def keep_weak_directions(
-    solution: Solution, kept: NDArray[np.int64], whole: Regression
+    solution: Solution, kept: NDArray[np.int64], whole: Regression, trusted: bool = True
 ) -> Solution:
     """A solution whose weak directions are those of the URDF.
 
@@ -70,6 +70,8 @@ def keep_weak_directions(
         Which of the rigid-body columns of ``whole`` the solution has coefficients of.
     whole : Regression
         With the columns of all base parameters, rows weighted as the estimator weighted them.
+    trusted : bool, default=True
+        Whether the URDF is weighed against the data; else it holds only what the data leaves open.
 
     Returns
     -------
@@ -106,9 +108,11 @@ def keep_weak_directions(
     spread, excess = _spreads(z, values)
     known = values * spread**2 / excess
     share = known**POWER / (1 + known**POWER)
-    if whole.instruments is not None:
+    if whole.instruments is not None or not trusted:
         # Instruments undo a bias that the information does not tell of: only what is open is held.
         share = (values > 0).astype(float)
+    if not trusted and len(kept) == n:  # nothing is open, however little the URDF leaves to a body
+        share = np.ones(n)
     moved = directions @ ((share - 1) * z)
     coefficients[:n] += moved
     coefficients[n:] -= follow @ moved

@@ -456,7 +456,7 @@ def late_joints(found: Delay) -> list[int]:
     for k, lag in enumerate(found.joints):
         others = np.delete(found.joints, k)
         sure = others[np.isfinite(others) & (np.delete(found.errors, k) < SMALLEST)]
-        if not np.isfinite(lag) or len(sure) < len(others) / 2:
+        if not np.isfinite(lag) or not len(sure) or len(sure) < len(others) / 2:
             continue
         common = float(np.median(sure))
         apart = abs(lag - common) > max(APART, ERRORS * found.errors[k]) and abs(common) < SMALLEST

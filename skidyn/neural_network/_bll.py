@@ -94,7 +94,7 @@ class BLLRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEst
     trajectory, time : int, str or None, default="auto"
         Key columns of X.
     random_state : int, RandomState or None, default=None
-        Seeds members and bootstraps; the result does not depend on `n_jobs`.
+        Seeds members, bootstraps and the meta-regressor; the result does not depend on `n_jobs`.
 
     Attributes
     ----------
@@ -175,8 +175,8 @@ class BLLRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEst
         """Make the BLL of the paper's table III.
 
         One LSTM with 32 cells per joint, learning rate 0.01, 130 epochs, batches of 32, window
-        bootstrap, and the meta-network 100-50-25 with rectifiers. The paper gives neither the
-        number of members (10 here) nor the window (10 rows here).
+        bootstrap, and the meta-network 100-50-25 with rectifiers, trained alike. The paper gives
+        neither the number of members (10 here) nor the window (10 rows here).
 
         Parameters
         ----------
@@ -207,7 +207,7 @@ class BLLRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEst
             direction=None,
         )
         network = MLPRegressor(
-            hidden_layer_sizes=(100, 50, 25), learning_rate_init=0.01, early_stopping=True
+            hidden_layer_sizes=(100, 50, 25), learning_rate_init=0.01, batch_size=32, max_iter=130
         )
         head = TransformedTargetRegressor(
             make_pipeline(StandardScaler(), network), transformer=StandardScaler()
@@ -272,8 +272,8 @@ class BLLRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEst
             self.final_estimator_ = _ridge_towards_mean(*own)
             return self
         head = clone(self.final_estimator)
-        if "random_state" in head.get_params():
-            head.set_params(random_state=int(rng.randint(2**31 - 1)))
+        seeded = [n for n in sorted(head.get_params()) if n.split("__")[-1] == "random_state"]
+        head.set_params(**{name: int(rng.randint(2**31 - 1)) for name in seeded})
         self.final_estimator_ = _fit_head(head, inputs[honest], y[honest], weight)
         return self
 

@@ -2,6 +2,7 @@
 """Better models of any estimator can be cloned, refitted and cross-validated."""
 
 import numpy as np
+import pandas as pd
 import pytest
 import sklearn
 from sklearn.base import BaseEstimator, RegressorMixin, clone
@@ -9,7 +10,7 @@ from sklearn.compose import TransformedTargetRegressor
 from sklearn.linear_model import Ridge
 from sklearn.model_selection import GridSearchCV, GroupKFold, cross_val_score
 from sklearn.pipeline import Pipeline, make_pipeline
-from sklearn.preprocessing import StandardScaler
+from sklearn.preprocessing import FunctionTransformer, StandardScaler
 
 import skidyn
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
@@ -142,8 +143,30 @@ def test_the_search_is_one_of_scikit_learn():
     np.testing.assert_allclose(best.predict(LOG.X), search.predict(LOG.X), atol=1e-6)
     assert list(search.feature_names_in_) == list(LOG.X.columns)
     assert not hasattr(EffectSearchCV(RBDRegressor(LOG.robot), refit=False), "predict")
+    table = pd.DataFrame(results)
+    assert {"mean_fit_time", "std_score_time", "param_model__effects"} < set(table)
+    np.testing.assert_allclose(table[["rmse1", "rmse2"]].mean(axis=1), results["mean_rmse"])
+    assert (table[["mean_fit_time", "mean_score_time"]] > 0).all(axis=None)
+    assert search.refit_time_ > 0 and not search.multimetric_
     with pytest.raises(ValueError, match="takes no effects"):
         EffectSearchCV(Ridge()).fit(LOG.X, LOG.y)
+
+
+def test_a_search_of_effects_stands_inside_other_searches():
+    grid = GridSearchCV(RBDRegressor(LOG.robot), {"parameters": ["identified"]})
+    target = TransformedTargetRegressor(RBDRegressor(LOG.robot))
+    for outer in (grid, target, make_pipeline(grid)):
+        with pytest.raises(ValueError, match="hides the parameter effects of the RBDRegressor"):
+            EffectSearchCV(outer).fit(LOG.X, LOG.y)
+
+
+def test_steps_without_a_state_learn_the_names_of_their_columns():
+    step = FunctionTransformer(feature_names_out="one-to-one")
+    pipeline = make_pipeline(step, RBDRegressor(LOG.robot))
+    found = diagnose(pipeline, LOG.X, LOG.y, effects=KINDS)
+    assert isinstance(found.model, Pipeline)
+    expected = diagnose(RBDRegressor(LOG.robot), LOG.X, LOG.y, effects=KINDS)
+    np.testing.assert_allclose(found.model.predict(LOG.X), expected.model.predict(LOG.X))
 
 
 def test_names_for_a_model_that_is_not_physics_are_said_to_be_of_the_model():

@@ -94,3 +94,22 @@ def test_what_never_shows_is_the_urdf_and_said_to_be_open():
     known, open_ = (model.predict(motion, return_std=True)[1].mean(0) for motion in (X, new))
     assert open_[0] > 1.5 * known[0]
     assert table["Izz_link1 + 0.0676*m_link2"]["std"] > 0.01
+
+
+def test_without_trust_in_the_urdf_it_is_least_squares():
+    robot = load_ur5()
+    rng = np.random.default_rng(0)
+    X = rng.uniform(-0.3, 0.3, (400, 18))  # the inertias hardly show
+    q, dq, ddq = np.split(X, 3, axis=1)
+    y = robot.inverse_dynamics(q, dq, ddq) + 2 * dq + rng.normal(0, NOISE, q.shape)
+    columns = np.concatenate(
+        [robot.torque_regressor(q, dq, ddq), np.einsum("si,ij->sij", dq, np.eye(6))], axis=2
+    )
+    columns = columns.reshape(y.size, -1)
+    expected = columns @ np.linalg.lstsq(columns, y.ravel(), rcond=1e-9)[0]
+    given = {"effects": ("viscous",), "estimator": "ordinary", "time": None}
+    plain = RBDRegressor(robot, prior_std=np.inf, **given).fit(X, y).predict(X)
+    np.testing.assert_allclose(plain.ravel(), expected, atol=1e-6)
+    held = RBDRegressor(robot, **given).fit(X, y).predict(X)
+    truth = robot.inverse_dynamics(q, dq, ddq) + 2 * dq
+    assert rms(held - truth) < rms(plain - truth)

@@ -83,7 +83,9 @@ def test_table_iii():
     member = bll.estimator
     assert (member.hidden_size, member.max_epochs, member.batch_size) == (32, 130, 32)
     assert member.learning_rate == 0.01 and member.per_joint
-    assert bll.final_estimator.regressor[-1].hidden_layer_sizes == (100, 50, 25)
+    head = bll.final_estimator.regressor[-1]
+    assert head.hidden_layer_sizes == (100, 50, 25) and head.activation == "relu"
+    assert (head.max_iter, head.batch_size, head.learning_rate_init) == (130, 32, 0.01)
 
 
 def test_paper_head_and_weights(log):
@@ -91,7 +93,9 @@ def test_paper_head_and_weights(log):
     bll = BLLRegressor.from_table_iii(n_estimators=1, random_state=0)
     bll.set_params(estimator__max_epochs=2, final_estimator__regressor__mlpregressor__max_iter=5)
     with pytest.warns(UserWarning, match="Maximum iterations"):
-        assert bll.fit(X, y).predict(X).shape == y.shape
+        found = bll.fit(X, y).predict(X)
+        np.testing.assert_array_equal(clone(bll).fit(X, y).predict(X), found)  # seeds the head too
+    assert found.shape == y.shape
     with pytest.raises(ValueError, match="takes no sample_weight"):
         bll.fit(X, y, sample_weight=np.ones(len(X)))
 
