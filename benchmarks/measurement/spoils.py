@@ -156,6 +156,10 @@ def true_gravity(log: pd.DataFrame, robot: Robot) -> np.ndarray:
     return robot.gravity_torque(log[columns("q", n)].to_numpy(), parameters=bodies)
 
 
+#: How near gravity of identified bodies is to that of the stated ones that either gives it back.
+NEAR = 0.05
+
+
 def compensated(stated: bool) -> Spoil:
     def spoil(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled | None:
         n = robot.n_joints
@@ -165,7 +169,8 @@ def compensated(stated: bool) -> Spoil:
             return None  # joints on which gravity does not change
         names = columns("tau", n)
         changes = dict(zip(names, (log[names].to_numpy() - pull).T, strict=True))
-        option = "--restore-gravity" if stated else "--gravity=0,0,0"
+        near = np.abs(pull - robot.gravity_torque(q)).max() < NEAR * np.abs(pull).max()
+        option = "--restore-gravity" if stated else "--" if near else "--gravity=0,0,0"
         return Spoiled(log.assign(**changes), robot, ("reading",), option)
 
     return spoil
@@ -342,9 +347,11 @@ def short_floats(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> S
 
 
 def repeated(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled:
+    """Rows that are those before them, for as long as nothing new was reported."""
     rows = np.arange(len(log))
     again = (rng.random(len(log)) < 0.25) & (log["trajectory"].diff() == 0).to_numpy()
-    stale = log.iloc[rows - again].reset_index(drop=True)
+    last = np.maximum.accumulate(np.where(again, 0, rows))
+    stale = log.iloc[last].reset_index(drop=True)
     return Spoiled(stale.assign(time=log["time"]), robot, ("repeated_rows",), "--drop-repeated")
 
 

@@ -207,7 +207,8 @@ def position_millimetres(
     if not sliding:
         return None
     changed = log.assign(**{f"q{sliding[0]}": 1e3 * log[f"q{sliding[0]}"]})
-    return Spoiled(changed, robot, ("velocity",), "", (sliding[0],), ("position_unit",))
+    told = ("position_unit", "velocity")
+    return Spoiled(changed, robot, told, f"--gain q{sliding[0]}=", (sliding[0],), told)
 
 
 def differential(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled | None:
@@ -236,8 +237,13 @@ def turned_tool(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Sp
     return Spoiled(log, claimed, ("reading", "bodies"), "", None, ("reading", "bodies"))
 
 
-def wrong_rate(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled:
-    """A rate that is wrong in the clock and, derived with it, in the velocities."""
+def wrong_rate(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled | None:
+    """A rate that is wrong in the clock and, derived with it, in the velocities.
+
+    Without gravity all torques are at another scale alike, which bodies may be, too.
+    """
+    if not felt(log, robot, np.zeros_like(joints_of(log, "q", robot))):
+        return None
     factor = float(rng.choice([0.5, 2.0, 4.0]))
     changes = {"time": log["time"] * factor}
     changes |= {c: log[c] / factor for c in columns("dq", robot.n_joints)}

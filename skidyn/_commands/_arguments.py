@@ -140,7 +140,9 @@ def with_remedies(parser: Any) -> None:
         help="change the sign of a joint (its torque), q3 (its motion), or a column such as dq3",
     )
     fix.add_argument(
-        "--order", metavar="2,1,3", help="for each joint the column that holds it, or tau=2,1,3"
+        "--order",
+        metavar="2,1,3",
+        help="for each joint the column that holds it, or of some: tau=2,1,3, motion=2,1,3",
     )
     fix.add_argument(
         "--gain", metavar="tau3=0.02", help="multiply columns or quantities by factors"
@@ -150,6 +152,9 @@ def with_remedies(parser: Any) -> None:
     )
     fix.add_argument("--zero", metavar="q2=1.57", help="what positions read at the robot's zero")
     fix.add_argument("--late", metavar="tau=0.008", help="delays in s, to be taken out")
+    fix.add_argument(
+        "--lowpass", metavar="tau=0.04", help="time constants of low passes in s, to be undone"
+    )
     fix.add_argument("--unwrap", action="store_true", help="remove jumps by whole turns")
     fix.add_argument(
         "--torque-sign",

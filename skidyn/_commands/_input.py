@@ -74,6 +74,7 @@ def reading(options: argparse.Namespace) -> dict[str, Any]:
         "summed": pairs("summed", said.get("summed")),
         "zero": pairs("zero", said.get("zero"), numbers=True),
         "late": pairs("late", said.get("late"), numbers=True),
+        "lowpass": pairs("lowpass", said.get("lowpass"), numbers=True),
         "unwrap": said.get("unwrap"),
         "torque_sign": said.get("torque_sign"),
         "clock": said.get("clock"),
@@ -103,10 +104,14 @@ def pairs(name: str, text: str | None, numbers: bool = False) -> Any:
         return content
     said: dict[str, Any] = {}
     for word in listed(text):
-        key, equals, value = word.partition("=")
-        if not equals or not key.strip() or not value.strip():
+        key, equals, value = (part.strip() for part in word.partition("="))
+        if not equals or not key or not value:
             raise SkidynError(f"--{name} {text}: {word!r} is not NAME=VALUE")
-        said[key.strip()] = number(name, value) if numbers else value.strip()
+        if numbers and key in said:  # one check after the other found a part of it
+            both = number(name, value)
+            said[key] = said[key] * both if name == "gain" else said[key] + both
+        else:
+            said[key] = number(name, value) if numbers else value
     return said
 
 
@@ -124,12 +129,18 @@ def columns_option(text: str | None) -> Any:
 
 
 def order_option(text: str | None) -> Any:
-    """``2,1,3`` as a list, ``tau=2,1,3`` as a mapping."""
+    """``2,1,3`` as a list, ``q=2,1,3,tau=3,2,1`` as a mapping."""
     if text is None:
         return None
-    quantity, equals, numbers = text.rpartition("=")
-    order = joint_numbers(numbers)
-    return {quantity.strip(): order} if equals else order
+    if "=" not in text:
+        return joint_numbers(text)
+    parts = re.split(r",?\s*(\w+)\s*=", text)
+    if parts[0].strip():
+        raise SkidynError(
+            f"--order {text}: {parts[0]!r} is of no quantity; expected such as 2,1,3 or "
+            "motion=2,1,3,tau=3,2,1"
+        )
+    return {q: joint_numbers(numbers) for q, numbers in zip(parts[1::2], parts[2::2], strict=True)}
 
 
 def number(name: str, text: str) -> float:

@@ -49,6 +49,7 @@ def read_log(
     summed: Mapping[str, str] | None = None,
     zero: Mapping[str, float] | None = None,
     late: Mapping[str, float] | None = None,
+    lowpass: Mapping[str, float] | None = None,
     unwrap: bool = False,
     torque_sign: Literal["recorded", "command"] = "recorded",
     clock: Literal["recorded", "regular"] = "recorded",
@@ -109,6 +110,10 @@ def read_log(
         What positions read at the robot's zero, which is taken off: ``{"q2": 1.5708}``.
     late : mapping of str to float, s, optional
         Delays of columns or quantities, which are taken out: ``{"tau": 0.008}``.
+    lowpass : mapping of str to float, s, optional
+        Time constants of low passes of first order that columns or quantities went through, which
+        are undone: ``{"tau": 0.04}``. What was added after the filter, such as steps of a file,
+        grows by as much as the filter takes off noise.
     unwrap : bool, default=False
         Take leaps by a turn out of positions.
     torque_sign : {"recorded", "command"}, default="recorded"
@@ -187,6 +192,7 @@ def read_log(
             clock=clock,
             drop_repeated=drop_repeated,
             late=late,
+            lowpass=lowpass,
             split_leaps=split_leaps,
             restore_gravity=restore_gravity,
         ),

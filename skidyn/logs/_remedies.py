@@ -31,6 +31,7 @@ REMEDIES = (
     "zero:",
     "clock:",
     "late:",
+    "lowpass:",
     "drop_repeated:",
     "torque_sign:",
     "split_leaps:",
@@ -52,6 +53,7 @@ class Remedies:
     clock: Literal["recorded", "regular"] = "recorded"
     drop_repeated: bool = False
     late: Mapping[str, float] | None = None
+    lowpass: Mapping[str, float] | None = None
     split_leaps: bool = False
     restore_gravity: bool = False
 
@@ -183,6 +185,8 @@ def mend_rows(table: pd.DataFrame, n: int, remedies: Remedies, notes: list[str])
             f"clock: {int(np.sum(np.abs(even - time) > 1e-9))} of {len(time)} stamps were moved to "
             "even steps"
         )
+    if remedies.lowpass:
+        table = _without_lowpass(table, remedies.lowpass, notes)
     if remedies.late:
         from skidyn.preprocessing import advance_channels  # only for this: it brings scikit-learn
 
@@ -208,10 +212,20 @@ def _reorder(
     order: Sequence[int] | Mapping[str, Sequence[int]],
     notes: list[str],
 ) -> None:
-    orders = order if isinstance(order, Mapping) else dict.fromkeys(QUANTITIES, order)
+    if isinstance(order, Mapping):
+        told = dict(order)
+        if (together := told.pop("motion", None)) is not None:
+            there = [q for q in MOTION if f"{q}1" in table.columns]
+            told = {**dict.fromkeys(there, together), **told}
+        orders: Mapping[str, Sequence[int]] = told
+    else:
+        orders = dict.fromkeys(QUANTITIES, order)
     for quantity, numbers in orders.items():
         if quantity not in QUANTITIES:
-            raise LogError(f"order: {quantity!r} is none of {', '.join(QUANTITIES)}.")
+            raise LogError(
+                f"order: {quantity!r} is none of motion (all of {', '.join(MOTION)}), "
+                f"{', '.join(QUANTITIES)}."
+            )
         if sorted(numbers) != list(range(1, n + 1)):
             raise LogError(
                 f"order: {list(numbers)} is not an order of {n} joints; expected every number "
@@ -223,9 +237,14 @@ def _reorder(
                 raise LogError(f"order: the log has no {quantity}1 .. {quantity}{n}.")
             continue
         table[[f"{quantity}{k + 1}" for k in range(n)]] = table[columns].to_numpy()
-    what = ", ".join(orders) if isinstance(order, Mapping) else "all signals"
-    numbers = list(next(iter(orders.values())))
-    notes.append(f"order: columns of {what} were put in the order {numbers}")
+    if not isinstance(order, Mapping):
+        orders = {"all signals": order}
+    said = [
+        f"columns of {', '.join(q for q in orders if list(orders[q]) == numbers)} were put in the "
+        f"order {numbers}"
+        for numbers in map(list, dict.fromkeys(map(tuple, orders.values())))
+    ]
+    notes.append(f"order: {', '.join(said)}")
 
 
 def _take_apart(table: pd.DataFrame, n: int, summed: Mapping[str, str], notes: list[str]) -> None:
@@ -332,6 +351,30 @@ def _split_at_leaps(table: pd.DataFrame, names: Sequence[str], notes: list[str])
         "trajectory"
     )
     return table.assign(trajectory=np.cumsum(cut) + 1)
+
+
+def _without_lowpass(
+    table: pd.DataFrame, constants: Mapping[str, float], notes: list[str]
+) -> pd.DataFrame:
+    """Undo low passes of first order within stretches without gaps."""
+    from skidyn.measurement import without_lowpass
+
+    time, number = table["time"].to_numpy(dtype=float), table["trajectory"].to_numpy()
+    changed: dict[str, np.ndarray] = {}
+    for name, constant in _each(constants, table, "lowpass"):
+        if name in ("time", "trajectory") or not np.isfinite(constant) or constant <= 0:
+            raise LogError(
+                f"lowpass: {name} is to be without a low pass of {constant:g} s; expected a signal "
+                "and the positive time constant of its low pass, such as tau=0.04."
+            )
+        values = table[name].to_numpy(dtype=float).copy()
+        for rows in find_segments(number, time):
+            if np.any(np.diff(time[rows]) <= 0):
+                raise LogError("lowpass: the clock does not rise; mend it first (clock='regular').")
+            values[rows] = without_lowpass(time[rows], values[rows], constant)
+        changed[name] = values
+        notes.append(f"lowpass: one of {1e3 * constant:g} ms was undone in {_all(table)} of {name}")
+    return table.assign(**changed)
 
 
 def _without_repeated(table: pd.DataFrame, n: int, notes: list[str]) -> pd.DataFrame:

@@ -73,8 +73,12 @@ def _zeros(measurement: Measurement, k: int) -> float:
     share = float(passes.sum()) / len(torque)
     step = position_step(torque)
     if np.isfinite(step):  # steps of a sensor come as often beside zero as there
-        beside = np.mean(np.abs(np.abs(torque) - step) < 0.1 * step) / 2
-        if np.mean(torque == 0) < OFTENER * beside:
+        beside, next_to = (
+            float(np.mean(np.abs(np.abs(torque) - n * step) < 0.1 * step)) / 2 for n in (1, 2)
+        )
+        # and where small torques are frequent, more often the nearer they are to zero
+        rising = max(1.0, beside / max(next_to, 1e-12))
+        if np.mean(torque == 0) < OFTENER * beside * rising:
             return 0.0
     return share
 

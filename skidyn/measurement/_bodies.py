@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from skidyn._signals import Array
 from skidyn.measurement._check import Check
 from skidyn.measurement._fits import Fits, Outcome, Reading, fit_admissible, friction
+from skidyn.measurement._gains import refined_scales
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import readable_fits
@@ -38,6 +39,8 @@ WRONG, TIMES, HEAVY = 0.2, 3.0, 0.3
 #: Error of any bodies, as a share of the spread, and in errors of the mean of a row, from which a
 #: torque has little to do with the motion.
 UNRELATED, BEYOND = 0.67, 4.0
+#: Share of that which any function of the position must leave, and the places of one.
+LEFT, PLACES = 0.8, 16
 #: Largest share of friction, and that of the joint in the middle, where there is none.
 FRICTIONLESS, HARDLY = 0.12, 0.05
 #: How near a computed torque is to that of the stated bodies, how little friction it holds, and
@@ -168,7 +171,7 @@ class TorqueScale(Check):
             "ampere of the drives (--drive-gains with i columns)",
             "suspected",
             sorted(gains),
-            _gain_remedy(gains),
+            _gain_remedy(refined_scales(fits, {}, gains).factors),
         )
 
     def _of_joints(
@@ -196,7 +199,7 @@ class TorqueScale(Check):
                     "tell which",
                     "noted",
                     [k],
-                    _gain_remedy({k: gain}),
+                    _gain_remedy({k: float(f"{1 / (_unit_like(gain) or gain):.3g}")}),
                 )
         told, evidence = ", ".join(f"{gains[k]:.3g}" for k in found), []
         if found:
@@ -210,15 +213,20 @@ class TorqueScale(Check):
             names = ", ".join(measurement.joint(k) for k in beyond)
             times = ", ".join(f"{size:.3g}" for size in beyond.values())
             evidence.append(f"it reaches {times} times the effort limit of {names}")
-            found |= dict.fromkeys(beyond, 1e3)
-        if found:
+        if found or beyond:
+            units = {k: unit for k, gain in found.items() if (unit := _unit_like(gain))}
+            units |= dict.fromkeys(beyond, 1e3)
+            refined = {k: gain for k, gain in found.items() if k not in units}
+            factors = {k: 1 / unit for k, unit in units.items()}
+            factors |= refined_scales(fits, units, refined).factors if refined else {}
+            joints = sorted(factors)
             yield self.suspicion(
-                f"the torque of {', '.join(measurement.joint(k) for k in sorted(found))} is at "
+                f"the torque of {', '.join(measurement.joint(k) for k in joints)} is at "
                 "another scale than that of the other joints",
                 "; ".join(evidence),
                 "suspected",
-                sorted(found),
-                _gain_remedy(dict(sorted(found.items()))),
+                joints,
+                _gain_remedy({k: factors[k] for k in joints}),
             )
 
 
@@ -265,16 +273,16 @@ def _one_sided(gains: Array) -> bool:
     return bool(np.all(gains < USUAL[0]) or np.all(gains > USUAL[1]))
 
 
-def _gain_remedy(gains: dict[int, float]) -> tuple[str, str]:
-    """Factors that take multiples of the robot's own torque off."""
-    pairs = {f"tau{k + 1}": float(f"{1 / _unit_like(gain):.3g}") for k, gain in gains.items()}
+def _gain_remedy(factors: dict[int, float]) -> tuple[str, str]:
+    """Factors of torques as an option."""
+    pairs = {f"tau{k + 1}": value for k, value in factors.items()}
     words = ",".join(f"{name}={value:g}" for name, value in pairs.items())
     return f"--gain {words}", f"gain={pairs}"
 
 
-def _unit_like(gain: float) -> float:
+def _unit_like(gain: float) -> float | None:
     """The factor of a unit that a multiple of the robot's torque is near."""
-    return next((f for f in UNITS if abs(np.log(gain / f)) < 0.3), gain)
+    return next((f for f in UNITS if abs(np.log(gain / f)) < 0.3), None)
 
 
 def joint_gain(fits: Fits, k: int, gain: float) -> tuple[float, float, float]:
@@ -383,7 +391,9 @@ class UnexplainedTorque(Check):
         least = np.minimum(*seen.errors)
         steady = seen.scatter / np.sqrt(6)  # white noise is no mistake
         bad: NDArray[np.bool_] = (least > UNRELATED) & (least > BEYOND * steady)
-        joints = [k for k, found in zip(seen.joints, bad, strict=True) if found]
+        unlike = [k for k, found in zip(seen.joints, bad, strict=True) if found]
+        joints = [k for k in unlike if _left_by_position(seen, k) > LEFT]
+        bad = np.isin(seen.joints, joints)
         if joints:
             names = ", ".join(measurement.joint(k) for k in joints)
             shares = ", ".join(f"{100 * share:.0f} %" for share in least[bad])
@@ -394,6 +404,19 @@ class UnexplainedTorque(Check):
                 "suspected",
                 joints,
             )
+
+
+def _left_by_position(seen: Explained, k: int) -> float:
+    """Share of what identified bodies leave of a torque that no function of the position explains.
+
+    A spring of any form, or a stop, has to do with the motion.
+    """
+    residual = seen.identified.residual[k]
+    q = seen.fits.average(seen.fits.signals.q[:, k])[seen.fits.moving[:, k]]
+    place = np.minimum(PLACES * np.argsort(np.argsort(q)) // len(q), PLACES - 1)
+    counts = np.maximum(np.bincount(place, minlength=PLACES), 1)
+    means = np.bincount(place, residual, minlength=PLACES) / counts
+    return float(np.std(residual - means[place]) / (np.std(residual) + 1e-300))
 
 
 class NoFriction(Check):

@@ -42,7 +42,7 @@ from skidyn.measurement._torque import Columns, TorqueDelay, UnsignedTorque
 from skidyn.measurement._units import ClockUnit, PositionUnit, WrappedPosition
 from skidyn.measurement._velocity import JoinedRecordings, Velocity, VelocityDelay
 
-TARED = TaredTorque()
+TARED, UNSIGNED = TaredTorque(), UnsignedTorque()
 #: Nothing else in skidyn keeps a list of checks.
 CHECKS: tuple[Check, ...] = (
     LostRows(),
@@ -58,7 +58,7 @@ CHECKS: tuple[Check, ...] = (
     InterpolatedRows(),
     TARED,
     DeadBand(),
-    UnsignedTorque(),
+    UNSIGNED,
     Axes(),
     OddRecording(),
     Columns(),
@@ -96,7 +96,7 @@ def list_checks() -> tuple[Check, ...]:
     --------
     >>> from skidyn.measurement import list_checks
     >>> [check.name for check in list_checks() if check.stage == 1]
-    ['unsigned_torque', 'axes', 'odd_recording', 'reading']
+    ['axes', 'odd_recording', 'reading']
     """
     return CHECKS
 
@@ -135,6 +135,7 @@ def check_measurement(measurement: Measurement) -> list[Suspicion]:
     for check in CHECKS:
         if check.stage >= misread:
             continue
+        measurement.readable = misread > 1
         told = list(check.look(measurement))
         found += told
         doubted = any(s.certainty != "noted" for s in told)
@@ -144,7 +145,7 @@ def check_measurement(measurement: Measurement) -> list[Suspicion]:
             misread = 1
         elif check in _SCALES and any(s.certainty == "suspected" for s in told):
             misread = 1
-        elif check.stage == 1 and any(s.certainty != "noted" for s in told):
+        elif (check.stage == 1 or check is UNSIGNED) and any(s.certainty != "noted" for s in told):
             misread = min(misread, 2)
     measurement.readable = misread > 1
     return sorted(found, key=lambda s: CERTAINTIES.index(s.certainty))

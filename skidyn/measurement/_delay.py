@@ -10,7 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import SIGN_BLUR, Array, Signals
-from skidyn.measurement._fits import FEWEST, SAMPLES, Fits, Reading, fit_together, friction
+from skidyn.measurement._fits import (
+    FEWEST,
+    SAMPLES,
+    Fits,
+    Reading,
+    RobustFit,
+    fit_together,
+    friction,
+)
 from skidyn.robots import base_parameter_index
 
 #: Lags that are tried, s, and groups of rows that are left out in turn.
@@ -154,7 +162,7 @@ def find_delay(fits: Fits) -> Delay:
         speed = np.abs(fits.average(s.dq[:, j])[use])
         fast = speed > np.median(speed)
         halves[j] = [_lowest((rest[rows] ** 2).sum(axis=0)) for rows in (~fast, fast)]
-        own_gains[j] = len(rest) / 2 * np.log(total[len(LAGS) // 2] / total.min())
+        own_gains[j] = len(rest) / 2 * np.log(total[len(LAGS) // 2] / _least(total))
     if not tables:
         return unknown
 
@@ -172,7 +180,7 @@ def find_delay(fits: Fits) -> Delay:
     error = _spread([lag(whole_log, g) for g in range(GROUPS)])
     drift = _spread([lag(seconds, g) - lag(firsts, g) for g in range(GROUPS)])
     whole = sum(n / 2 * np.log(e.sum(axis=0)) for n, e in tables)
-    gain = float(whole[len(LAGS) // 2] - whole.min())
+    gain = float(whole[len(LAGS) // 2] - _least(whole))
     early, late = lag(firsts), lag(seconds)
     runs = _of_runs(squares, counts)
     return Delay(common, error, lags, own_errors, gain, own_gains, halves, early, late, drift, runs)
@@ -237,6 +245,68 @@ def _of_runs(squares: Mapping[int, list[Array]], counts: Mapping[int, int]) -> d
     return found
 
 
+class JointFit:
+    """Fits of all joints together to torques that are changed, with bodies that they share.
+
+    Parameters
+    ----------
+    fits : Fits
+        Rows.
+    changed : sequence of int
+        Joints, from 0, whose torque is changed.
+    """
+
+    def __init__(self, fits: Fits, changed: Sequence[int]) -> None:
+        self.fits, self.changed = fits, list(changed)
+        self.signals = s = fits.motion(Reading())
+        self.base = base_parameter_index(fits.robot)
+        regressor = fits.mean_regressor(fits.robot, s, self.base)
+        self.joints: list[int] = []
+        self.designs: list[Array] = []
+        self.places: list[NDArray[np.int64]] = []
+        self.rows: list[NDArray[np.bool_]] = []
+        self.own: list[Array] = []
+        first = len(self.base)
+        for j in range(fits.n_joints):
+            use = _sliding(fits, s, j)
+            if not fits.usable(j) or use.sum() < FEWEST:
+                continue
+            own = np.column_stack([friction(s, j), _bent_friction(s, j), np.ones(len(s.q))])
+            felt = np.flatnonzero(regressor[:, j].any(axis=0))
+            self.joints.append(j)
+            self.rows.append(use)
+            self.own.append(own)
+            self.designs.append(np.hstack([regressor[use, j][:, felt], fits.average(own)[use]]))
+            self.places.append(np.append(felt, first + np.arange(own.shape[1])))
+            first += own.shape[1]
+        self.torque = fits.average(fits.torque)
+
+    def fit(self, samples: Array) -> list[RobustFit]:
+        """Fits to the torque of all samples of the rows, shape (n_samples, n_joints)."""
+        torque = self.torque.copy()
+        torque[:, self.changed] = self.fits.average(samples)[:, self.changed]
+        targets = [torque[use, j] for j, use in zip(self.joints, self.rows, strict=True)]
+        return fit_together(self.designs, self.places, targets)
+
+    def likelihood(self, samples: Array) -> float:
+        """Log-likelihood of these fits."""
+        return sum(fit.likelihood for fit in self.fit(samples))
+
+    def left(self, samples: Array, fitted: Sequence[RobustFit]) -> Array:
+        """What fits leave of the torque of every sample, for the joints that are fitted."""
+        robot, s = self.fits.robot, self.signals
+        parameters = np.zeros((robot.n_bodies, 10))
+        for place, fit in zip(self.places, fitted, strict=True):
+            bodies = place < len(self.base)
+            parameters.flat[self.base[place[bodies]]] = fit.coefficients[bodies]
+        rigid = robot.inverse_dynamics(s.q, s.dq, s.ddq, parameters=parameters)
+        own = [
+            columns @ fit.coefficients[-columns.shape[1] :]
+            for columns, fit in zip(self.own, fitted, strict=True)
+        ]
+        return np.asarray((samples - rigid)[:, self.joints] - np.column_stack(own))
+
+
 def refined_lag(fits: Fits, start: float, error: float, late: Sequence[int]) -> float:
     """Lag of some torques at which all joints together are explained best.
 
@@ -259,29 +329,10 @@ def refined_lag(fits: Fits, start: float, error: float, late: Sequence[int]) -> 
     -------
     float, s
     """
-    s = fits.motion(Reading())
-    base = base_parameter_index(fits.robot)
-    regressor = fits.mean_regressor(fits.robot, s, base)
-    joints, designs, places, rows = [], [], [], []
-    first = len(base)
-    for j in range(fits.n_joints):
-        use = _sliding(fits, s, j)
-        if not fits.usable(j) or use.sum() < FEWEST:
-            continue
-        own = np.column_stack([friction(s, j), _bent_friction(s, j), np.ones(len(s.q))])
-        felt = np.flatnonzero(regressor[:, j].any(axis=0))
-        joints.append(j)
-        rows.append(use)
-        designs.append(np.hstack([regressor[use, j][:, felt], fits.average(own)[use]]))
-        places.append(np.append(felt, first + np.arange(own.shape[1])))
-        first += own.shape[1]
-    now = fits.average(fits.torque)
+    together = JointFit(fits, late)
 
     def likelihood(lag: float) -> float:
-        torque = now.copy()
-        torque[:, late] = fits.average(fits.torque_at(lag))[:, late]
-        targets = [torque[use, j] for j, use in zip(joints, rows, strict=True)]
-        return sum(fit.likelihood for fit in fit_together(designs, places, targets))
+        return together.likelihood(fits.torque_at(lag))
 
     lag = start
     for _ in range(STEPS):
@@ -327,9 +378,20 @@ def _bent_friction(signals: Signals, joint: int) -> Array:
 def _lowest(cost: Array) -> float:
     """Lag of least cost, between those tried by a parabola."""
     k = int(np.argmin(cost))
+    return float(LAGS[k] + float(LAGS[1] - LAGS[0]) * _bottom(cost, k))
+
+
+def _least(cost: Array) -> float:
+    """Least cost, between the lags that were tried."""
+    k = int(np.argmin(cost))
+    step = _bottom(cost, k)
+    return float(cost[k] - 0.25 * step * (cost[k - 1] - cost[k + 1]) if step else cost[k])
+
+
+def _bottom(cost: Array, k: int) -> float:
+    """Where a parabola through a cost and its neighbours is least, in their distance."""
     if k in (0, len(cost) - 1):
-        return float(LAGS[k])
+        return 0.0
     left, middle, right = cost[k - 1 : k + 2]
     bend = left - 2 * middle + right
-    step = float(LAGS[1] - LAGS[0])
-    return float(LAGS[k] + step * (0.5 * (left - right) / bend if bend > 0 else 0.0))
+    return float(0.5 * (left - right) / bend) if bend > 0 else 0.0

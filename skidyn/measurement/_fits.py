@@ -677,6 +677,15 @@ def student(residual: Array, scale: float) -> float:
     return float(len(residual) * (constant - np.log(scale)) - (FREEDOM + 1) / 2 * spread.sum())
 
 
+def robust_likelihood(residual: Array) -> float:
+    """Log-likelihood of residuals at the scale at which it is about greatest."""
+    scale = float(np.std(residual)) + 1e-12
+    for _ in range(ROUNDS):
+        weight = (FREEDOM + 1) / (FREEDOM + (residual / scale) ** 2)
+        scale = float(np.sqrt(np.mean(weight * residual**2))) + 1e-12
+    return student(residual, scale)
+
+
 def _inflation(residual: Array) -> float:
     """Variance inflation of a mean of rows, from the likeness of neighbouring rows."""
     if len(residual) < FEWEST:

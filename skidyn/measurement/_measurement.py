@@ -57,6 +57,10 @@ class Measurement:
         What checks found that other checks use; filled in by them.
     scaled, smoothed, computed, frictionless : bool, optional
         What checks found that other checks use; filled in by them.
+    clock : float, optional
+        How many of its units the clock counts in a second; filled in by its check.
+    millimetres : set of int, optional
+        Joints, from 0, whose positions are told to be in millimetres; filled in by their check.
 
     Examples
     --------
@@ -87,6 +91,8 @@ class Measurement:
     smoothed: bool = field(default=False, repr=False)
     computed: bool = field(default=False, repr=False)
     frictionless: bool = field(default=False, repr=False)
+    clock: float = field(default=1.0, repr=False)
+    millimetres: set[int] = field(default_factory=set, repr=False)
     #: Rows to which positions leap; trajectories are taken to end there.
     leaps: Array = field(init=False, repr=False)
 

@@ -114,9 +114,10 @@ class NearBodies:
 
     def fit(self, extra: ExtraColumns | None = None) -> NearFit:
         """Fit, with the columns of an effect where there are some."""
-        return max((self._fit(share, extra) for share in KNOWN_TO), key=lambda fit: fit.posterior)
+        return max((self.fit_to(share, extra) for share in KNOWN_TO), key=lambda f: f.posterior)
 
-    def _fit(self, share: float, extra: ExtraColumns | None) -> NearFit:
+    def fit_to(self, share: float, extra: ExtraColumns | None = None) -> NearFit:
+        """Fit with bodies that are known to a share of their masses and lengths."""
         designs, places, positive, size = self.designs, self.places, self.positive, self.size
         if extra is not None:
             new, size = size + np.arange(extra.count), size + extra.count

@@ -21,8 +21,8 @@ from skidyn.measurement._torque import asked_changes
 
 #: Fewest rows of a recording for a word on it.
 FEWEST = 12
-#: Log-likelihood that another multiple must gain in a recording.
-LEAST = 15.0
+#: Log-likelihood that another multiple must gain in a recording, and another zero, which is free.
+LEAST, SURE = 15.0, 40.0
 #: Least spread of what the other recordings predict, in residuals, for its multiple to be told.
 CLEAR = 2.0
 #: Correlation with the prediction from which a recording is only at another scale, and below which
@@ -207,7 +207,7 @@ def _zero_of(fits: Fits, run: int) -> tuple[int, float, float] | None:
     joint, angle, value = best
     before, after = errors(joint, 0.0), errors(joint, angle)
     worst = max(before, key=lambda k: before[k], default=None)
-    if worst is None or value - plain < LEAST or abs(angle) < LEAST_ZERO:
+    if worst is None or value - plain < SURE or abs(angle) < LEAST_ZERO:
         return None
     without, left = left_by_effects(fits, worst, rows)
     share = after[worst] / before[worst]

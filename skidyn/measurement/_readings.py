@@ -150,11 +150,14 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
     if absent is not None and absent.gain >= LEAST:
         if _without_gravity(fits, reading, here):
             # identified bodies make up for what is left of it
-            restored = _restored_gain(fits, absent.reading)
+            restored, kept = _restored_gain(fits, absent.reading, reading)
             another = any(c.kind == "gravity" and c.gain > absent.gain - TIED for c in judged)
             if another and restored < LEAST:
                 return replace(absent, rivals=("gravity",))  # along it no joint feels a change
-            return replace(absent, restorable=restored > LEAST)
+            # where bodies of any mass explain the torque with gravity, those stated are wrong
+            if kept > -TIED:
+                return replace(absent, restorable=restored > LEAST)
+            judged = [c for c in judged if c.kind != "gravity"]
     accepted = []
     for change in judged:
         if change.kind == "no_gravity":
@@ -378,10 +381,16 @@ def _without_gravity(fits: Fits, reading: Reading, here: Outcome) -> bool:
     return best is not None and abs(float(best @ own / (own @ own))) < LEFT_OVER
 
 
-def _restored_gain(fits: Fits, without: Reading) -> float:
-    """Log-likelihood gained if stated bodies, and not the robot's own, took gravity off."""
+def _restored_gain(fits: Fits, without: Reading, reading: Reading) -> tuple[float, float]:
+    """Log-likelihood gained if stated bodies, and not the robot's own, took gravity off.
+
+    Beside it that which the likelier of both gains over the log as it is, with bodies of any mass.
+    """
     whole = fits.with_gravity(without).identified(replace(without, gravity=None))
-    return float(whole.margin(fits.identified(without)).sum())
+    absent, present = fits.identified(without), fits.identified(reading)
+    restored = float(whole.margin(absent).sum())
+    held = (whole if restored > 0 else absent).margin(present)
+    return restored, float(held.sum())
 
 
 def fitted_gravity(fits: Fits, reading: Reading, here: Outcome) -> Array | None:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from skidyn.measurement._check import Check
 from skidyn.measurement._copies import copied_columns
 from skidyn.measurement._delay import Delay, RunDelay, find_delay, refined_lag
 from skidyn.measurement._fits import Fits, Reading, fit_admissible, friction
+from skidyn.measurement._lowpass import lowpass_of_torque
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import reversals
 from skidyn.measurement._readings import DECISIVE, HALF, Change, find_changes
@@ -46,8 +47,12 @@ APART, SAME = 0.008, 0.3
 
 #: Share of the recordings that may be late by themselves, and log-likelihood that they must gain:
 #: what one carries shifts the lag of few rows, too. How many times as much they leave without it:
-#: friction that is missing is late by itself, but leaves little.
-ODD, RUN_SURE, TIMES = 0.34, 80.0, 1.75
+#: friction that is missing is late by itself, but leaves little, and not on all joints, which need
+#: less where they agree.
+ODD, RUN_SURE, TIMES, FEWER, ALL_AGREE = 0.34, 80.0, 1.75, 1.4, 0.95
+#: Least lag, s, that may be that of a low pass, and log-likelihood by which that must be likelier
+#: than a delay; both are as free.
+FILTERED, LIKELIER = 0.012, 3.0
 #: How near a lag is to a whole number of samples that is one, s, and in samples.
 WHOLE, MOST_WHOLE = 4e-4, 0.1
 
@@ -57,7 +62,6 @@ class UnsignedTorque(Check):
 
     name = "unsigned_torque"
     suspects = "torque or current without its sign"
-    stage = 1
     misnames = True
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
@@ -150,7 +154,7 @@ def _unsigned(measurement: Measurement) -> tuple[list[int], dict[int, float]]:
     ]
     moving = [k for k, moves in enumerate(measurement.excited) if moves]
     gains = {}
-    if measurement.fits is not None:
+    if measurement.readable and measurement.fits is not None:
         for k in one_sided:
             gain = _magnitude_gain(measurement.fits, k)
             if gain > LEAST:
@@ -203,8 +207,13 @@ class Columns(Check):
         if fits is None or measurement.odd:
             return  # recordings that contradict each other have no reading
         changes = asked_changes(measurement, fits)
+        orders = [change for change in changes if change.kind in ORDERS]
         for kind in dict.fromkeys(change.kind for change in changes):
             alike = [change for change in changes if change.kind == kind]
+            if kind in ORDERS and len(alike) < len(orders):
+                if kind != orders[0].kind:
+                    continue  # one order after another is one order of each quantity
+                alike = orders
             yield _one_of_two(self._told(measurement, kind, alike, changes[-1].reading), alike)
 
     def _told(
@@ -239,15 +248,8 @@ class Columns(Check):
             columns = [f"{q}{j + 1}" for j in joints for q in ("q", "tau")]
             what = f"{names} count the other way round than in the robot's description"
             remedy = (f"--flip {','.join(columns)}", f"flip={columns}")
-        elif kind in ("order", "torque_order"):
-            order = [k + 1 for k in (getattr(final, kind) or range(measurement.n_joints))]
-            words = ",".join(map(str, order))
-            if kind == "order":
-                what = f"the columns of {names} are in another order than the robot's joints"
-                remedy = (f"--order {words}", f"order={order}")
-            else:
-                what = f"the torques of {names} are exchanged"
-                remedy = (f"--order tau={words}", f"order={{'tau': {order}}}")
+        elif kind in ORDERS:
+            what, remedy = _ordered(measurement, final)
         elif kind == "summed":
             what = f"the position of {names} holds that of the joint before: its angle is against "
             what += "another link than the one it turns on"
@@ -273,6 +275,38 @@ class Columns(Check):
                     return self.suspicion(what, evidence, certainty, joints, remedy)
             remedy = (f"--gravity={words}", f"Robot.from_urdf(..., gravity={tuple(gravity)})")
         return self.suspicion(what, evidence, certainty, joints, remedy)
+
+
+#: Kinds of changes that exchange columns.
+ORDERS = ("order", "torque_order")
+
+
+def _ordered(measurement: Measurement, final: Reading) -> tuple[str, tuple[str, str]]:
+    """What is said of columns in another order, and the remedy."""
+    every = range(measurement.n_joints)
+    motion = [k + 1 for k in (final.order or every)]
+    torque = [final_column + 1 for final_column in _torque_order(final, every)]
+    own = [k + 1 for k in every]
+    orders = {"motion": motion, "tau": torque}
+    moved = sorted(
+        {k for order in orders.values() for k, c in zip(every, order, strict=True) if c != k + 1}
+    )
+    names = ", ".join(measurement.joint(k) for k in moved)
+    if motion == torque:
+        words = ",".join(map(str, motion))
+        what = f"the columns of {names} are in another order than the robot's joints"
+        return what, (f"--order {words}", f"order={motion}")
+    orders = {q: order for q, order in orders.items() if order != own}
+    called = {"motion": "positions and velocities", "tau": "torques"}
+    said = " and ".join(called[q] for q in orders)
+    words = ",".join(f"{q}={','.join(map(str, order))}" for q, order in orders.items())
+    return f"the {said} of {names} are exchanged", (f"--order {words}", f"order={orders}")
+
+
+def _torque_order(reading: Reading, every: Iterable[int]) -> list[int]:
+    """Column of the torque of every joint."""
+    own = [k if reading.torque_order is None else reading.torque_order[k] for k in every]
+    return [k if reading.order is None else reading.order[k] for k in own]
 
 
 #: What another reading of the same joints would mean.
@@ -386,9 +420,13 @@ class TorqueDelay(Check):
             and alike.sum() > measurement.n_joints / 2
             and (alike.mean() >= AGREEING or weight[alike].sum() >= AGREEING)
         ):
-            lag = _whole(
-                measurement, refined_lag(fits, found.common, found.error, range(fits.n_joints))
-            )
+            every = range(fits.n_joints)
+            lag = refined_lag(fits, found.common, found.error, every)
+            constant = _lowpass(fits, lag, every) if not early else None
+            if constant is not None:
+                yield self._filtered("torque", "tau", constant, lag)
+                return
+            lag = _whole(measurement, lag)
             if abs(lag) < SMALLEST:
                 return
             ms = 1e3 * lag
@@ -404,8 +442,13 @@ class TorqueDelay(Check):
             )
             return
         for k in late_joints(found):
-            lag = _whole(measurement, refined_lag(fits, found.joints[k], found.errors[k], [k]))
-            lag = float(f"{lag:.5f}")
+            lag = refined_lag(fits, found.joints[k], found.errors[k], [k])
+            constant = _lowpass(fits, lag, [k])
+            if constant is not None:
+                what = f"torque of {measurement.joint(k)}"
+                yield self._filtered(what, f"tau{k + 1}", constant, lag, [k])
+                continue
+            lag = float(f"{_whole(measurement, lag):.5f}")
             slow, fast = 1e3 * found.halves[k]
             yield self.suspicion(
                 f"the torque of {measurement.joint(k)} is {'late' if lag > 0 else 'early'} by "
@@ -417,6 +460,28 @@ class TorqueDelay(Check):
                 [k],
                 (f"--late tau{k + 1}={lag:g}", f"late={{'tau{k + 1}': {lag:g}}}"),
             )
+
+    def _filtered(
+        self, what: str, column: str, constant: float, lag: float, joints: Iterable[int] = ()
+    ) -> Suspicion:
+        value = float(f"{constant:.3g}")
+        return self.suspicion(
+            f"the {what} went through a low pass of about {0.5 / np.pi / constant:.2g} Hz",
+            f"bodies, friction and rotor inertia explain it better without a low pass of first "
+            f"order with a time constant of {1e3 * constant:.1f} ms than with a delay, which would "
+            f"be {1e3 * lag:.1f} ms",
+            "suspected",
+            joints,
+            (f"--lowpass {column}={value:g}", f"lowpass={{'{column}': {value:g}}}"),
+        )
+
+
+def _lowpass(fits: Fits, lag: float, late: Sequence[int]) -> float | None:
+    """Time constant of a low pass that makes torque late; None where a delay explains it better."""
+    if lag < FILTERED:
+        return None
+    constant, gain = lowpass_of_torque(fits, lag, late)
+    return constant if gain > LIKELIER else None
 
 
 def _whole(measurement: Measurement, lag: float) -> float:
@@ -438,7 +503,7 @@ def late_runs(found: Delay) -> dict[int, RunDelay]:
         if abs(one.lag) > max(APART, ERRORS * one.error)
         and one.gain > RUN_SURE
         and one.agreeing >= AGREEING
-        and one.before > TIMES * one.left
+        and one.before > (TIMES if one.agreeing < ALL_AGREE else FEWER) * one.left
     }
     # one that is late makes others look early
     first = max(odd.values(), key=lambda one: one.gain, default=None)

@@ -32,6 +32,12 @@ MILLIMETRES = 20.0
 LEAST_DEGREES = 6.0
 #: How nearly a factor is a round number that it is taken for.
 WHOLE = 2e-3
+#: Distance of the logarithms of sizes between which a parabola is laid, and how far that at which
+#: identified bodies fit best may be from that of the stated ones.
+APART, NOT_FAR = 0.02, 0.06
+#: Share of recordings in which positions may be in another unit, how many times as far they then
+#: spread, and recordings at least.
+FEW, SPREAD, RECORDINGS = 0.4, 10.0, 3
 #: Log-likelihood by which one scale must explain the torque better than another.
 LEAST = 15.0
 
@@ -55,6 +61,7 @@ class ClockUnit(Check):
         typical = float(np.median(slopes)) if slopes else np.nan
         for factor, unit in CLOCKS.items():
             if is_near(typical, factor):
+                measurement.clock = factor
                 yield self.suspicion(
                     f"time looks like {NAMES.get(unit, unit)}",
                     f"the integrated velocities are {typical:.4g} times the positions they lead to "
@@ -134,6 +141,18 @@ class PositionUnit(Check):
                     remedy=unit_remedy({"q": unit}),
                 )
                 return
+        odd = _odd_runs(measurement)
+        if odd:
+            measurement.odd = True
+            largest = np.abs(measurement.signals.q).max()
+            yield self.suspicion(
+                f"in trajectory {', '.join(map(str, odd))} positions are in another unit than in "
+                "the others",
+                f"they spread {min(odd.values()):.3g} times as far there, up to {largest:.4g} rad; "
+                "fix that file, or leave it out",
+                "certain",
+            )
+            return
         far = _too_far(measurement, DISTANT)
         shared = measurement.velocity_scale
         if far.any() and unnamed_scale(measurement, shared) and shared < 1:
@@ -167,6 +186,7 @@ class PositionUnit(Check):
             both = likeness > ALIKE and abs(slope - 1) < NEAR
             gains = dict.fromkeys([f"q{k + 1}", f"dq{k + 1}"] if both else [f"q{k + 1}"], 1e-3)
             words = ",".join(f"{name}={size:g}" for name, size in gains.items())
+            measurement.millimetres.add(k)
             yield self.suspicion(
                 f"the position of {measurement.joint(k)} looks like millimetres",
                 f"it reaches {largest[k]:.4g} where the limit is {limits[k]:.3g} m",
@@ -215,7 +235,7 @@ class PositionUnit(Check):
             else _fitted_size(measurement, float((largest / limits)[turning].max()))
         )
         if ratio is not None and not (degrees and abs(ratio * DEGREE - 1) < 0.06):
-            value = float(f"{1 / ratio:.3g}")
+            value = float(f"{1 / ratio:.4g}")
             moving = dict.fromkeys(both, value)
             words = ",".join(f"{name}={size:g}" for name, size in moving.items())
             yield self.suspicion(
@@ -265,6 +285,23 @@ def _too_far(measurement: Measurement, times: float) -> NDArray[np.bool_]:
     return np.asarray(turning & (np.abs(q).max(axis=0) > times * limits))
 
 
+def _odd_runs(measurement: Measurement) -> dict[int, float]:
+    """Recordings in which all turning joints move many times as far, beyond what any can."""
+    turning, limits, _ = _limits(measurement)
+    moves = turning & np.array(measurement.excited)
+    number, q = measurement.signals.trajectory, measurement.signals.q
+    runs = np.unique(number)
+    if len(runs) < RECORDINGS or len(measurement.leaps) or not moves.any():
+        return {}
+    spread = np.array([np.ptp(q[number == run], axis=0) for run in runs])[:, moves]
+    times = np.median(spread / np.maximum(np.median(spread, axis=0), 1e-12), axis=1)
+    odd = times > SPREAD
+    beyond = (spread > 2 * FAR * limits[moves]).any(axis=1)
+    if not odd.any() or not beyond[odd].all() or beyond[~odd].any() or odd.mean() > FEW:
+        return {}
+    return {int(run): float(x) for run, x in zip(runs[odd], times[odd], strict=True)}
+
+
 def unnamed_scale(measurement: Measurement, shared: float) -> bool:
     """Whether velocities share a scale that is neither 1 nor that of a unit."""
     known = (1.0, *CLOCKS, *VELOCITIES, *POSITIONS)
@@ -292,7 +329,38 @@ def _fitted_size(measurement: Measurement, least: float) -> float | None:
         return None
     finer = sizes[best] * 1.002 ** np.arange(-14, 15)
     likely = np.array([fits.nominal(Reading(size=x), 2).likelihood.sum() for x in finer])
-    return float(finer[int(np.argmax(likely))])
+    return _sharpened(fits, float(finer[int(np.argmax(likely))]))
+
+
+def _sharpened(fits: Fits, size: float) -> float:
+    """Factor of all positions at which identified bodies fit best: those stated are not exact.
+
+    Gears have whole ratios, mostly round ones.
+    """
+    inflation = np.maximum(fits.identified(Reading(size=size)).inflation, 1.0)
+
+    def likelihood(log: float) -> float:
+        outcome = fits.identified(Reading(size=float(np.exp(log))))
+        return float(np.sum(outcome.likelihood / inflation))
+
+    first = log = float(np.log(size))
+    step, error = APART, NOT_FAR
+    for _ in range(4):
+        left, middle, right = (likelihood(log + x) for x in (-step, 0.0, step))
+        bend = 2 * middle - left - right
+        if bend <= 0:
+            return size  # bodies make up for any size
+        error = step / np.sqrt(bend)
+        log += float(np.clip(0.5 * step * (right - left) / bend, -2 * step, 2 * step))
+        step /= 2
+    if abs(log - first) > NOT_FAR or error > NOT_FAR:
+        return size
+    found = float(np.exp(log))
+    for whole in (10, 5, 1):
+        near = float(whole * round(found / whole))
+        if near > 2 and abs(np.log(near / found)) < min(2 * error, NOT_FAR / 2):
+            return near
+    return found
 
 
 def _round(factor: float) -> float:

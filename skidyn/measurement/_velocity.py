@@ -3,13 +3,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from skidyn._signals import Signals
+from skidyn._signals import Array, Signals
 from skidyn.measurement._check import Check
 from skidyn.measurement._fits import Reading
+from skidyn.measurement._lowpass import TRIED, summit, without_lowpass
 from skidyn.measurement._measurement import ALIKE, Measurement
 from skidyn.measurement._measures import velocity_consistency
 from skidyn.measurement._suspicion import Suspicion
@@ -33,6 +36,9 @@ WINDOWS = 3000
 #: of the difference that it takes away; joints that agree and how nearly, s.
 LAGS = np.linspace(-0.1, 0.1, 21)
 SMALLEST, STEPS, TAKEN, AGREEING, NEARLY = 0.006, 1.2, 0.3, 0.75, 0.01
+#: What a low pass leaves, as a share of what a delay leaves, to be told; how near constants of
+#: joints are that share one.
+FILTERED, SAME_FILTER = 0.4, 0.15
 
 
 class Velocity(Check):
@@ -80,8 +86,13 @@ class Velocity(Check):
             return [self._held(measurement, k, runs) for k, runs in measurement.stuck.items()]
         groups: dict[str, list[int]] = {}
         for k, (slope, correlation) in enumerate(measurement.velocities):
+            slope /= measurement.clock
             if not np.isfinite(slope) or not measurement.excited[k] or abs(slope - 1) < NEAR:
                 continue
+            if k in measurement.millimetres:
+                continue
+            if measurement.clock != 1 and _cause(slope, correlation) in ("scale", "other"):
+                continue  # to be told when time is in seconds
             groups.setdefault(_cause(slope, correlation), []).append(k)
         return [self._told(measurement, cause, joints) for cause, joints in groups.items()]
 
@@ -97,8 +108,8 @@ class Velocity(Check):
     def _told(self, measurement: Measurement, cause: str, joints: list[int]) -> Suspicion:
         names = ", ".join(measurement.joint(k) for k in joints)
         slopes = ", ".join(
-            f"{measurement.velocities[k][0]:.4g} (correlation {measurement.velocities[k][1]:.3f})"
-            for k in joints
+            f"{slope / measurement.clock:.4g} (correlation {likeness:.3f})"
+            for slope, likeness in (measurement.velocities[k] for k in joints)
         )
         evidence = f"the velocity is {slopes} times the differentiated position"
         if cause == "sign" and _runs_backwards(measurement, joints):
@@ -231,14 +242,33 @@ class VelocityDelay(Check):
             return
         late, early = ("velocity", "position") if common > 0 else ("position", "velocity")
         column = "dq" if common > 0 else "q"
-        value = float(f"{abs(common):.2g}")
+        of = [k for k, lag in lags.items() if np.isfinite(lag)]
+        own = {k: lags[k] for k, near in zip(of, alike, strict=True) if near}
+        value = float(f"{abs(_refined(measurement.signals, own)):.3g}")
         measurement.late_position = value if late == "position" else 0.0
+        constant = _lowpass(measurement.signals, own)
+        if constant is not None:
+            yield self._filtered(f"the {late}", early, column, constant)
+            return
         yield self.suspicion(
             f"the {late} is late against the {early} by about {1e3 * value:g} ms",
             f"at that lag it is the rate of the position, alike in {int(alike.sum())} of "
             f"{len(told)} joints that move: it was filtered, or has another clock",
             "suspected",
             remedy=(f"--late {column}={value:g}", f"late={{'{column}': {value:g}}}"),
+        )
+
+    def _filtered(
+        self, what: str, other: str, column: str, constant: float, joints: Iterable[int] = ()
+    ) -> Suspicion:
+        value = float(f"{constant:.3g}")
+        return self.suspicion(
+            f"{what} went through a low pass of about {0.5 / np.pi / constant:.2g} Hz",
+            f"without one of first order with a time constant of {1e3 * constant:.1f} ms it agrees "
+            f"with the {other}, and far better than at any delay",
+            "suspected",
+            joints,
+            (f"--lowpass {column}={value:g}", f"lowpass={{'{column}': {value:g}}}"),
         )
 
     def _single(self, measurement: Measurement, lags: dict[int, float]) -> Iterator[Suspicion]:
@@ -249,9 +279,14 @@ class VelocityDelay(Check):
         if right < len(lags) / 2 or len(odd) > max(1, len(lags) / 3):
             return
         for k in odd:
-            value = float(f"{abs(lags[k]):.2g}")
+            value = float(f"{abs(_refined(measurement.signals, {k: lags[k]})):.3g}")
             late, early = ("velocity", "position") if lags[k] > 0 else ("position", "velocity")
             column = f"dq{k + 1}" if lags[k] > 0 else f"q{k + 1}"
+            constant = _lowpass(measurement.signals, {k: lags[k]})
+            if constant is not None:
+                what = f"the {late} of {measurement.joint(k)}"
+                yield self._filtered(what, early, column, constant, [k])
+                continue
             yield self.suspicion(
                 f"the {late} of {measurement.joint(k)} is late against its {early} by about "
                 f"{1e3 * value:g} ms, and that of other joints is not",
@@ -265,19 +300,9 @@ class VelocityDelay(Check):
 def _lag(signals: Signals, k: int) -> float:
     """Lag of a joint's velocity behind the rate of its position, s; NaN where it cannot be told."""
     errors, plain = np.zeros(len(LAGS)), 0.0
-    for rows in signals.segments:
-        time, q, dq = signals.clock[rows], signals.q[rows, k], signals.dq[rows, k]
-        if len(time) < 20 or time[-1] - time[0] < 10 * LAGS[-1] or np.any(np.diff(time) <= 0):
-            continue
-        area = np.r_[0.0, np.cumsum((dq[1:] + dq[:-1]) / 2 * np.diff(time))]
-        # change over windows, so that steps of an encoder do not count
-        begin = time[(time > time[0] + 0.15) & (time < time[-1] - 0.2)]
-        begin = begin[:: 1 + len(begin) * len(signals.segments) // WINDOWS]
-        change = np.interp(begin + 0.05, time, q) - np.interp(begin, time, q)
-        for i, lag in enumerate(LAGS):
-            later = np.interp(begin + 0.05 + lag, time, area) - np.interp(begin + lag, time, area)
-            errors[i] += float(np.sum((later - change) ** 2))
-        plain += float(np.sum(change**2))
+    for window in _windows(signals, k):
+        errors += [window.error(lag) for lag in LAGS]
+        plain += float(np.sum(window.change**2))
     best = int(np.argmin(errors))
     if plain <= 0 or best in (0, len(LAGS) - 1) or errors[best] > 0.1 * plain:
         return float("nan")
@@ -286,6 +311,112 @@ def _lag(signals: Signals, k: int) -> float:
     step = LAGS[1] - LAGS[0]
     lag = LAGS[best] + step * (0.5 * (left - right) / bend if bend > 0 else 0.0)
     return float(lag) if errors[best] < (1 - TAKEN) * errors[len(LAGS) // 2] else 0.0
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Windows of a stretch over which the way of a joint is compared with that by its velocity.
+
+    Attributes
+    ----------
+    time, q, dq : ndarray of shape (n_samples,)
+        The stretch.
+    begin : ndarray of shape (n_windows,), s
+        Where windows begin.
+    """
+
+    time: Array
+    q: Array
+    dq: Array
+    begin: Array
+
+    @cached_property
+    def change(self) -> Array:
+        """Change of the position over windows, so that steps of an encoder do not count."""
+        return self._over(self.q, 0.0)
+
+    @cached_property
+    def _area(self) -> Array:
+        way = np.cumsum((self.dq[1:] + self.dq[:-1]) / 2 * np.diff(self.time))
+        return np.asarray(np.r_[0.0, way])
+
+    def _over(self, values: Array, lag: float) -> Array:
+        start = self.begin + lag
+        later, sooner = (np.interp(x, self.time, values) for x in (start + 0.05, start))
+        return np.asarray(later - sooner)
+
+    def error(self, lag: float) -> float:
+        """Squared differences if the velocity is so late."""
+        return float(np.sum((self._over(self._area, lag) - self.change) ** 2))
+
+
+def _windows(signals: Signals, k: int) -> Iterator[Windows]:
+    for rows in signals.segments:
+        time, q, dq = signals.clock[rows], signals.q[rows, k], signals.dq[rows, k]
+        if len(time) < 20 or time[-1] - time[0] < 10 * LAGS[-1] or np.any(np.diff(time) <= 0):
+            continue
+        begin = time[(time > time[0] + 0.15) & (time < time[-1] - 0.2)]
+        yield Windows(time, q, dq, begin[:: 1 + len(begin) * len(signals.segments) // WINDOWS])
+
+
+def _refined(signals: Signals, lags: Mapping[int, float]) -> float:
+    """Lag of some velocities, all of one sign, at which they agree best with the positions, s."""
+    middle = float(np.median(list(lags.values())))
+    sign, own = np.sign(middle), []
+    for k in lags:
+        windows = list(_windows(signals, k))
+
+        def likelihood(size: float, windows: list[Windows] = windows) -> float:
+            return -sum(w.error(sign * size) for w in windows)
+
+        own.append(summit(likelihood, [share * abs(middle) for share in (0.8, 1.0, 1.2)])[0])
+    return float(sign * np.median(own))
+
+
+def _lowpass(signals: Signals, lags: Mapping[int, float]) -> float | None:
+    """Time constant of a low pass of all the positions, or velocities, that are late.
+
+    Parameters
+    ----------
+    signals : Signals
+        Recorded motion.
+    lags : mapping of int to float, s
+        Lag of the velocity of each joint that is late, all of one sign; of the position if
+        negative.
+
+    Returns
+    -------
+    float or None
+        None where a delay explains it as well.
+    """
+    constants = []
+    for k, lag in lags.items():
+        windows = list(_windows(signals, k))
+
+        def likelihood(
+            constant: float, windows: list[Windows] = windows, lag: float = lag
+        ) -> float:
+            total = 0.0
+            for w in windows:
+                q, dq = w.q, w.dq
+                if lag < 0:
+                    q = without_lowpass(w.time, q, constant)
+                else:
+                    dq = without_lowpass(w.time, dq, constant)
+                total -= Windows(w.time, q, dq, w.begin).error(0.0)
+            return total
+
+        size = abs(lag)
+        constant, best = summit(likelihood, [x * size for x in TRIED])
+        delayed = min(
+            sum(w.error(share * lag) for w in windows) for share in (0.8, 0.9, 1.0, 1.1, 1.2)
+        )
+        if -best > FILTERED * delayed:
+            return None
+        constants.append(constant)
+    middle = float(np.median(constants))
+    alike = np.all(np.abs(np.array(constants) / middle - 1) < SAME_FILTER)
+    return middle if alike else None
 
 
 class JoinedRecordings(Check):

@@ -56,11 +56,20 @@ def test_the_command_that_fixes_a_log_keeps_its_options(tmp_path, capsys):
         (["--zero", "q1"], "'q1' is not NAME=VALUE"),
         (["--gain", "tau1=much"], "'much' is not a number"),
         (["--order", "tau=1"], "is not an order of 2 joints"),
+        (["--order", "2,1,tau=2,1"], "'2,1' is of no quantity"),
+        (["--lowpass", "tau=-1"], "expected a signal and the positive time constant"),
     ],
 )
 def test_an_option_that_cannot_be_met_is_refused(flipped, capsys, option, words):
     assert main(["check", flipped, *option]) == 2
     assert words in capsys.readouterr().err
+
+
+def test_what_one_check_after_another_found_is_taken_together(flipped, capsys):
+    words = ["--gain", "tau1=2,tau1=0.5", "--late", "tau=0.01,tau=-0.01"]
+    assert main(["check", flipped, "--order", "q=1,2,tau=1,2", *words]) == 0
+    told = capsys.readouterr()
+    assert "gain: tau1 was multiplied by 1 in" in told.out + told.err
 
 
 def test_gravity_of_another_length_than_three_is_refused(flipped, capsys):

@@ -49,6 +49,9 @@ def test_order_and_zero_are_taken_back(read):
     np.testing.assert_allclose(mended["tau1"], LOG["tau1"])
     torques = read(LOG.assign(tau1=LOG["tau2"], tau2=LOG["tau1"]), order={"tau": [2, 1]})
     np.testing.assert_allclose(torques["tau1"], LOG["tau1"])
+    moved = {f"{q}{k}": LOG[f"{q}{3 - k}"] for q in ("q", "dq") for k in (1, 2)}
+    motion = read(LOG.assign(**moved), order={"motion": [2, 1]})
+    np.testing.assert_allclose(motion[["q1", "dq2", "tau1"]], LOG[["q1", "dq2", "tau1"]])
     np.testing.assert_allclose(
         read(LOG.assign(q1=LOG["q1"] + 1), zero={"q1": 1.0})["q1"], LOG["q1"]
     )
@@ -98,6 +101,20 @@ def test_delay_and_wrapped_positions_are_taken_out(read):
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
+def test_a_low_pass_is_undone_within_recordings(read):
+    filtered = LOG.copy()
+    for rows in LOG.groupby("trajectory").indices.values():
+        time, values = LOG["time"].to_numpy()[rows], LOG["tau1"].to_numpy()[rows].copy()
+        for i in range(1, len(rows)):
+            passed = 1 - np.exp((time[i - 1] - time[i]) / 0.03)
+            values[i] = values[i - 1] + passed * (values[i] - values[i - 1])
+        filtered.loc[rows, "tau1"] = values
+    mended = read(filtered, lowpass={"tau1": 0.03})
+    np.testing.assert_allclose(mended["tau1"], LOG["tau1"], atol=1e-9)
+    assert any(note.startswith("lowpass: one of 30 ms") for note in mended.attrs["notes"])
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
 def test_sign_from_the_command(read):
     command = {f"cmd{k}": LOG[f"q{k}"] + 0.01 * LOG[f"tau{k}"] for k in (1, 2)}
     unsigned = LOG.assign(tau1=LOG["tau1"].abs(), tau2=LOG["tau2"].abs(), **command)
@@ -117,6 +134,9 @@ def test_sign_from_the_command(read):
         ({"zero": {"tau1": 2.0}}, "zero: tau1 is not a position"),
         ({"zero": {"q1": float("nan")}}, "zero: q1 is to read nan"),
         ({"late": {"volts": 0.1}}, "late: the log has no volts"),
+        ({"lowpass": {"volts": 0.1}}, "lowpass: the log has no volts"),
+        ({"lowpass": {"tau": 0.0}}, "lowpass: tau1 is to be without a low pass of 0 s"),
+        ({"lowpass": {"time": 0.1}}, "lowpass: time is to be without"),
         ({"clock": "even"}, "clock is 'even'"),
         ({"torque_sign": "guess"}, "torque_sign is 'guess'"),
         ({"torque_sign": "command"}, "the log has no cmd1, cmd2"),

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Scales of torques, refined together with bodies that all joints share.
+
+What a torque is of that of the stated bodies says its scale to as many per cent as these bodies are
+off. Joints that move the same bodies tell scales against each other far better, so that bodies near
+the description and scales are found together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from skidyn._signals import Array
+from skidyn.measurement._fits import Fits, Reading
+from skidyn.measurement._near_bodies import ExtraColumns, Factored, NearBodies
+
+#: Steps at most, the largest one, and that which ends them.
+STEPS, FARTHEST, CLOSE = 8, 0.3, 1e-3
+#: Shares of their masses and lengths to which bodies are known: scales should follow from how
+#: joints feel the same bodies, and not from how far bodies are off.
+SHARE = 1.0
+#: How far a scale may be from that of the stated bodies, as a share of it (one standard deviation).
+KNOWN_TO = 0.5
+#: Standard errors, and share, up to which a factor is the round number that it is near, and up to
+#: which factors of several torques are the same, with the least and largest such share.
+ROUND, NEARLY, SAME, ALIKE = 1.5, 0.01, 2.0, (0.1, 0.35)
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Scales of torques, and how well they are known.
+
+    Attributes
+    ----------
+    gains : dict of int to float
+        What each torque is of that of the robot, by joint from 0.
+    errors : dict of int to float
+        Standard errors of their logarithms.
+    """
+
+    gains: dict[int, float]
+    errors: dict[int, float]
+
+    @property
+    def factors(self) -> dict[int, float]:
+        """Factors that take the scales off; one for all where they do not differ.
+
+        A round number near by is taken for a single one that is not known better.
+        """
+        logs = np.log([self.gains[k] for k in self.gains])
+        errors = np.array([self.errors[k] for k in self.gains]) + 1e-4
+        weight = errors**-2 / np.sum(errors**-2)
+        common = float(weight @ logs)
+        # that torques of several joints are all within a tenth by chance is unlikely
+        if len(logs) > 1 and np.all(np.abs(logs - common) < np.clip(SAME * errors, *ALIKE)):
+            one = _rounded(float(np.exp(-common)), float(np.sum(errors**-2) ** -0.5))
+            return dict.fromkeys(self.gains, one)
+        if len(logs) > 1:  # what they are against each other is known better than any of them
+            return {k: float(f"{1 / gain:.4g}") for k, gain in self.gains.items()}
+        return {k: _rounded(1 / gain, self.errors[k]) for k, gain in self.gains.items()}
+
+
+def refined_scales(fits: Fits, gains: Mapping[int, float], free: Mapping[int, float]) -> Scales:
+    """Scales of some torques with which bodies near those stated explain all torques best.
+
+    Parameters
+    ----------
+    fits : Fits
+        Rows.
+    gains : mapping of int to float
+        Scale of every torque whose scale is known, by joint from 0.
+    free : mapping of int to float
+        Scales that are refined, as far as they are known; the torques of other joints are at those
+        of ``gains``.
+    """
+    inflation = np.maximum(fits.identified(Reading()).inflation, 1.0)
+    now = np.ones(fits.n_joints)
+    for k, gain in {**gains, **free}.items():
+        now[k] = gain
+    joints = [k for k in free if fits.usable(k)]
+    near = NearBodies(fits, Reading(), np.ones(fits.n_joints), inflation)
+    torques = [fits.mean_torque(k)[0][use] for k, use in zip(near.joints, near.rows, strict=True)]
+    stated = [y - target for y, target in zip(torques, near.targets, strict=True)]
+    precision = np.full(len(joints), KNOWN_TO**-2)
+    errors = np.full(len(joints), KNOWN_TO)
+    for _ in range(STEPS if joints else 0):
+        near.targets = [
+            y / now[k] - x for k, y, x in zip(near.joints, torques, stated, strict=True)
+        ]
+        plain = near.fit_to(SHARE)
+        columns: dict[int, Array] = {}
+        for j, d, p, x, use in zip(
+            near.joints, near.designs, near.places, stated, near.rows, strict=True
+        ):
+            if j in joints:  # what bodies make, and not friction, that is free in any case
+                bodies = p < near.n_bodies
+                columns[j] = np.zeros((fits.n_rows, len(joints)))
+                columns[j][use, joints.index(j)] = x + d[:, bodies] @ plain.coefficients[p[bodies]]
+        found = near.fit_to(SHARE, ExtraColumns(columns, (), precision))
+        change = found.coefficients[-len(joints) :]
+        spread = Factored(found.gram).solve(np.eye(len(found.gram))[:, -len(joints) :])
+        errors = np.sqrt(np.maximum(np.diag(spread[-len(joints) :]), 0.0))
+        now[joints] *= 1 + np.clip(change, -FARTHEST, FARTHEST)
+        if np.abs(change).max() < CLOSE:
+            break
+    if set(joints) == set(near.joints):  # only stated bodies know all of them together
+        now[joints] *= np.median([free[k] / now[k] for k in joints])
+    known = dict(zip(joints, errors.tolist(), strict=True))
+    return Scales(
+        {k: float(now[k]) for k in free}, {k: float(known.get(k, KNOWN_TO)) for k in free}
+    )
+
+
+def _rounded(factor: float, error: float) -> float:
+    """A factor, or the number of two digits, or reciprocal of one, that it may as well be."""
+    near = (float(f"{factor:.2g}"), 1 / float(f"{1 / factor:.2g}"))
+    best = min(near, key=lambda x: abs(x / factor - 1))
+    within = abs(best / factor - 1) < min(NEARLY, ROUND * error)
+    return float(f"{best:.6g}" if within else f"{factor:.4g}")

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Low passes of first order: taken out of a channel, and told from a delay."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.signal import lfilter
+
+from skidyn._signals import Array
+from skidyn.measurement._delay import NEAR, JointFit
+from skidyn.measurement._fits import Fits, robust_likelihood
+
+#: Time constants that are tried, in lags that a delay in its place has; steps of their logarithm
+#: that are halved, and the least one.
+TRIED, STEP, LEAST_STEP = (0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0), 0.1, 0.005
+
+
+def without_lowpass(time: Array, values: Array, constant: float) -> Array:
+    """What a low pass of first order was given, from what came out of it.
+
+    Parameters
+    ----------
+    time : ndarray of shape (n_samples,), s
+        Rising stamps of one stretch.
+    values : ndarray of shape (n_samples,) or (n_samples, n_channels)
+        Filtered values.
+    constant : float, s
+        Time constant.
+
+    Returns
+    -------
+    ndarray of the shape of ``values``
+        The first one is that which came out: what came before it is not known.
+    """
+    out = np.array(values, dtype=float)
+    passed = 1 - np.exp(-np.diff(time) / constant)
+    passed = passed.reshape(-1, *([1] * (out.ndim - 1)))
+    out[1:] = values[:-1] + np.diff(values, axis=0) / passed
+    return out
+
+
+def summit(likelihood: Callable[[float], float], tried: Sequence[float]) -> tuple[float, float]:
+    """Positive number at which a likelihood is greatest, and that likelihood.
+
+    Parameters
+    ----------
+    likelihood : callable
+    tried : sequence of float
+        Where it is looked for first.
+    """
+    best, log = max((likelihood(x), float(np.log(x))) for x in tried)
+    step = STEP
+    while step > LEAST_STEP:
+        near, other = max((likelihood(float(np.exp(x))), x) for x in (log - step, log + step))
+        if near > best:
+            best, log = near, other
+        else:
+            step /= 2
+    return float(np.exp(log)), best
+
+
+def lowpass_of_torque(fits: Fits, lag: float, late: Sequence[int]) -> tuple[float, float]:
+    """Time constant of a low pass in the place of a delay, and log-likelihood gained over that.
+
+    Bodies are fitted to the torque without the low pass. What they leave goes through it again, so
+    that both hypotheses are of the torque as it was recorded.
+
+    Parameters
+    ----------
+    fits : Fits
+        Rows.
+    lag : float, s
+        About how late the torque seems to be.
+    late : sequence of int
+        Joints, from 0, whose torque is late.
+    """
+    together = JointFit(fits, late)
+    source, clock = fits.recorded, fits.signals.clock
+    steps = np.diff(clock)
+    step = float(np.median(steps))
+    parts = np.split(np.arange(len(clock)), np.flatnonzero(np.abs(steps / step - 1) > 0.5) + 1)
+
+    def filtered(constant: float) -> float:
+        torque = np.empty_like(source.torque)
+        for rows in source.segments:
+            torque[rows] = without_lowpass(source.clock[rows], source.torque[rows], constant)
+        samples = fits.torque.copy()
+        samples[:, late] = torque[source.picked][:, late]
+        left = together.left(samples, together.fit(samples))
+        passed = 1 - np.exp(-step / constant)
+        for column, k in enumerate(together.joints):
+            for part in parts if k in late else ():
+                start = [(1 - passed) * left[part[0], column]]
+                left[part, column], _ = lfilter(
+                    [passed], [1, passed - 1], left[part, column], zi=start
+                )
+        rest = fits.average(left)
+        return sum(robust_likelihood(rest[use, column]) for column, use in enumerate(together.rows))
+
+    def delayed(shift: float) -> float:
+        return together.likelihood(fits.torque_at(shift))
+
+    def still_late(constant: float) -> float:
+        """Lag of the torque without the low pass, by a parabola."""
+        torque = np.empty_like(source.torque)
+        for rows in source.segments:
+            torque[rows] = without_lowpass(source.clock[rows], source.torque[rows], constant)
+        other = replace(fits, recorded=replace(source, torque=torque))
+        left, middle, right = (
+            together.likelihood(other.torque_at(shift)) for shift in (-NEAR, 0.0, NEAR)
+        )
+        bend = 2 * middle - left - right
+        return float(np.clip(0.5 * (right - left) / bend, -1, 1)) * NEAR if bend > 0 else 0.0
+
+    constant, best = summit(filtered, [share * lag for share in TRIED])
+    _, other = summit(delayed, [share * lag for share in (0.8, 1.0, 1.2)])
+    # how late a low pass makes slow motion is known better than its form
+    return constant + still_late(constant), best - other
