@@ -89,7 +89,8 @@ class ELMCommittee(MultiOutputMixin, RegressorMixin, BaseEstimator):
         W = (\operatorname{cov}(h, h) + \tfrac{1 - p}{p} I)^{-1} \operatorname{cov}(h, \tau).
 
     Eq. 4 of [1]_ has means of products in place of covariances, and prints :math:`E[\tau \tau^T]`
-    where only :math:`E[h \tau^T]` has the dimensions of the output layer.
+    where only :math:`E[h \tau^T]` has the dimensions of the output layer. Its form is
+    ``ELMCommittee(fit_intercept=False, scaling=None)`` (:ref:`papers_own_forms`).
 
     References
     ----------

@@ -53,7 +53,8 @@ class BLLRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEst
 
     Members are trained on bootstraps of the log; their mean is the input of a meta-regressor,
     which is trained on predictions for trajectories that the averaged members have not seen. (The
-    paper [1]_ trains it on the rows that it then reports.)
+    paper [1]_ trains it on the rows that it then reports; :ref:`papers_own_forms` has all that
+    differs.)
 
     To learn what a physical model leaves over, put it into :class:`skidyn.hybrid.HybridRegressor`:
     ``HybridRegressor(physics, BLLRegressor())``.

@@ -140,7 +140,8 @@ class NDLRegressor(LSTMRegressor):
     """Nonparametric deep learning model: LSTM, fully connected layer, dropout, output.
 
     The network of [1]_, section 2.2.2: Glorot input weights, forget-gate bias 1; its scaling is
-    ``scaling="minmax"``. It learns the torque from positions, velocities and
+    ``scaling="minmax"``, and ``linear=False, direction=None`` leaves out what was added to it
+    (:ref:`papers_own_forms`). It learns the torque from positions, velocities and
     accelerations without any physics. Windows, training and prediction are those of
     :class:`LSTMRegressor`.
 

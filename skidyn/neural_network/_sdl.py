@@ -99,7 +99,8 @@ class SDLRegressor(SequenceRegressor):
         Whether the coefficients are optimised with the network.
     residual : bool, default=True
         Add the physical torque to the network's output, so that the network learns what is
-        missing. False is the paper's architecture, which only reads it.
+        missing. False is the paper's architecture, which only reads it
+        (:ref:`papers_own_forms` has all that differs).
     cv : int, cross-validator, iterable of splits or None, default=3
         Folds, by trajectory (or by blocks of a single one) where it is a number, on which copies of
         the model are held out to find ``learned_weight_``. None keeps all that the network learned
