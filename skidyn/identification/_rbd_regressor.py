@@ -511,6 +511,11 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
             raise ValueError(f"forgetting={self.forgetting!r}; expected a weight above 0, up to 1")
         if self.prior_std is not None and not self.prior_std > 0:
             raise ValueError(f"prior_std={self.prior_std!r}; expected a number above 0, or None")
+        if self.estimator == "entropic" and self.prior_std == np.inf:
+            raise ValueError(
+                "prior_std=inf leaves estimator='entropic' without a prior; give a finite number, "
+                "None, or estimator='ordinary' with consistent=True"
+            )
         return find_estimator(self.estimator)
 
     def _store_evidence(self, evidence: Evidence, terms: Sequence[Term]) -> None:

@@ -113,3 +113,5 @@ def test_without_trust_in_the_urdf_it_is_least_squares():
     held = RBDRegressor(robot, **given).fit(X, y).predict(X)
     truth = robot.inverse_dynamics(q, dq, ddq) + 2 * dq
     assert rms(held - truth) < rms(plain - truth)
+    with pytest.raises(ValueError, match="prior_std=inf leaves estimator='entropic' without"):
+        RBDRegressor(robot, estimator="entropic", prior_std=np.inf).fit(X, y)
