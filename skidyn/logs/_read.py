@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import os
 import re
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -214,7 +213,7 @@ def read_log(
         if tables:
             _refuse_other_columns(table, match.joint_names, tables[0], joints, file)
         joints = match.joint_names
-        notes += [note.removeprefix(f"{file}: ") for note in match.notes]
+        notes += dict.fromkeys(note.removeprefix(f"{file}: ") for note in match.notes)
         _, number = np.unique(table["trajectory"], return_inverse=True)
         if tables or len(found) > 1 or found[0].files[1:]:
             table["trajectory"] = number + len(files) + 1
@@ -254,21 +253,24 @@ def _check_mapping(name: str, value: Any, kinds: tuple[type, ...]) -> None:
 _OF = re.compile(r"(\d+) of (\d+)")
 
 
-def _summed(notes: Sequence[str]) -> list[str]:
-    """Notes of remedies that differ by their counts alone, as one with the sums.
+def _counted(notes: Sequence[str]) -> dict[str, int]:
+    """In how many files each note is; those of remedies that differ by counts alone are summed.
 
-    >>> _summed(["flip: 1 of 3 rows", "cut", "flip: 2 of 4 rows"])
-    ['flip: 3 of 7 rows', 'cut']
+    >>> _counted(["flip: 1 of 3 rows", "cut", "flip: 2 of 4 rows"])
+    {'flip: 3 of 7 rows': 2, 'cut': 1}
     """
-    sums: dict[str, list[int]] = {}
+    alike: dict[str, list[str]] = {}
     for note in notes:
-        told = _OF.search(note) if note.startswith(REMEDIES) else None
-        here = [int(told[1]), int(told[2])] if told else [0, 0]
-        key = _OF.sub("\0", note, count=1) if told else note
-        sums[key] = [a + b for a, b in zip(sums.get(key, [0, 0]), here, strict=True)]
-    kept = [n for n in notes if not (n.startswith(REMEDIES) and _OF.search(n))]
-    summed = [key.replace("\0", f"{a} of {b}") for key, (a, b) in sums.items() if key not in kept]
-    return [*summed, *kept]
+        summed = note.startswith(REMEDIES) and _OF.search(note)
+        alike.setdefault(_OF.sub("\0", note, count=1) if summed else note, []).append(note)
+    counts: dict[str, int] = {}
+    for key, same in alike.items():
+        told = [_OF.search(note) for note in same] if "\0" in key else []
+        pairs = [(int(hit[1]), int(hit[2])) for hit in told if hit]
+        if pairs:
+            key = key.replace("\0", "{} of {}".format(*map(sum, zip(*pairs, strict=True))))
+        counts[key] = len(same)
+    return counts
 
 
 def _told_once(notes: Sequence[str], n_files: int) -> list[str]:
@@ -277,8 +279,7 @@ def _told_once(notes: Sequence[str], n_files: int) -> list[str]:
     >>> _told_once(["no velocities", "cut", "no velocities"], 3)
     ['no velocities (2 of 3 files)', 'cut (1 of 3 files)']
     """
-    notes = _summed(notes)
-    counts = Counter(notes)
+    counts = _counted(notes)
     if n_files == 1:
         return list(counts)
     return [f"{note} ({count} of {n_files} files)" for note, count in counts.items()]

@@ -191,8 +191,15 @@ def mend_rows(table: pd.DataFrame, n: int, remedies: Remedies, notes: list[str])
         from skidyn.preprocessing import advance_channels  # only for this: it brings scikit-learn
 
         before = len(table)
-        _each(remedies.late, table, "late")
+        for name, delay in _each(remedies.late, table, "late"):
+            if not np.isfinite(delay):
+                raise LogError(f"late: {name} is late by {delay:g}; expected seconds.")
         table = advance_channels(table, dict(remedies.late))
+        if table.empty:
+            raise LogError(
+                f"late: no recording is as long as the delays {dict(remedies.late)} in s take, so "
+                "that no row is left."
+            )
         told = ", ".join(f"{name} by {1e3 * v:g} ms" for name, v in remedies.late.items())
         notes.append(
             f"late: {told} taken out; {before - len(table)} of {before} rows, at the ends of "

@@ -21,7 +21,7 @@ from skidyn.robots._dynamics import PARAMETER_SYMBOLS, RigidBodyDynamics
 from skidyn.robots._mjcf import parse_mjcf
 from skidyn.robots._sdf import parse_sdf
 from skidyn.robots._urdf import parse_urdf
-from skidyn.robots._xml import first_element, parse_robot_element, read_description
+from skidyn.robots._xml import first_element, name_of, parse_robot_element, read_description
 
 #: By how much frames of a chain may differ from its description, m: it went through float32.
 _SINGLE_PRECISION = 1e-5
@@ -206,7 +206,8 @@ class Robot(RigidBodyDynamics):
         >>> robot.gravity_torque([[1.5707963267948966]]).round(2)
         array([[9.81]])
         """
-        description = parse_urdf(parse_robot_element(read_description(source)))
+        data = read_description(source)
+        description = parse_urdf(parse_robot_element(data, name_of(source)))
         return cls._from_description(description, joints, gravity)
 
     @classmethod

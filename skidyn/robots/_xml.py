@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 from xml.parsers import expat
@@ -51,6 +52,12 @@ def read_description(source: str | bytes | os.PathLike[str]) -> bytes:
     return data
 
 
+def name_of(source: str | bytes | os.PathLike[str]) -> str:
+    """Path of a description; a usual one where the source is the text itself."""
+    is_text = isinstance(source, bytes) or str(source).lstrip("\ufeff \t\r\n").startswith("<")
+    return "robot.urdf.xacro" if is_text else os.fsdecode(source)
+
+
 def first_element(data: bytes) -> str:
     """Name of the root element, which says the format of a description; empty if there is none."""
     text = re.sub(rb"<!--.*?-->|<\?.*?\?>", b"", data[:100_000], flags=re.DOTALL)
@@ -58,8 +65,10 @@ def first_element(data: bytes) -> str:
     return hit[1].decode() if hit else ""
 
 
-def parse_robot_element(data: bytes) -> ElementTree.Element:
+def parse_robot_element(data: bytes, path: str = "robot.urdf.xacro") -> ElementTree.Element:
     """Root element with only links and joints in it, free of anything a parser could expand.
+
+    The path is that of an error message.
 
     Raises
     ------
@@ -74,9 +83,11 @@ def parse_robot_element(data: bytes) -> ElementTree.Element:
             + (f" Robot.{reader} reads it." if reader else "")
         )
     if any("xacro" in element.tag for element in root.iter() if isinstance(element.tag, str)):
+        expanded = Path(path).name.removesuffix(".xacro").removesuffix(".urdf") + ".urdf"
+        expanded = expanded if expanded != Path(path).name else f"expanded_{expanded}"
         raise RobotDescriptionError(
-            "The description holds xacro macros; expand them first: "
-            "xacro robot.urdf.xacro > robot.urdf (pip install xacro brings it without ROS)."
+            f"The description holds xacro macros; expand them first: xacro {shlex.quote(path)} > "
+            f"{shlex.quote(expanded)} (pip install xacro brings it without ROS)."
         )
     for element in list(root):
         if element.tag == "link":

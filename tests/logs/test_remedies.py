@@ -134,6 +134,8 @@ def test_sign_from_the_command(read):
         ({"zero": {"tau1": 2.0}}, "zero: tau1 is not a position"),
         ({"zero": {"q1": float("nan")}}, "zero: q1 is to read nan"),
         ({"late": {"volts": 0.1}}, "late: the log has no volts"),
+        ({"late": {"tau": 100.0}}, "late: no recording is as long as"),
+        ({"late": {"tau": float("nan")}}, "late: tau1 is late by nan"),
         ({"lowpass": {"volts": 0.1}}, "lowpass: the log has no volts"),
         ({"lowpass": {"tau": 0.0}}, "lowpass: tau1 is to be without a low pass of 0 s"),
         ({"lowpass": {"time": 0.1}}, "lowpass: time is to be without"),

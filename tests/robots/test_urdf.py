@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 
+from skidyn.exceptions import RobotDescriptionError
 from skidyn.robots import Robot
 
 GOOD_INERTIA = '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>'
@@ -152,3 +153,10 @@ def test_standard_defaults():
     assert arm.inertial_parameters[1].tolist() == [0] * 10
     assert arm.position_limits.tolist() == [[-np.inf, np.inf], [-1, 1]]
     assert arm.joint_types == ("continuous", "revolute")
+
+
+def test_xacro_is_expanded_by_a_command_that_can_be_copied(tmp_path):
+    path = tmp_path / "arm.urdf.xacro"
+    path.write_text('<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:m/></robot>')
+    with pytest.raises(RobotDescriptionError, match=r"xacro \S+arm\.urdf\.xacro > arm\.urdf "):
+        Robot.from_urdf(path)
