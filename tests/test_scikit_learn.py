@@ -36,6 +36,7 @@ from sklearn.model_selection import (
 from sklearn.multioutput import MultiOutputRegressor
 from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import FunctionTransformer, StandardScaler
+from sklearn.utils.fixes import parse_version
 
 import skidyn
 from skidyn.committee import ELMCommittee
@@ -390,7 +391,14 @@ class Spy(RegressorMixin, BaseEstimator):
         (make_pipeline(DropKeys(), StandardScaler(), Spy()), 3),
         (make_pipeline(FrictionTransformer(), Spy()), 5),
         (make_pipeline(SignalScaler(), StandardScaler(), Spy()), 3),
-        (VotingRegressor([("own", OwnJointRegressor(Ridge())), ("spy", Spy())]), 3),
+        pytest.param(
+            VotingRegressor([("own", OwnJointRegressor(Ridge())), ("spy", Spy())]),
+            3,
+            marks=pytest.mark.skipif(
+                parse_version(sklearn.__version__) < parse_version("1.7"),
+                reason="this VotingRegressor in a bag gives weights to members that take none",
+            ),
+        ),
     ],
 )
 @pytest.mark.parametrize("table", [X, X.to_numpy()], ids=["names", "positions"])
