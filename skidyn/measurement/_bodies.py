@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from skidyn._signals import Array
 from skidyn.measurement._check import Check
 from skidyn.measurement._fits import Fits, Outcome, Reading, fit_admissible, friction
-from skidyn.measurement._gains import refined_scales
+from skidyn.measurement._gains import Scales, refined_scales
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import readable_fits
@@ -28,6 +28,8 @@ USUAL = (0.4, 2.5)
 CLEARLY = (0.62, 1.6)
 #: Multiples of an effort limit that only another unit reaches.
 FAR = 20.0
+#: Standard error of a scale that is told although stated bodies alone do not tell it.
+TELLING = 0.15
 #: Rates of clock and velocities that are tried.
 RATES = (0.1, 0.2, 0.33, 0.5, 2.0, 3.0, 5.0, 10.0)
 AS_IT_IS = Reading()
@@ -171,7 +173,7 @@ class TorqueScale(Check):
             "ampere of the drives (--drive-gains with i columns)",
             "suspected",
             sorted(gains),
-            _gain_remedy(refined_scales(fits, {}, gains).factors),
+            _gain_remedy(_all_factors(fits, gains, typical)),
         )
 
     def _of_joints(
@@ -228,6 +230,14 @@ class TorqueScale(Check):
                 joints,
                 _gain_remedy({k: factors[k] for k in joints}),
             )
+
+
+def _all_factors(fits: Fits, gains: dict[int, float], typical: float) -> dict[int, float]:
+    """Factors of torques none of which is at its scale; those of unknown ones are free, too."""
+    usable = [k for k in range(fits.n_joints) if fits.usable(k)]
+    found = refined_scales(fits, {}, {k: gains.get(k, typical) for k in usable})
+    known = [k for k in usable if k in gains or found.errors[k] < TELLING]
+    return Scales({k: found.gains[k] for k in known}, {k: found.errors[k] for k in known}).factors
 
 
 def _rate_gain(fits: Fits, rate: float) -> float:

@@ -12,13 +12,15 @@ from numpy.typing import NDArray
 from skidyn._signals import Array, Signals, find_segments
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._measures import position_step
+from skidyn.measurement._measures import is_repeated, position_step
 from skidyn.measurement._suspicion import Suspicion
 
 #: Stamps nearer than this share of a step to a regular clock do not jitter.
 REGULAR = 1e-3
 #: Half width in samples of the polynomial that predicts a position from its neighbours.
 NEIGHBOURS = np.array([-2, -1, 1, 2])
+#: Fewest rows of a stretch, and rows away from repetitions without which all of them count.
+SHORTEST, FRESH = 8, 200
 #: Twice the log-likelihood ratio from which the stamps are told to jitter, and surely do.
 TOLD, CERTAIN = 20.0, 60.0
 #: Steps by which stamps may be off a clock that is still regular.
@@ -146,7 +148,12 @@ class Jitter:
     ratio: float
 
 
-def find_jitter(time: Array, q: Array, trajectory: NDArray[np.int64]) -> Jitter:
+def find_jitter(
+    time: Array,
+    q: Array,
+    trajectory: NDArray[np.int64],
+    repeated: NDArray[np.bool_] | None = None,
+) -> Jitter:
     """Whether the stamps jitter or the samples really were uneven.
 
     Each position is predicted from its four neighbours by a cubic over time, once with the stamps
@@ -160,6 +167,8 @@ def find_jitter(time: Array, q: Array, trajectory: NDArray[np.int64]) -> Jitter:
         Recorded positions.
     trajectory : ndarray of shape (n_samples,)
         Trajectory of every row.
+    repeated : ndarray of shape (n_samples,) of bool, optional
+        Rows that repeat the one before; what is next to one follows neither clock.
     """
     regular = regular_clock(time, trajectory)
     segments = find_segments(trajectory, time)
@@ -170,9 +179,12 @@ def find_jitter(time: Array, q: Array, trajectory: NDArray[np.int64]) -> Jitter:
     for clock in (time, regular):
         parts = [_prediction_errors(clock[rows], q[rows]) for rows in segments]
         errors.append(np.concatenate(parts))
+    if repeated is not None and repeated.any():
+        fresh = np.concatenate([_all_fresh(~repeated[rows]) for rows in segments])
+        if len(fresh) == len(errors[0]) and fresh.sum() > FRESH:
+            errors = [e[fresh] for e in errors]
     for k in range(q.shape[1]):
-        moving = np.ones(len(errors[0]), dtype=bool)
-        with_stamps, even = (np.abs(e[moving, k]) for e in errors)
+        with_stamps, even = (np.abs(e[:, k]) for e in errors)
         # the larger half says what the clock does; the rest are rows in which a joint rests
         sizes = [float(np.mean(np.sort(e)[len(e) // 2 :] ** 2)) for e in (with_stamps, even)]
         if min(sizes) <= 0:
@@ -183,10 +195,17 @@ def find_jitter(time: Array, q: Array, trajectory: NDArray[np.int64]) -> Jitter:
     return Jitter(spread, float(margin), float(np.max(ratios)) if ratios else 1.0)
 
 
+def _all_fresh(fresh: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Whether a row and two on either side are no repetitions, of all rows but two at each end."""
+    if len(fresh) < SHORTEST:
+        return np.zeros(0, dtype=bool)
+    return np.asarray(np.all([fresh[k : len(fresh) - 4 + k] for k in range(5)], axis=0))
+
+
 def _prediction_errors(time: Array, q: Array) -> Array:
     """Positions less their prediction by the cubic through two neighbours on either side."""
     n = len(time)
-    if n < 8 or np.any(np.diff(time) <= 0):
+    if n < SHORTEST or np.any(np.diff(time) <= 0):
         return np.zeros((0, q.shape[1]))
     middle = np.arange(2, n - 2)
     around = time[middle[:, None] + NEIGHBOURS]
@@ -220,7 +239,8 @@ class ClockJitter(Check):
         if len(measurement.steps) < 50 or np.any(measurement.steps <= 0):
             return
         step = float(np.mean(measurement.steps[measurement.steps < 2.5 / measurement.rate]))
-        found = find_jitter(signals.clock, signals.q, signals.trajectory)
+        again = is_repeated(signals.q, signals.dq, signals.trajectory)
+        found = find_jitter(signals.clock, signals.q, signals.trajectory, again)
         if found.spread < REGULAR * step:
             return
         size = (

@@ -25,8 +25,9 @@ SHARE = 1.0
 #: How far a scale may be from that of the stated bodies, as a share of it (one standard deviation).
 KNOWN_TO = 0.5
 #: Standard errors, and share, up to which a factor is the round number that it is near, and up to
-#: which factors of several torques are the same, with the least and largest such share.
-ROUND, NEARLY, SAME, ALIKE = 1.5, 0.01, 2.0, (0.1, 0.35)
+#: which factors of several torques are the same where they are known to a tenth; standard errors
+#: up to which one that is not may be the same.
+ROUND, NEARLY, ALIKE, KNOWN, FAR = 1.5, 0.01, 0.1, 0.1, 3.0
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,8 @@ class Scales:
     gains : dict of int to float
         What each torque is of that of the robot, by joint from 0.
     errors : dict of int to float
-        Standard errors of their logarithms.
+        Standard errors of their logarithms; where all torques are at another scale, against their
+        mean.
     """
 
     gains: dict[int, float]
@@ -54,8 +56,9 @@ class Scales:
         errors = np.array([self.errors[k] for k in self.gains]) + 1e-4
         weight = errors**-2 / np.sum(errors**-2)
         common = float(weight @ logs)
+        apart, known = np.abs(logs - common), errors < KNOWN
         # that torques of several joints are all within a tenth by chance is unlikely
-        if len(logs) > 1 and np.all(np.abs(logs - common) < np.clip(SAME * errors, *ALIKE)):
+        if known.sum() > 1 and np.all(apart < np.where(known, ALIKE, FAR * errors)):
             one = _rounded(float(np.exp(-common)), float(np.sum(errors**-2) ** -0.5))
             return dict.fromkeys(self.gains, one)
         if len(logs) > 1:  # what they are against each other is known better than any of them
@@ -106,7 +109,11 @@ def refined_scales(fits: Fits, gains: Mapping[int, float], free: Mapping[int, fl
         now[joints] *= 1 + np.clip(change, -FARTHEST, FARTHEST)
         if np.abs(change).max() < CLOSE:
             break
-    if set(joints) == set(near.joints):  # only stated bodies know all of them together
+    if joints and set(joints) == set(near.joints):  # only stated bodies know all of them together
+        cov = spread[-len(joints) :]
+        mean = 1 / np.diag(cov) / np.sum(1 / np.diag(cov))
+        against = np.eye(len(joints)) - mean
+        errors = np.sqrt(np.maximum(np.diag(against @ cov @ against.T), 0.0))
         now[joints] *= np.median([free[k] / now[k] for k in joints])
     known = dict(zip(joints, errors.tolist(), strict=True))
     return Scales(

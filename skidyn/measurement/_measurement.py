@@ -175,7 +175,7 @@ class Measurement:
         odd = list(self.odd_motion)
         parts = [rows for rows in s.segments if s.trajectory[rows.start] not in odd]
         return [
-            velocity_consistency(s.clock, self._unwrapped(k)[fresh], s.dq[:, k], parts)
+            velocity_consistency(s.clock, self.unwrapped[fresh, k], s.dq[:, k], parts)
             for k in range(self.n_joints)
         ]
 
@@ -186,15 +186,24 @@ class Measurement:
             return {}  # parts between leaps have no numbers of their own
         from skidyn.measurement._odd_motion import odd_motion
 
-        every = range(self.n_joints)
-        return odd_motion(self.signals, np.column_stack([self._unwrapped(k) for k in every]))
+        return odd_motion(self.signals, self.unwrapped)
 
-    def _unwrapped(self, k: int) -> Array:
-        """Position without leaps by a turn, where it stays within one."""
-        q = self.whole.q[:, k].copy()
-        if not self.signals.prismatic[k] and np.ptp(q) < 1.1 * 2 * np.pi:
+    @cached_property
+    def unwrapped(self) -> Array:
+        """Positions without leaps by a turn, where they stay within one.
+
+        Of one that leaps, recordings may lie a turn apart as well.
+        """
+        q = self.whole.q.copy()
+        turn = 2 * np.pi
+        for k in np.flatnonzero(~self.signals.prismatic & (np.ptp(q, axis=0) < 1.1 * turn)):
             for rows in self.signals.segments:
-                q[rows] = np.unwrap(q[rows])
+                q[rows, k] = np.unwrap(q[rows, k])
+            if np.array_equal(q[:, k], self.whole.q[:, k]):
+                continue
+            middles = [float(np.median(q[rows, k])) for rows in self.signals.segments]
+            for rows, own in zip(self.signals.segments, middles, strict=True):
+                q[rows, k] -= turn * np.round((own - middles[0]) / turn)
         return q
 
     @cached_property

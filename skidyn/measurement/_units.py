@@ -224,7 +224,8 @@ class PositionUnit(Check):
         where = f"the limit is {limits[k]:.3g} rad" if known[k] else "a turn has 6.28 rad"
         seen = f"q{k + 1} ({measurement.joint_names[k]}) reaches {largest[k]:.4g} rad where {where}"
         degrees = bool(np.all(largest[turning] * DEGREE <= 1.1 * limits[turning]))
-        if float(np.median(largest[turning])) < LEAST_DEGREES and degrees:
+        usual = float(np.quantile(largest[turning], 0.5, method="lower"))  # of two the smaller
+        if usual < LEAST_DEGREES and degrees:
             outside &= _too_far(measurement, DISTANT)  # else its zero may be elsewhere
             if not outside.any():
                 return
@@ -247,7 +248,7 @@ class PositionUnit(Check):
                 (f"--gain {words}", f"gain={moving}"),
             )
         elif degrees:
-            certain = bool((outside & known).any()) or float(np.median(largest[turning])) > 25
+            certain = bool((outside & known).any()) or usual > 25
             yield self.suspicion(
                 "positions look like degrees",
                 f"{seen}; read as degrees it would be {largest[k] * DEGREE:.3g} rad",
@@ -279,7 +280,7 @@ def _limits(measurement: Measurement) -> tuple[NDArray[np.bool_], Array, NDArray
 def _too_far(measurement: Measurement, times: float) -> NDArray[np.bool_]:
     """Turning joints whose positions go so many times their limits, or turns, away."""
     turning, limits, _ = _limits(measurement)
-    q = measurement.signals.q
+    q = measurement.unwrapped  # a position that was wrapped goes no farther
     # Whole turns too many are no other unit.
     q = q - 2 * np.pi * np.round(np.median(q, axis=0) / (2 * np.pi))
     return np.asarray(turning & (np.abs(q).max(axis=0) > times * limits))
