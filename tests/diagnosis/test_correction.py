@@ -8,6 +8,7 @@ import sklearn
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.compose import TransformedTargetRegressor
 from sklearn.linear_model import Ridge
+from sklearn.metrics import make_scorer, r2_score
 from sklearn.model_selection import GridSearchCV, GroupKFold, cross_val_score
 from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import FunctionTransformer, StandardScaler
@@ -109,6 +110,8 @@ def test_weights_reach_the_steps_of_a_corrected_pipeline(tmp_path):
             LOG.y,
             cv=GroupKFold(2),
             params={"groups": LOG.X["trajectory"], "sample_weight": weight},
+            # before scikit-learn 1.7 a Pipeline's own score asks for a request
+            scoring=make_scorer(r2_score).set_score_request(sample_weight=True),
             error_score="raise",
         )
     assert np.isfinite(scores).all()
