@@ -33,7 +33,7 @@ MOST_ROWS, MOST_SIGNALS = 2000, 3
 #: Trees after which a first look tells whether there is anything, and all of them.
 TREES = (15, 50)
 #: Share of the squared residual that must be predictable, and the chance that it only seems so.
-LEAST_SHARE, CHANCE = 0.03, 0.005
+LEAST_SHARE, CHANCE = 0.03, 0.05
 #: A signal counts if shuffling it costs this share of what shuffling the strongest one costs.
 COUNTS = 0.1
 #: A further product must bring this share of the squared residual.
@@ -155,9 +155,10 @@ def _solved(gram: Array, right: Array) -> Array:
 def _predictable(before: Array, after: Array) -> bool:
     """Whether a learner takes away more of the squared errors of folds left out than chance would.
 
-    The gain of a fold is relative to its own error, so that one lively fold does not decide.
+    The gain of a fold is relative to its own error and that of an average fold, so that neither one
+    lively fold decides nor one in which there is nothing to predict.
     """
-    gain = (before - after) / np.maximum(np.maximum(before, after), 1e-300)
+    gain = (before - after) / np.maximum(np.maximum(before, after) + before.mean(), 1e-300)
     enough = bool(after.sum() < (1 - LEAST_SHARE) * before.sum())
     return enough and float(ttest_1samp(gain, 0.0, alternative="greater").pvalue) < CHANCE
 

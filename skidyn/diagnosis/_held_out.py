@@ -3,17 +3,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array
+from skidyn.diagnosis._rule import CONFINED
 from skidyn.effects import Term, TermSum
 from skidyn.evidence import Problem, left_out_coefficients
-
-#: Share of the squares of a term's columns from which on a fold tells it alone.
-ALONE = 0.5
 
 
 def held_out_residual(
@@ -86,7 +84,20 @@ def folds_alone(problem: Problem, term: Term) -> NDArray[np.bool_]:
         return np.ones(problem.n_folds, dtype=bool)
     if term.effect.nameless:
         return np.zeros(problem.n_folds, dtype=bool)
+    return shares_of_folds(problem, problem.term_rows(term)) > CONFINED
+
+
+def shares_of_folds(problem: Problem, rows: Mapping[int, Array]) -> Array:
+    """Shares of the squares of some columns that lie in each fold, shape (n_folds,).
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows and folds.
+    rows : mapping of int to ndarray of shape (n_rows_j, k)
+        Averaged columns, per joint they reach.
+    """
     energy = np.zeros(problem.n_folds)
-    for j, rows in problem.term_rows(term).items():
-        energy += np.bincount(problem.fold[j], np.sum(rows**2, axis=1), problem.n_folds)
-    return np.asarray(energy > ALONE * energy.sum())
+    for j, columns in rows.items():
+        energy += np.bincount(problem.fold[j], np.sum(columns**2, axis=1), problem.n_folds)
+    return np.asarray(energy / max(float(energy.sum()), 1e-300))

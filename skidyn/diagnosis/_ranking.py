@@ -117,17 +117,24 @@ class RankingSearch(SearchState):
 
     def _screening(self, nameless: bool = True) -> list[Callable[[], _Greedy]]:
         """A look for each kind."""
-        screen = Screen(self.problem, self.sigma, self.pool, self.target)
         kinds = np.array([c.kind for c in self.pool])
-        base_model = screen.model(self.blocks)
-        first = screen.step(base_model)
-        self._drops = base_model.errors.sum() - first.sum(1)
+        within = np.array([self.is_judged_within(c) for c in self.pool], dtype=bool)
         tester = self.tester(self.chosen)
-        return [
-            partial(self._greedy, screen, kinds == kind, base_model, first, tester)
-            for kind in dict.fromkeys(kinds)
-            if nameless or kind != UNKNOWN
-        ]
+        self._drops = np.full(len(self.pool), -np.inf)
+        looks: list[Callable[[], _Greedy]] = []
+        for wanted, inside in ((~within, False), (within, True)):
+            if not wanted.any():
+                continue
+            screen = Screen(self.problem, self.sigma, self.pool, self.target, within=inside)
+            base = screen.model(self.blocks)
+            first = screen.step(base, wanted)
+            self._drops[wanted] = base.errors.sum() - first[wanted].sum(1)
+            looks += [
+                partial(self._greedy, screen, wanted & (kinds == kind), base, first, tester)
+                for kind in dict.fromkeys(kinds[wanted])
+                if nameless or kind != UNKNOWN
+            ]
+        return looks
 
     def _greedy(
         self, screen: Screen, wanted: Mask, base: Model, first: Array, tester: Tester
@@ -225,7 +232,7 @@ class RankingSearch(SearchState):
         for i, candidates in enumerate(track(rough, f"{self._round}: refining the best")):
             kind = candidates[0].kind
             candidates = [replace(c, rows=self.problem.term_rows(c.term)) for c in candidates]
-            within = any(some_recordings(c) for c in candidates)
+            within = any(map(self.is_judged_within, candidates))
             hypothesis = Hypothesis(kind, tuple(candidates), np.zeros(0), 0.0, 0)
             if i < self.settings.refined and any(c.n_shapes for c in candidates):
                 candidates, after = self._refined(candidates, within)

@@ -237,7 +237,7 @@ class ReconsideringSearch(JudgingSearch):
 
     def _needless(self, old: Hypothesis, without: list[Candidate]) -> bool:
         """Whether an earlier finding became the shadow of others."""
-        within = within_recordings(old)
+        within = any(map(self.is_judged_within, old.candidates))
         errors = [
             profile_error(
                 self.problem, self.blocks_with(some), self.sigma, self.target, within=within

@@ -60,6 +60,9 @@ NEGLIGIBLE = 0.05
 #: by a noise that was mostly itself: unless it is more than this sure, it is tested again with what
 #: it leaves, found in so many rounds.
 MASKED, SURE, ROUNDS = 0.3, 1e-9, 3
+#: Share of an effect in one fold above which the others tell nothing of it: parts of recordings are
+#: held out in place of whole ones.
+CONFINED = 0.8
 
 #: What is less likely right than this, and removes a smaller share of the error, is no finding,
 #: unless another name equals it: one of two (``_conclusion.py``; ``confidence.py``).

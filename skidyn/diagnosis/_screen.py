@@ -12,13 +12,14 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
+from skidyn.diagnosis._profile import QUARTERS
 from skidyn.evidence import (
     RIDGE,
     Felt,
@@ -62,6 +63,8 @@ class Screen:
         What might be missing.
     target : list of ndarray
         Averaged torque of every joint.
+    within : bool, default=False
+        Leave out interleaved parts of every trajectory instead of whole ones.
     """
 
     def __init__(
@@ -70,11 +73,19 @@ class Screen:
         sigma: Array,
         candidates: Sequence[Candidate],
         target: Sequence[Array],
+        *,
+        within: bool = False,
     ) -> None:
         self.problem = problem
         self.sigma = sigma
         self.target = [y / s for y, s in zip(target, sigma, strict=True)]
-        self.folds = [list(fold_slices(fold, problem.n_folds)) for fold in problem.fold]
+        self.folds: list[list[Any]]
+        if within:
+            parts = range(QUARTERS)
+            self.folds = [[np.flatnonzero(q == k) for k in parts] for q in problem.rows.quarter]
+        else:
+            self.folds = [list(fold_slices(fold, problem.n_folds)) for fold in problem.fold]
+        self.n_folds = len(self.folds[0])
         self.candidates = list(candidates)
         self._groups = self._group()
 
@@ -97,7 +108,7 @@ class Screen:
     def model(self, blocks: Sequence[dict[int, Array]]) -> Model:
         """Prepare the model with some blocks of columns added to the rigid body."""
         felt, width = felt_columns(self.problem, blocks, self.sigma)
-        n_folds = self.problem.n_folds
+        n_folds = self.n_folds
         gram, cross = np.zeros((n_folds, width, width)), np.zeros((n_folds, width))
         square = np.zeros(n_folds)
         for j, (own, y) in enumerate(zip(felt, self.target, strict=True)):
@@ -136,7 +147,7 @@ class Screen:
         Candidates that are not ``wanted``, and those whose coefficients come out with a sign or a
         magnitude that physics forbids, get infinity.
         """
-        errors = np.full((len(self.candidates), self.problem.n_folds), np.inf)
+        errors = np.full((len(self.candidates), self.n_folds), np.inf)
         for some in self._in_parts(wanted):
             parts = [self._products_of(model, group, pick) for group, pick in some]
             ends = np.cumsum([part.cross.shape[2] for part in parts])
@@ -161,7 +172,7 @@ class Screen:
 
     def _products_of(self, model: Model, group: _Group, pick: NDArray[np.int64]) -> _Columns:
         """Products of some candidates' columns, which are put side by side only meanwhile."""
-        k, n_folds = group.width, self.problem.n_folds
+        k, n_folds = group.width, self.n_folds
         own = np.zeros((n_folds, len(pick), k, k))
         target = np.zeros((n_folds, len(pick) * k))
         cross = np.zeros((*model.cross.shape, len(pick) * k))

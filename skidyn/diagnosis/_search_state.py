@@ -18,15 +18,18 @@ from skidyn.diagnosis._hypothesis import (
     Hypothesis,
     uses_the_fit,
 )
+from skidyn.diagnosis._held_out import shares_of_folds
 from skidyn.diagnosis._nameless_candidates import nameless_candidates
 from skidyn.diagnosis._profile import profile_error
 from skidyn.diagnosis._recordings import recording_candidates
 from skidyn.diagnosis._rule import (
+    CONFINED,
     Settings,
     Tester,
     false_discovery_rate,
     variance_inflation,
 )
+from skidyn.effects import Term
 from skidyn.evidence import Problem
 
 #: Share of a joint's squared residual up to which a change of it leaves what it follows as it was.
@@ -73,6 +76,7 @@ class SearchState:
         #: What each candidate of the pool removes, held out, as screened last.
         self._drops = np.zeros(0)
         self._reconsidering = False
+        self._within: dict[Term, bool] = {}
         self._kept_tester: tuple[list[Array], Tester | None] = ([], None)
 
     @property
@@ -200,6 +204,21 @@ class SearchState:
             tester = Tester(self.problem, blocks, self.sigma, self.target)
             self._kept_tester = made_of, tester
         return tester.beside([c.rows for c in further]) if further else tester
+
+    def is_judged_within(self, candidate: Candidate) -> bool:
+        """Whether a candidate is held out by parts of recordings: in one of them it does most.
+
+        Nothing is learnt of it from the others. What each of many coefficients does is elsewhere.
+        """
+        term = candidate.term
+        if term.trajectories is not None:
+            return True
+        if term.effect.nameless:
+            return False
+        if term not in self._within:
+            shares = shares_of_folds(self.problem, candidate.rows)
+            self._within[term] = bool(shares.max() > CONFINED)
+        return self._within[term]
 
     def _left(self) -> Array:
         """Held-out squared error of every joint with all that was found so far."""

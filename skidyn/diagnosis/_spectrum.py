@@ -20,6 +20,8 @@ from skidyn.evidence import Problem
 SPAN, BINS = 4 * np.pi, 32768
 #: Waves per rad searched.
 LOWEST, HIGHEST = 8.0, 420.0
+#: Waves that must lie within the range of the joint: of fewer, any function of its position is made.
+WITHIN_RANGE = 2.0
 #: Slowest vibration in Hz: what is slower shows in averaged rows (window of 1/8 s).
 SLOWEST = 8.0
 #: A line lower than this, in units of the local noise, is not looked at.
@@ -140,7 +142,8 @@ def _peaks(q: Array, r: Array) -> list[tuple[float, float]]:
     """Waves and heights (power over the level that stays without the line) of the top two lines."""
     power, level = _spectrum(q, r)
     ratio = power / level
-    ratio[: int(LOWEST * SPAN / (2 * np.pi))] = 0.0
+    lowest = max(LOWEST, WITHIN_RANGE * 2 * np.pi / max(float(np.ptp(q)), 1e-12))
+    ratio[: int(min(lowest, HIGHEST) * SPAN / (2 * np.pi))] = 0.0
     peaks = []
     for _ in range(2):
         k = int(np.argmax(ratio))

@@ -93,11 +93,15 @@ class AsymmetricFriction(Effect):
     title = "Direction-dependent friction"
     formula = r"\Delta F_v\,|\dot q|^p + \Delta F_c"
     coefficients = (Coefficient("dFv", "N m s/rad"), Coefficient("dFc", "N m"))
+    shapes = (Shape("power", "1", (), 0.3, 3.0, scales=False),)
     forms = ({"power": 2.0}, {"power": 0.5})
     simplicity = 11
     rivals = ("offset", "viscous")
     separating_motion = "equal sweeps in both directions at two speeds or more"
     reference = "Janot, Gautier, Brunot (2019), Nonlinear System Identification Benchmarks (EMPS)."
+
+    #: The plain form needs no search, although there are others.
+    has_shape = False
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         speed = np.abs(signals.dq[:, joint]) ** shape.get("power", 1.0)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from skidyn._signals import Signals
-from skidyn.effects._base import Array, Coefficient, Effect
+from skidyn.effects._base import Array, Coefficient, Effect, Shape
 
 
 class LoadDependentFriction(Effect):
@@ -18,7 +18,8 @@ class LoadDependentFriction(Effect):
     The power is 1 where the shape has none. Another one is of the load over a ``reference`` in N m,
     1 N m where the shape has none, so that ``mu`` is the share that is lost of a load of this size.
     One that is ``driving`` acts only while the joint moves its load, and not while the load moves
-    the joint, as the efficiency of many gears does.
+    the joint, as the efficiency of many gears does. One that is ``viscous`` grows with the speed, too,
+    in units of 1 rad/s or 1 m/s, so that ``mu`` has no unit.
 
     The gear transmits what the bodies need at the joint; the torque that accelerates the rotor is
     spent before it, and is no part of the load.
@@ -29,7 +30,8 @@ class LoadDependentFriction(Effect):
     title = "Load-dependent friction"
     formula = r"\mu\,\tau_r\,|\tau_\mathrm{load}/\tau_r|^p\,\mathrm{sign}(\dot q)"
     coefficients = (Coefficient("mu", "1", sign=1),)
-    forms = ({"power": 0.5}, {"power": 2.0}, {"driving": 1.0})
+    shapes = (Shape("power", "1", (), 0.3, 3.0, scales=False),)
+    forms = ({"power": 0.5}, {"power": 2.0}, {"driving": 1.0}, {"viscous": 1.0})
     needs = ("load",)
     simplicity = 7
     rivals = ("coulomb", "position_dependent_friction", "torque_gain")
@@ -52,7 +54,7 @@ class LoadDependentFriction(Effect):
         assert signals.load is not None
         reference = shape.get("reference", 1.0)
         load = reference * np.abs(signals.load[:, joint] / reference) ** shape.get("power", 1.0)
-        friction: Array = load * signals.sign[:, joint]
+        friction: Array = load * (signals.dq if "viscous" in shape else signals.sign)[:, joint]
         if "driving" in shape:
             friction = friction * (signals.load[:, joint] * signals.dq[:, joint] > 0)
         return friction[:, None]

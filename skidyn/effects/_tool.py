@@ -127,6 +127,8 @@ class ExternalWrench(_ToolEffect):
         return {f"force_{a}": "N" for a in "xyz"}
 
 
+#: Power of the depth with which the force between round bodies grows (Hertz 1882).
+_HERTZ = 1.5
 #: Directions, azimuth and elevation in rad, in which planes are looked for that face no axis: walls
 #: and tilted tables.
 _OBLIQUE = (
@@ -139,19 +141,21 @@ class EnvironmentContact(Effect):
     """A soft plane that the tool presses into.
 
     Its normal is an axis of the base, or points to ``azimuth`` and ``elevation``, where the plane
-    lies at ``z0`` beside the place ``x``, ``y``, ``z``.
+    lies at ``z0`` beside the place ``x``, ``y``, ``z``. What is pressed between round bodies stiffens:
+    then the force grows with another ``power`` of the depth (1 where the shape has none), in units of
+    1 m, so that the unit of the stiffness stays.
     """
 
     kind = "environment_contact"
     title = "Contact with the environment"
-    formula = r"-J_n(q)^\top n\,k\,\max(0,\ z_0 - n^\top p(q))"
+    formula = r"-J_n(q)^\top n\,k\,\max(0,\ z_0 - n^\top p(q))^p"
     coefficients = (Coefficient("k", "N/m", sign=1),)
     shapes = (
         Shape("z0", "m", (), -np.inf, np.inf, spacing="linear", scales=False),
         Shape("azimuth", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
         Shape("elevation", "rad", (), -np.pi / 2, np.pi / 2, spacing="linear", scales=False),
     )
-    forms = tuple({"azimuth": a, "elevation": e} for a, e in _OBLIQUE)
+    forms = (*({"azimuth": a, "elevation": e} for a, e in _OBLIQUE), {"power": _HERTZ})
     scope = "robot"
     needs = ("robot",)
     simplicity = 26
@@ -172,14 +176,16 @@ class EnvironmentContact(Effect):
             for share in (0.05, 0.1, 0.15, 0.2, 0.3)
         ]
         oblique = []
-        for form in map(dict, self.forms):
+        *planes, stiffening = map(dict, self.forms)
+        for form in planes:
             height = position @ _normal(form)
             for share in (0.06, 0.12, 0.25):
                 edge = np.quantile(height, share)
                 place = position[height <= edge].mean(axis=0)
                 at = dict(zip("xyz", map(float, place), strict=True))
                 oblique.append({"z0": float(edge - place @ _normal(form))} | form | at)
-        return along_axes + oblique
+        plain = along_axes + oblique
+        return plain + [shape | stiffening for shape in plain[1::3]]
 
     def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
         return bool(FEWEST_TOUCHING < np.mean(_depth(signals, shape) > 0) < MOST_TOUCHING)
@@ -191,7 +197,7 @@ class EnvironmentContact(Effect):
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
         reach = np.einsum("ian,a->in", tool_jacobian(signals), _normal(shape))
-        pressed = -_depth(signals, shape)[:, None] * reach
+        pressed = -(_depth(signals, shape) ** shape.get("power", 1.0))[:, None] * reach
         return {j: pressed[:, [j]] for j in joints}
 
 

@@ -56,3 +56,19 @@ def test_a_stop_that_one_recording_touches(log):
     assert [(f.kind, f.joints) for f in found] == [("end_stop", (2,))]
     assert found[0].parameters["q_lim"]["value"] == pytest.approx(stop, abs=0.05)
     assert found[0].error_drop > 0.5
+
+
+def test_a_plane_that_one_recording_touches(log):
+    robot = log.robot
+    q = log.X[[f"q{j + 1}" for j in range(7)]].to_numpy()
+    normal = np.array([0.35, -0.3, 0.89]) / np.linalg.norm([0.35, -0.3, 0.89])
+    height = robot.forward_kinematics(q)[0] @ normal
+    lowest = np.sort([height[rows].min() for rows in log.X.groupby("trajectory").indices.values()])
+    depth = np.maximum(0.0, lowest[1] - height)
+    force = np.where(depth > 0, (depth / depth.max()) ** 1.5, 0.0)
+    push = np.einsum("iaj,a->ij", robot.jacobian(q)[:, :3], normal)
+    torque = log.y - 40.0 * force[:, None] * push
+
+    found = diagnose(RBDRegressor(robot, MODEL), log.X, torque).findings
+
+    assert [f.kind for f in found] == ["environment_contact"]

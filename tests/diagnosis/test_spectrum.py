@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lines in the spectrum over the angle."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -23,3 +25,16 @@ def test_a_ripple_is_found_with_its_waves_and_size(missing):
 def test_noise_has_no_line(missing):
     residual = np.random.default_rng(1).normal(size=missing.problem.signals.q.shape)
     assert all(line.chance > 1e-3 for line in find_lines(missing.problem, residual))
+
+
+def test_fewer_than_two_waves_within_the_motion_are_no_ripple(missing):
+    problem = missing.problem
+    few = 1.5 * 2 * np.pi / np.ptp(problem.signals.q[:, 1])
+    q = problem.signals.q * (few / 9.0)  # so that 9 waves a rad are one and a half
+    narrow = replace(problem, signals=problem.signals.with_(q=q))
+    residual = 0.05 * np.random.default_rng(0).normal(size=q.shape)
+    residual[:, 1] += 0.2 * np.sin(9.0 * q[:, 1])
+
+    lines = [line for line in find_lines(narrow, residual) if line.joint == 1]
+
+    assert all(line.term.shape["N"] * np.ptp(q[:, 1]) > 3.9 * np.pi for line in lines)

@@ -17,3 +17,12 @@ def test_a_gear_that_loses_only_while_it_drives(signals, columns_of):
     driving = columns_of("load_dependent_friction", signals, driving=1.0)[:, 0]
     drives = signals.load[:, 0] * signals.dq[:, 0] > 0
     np.testing.assert_array_equal(driving, np.where(drives, plain, 0.0))
+
+
+def test_a_loss_that_grows_with_load_and_speed(signals, columns_of):
+    load = np.ones_like(signals.q)
+    loaded = signals.with_(load=3.0 * load)
+
+    friction = columns_of("load_dependent_friction", loaded, viscous=1.0)
+
+    np.testing.assert_allclose(friction[:, 0], 3.0 * loaded.dq[:, 0])

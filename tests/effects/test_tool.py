@@ -46,3 +46,12 @@ def test_a_plane_that_faces_no_axis_pushes_along_its_normal(signals):
     assert np.any(faces_x[0] != 0)
     for joint in (0, 1):
         np.testing.assert_allclose(oblique[joint], faces_x[joint], atol=1e-12)
+
+
+def test_what_is_pressed_between_round_bodies_stiffens(signals):
+    effect = get_effect("environment_contact")
+    plane = {"axis": 2, "side": 1.0, "z0": 0.4}
+    plain = effect.torque_columns(signals, (0, 1), **plane)[0][:, 0]
+    stiffening = effect.torque_columns(signals, (0, 1), power=1.5, **plane)[0][:, 0]
+    depth = np.maximum(0.0, 0.4 - signals.robot.forward_kinematics(signals.q)[0][:, 2])
+    np.testing.assert_allclose(stiffening, plain * np.sqrt(depth), atol=1e-12)
