@@ -113,7 +113,7 @@ def conclude(
             findings.append(finding)
     share = predictable_share(problem, result.fit.residual)
     rmse = np.array(history[-1]["rmse"])
-    parts = find_remainder(problem, residual, result.fit.residual, torque, rmse, share)
+    parts = find_remainder(problem, result.fit, residual, torque, rmse, share)
     least = np.maximum(
         EPISODE_LEAST_RANGE * torque_range(torque), EPISODE_LEAST_NOISE * parts.noise
     )

@@ -39,7 +39,12 @@ def held_out_residual(
     """
     design = problem.design([problem.term_rows(t) for t in terms])
     whole, left = left_out_coefficients(
-        problem, design, sigma, problem.target, soft=problem.soft(terms)
+        problem,
+        design,
+        sigma,
+        problem.target,
+        soft=problem.soft(terms),
+        kept=lambda grams: told_alone(grams, [t.width for t in terms]),
     )
     fold = problem.sample_folds(int(np.argmax(problem.rows.counts)))
     prediction = np.zeros_like(problem.torque)
@@ -53,12 +58,9 @@ def held_out_residual(
     torque = {}
     wanted = set(keep)
     for term, place in TermSum(terms).slices(len(problem.rigid_index)):
-        # What only one fold can tell is not held out with it.
-        held = left[:, place].copy()
-        held[folds_alone(problem, term)] = whole[place]
         own = np.zeros_like(problem.torque) if term in wanted else None
         for j, block in term.torque_columns(problem.signals).items():
-            prediction[:, j] += (block * held[fold]).sum(1)
+            prediction[:, j] += (block * left[fold, place]).sum(1)
             if own is not None:
                 own[:, j] += block @ whole[place]
         if own is not None:
@@ -85,6 +87,30 @@ def folds_alone(problem: Problem, term: Term) -> NDArray[np.bool_]:
     if term.effect.nameless:
         return np.zeros(problem.n_folds, dtype=bool)
     return shares_of_folds(problem, problem.term_rows(term)) > CONFINED
+
+
+def told_alone(grams: Array, widths: Sequence[int]) -> NDArray[np.bool_]:
+    """Coefficients that the fold left out tells nearly alone, (n_folds, n_coefficients).
+
+    What only one fold can tell is not held out with it: the little that others hold of it would be
+    taken for all of it.
+
+    Parameters
+    ----------
+    grams : ndarray of shape (n_folds, n_coefficients, n_coefficients)
+        Products of the columns of every fold.
+    widths : sequence of int
+        Numbers of columns of the effects, which come after those of the bodies.
+    """
+    squares = np.diagonal(grams, axis1=1, axis2=2)
+    alone = np.zeros(squares.shape, dtype=bool)
+    end = squares.shape[1]
+    for width in reversed(widths):
+        own = slice(end - width, end)
+        energy = squares[:, own].sum(1)
+        alone[:, own] = (energy > CONFINED * energy.sum())[:, None]
+        end -= width
+    return alone
 
 
 def shares_of_folds(problem: Problem, rows: Mapping[int, Array]) -> Array:

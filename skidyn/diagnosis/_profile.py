@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
+from skidyn.diagnosis._held_out import told_alone
 from skidyn.evidence import (
     RIDGE,
     Gain,
@@ -64,12 +65,15 @@ def profile_error(
     counts = problem.rows.counts
     errors = np.zeros((len(grams[0][1]), len(grams)))
     places = _places(blocks, soft, width)
+    widths = [next(iter(block.values())).shape[1] for block in blocks]
     for _ in range(passes):
         joined = np.zeros((len(errors), width + 1, width + 1))
         for (own, gram), s in zip(grams, sigma, strict=True):
             joined[:, own[:, None], own] += gram / s**2
         pull = soft_prior(joined[:, :-1, :-1].sum(0), places) if places else None
-        _, left = solve_left_out(joined[:, :-1, :-1], joined[:, :-1, -1], pull, ridge=10 * RIDGE)
+        products, cross = joined[:, :-1, :-1], joined[:, :-1, -1]
+        kept = told_alone(products, widths)
+        _, left = solve_left_out(products, cross, pull, ridge=10 * RIDGE, kept=kept)
         b = np.column_stack([-left, np.ones(len(left))])
         for j, (own, gram) in enumerate(grams):
             part = b[:, own]

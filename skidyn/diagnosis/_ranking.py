@@ -75,7 +75,7 @@ class RankingSearch(SearchState):
             forms = get_effect(h.kind).forms
             if h.torque is None and forms and self._price(h.candidates) > self.settings.white:
                 found += self._in_other_forms(h)
-        return self._finals(found)
+        return self._finals(found, refined=len(found))
 
     def _in_other_forms(self, hypothesis: Hypothesis) -> list[list[Candidate]]:
         """The terms of a hypothesis, all of them in each other form of its kind."""
@@ -222,8 +222,9 @@ class RankingSearch(SearchState):
         ]
         return [replace(candidate, term=t, rows=self.problem.term_rows(t)) for t in terms]
 
-    def _finals(self, rough: list[list[Candidate]]) -> list[Hypothesis]:
-        """Compare the best kinds with their shape refined and the noise re-estimated."""
+    def _finals(self, rough: list[list[Candidate]], refined: int | None = None) -> list[Hypothesis]:
+        """Compare the best kinds, the first of them with refined shapes, noise re-estimated."""
+        refined = self.settings.refined if refined is None else refined
         before = {
             within: profile_error(self.problem, self.blocks, self.sigma, self.target, within=within)
             for within in (False, True)
@@ -234,7 +235,7 @@ class RankingSearch(SearchState):
             candidates = [replace(c, rows=self.problem.term_rows(c.term)) for c in candidates]
             within = any(map(self.is_judged_within, candidates))
             hypothesis = Hypothesis(kind, tuple(candidates), np.zeros(0), 0.0, 0)
-            if i < self.settings.refined and any(c.n_shapes for c in candidates):
+            if i < refined and any(c.n_shapes for c in candidates):
                 candidates, after = self._refined(candidates, within)
                 hypothesis = replace(hypothesis, candidates=tuple(candidates))
                 beside = [[o for o in candidates if o is not c] for c in candidates]
@@ -284,9 +285,11 @@ class RankingSearch(SearchState):
             lines = [
                 line
                 for line in find_lines(problem, residual, self.significant)
-                if line.term.shape["N"] >= RESOLVED or not self._follows_position(line.joint)
+                if line.term.shape["N"] * problem.signals.unit[line.joint] >= RESOLVED
+                or not self._follows_position(line.joint)
             ]
-            found.append(self._of_lines("torque_ripple", "N", 1.0, lines, least))
+            shortest = 1.0 / problem.signals.unit.max()
+            found.append(self._of_lines("torque_ripple", "N", shortest, lines, least))
         if self.vibration:
             # On samples, of which there are many more than rows.
             least = self.settings.least_drop * len(residual) / max(1, problem.rows.counts.max())

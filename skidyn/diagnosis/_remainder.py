@@ -8,7 +8,6 @@ tell of the residual. The remainder is neither.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +24,8 @@ from skidyn.diagnosis._rule import (
     REMAINDER_TIMES_NOISE,
     variance_inflation,
 )
-from skidyn.evidence import Problem, smooth_motion
+from skidyn.evidence import Fit, Problem, SmoothedMotion, smooth_motion
+from skidyn.measurement import position_step
 
 #: Quantiles between which the range of the torque lies.
 RANGE = (0.005, 0.995)
@@ -88,8 +88,8 @@ def torque_range(torque: Array) -> Array:
 
 def find_remainder(
     problem: Problem,
+    fit: Fit,
     residual: Array,
-    averaged: Sequence[Array],
     torque: Array,
     rmse: Array,
     share: Array,
@@ -100,10 +100,10 @@ def find_remainder(
     ----------
     problem : Problem
         Motion and rows.
+    fit : Fit
+        Of the completed model; its residual rows are those over which noise is averaged.
     residual : ndarray of shape (n_samples, n_joints), N m or N
         Held-out residual of the completed model.
-    averaged : sequence of ndarray of shape (n_rows_j,)
-        Residual rows of every joint, over which noise is averaged.
     torque : ndarray of shape (n_samples, n_joints), N m or N
         Measured torque.
     rmse : ndarray of shape (n_joints,), N m or N
@@ -112,7 +112,7 @@ def find_remainder(
         Share of the squared error of averaged rows that is predictable.
     """
     sensor = sensor_noise(problem.signals, residual)
-    position = position_noise(problem)
+    position, averaged = position_noise(problem, fit), fit.residual
     noise = np.hypot(np.nan_to_num(sensor), position)
     excess = np.maximum(rmse**2 - noise**2, 0.0)
     predictable = np.sqrt(np.minimum(share * rmse**2, excess))
@@ -145,11 +145,16 @@ def noise_level(problem: Problem, residual: Array) -> Array:
     return np.asarray(np.hypot(sensor, position_noise(problem)))
 
 
-def position_noise(problem: Problem) -> Array:
-    """Torque that the noise of the logged positions makes in the rigid body, (n_joints,).
+def position_noise(problem: Problem, fit: Fit | None = None) -> Array:
+    """Torque that the noise of the logged positions makes in a model, (n_joints,).
+
+    Without a fit, in the rigid body of the robot alone: rotors, which are no part of it, may make
+    most of it.
 
     The noise is what the smoother takes off the positions. As much of it, drawn at random, is put
-    on the smoothed positions and followed through the smoother and the inverse dynamics.
+    on the smoothed positions and followed through the smoother and the inverse dynamics. Where an
+    encoder counts in visible steps, the smoothed positions are counted in them instead: of slow
+    motion such noise is slow, too, and passes the smoother.
     """
     signals, motion, robot = problem.logged, problem.motion, problem.robot
     quiet = np.zeros(problem.n_joints)
@@ -158,13 +163,30 @@ def position_noise(problem: Problem) -> Array:
     taken = np.median(np.abs(signals.q - motion.signals.q), axis=0) / MEDIAN
     part = slice(0, min(signals.n_samples, MOST_SAMPLES))
     smooth = motion.signals.take(part)
-    noise = np.random.default_rng(0).normal(size=smooth.q.shape) * taken
+    rng = np.random.default_rng(0)
+    noise = rng.normal(size=smooth.q.shape) * taken
+    for k, step in enumerate(map(position_step, signals.q.T)):
+        if np.isfinite(step):
+            counted = smooth.q[:, k] / step + rng.uniform()
+            noise[:, k] = step * (np.round(counted) - counted)
     shaken = smooth_motion(smooth.with_(q=smooth.q + noise))
     again = smooth_motion(smooth)
     use = shaken.valid & again.valid
-    torques = [
-        robot.inverse_dynamics(m.signals.q, m.signals.dq, m.signals.ddq) for m in (shaken, again)
-    ]
-    change = np.where(use, torques[0] - torques[1], 0.0)
+    change = np.where(use, _torque(problem, fit, shaken) - _torque(problem, fit, again), 0.0)
     counts = np.maximum(use.sum(0), 1)
     return np.asarray(np.sqrt(np.sum(change**2, axis=0) / counts))
+
+
+def _torque(problem: Problem, fit: Fit | None, motion: SmoothedMotion) -> Array:
+    """Torque of the bodies and of the effects that follow a motion smoothly, N m or N."""
+    s, robot = motion.signals, problem.robot
+    assert robot is not None
+    own = None if fit is None else problem.inertial_parameters(fit)
+    torque = robot.inverse_dynamics(s.q, s.dq, s.ddq, parameters=own)
+    if fit is None:
+        return torque
+    for term, place in fit.terms.slices(len(problem.rigid_index)):
+        if not term.is_dry and not term.effect.needs:
+            for j, block in term.torque_columns(s).items():
+                torque[:, j] += block @ fit.coefficients[place]
+    return torque

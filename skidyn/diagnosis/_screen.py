@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
+from skidyn.diagnosis._held_out import told_alone
 from skidyn.diagnosis._profile import QUARTERS
 from skidyn.evidence import (
     RIDGE,
@@ -27,6 +28,7 @@ from skidyn.evidence import (
     column_sizes,
     felt_columns,
     fold_slices,
+    kept_pull,
     solve_left_out,
 )
 
@@ -115,7 +117,7 @@ class Screen:
             gram[:, own.places[:, None], own.places] += self._folded(own.rows, own.rows, j)
             cross[:, own.places] += self._folded(own.rows, y[:, None], j)[:, :, 0]
             square += self._folded(y[:, None], y[:, None], j)[:, 0, 0]
-        return Model(felt, gram, cross, square)
+        return Model(felt, gram, cross, square, tuple(map(_width, blocks)))
 
     def beside(self, model: Model, rows: dict[int, Array]) -> Model:
         """The model with further columns.
@@ -128,7 +130,7 @@ class Screen:
             Averaged columns, per joint they reach.
         """
         felt, start = list(model.felt), model.cross.shape[1]
-        k = next(iter(rows.values())).shape[1]
+        k = _width(rows)
         gram = np.pad(model.gram, ((0, 0), (0, k), (0, k)))
         cross = np.pad(model.cross, ((0, 0), (0, k)))
         for j, block in rows.items():
@@ -139,7 +141,7 @@ class Screen:
             gram[:, start:, start:] += self._folded(scaled, scaled, j)
             cross[:, start:] += self._folded(scaled, self.target[j][:, None], j)[:, :, 0]
             felt[j] = felt[j].with_columns(start, scaled)
-        return Model(felt, gram, cross, model.square)
+        return Model(felt, gram, cross, model.square, (*model.widths, k))
 
     def step(self, model: Model, wanted: NDArray[np.bool_] | None = None) -> Array:
         """Held-out error of every fold after each candidate is added, (n_candidates, n_folds).
@@ -206,6 +208,10 @@ class Screen:
             yield some
 
 
+def _width(block: dict[int, Array]) -> int:
+    return int(next(iter(block.values())).shape[1])
+
+
 #: A group, and which of its candidates.
 _Wanted = tuple[_Group, NDArray[np.int64]]
 
@@ -235,12 +241,15 @@ class Model:
         With the torque.
     square : ndarray of shape (n_folds,)
         Of the torque.
+    widths : tuple of int
+        Numbers of columns of the effects, the last ones of the model.
     """
 
     felt: list[Felt]
     gram: Array
     cross: Array
     square: Array
+    widths: tuple[int, ...]
 
     @cached_property
     def solutions(self) -> Array:
@@ -254,12 +263,17 @@ class Model:
 
     @cached_property
     def _solved(self) -> tuple[Array, Array]:
-        return solve_left_out(self.gram, self.cross)
+        return solve_left_out(self.gram, self.cross, kept=self._kept)
+
+    @cached_property
+    def _kept(self) -> NDArray[np.bool_]:
+        return told_alone(self.gram, self.widths)
 
     @cached_property
     def inverses(self) -> Array:
         """Of the normal equations without each fold in turn, shape (n_folds, p, p)."""
-        return self._inverse(self.gram.sum(0) - self.gram)
+        pull = kept_pull(self.gram, self._kept)[:, :, None] * np.eye(len(self.gram[0]))
+        return self._inverse(self.gram.sum(0) - self.gram + pull)
 
     @cached_property
     def inverse(self) -> Array:

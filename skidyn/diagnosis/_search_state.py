@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate, catalogue_candidates
+from skidyn.diagnosis._held_out import shares_of_folds
 from skidyn.diagnosis._hypothesis import (
     UNKNOWN,
     Hypothesis,
     uses_the_fit,
 )
-from skidyn.diagnosis._held_out import shares_of_folds
 from skidyn.diagnosis._nameless_candidates import nameless_candidates
 from skidyn.diagnosis._profile import profile_error
 from skidyn.diagnosis._recordings import recording_candidates

@@ -18,9 +18,9 @@ from skidyn.evidence import Problem
 
 #: Angle covered by the spectrum in rad and its number of bins; sets resolution and range.
 SPAN, BINS = 4 * np.pi, 32768
-#: Waves per rad searched.
+#: Waves per rad searched, or per 0.1 m.
 LOWEST, HIGHEST = 8.0, 420.0
-#: Waves that must lie within the range of the joint: of fewer, any function of its position is made.
+#: Waves that must lie within the range of the joint: fewer make any function of its position.
 WITHIN_RANGE = 2.0
 #: Slowest vibration in Hz: what is slower shows in averaged rows (window of 1/8 s).
 SLOWEST = 8.0
@@ -77,9 +77,10 @@ def find_lines(
     lines = []
     for joint in range(problem.n_joints):
         use = problem.rows.sliding[:, joint]
-        if problem.signals.prismatic[joint] or use.sum() < 100:
+        if use.sum() < 100:
             continue
-        q, r = problem.signals.q[:, joint], residual[:, joint]
+        unit = float(problem.signals.unit[joint])  # waves of a slider are so many times shorter
+        q, r = problem.signals.q[:, joint] / unit, residual[:, joint]
         for waves, height in _peaks(q[use], r[use]):
             if height < LEAST_HEIGHT:
                 continue
@@ -87,7 +88,7 @@ def find_lines(
             chance = min(1.0, 2 * HIGHEST * float(np.exp(-height)))
             if not significant(chance):
                 continue
-            term = Term.at("torque_ripple", (joint,), {"N": waves})
+            term = Term.at("torque_ripple", (joint,), {"N": waves / unit})
             line = _test_line(problem, term, chance, 2 * HIGHEST, use, r, fold)
             weak = _explained_share(r[use], line.torque[use]) <= 0.2
             lines.append(_capped(line, height) if weak else line)

@@ -57,7 +57,7 @@ def look_at_swift(
         return problem, result
     residual = problem.torque - problem.explained(result.fit)
     sensor = np.nan_to_num(sensor_noise(problem.signals, residual))
-    if np.any(position_noise(problem) > sensor):  # coarse positions
+    if np.any(position_noise(problem, result.fit) > sensor):  # coarse positions
         family = [k for k in family if not get_effect(k).follows_acceleration]
     if not family:
         return problem, result

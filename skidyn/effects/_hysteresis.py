@@ -159,11 +159,13 @@ def dahl_state(position: Array, segments: list[slice], presliding: float) -> Arr
 
 
 def _dahl_law(presliding: float, exponent: float = 1.0) -> Law:
-    if exponent == 2.0:  # the same equation, its right side squared
+    if exponent != 1.0:
+        # With u = 1 - h in the direction of the stroke: du/dx = -u^i.
+        less = exponent - 1.0
 
         def slower(start: Any, direction: Any, way: Any) -> Any:
-            short = 1.0 - direction * start
-            return direction * (1.0 - short / (1.0 + short * way))
+            short = np.maximum(1.0 - direction * start, 1e-300)
+            return direction * (1.0 - np.maximum(short**-less + less * way, 0.0) ** (-1.0 / less))
 
         return Law(lambda way: way / presliding, slower)
 
@@ -240,8 +242,8 @@ class PathMemory(Effect):
 class Dahl(PathMemory):
     """Friction that builds up over a short way after each reversal.
 
-    Dahl's exponent i is 1 for ductile materials, which the plain form has, and 2 where ``exponent``
-    says so in the shape.
+    Dahl's exponent i is 1 for ductile materials, which the plain form has, or the ``exponent`` of
+    the shape.
     """
 
     kind = "dahl"
@@ -259,6 +261,7 @@ class Dahl(PathMemory):
             0.5,
             limit_kind="coulomb",
         ),
+        Shape("exponent", "1", (), 0.4, 3.0, scales=False, has_interval=False),
     )
     family = "hysteresis"
     simplicity = 21

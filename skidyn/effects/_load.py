@@ -18,8 +18,10 @@ class LoadDependentFriction(Effect):
     The power is 1 where the shape has none. Another one is of the load over a ``reference`` in N m,
     1 N m where the shape has none, so that ``mu`` is the share that is lost of a load of this size.
     One that is ``driving`` acts only while the joint moves its load, and not while the load moves
-    the joint, as the efficiency of many gears does. One that is ``viscous`` grows with the speed, too,
-    in units of 1 rad/s or 1 m/s, so that ``mu`` has no unit.
+    the joint, as the efficiency of many gears does. One that is ``viscous`` grows with the speed,
+    too, in units of 1 rad/s or 1 m/s, so that ``mu`` has no unit. Where the torque of the drive
+    counts, the load has the ``friction`` (N m or N) and the ``damping`` beside it that the drive
+    has to overcome as well.
 
     The gear transmits what the bodies need at the joint; the torque that accelerates the rotor is
     spent before it, and is no part of the load.
@@ -30,8 +32,19 @@ class LoadDependentFriction(Effect):
     title = "Load-dependent friction"
     formula = r"\mu\,\tau_r\,|\tau_\mathrm{load}/\tau_r|^p\,\mathrm{sign}(\dot q)"
     coefficients = (Coefficient("mu", "1", sign=1),)
-    shapes = (Shape("power", "1", (), 0.3, 3.0, scales=False),)
-    forms = ({"power": 0.5}, {"power": 2.0}, {"driving": 1.0}, {"viscous": 1.0})
+    shapes = (
+        Shape("power", "1", (), 0.3, 3.0, scales=False),
+        Shape("friction", "N m", (), 1e-9, np.inf, scales=False, has_interval=False),
+        Shape("damping", "N m s/rad", (), 1e-9, np.inf, scales=False, has_interval=False),
+    )
+    forms = (
+        {"power": 0.5},
+        {"power": 2.0},
+        {"driving": 1.0},
+        {"viscous": 1.0},
+        {"friction": 0.3, "damping": 0.1},
+        {"driving": 1.0, "friction": 0.3, "damping": 0.1},
+    )
     needs = ("load",)
     simplicity = 7
     rivals = ("coulomb", "position_dependent_friction", "torque_gain")
@@ -47,16 +60,25 @@ class LoadDependentFriction(Effect):
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
         assert signals.load is not None
         typical = float(np.sqrt(np.mean(signals.load[:, joints[0]] ** 2)))
+        speed = float(np.sqrt(np.mean(signals.dq[:, joints[0]] ** 2)))
         reference = {"reference": typical} if typical > 0 else {}
-        return [{}, *({**f, **(reference if "power" in f else {})} for f in self.forms)]
+        found: list[dict[str, Any]] = [{}]
+        for form in map(dict, self.forms):
+            if "friction" in form:
+                form["friction"] *= typical
+                form["damping"] *= typical / max(speed, 1e-9)
+            found.append(form | (reference if "power" in form else {}))
+        return found
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         assert signals.load is not None
-        reference = shape.get("reference", 1.0)
-        load = reference * np.abs(signals.load[:, joint] / reference) ** shape.get("power", 1.0)
+        reference, carried = shape.get("reference", 1.0), signals.load[:, joint]
+        carried = carried + shape.get("friction", 0.0) * signals.sign[:, joint]
+        carried = carried + shape.get("damping", 0.0) * signals.dq[:, joint]
+        load = reference * np.abs(carried / reference) ** shape.get("power", 1.0)
         friction: Array = load * (signals.dq if "viscous" in shape else signals.sign)[:, joint]
         if "driving" in shape:
-            friction = friction * (signals.load[:, joint] * signals.dq[:, joint] > 0)
+            friction = friction * (carried * signals.dq[:, joint] > 0)
         return friction[:, None]
 
     def units(self, prismatic: bool = False) -> dict[str, str]:

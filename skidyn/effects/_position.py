@@ -74,7 +74,7 @@ class PositionDependentFriction(Effect):
 
 
 class TorqueRipple(Effect):
-    """Torque periodic in the joint angle: cogging, gear teeth, the wave of a harmonic drive."""
+    """Torque periodic in the position: cogging, gear teeth, a harmonic drive, a ball screw."""
 
     kind = "torque_ripple"
     title = "Torque ripple"
@@ -93,11 +93,6 @@ class TorqueRipple(Effect):
         phase = shape["N"] * signals.q[:, joint]
         return np.column_stack([np.sin(phase), np.cos(phase)])
 
-    def not_shown(self, signals: Signals, joint: int) -> str | None:
-        if signals.prismatic[joint]:
-            return f"joint {joint + 1} slides"
-        return super().not_shown(signals, joint)
-
     def parameters(
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
     ) -> dict[str, Any]:
@@ -105,4 +100,5 @@ class TorqueRipple(Effect):
         return {"A": float(np.hypot(a, b)), "phase": float(np.arctan2(-b, a)), **shape}
 
     def units(self, prismatic: bool = False) -> dict[str, str]:
-        return {"A": "N m", "phase": "rad", "N": "1/rad"}
+        torque, length = ("N", "m") if prismatic else ("N m", "rad")
+        return {"A": torque, "phase": "rad", "N": f"1/{length}"}

@@ -203,6 +203,7 @@ class EndStop(Effect):
         Shape("q_lim", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
         Shape("q_low", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
         Shape("damping", "s/rad", (), 1e-3, 1e3, scales=False, has_interval=False),
+        Shape("power", "1", (), 0.7, 2.2, scales=False, has_interval=False),
     )
     forms = (
         {"power": 2.0},

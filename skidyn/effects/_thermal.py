@@ -52,11 +52,15 @@ class TemperatureFriction(Effect):
         Coefficient("d2Fv_dT2", "N m s/(rad K^2)"),
     )
     needs = ("temperature",)
+    shapes = (Shape("levels_over", "K", (), 1.5, 60.0, scales=False, has_interval=False),)
     forms = _LEVELLING
     simplicity = 14
     rivals = ("friction_drift", "temperature_offset")
     separating_motion = "the same sweep on the cold and on the warm robot"
     reference = _BITTENCOURT
+
+    #: The plain form needs no search, although there are others.
+    has_shape = False
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         warm = _warmth(signals, joint, **shape)
@@ -80,11 +84,15 @@ class TemperatureOffset(Effect):
         Coefficient("tau0", "N m", is_zero=True),
     )
     needs = ("temperature",)
+    shapes = (Shape("levels_over", "K", (), 1.5, 60.0, scales=False, has_interval=False),)
     forms = _LEVELLING
     simplicity = 13
     rivals = ("offset", "temperature_friction")
     separating_motion = "one pose held or one sweep repeated while the robot warms up"
     reference = _BITTENCOURT
+
+    #: The plain form needs no search, although there are others.
+    has_shape = False
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         warm = _warmth(signals, joint, **shape)

@@ -31,6 +31,16 @@ def tool_jacobian(signals: Signals) -> Array:
     return jacobian
 
 
+def _turning_jacobian(signals: Signals) -> Array:
+    """Its angular velocity per unit joint velocity, (n_samples, 3, n_joints), computed once."""
+    robot = signals.robot
+    assert robot is not None
+    jacobian: Array = signals.once(
+        "turning jacobian", lambda: robot.jacobian(signals.q)[:, 3:].copy(order="K")
+    )
+    return jacobian
+
+
 #: Distance of a centre of mass from its link, in m, beyond which the motion does not tell the mass.
 FARTHEST = 5.0
 
@@ -100,13 +110,21 @@ class Payload(_ToolEffect):
 
 
 class ExternalWrench(_ToolEffect):
-    """A constant force on the tool: a hose, a spring balancer, a hand that pulls."""
+    """A constant force on the tool: a hose, a spring balancer, a hand that pulls.
+
+    Where it does not act at the origin of the tool, its moment about that is constant, too.
+    """
 
     kind = "external_wrench"
     drawn_against = "time"
     title = "External force at the tool"
     formula = r"-J_n(q)^\top f"
-    coefficients = (Coefficient("fx", "N"), Coefficient("fy", "N"), Coefficient("fz", "N"))
+    coefficients = (
+        *(Coefficient(f"f{axis}", "N") for axis in "xyz"),
+        *(Coefficient(f"m{axis}", "N m") for axis in "xyz"),
+    )
+    # One trajectory tells a force, and a moment only if it turns the tool about all axes.
+    leading = 3
     simplicity = 28
     rivals = ("payload", "environment_contact")
     separating_motion = "the tool moved through several orientations while the force acts"
@@ -115,16 +133,17 @@ class ExternalWrench(_ToolEffect):
     def torque_columns(
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
-        jacobian = tool_jacobian(signals)
-        return {j: -jacobian[:, :, j] for j in joints}
+        moving, turning = tool_jacobian(signals), _turning_jacobian(signals)
+        return {j: -np.hstack([moving[:, :, j], turning[:, :, j]]) for j in joints}
 
     def parameters(
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
     ) -> dict[str, Any]:
-        return {f"force_{a}": float(v) for a, v in zip("xyz", coefficients, strict=True)}
+        names = [f"{what}_{axis}" for what in ("force", "moment") for axis in "xyz"]
+        return dict(zip(names, map(float, coefficients), strict=True))
 
     def units(self, prismatic: bool = False) -> dict[str, str]:
-        return {f"force_{a}": "N" for a in "xyz"}
+        return {f"force_{a}": "N" for a in "xyz"} | {f"moment_{a}": "N m" for a in "xyz"}
 
 
 #: Power of the depth with which the force between round bodies grows (Hertz 1882).
@@ -141,21 +160,31 @@ class EnvironmentContact(Effect):
     """A soft plane that the tool presses into.
 
     Its normal is an axis of the base, or points to ``azimuth`` and ``elevation``, where the plane
-    lies at ``z0`` beside the place ``x``, ``y``, ``z``. What is pressed between round bodies stiffens:
-    then the force grows with another ``power`` of the depth (1 where the shape has none), in units of
-    1 m, so that the unit of the stiffness stays.
+    lies at ``z0`` beside the place ``x``, ``y``, ``z``. What is pressed between round bodies
+    stiffens: then the force grows with another ``power`` of the depth (1 where the shape has none),
+    in units of 1 m, so that the unit of the stiffness stays. What loses energy resists more on the
+    way in: the force is larger by the factor ``1 + damping`` times the speed of the approach (Hunt,
+    Crossley 1975, J. Applied Mechanics 42(2)), and never pulls.
     """
 
     kind = "environment_contact"
     title = "Contact with the environment"
-    formula = r"-J_n(q)^\top n\,k\,\max(0,\ z_0 - n^\top p(q))^p"
+    formula = (
+        r"-J_n(q)^\top n\,k\,x^p\,\max(0,\ 1 + d\,\dot x),"
+        r"\quad x = \max(0,\ z_0 - n^\top p(q))"
+    )
     coefficients = (Coefficient("k", "N/m", sign=1),)
     shapes = (
         Shape("z0", "m", (), -np.inf, np.inf, spacing="linear", scales=False),
         Shape("azimuth", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
         Shape("elevation", "rad", (), -np.pi / 2, np.pi / 2, spacing="linear", scales=False),
+        Shape("damping", "s/m", (), 1e-2, 1e3, scales=False, has_interval=False),
     )
-    forms = (*({"azimuth": a, "elevation": e} for a, e in _OBLIQUE), {"power": _HERTZ})
+    forms = (
+        *({"azimuth": a, "elevation": e} for a, e in _OBLIQUE),
+        {"power": _HERTZ},
+        {"damping": 2.0},
+    )
     scope = "robot"
     needs = ("robot",)
     simplicity = 26
@@ -176,7 +205,7 @@ class EnvironmentContact(Effect):
             for share in (0.05, 0.1, 0.15, 0.2, 0.3)
         ]
         oblique = []
-        *planes, stiffening = map(dict, self.forms)
+        *planes, stiffening, damped = map(dict, self.forms)
         for form in planes:
             height = position @ _normal(form)
             for share in (0.06, 0.12, 0.25):
@@ -185,7 +214,7 @@ class EnvironmentContact(Effect):
                 at = dict(zip("xyz", map(float, place), strict=True))
                 oblique.append({"z0": float(edge - place @ _normal(form))} | form | at)
         plain = along_axes + oblique
-        return plain + [shape | stiffening for shape in plain[1::3]]
+        return plain + [shape | form for form in (stiffening, damped) for shape in plain[1::3]]
 
     def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
         return bool(FEWEST_TOUCHING < np.mean(_depth(signals, shape) > 0) < MOST_TOUCHING)
@@ -197,7 +226,11 @@ class EnvironmentContact(Effect):
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
         reach = np.einsum("ian,a->in", tool_jacobian(signals), _normal(shape))
-        pressed = -(_depth(signals, shape) ** shape.get("power", 1.0))[:, None] * reach
+        pressure = _depth(signals, shape) ** shape.get("power", 1.0)
+        if "damping" in shape:
+            approach = -np.sum(reach * signals.dq, axis=1)
+            pressure = pressure * np.maximum(0.0, 1.0 + shape["damping"] * approach)
+        pressed = -pressure[:, None] * reach
         return {j: pressed[:, [j]] for j in joints}
 
 

@@ -27,6 +27,7 @@ from skidyn.evidence._folds import (
     fold_slices as fold_slices,
     jackknife as jackknife,
     jackknife_rows as jackknife_rows,
+    kept_pull as kept_pull,
     left_out_coefficients as left_out_coefficients,
     left_out_errors as left_out_errors,
     soft_prior as soft_prior,
@@ -39,6 +40,7 @@ from skidyn.evidence._from_motion import (
     sample_blocks as sample_blocks,
 )
 from skidyn.evidence._kinematics import (
+    SmoothedMotion as SmoothedMotion,
     as_given as as_given,
     sampling_rate as sampling_rate,
     smooth_motion as smooth_motion,

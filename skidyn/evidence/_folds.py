@@ -7,7 +7,7 @@ folds, so a fold is left out by subtraction, without another pass over the rows.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -124,6 +124,7 @@ def left_out_coefficients(
     target: Sequence[Array],
     instruments: Sequence[Array] | None = None,
     soft: Sequence[tuple[slice, float]] = (),
+    kept: Callable[[Array], NDArray[np.bool_]] | None = None,
 ) -> tuple[Array, Array]:
     """Coefficients of the whole fit and of the fits that leave one fold out.
 
@@ -142,6 +143,8 @@ def left_out_coefficients(
     soft : sequence of (slice, float), default=()
         Coefficients that are drawn to zero where no row says what they are, see
         :func:`soft_prior`.
+    kept : callable, optional
+        From the products of every fold, those coefficients that :func:`solve_left_out` keeps.
 
     Returns
     -------
@@ -150,7 +153,8 @@ def left_out_coefficients(
     """
     grams, cross = fold_products(folds, design, sigma, target, instruments)
     prior = soft_prior(grams.sum(0), soft) if soft else None
-    return solve_left_out(grams, cross, prior, symmetric=instruments is None)
+    stay = None if kept is None else kept(grams)
+    return solve_left_out(grams, cross, prior, symmetric=instruments is None, kept=stay)
 
 
 def soft_prior(gram: Array, soft: Sequence[tuple[slice, float]]) -> tuple[Array, Array]:
@@ -184,6 +188,7 @@ def solve_left_out(
     *,
     symmetric: bool = True,
     ridge: float = RIDGE,
+    kept: NDArray[np.bool_] | None = None,
 ) -> tuple[Array, Array]:
     """Solutions of the sum of all folds' normal equations, and of all sums without one fold.
 
@@ -199,6 +204,9 @@ def solve_left_out(
         Whether the left sides are symmetric.
     ridge : float, default=1e-9
         Added to the diagonal of the scaled left sides.
+    kept : ndarray of shape (n_folds, n_coefficients) of bool, optional
+        Coefficients that stay near those of all folds where a fold is left out, see
+        :func:`kept_pull`; none by default.
 
     Returns
     -------
@@ -216,8 +224,28 @@ def solve_left_out(
         normal = gram / scale[:, None] / scale + ridge * np.eye(len(scale))
         return np.asarray(np.linalg.solve(normal, r / scale) / scale)
 
-    left = [solve(total - g, right - c) for g, c in zip(grams, cross, strict=True)]
-    return solve(total, right), np.array(left)
+    whole = solve(total, right)
+    pulls = np.zeros(cross.shape) if kept is None else kept_pull(grams, kept)
+    left = [
+        solve(total - g + np.diag(pull), right - c + pull * whole)
+        for g, c, pull in zip(grams, cross, pulls, strict=True)
+    ]
+    return whole, np.array(left)
+
+
+def kept_pull(grams: Array, kept: NDArray[np.bool_]) -> Array:
+    """Weights by which coefficients are drawn to those of all folds, (n_folds, n_coefficients).
+
+    As much as all rows know of them by themselves.
+
+    Parameters
+    ----------
+    grams : ndarray of shape (n_folds, n_coefficients, n_coefficients)
+        Left sides.
+    kept : ndarray of shape (n_folds, n_coefficients) of bool
+        Coefficients that are kept where each fold is left out.
+    """
+    return np.where(kept, np.diag(grams.sum(0)), 0.0)
 
 
 def left_out_errors(grams: Array, ridge: float = 10 * RIDGE) -> Array:

@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
 
 import numpy as np
+from scipy.optimize import minimize
 
 from skidyn._signals import Array
 from skidyn.effects import Shape, Term, get_effect
@@ -16,6 +16,8 @@ from skidyn.evidence._problem import Problem
 #: First step of a refinement (a factor 1.5, or a share of the travel), its shrinkage and rounds.
 FIRST_STEP, SHRINK, ROUNDS = 0.5, 2.2, 7
 FIRST_SHARE = 0.06
+#: Trials of a simplex for each parameter at most, and its size in first steps when it stops.
+MOST_TRIALS, CLOSE = 40, 0.01
 
 
 class Gain:
@@ -73,6 +75,9 @@ def best_on_grid(problem: Problem, kind: str, joints: tuple[int, ...], gain: Gai
 def refine_term(problem: Problem, term: Term, gain: Gain) -> Term:
     """Walk along one shape parameter after the other with shrinking steps.
 
+    Parameters that can do for each other lie in a narrow valley, along which a simplex goes on
+    (Nelder, Mead 1965, The Computer Journal 7(4)).
+
     Parameters
     ----------
     problem : Problem
@@ -86,28 +91,66 @@ def refine_term(problem: Problem, term: Term, gain: Gain) -> Term:
     shapes = [s for s in effect.shapes if s.name in term.shape]
     if not shapes or effect.search != "grid":
         return term
-    values: dict[str, Any] = dict(term.shape)
+    ranges = [_range(problem, term, shape) for shape in shapes]
+    other = {name: x for name, x in term.shape.items() if name not in {s.name for s in shapes}}
+
+    def with_values(values: Sequence[float]) -> Term:
+        return term.with_shape(**other, **{s.name: v for s, v in zip(shapes, values, strict=True)})
+
+    def gain_of(values: Sequence[float]) -> float:
+        if not all(low <= v <= high for v, (low, high, _) in zip(values, ranges, strict=True)):
+            return -np.inf
+        trial = with_values(values)
+        if not effect.admissible(problem.signals, term.places, trial.shape):
+            return -np.inf
+        return gain(problem.term_rows(trial), trial.lowest)
+
+    values = [float(term.shape[s.name]) for s in shapes]
     best = gain(problem.term_rows(term), term.lowest)
-    # The first parameters are visited again after the last has moved.
-    for shape in [*shapes, *shapes[: len(shapes) - 1]]:
-        low, high, step = _range(problem, term, shape)
+    for i, (shape, (_, _, step)) in enumerate(zip(shapes, ranges, strict=True)):
         for _ in range(ROUNDS):
             improved = False
             for way in (1, -1):
-                here = values[shape.name]
+                here = values[i]
                 there = here * (1 + step) ** way if shape.spacing == "log" else here + way * step
-                if not low <= there <= high:
-                    continue
-                trial = {**values, shape.name: float(there)}
-                if not effect.admissible(problem.signals, term.places, trial):
-                    continue
-                other = term.with_shape(**trial)
-                value = gain(problem.term_rows(other), other.lowest)
-                if value > best:
+                trial = [*values[:i], float(there), *values[i + 1 :]]
+                if (value := gain_of(trial)) > best:
                     best, values, improved = value, trial, True
             if not improved:
                 step /= SHRINK
-    return term.with_shape(**values)
+    if len(shapes) == 1 or not np.isfinite(best):
+        return with_values(values)
+    return with_values(_by_simplex(shapes, ranges, values, gain_of))
+
+
+def _by_simplex(
+    shapes: Sequence[Shape],
+    ranges: Sequence[tuple[float, float, float]],
+    values: Sequence[float],
+    gain_of: Callable[[Sequence[float]], float],
+) -> list[float]:
+    """Values from which no simplex goes further, beginning with smaller steps than a walk."""
+
+    def at(steps: Array) -> list[float]:
+        moved = zip(shapes, ranges, values, steps.tolist(), strict=True)
+        return [
+            v * (1 + step) ** x if shape.spacing == "log" else v + x * step
+            for shape, (_, _, step), v, x in moved
+        ]
+
+    first = np.vstack([np.zeros(len(shapes)), np.eye(len(shapes)) / SHRINK])
+    found = minimize(
+        lambda steps: -gain_of(at(steps)),
+        first[0],
+        method="Nelder-Mead",
+        options={
+            "initial_simplex": first,
+            "maxfev": MOST_TRIALS * len(shapes),
+            "xatol": CLOSE,
+            "fatol": np.inf,
+        },
+    )
+    return at(found.x)
 
 
 def _range(problem: Problem, term: Term, shape: Shape) -> tuple[float, float, float]:
