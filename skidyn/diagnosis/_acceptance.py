@@ -18,6 +18,7 @@ from skidyn.diagnosis._hypothesis import (
     within_recordings,
 )
 from skidyn.diagnosis._ranking import RankingSearch
+from skidyn.effects import get_effect
 
 
 class JudgingSearch(RankingSearch):
@@ -128,7 +129,10 @@ class JudgingSearch(RankingSearch):
         return behind <= self.settings.form_tolerance * float(weight @ removed[own])
 
     def _simplest_of_family(self, best: Hypothesis, ranking: list[Hypothesis]) -> Hypothesis:
-        """Members of a family differ only in motion made for it: the simplest near one is named."""
+        """Members of a family differ only in motion made for it: the simplest near one is named.
+
+        Of its forms, the one that explains most.
+        """
         family = family_of(best)
         if not family:
             return best
@@ -139,7 +143,8 @@ class JudgingSearch(RankingSearch):
             and h.joints == best.joints
             and h.score >= self.settings.family_share * best.score
         ]
-        return min([best, *near], key=simplicity_of)
+        kind = min([best, *near], key=lambda h: get_effect(h.kind).simplicity).kind
+        return max((h for h in [best, *near] if h.kind == kind), key=lambda h: h.score)
 
     def judged(self, hypothesis: Hypothesis) -> Hypothesis | None:
         """The hypothesis with those of its terms that are more than chance beside the others."""

@@ -18,6 +18,8 @@ FIRST_STEP, SHRINK, ROUNDS = 0.5, 2.2, 7
 FIRST_SHARE = 0.06
 #: Trials of a simplex for each parameter at most, and its size in first steps when it stops.
 MOST_TRIALS, CLOSE = 40, 0.01
+#: Squared error, in units of the noise, that it must take away: less says nothing of the values.
+LEAST_FURTHER = 4.0
 
 
 class Gain:
@@ -120,7 +122,8 @@ def refine_term(problem: Problem, term: Term, gain: Gain) -> Term:
                 step /= SHRINK
     if len(shapes) == 1 or not np.isfinite(best):
         return with_values(values)
-    return with_values(_by_simplex(shapes, ranges, values, gain_of))
+    further = _by_simplex(shapes, ranges, values, gain_of)
+    return with_values(further if gain_of(further) > best + LEAST_FURTHER else values)
 
 
 def _by_simplex(

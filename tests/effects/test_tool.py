@@ -25,7 +25,15 @@ def test_wrench_works_against_the_motion_of_the_tool(signals, robot):
         moved = signals.q + step * np.eye(2)[j]
         before, after = (robot.forward_kinematics(q)[0] for q in (signals.q, moved))
         work = (after - before) @ force / step
-        np.testing.assert_allclose(blocks[j] @ force, -work, atol=1e-5)
+        np.testing.assert_allclose(blocks[j][:, :3] @ force, -work, atol=1e-5)
+
+
+def test_a_moment_works_against_the_turning_of_the_tool(signals):
+    blocks = get_effect("external_wrench").torque_columns(signals, (0, 1))
+    moment = np.array([0.3, -0.2, 1.5])
+    for j in range(2):
+        axis = signals.robot.jacobian(signals.q)[:, 3:, j]
+        np.testing.assert_allclose(blocks[j][:, 3:] @ moment, -axis @ moment, atol=1e-12)
 
 
 def test_contact_only_below_its_plane(signals, robot):
