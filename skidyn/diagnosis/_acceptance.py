@@ -103,12 +103,18 @@ class JudgingSearch(RankingSearch):
             errors = rival.errors
             if errors.shape != best.errors.shape:
                 errors = self._errors(rival, within=single)
-            if self._good_enough(errors.sum(0), left, removed, joints):
+            left_over = self.settings.further_tolerance if rival.is_further_form else None
+            if self._good_enough(errors.sum(0), left, removed, joints, left_over):
                 return rival
         return best
 
     def _good_enough(
-        self, errors: Array, least: Array, removed: Array, joints: Sequence[int]
+        self,
+        errors: Array,
+        least: Array,
+        removed: Array,
+        joints: Sequence[int],
+        tolerance: float | None = None,
     ) -> bool:
         """Whether a name leaves no more than its formula may leave of what a function removes.
 
@@ -122,11 +128,14 @@ class JudgingSearch(RankingSearch):
             Squared error that the function removes.
         joints : sequence of int
             Joints, from 0, on which they are compared, each in units of what is left there.
+        tolerance : float, optional
+            Share of what the function removes; that of a plain formula by default.
         """
+        tolerance = self.settings.form_tolerance if tolerance is None else tolerance
         own = list(joints)
         weight = 1 / np.maximum(least[own], 1e-300)
         behind = float(weight @ (errors - least)[own])
-        return behind <= self.settings.form_tolerance * float(weight @ removed[own])
+        return behind <= tolerance * float(weight @ removed[own])
 
     def _simplest_of_family(self, best: Hypothesis, ranking: list[Hypothesis]) -> Hypothesis:
         """Members of a family differ only in motion made for it: the simplest near one is named.

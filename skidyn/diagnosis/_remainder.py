@@ -16,6 +16,9 @@ from numpy.typing import NDArray
 from skidyn._signals import Array
 from skidyn.diagnosis._noise import MEDIAN, sensor_noise
 from skidyn.diagnosis._rule import (
+    COLOURED_ALIKE,
+    COLOURED_FEWEST_JOINTS,
+    COLOURED_MOST,
     REMAINDER_CORRELATED,
     REMAINDER_PREDICTABLE_SHARE,
     REMAINDER_SHARE_OF_RANGE,
@@ -54,6 +57,9 @@ class Remainder:
         Whether the error is more than noise, and more than what a healthy robot leaves; or what
         is slow is correlated, which noise is not, and stands out of averaged noise; or what is
         predictable exceeds the noise.
+    coloured : bool
+        Whether the error is so many times the fast noise on all joints alike that it is noise that
+        is correlated in time: a torque that is missing is larger on some joints than on others.
 
     Examples
     --------
@@ -67,6 +73,7 @@ class Remainder:
     left: Array
     inflation: Array
     material: NDArray[np.bool_]
+    coloured: bool = False
 
     @property
     def noise(self) -> Array:
@@ -123,8 +130,19 @@ def find_remainder(
     inflation = variance_inflation(problem, averaged, range(len(averaged)))
     slow = (inflation > REMAINDER_CORRELATED) & (rows > REMAINDER_SLOW_TIMES_NOISE * noise)
     material |= slow & (left > REMAINDER_SLOW_SHARE_OF_RANGE * span)
+    coloured = bool(material.any()) and _is_alike(rmse, noise)
+    if coloured:
+        material[:] = False
     material |= (predictable > noise) & (predictable > REMAINDER_PREDICTABLE_SHARE * span)
-    return Remainder(sensor, position, predictable, left, inflation, material)
+    return Remainder(sensor, position, predictable, left, inflation, material, coloured)
+
+
+def _is_alike(rmse: Array, noise: Array) -> bool:
+    """Whether errors are about as many times the noise on all of several joints, and not many."""
+    moves = noise > 0
+    ratio = rmse[moves] / noise[moves]
+    few = moves.sum() < COLOURED_FEWEST_JOINTS
+    return not few and bool(ratio.max() < min(COLOURED_MOST, COLOURED_ALIKE * ratio.min()))
 
 
 def noise_level(problem: Problem, residual: Array) -> Array:

@@ -177,6 +177,11 @@ class Diagnosis:
         return np.ones(len(self.joint_names)) if self.parts is None else self.parts.inflation
 
     @property
+    def noise_is_coloured(self) -> bool:
+        """Whether the error exceeds the fast noise on all joints alike, as correlated noise does."""
+        return self.parts is not None and self.parts.coloured
+
+    @property
     def regimes(self) -> tuple[str, ...]:
         """Names of the columns of :meth:`error_map`."""
         return REGIMES
@@ -425,6 +430,7 @@ class Diagnosis:
             "sensor_noise": [float(x) for x in self.sensor_noise],
             "remainder": [float(x) for x in self.remainder],
             "remainder_inflation": [float(x) for x in self.remainder_inflation],
+            "noise_is_coloured": self.noise_is_coloured,
             "effects": [
                 {**finding.to_dict(), **of_finding(self.in_turn, k)}
                 for k, finding in enumerate(self.findings)

@@ -97,6 +97,9 @@ REMAINDER_TIMES_NOISE, REMAINDER_SHARE_OF_RANGE = 2.0, 0.02
 #: a slow torque to more than coloured noise does; and they reach this share of the range.
 REMAINDER_SLOW_TIMES_NOISE, REMAINDER_CORRELATED = 3.0, 2.2
 REMAINDER_SLOW_SHARE_OF_RANGE = 0.01
+#: Errors that are at most so many times the fast noise on every joint, and alike within this factor
+#: on all of so many joints, are noise that is correlated in time.
+COLOURED_MOST, COLOURED_ALIKE, COLOURED_FEWEST_JOINTS = 4.0, 1.5, 3
 #: Share of the torque's range above which something predictable is material if it exceeds noise.
 REMAINDER_PREDICTABLE_SHARE = 0.01
 
@@ -139,6 +142,9 @@ class Settings:
         tenth of its size. A nameless function that does better by no more than this does not take
         the place of a name, and a later finding that removes no more on the same joints is the
         shadow of the earlier ones.
+    further_tolerance : float
+        The same where a further form of a known effect is compared with a nameless function: it
+        was chosen among several.
     exact_tolerance : float
         The same where every formula is exact (:attr:`Effect.is_exact`).
     nameless_tolerance : float
@@ -204,6 +210,7 @@ class Settings:
     least_share: float = 0.006
     least_drop: float = 0.002
     form_tolerance: float = 0.015
+    further_tolerance: float = 0.005
     exact_tolerance: float = 0.0015
     nameless_tolerance: float = 0.15
     alike: float = 0.005

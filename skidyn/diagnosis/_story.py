@@ -49,7 +49,7 @@ def story(diagnosis: Diagnosis) -> dict[str, Any]:
     """
     rows = joint_rows(diagnosis)
     cards = [_line(diagnosis, k, rows) for k in range(len(diagnosis.findings))]
-    mark, headline, text = _verdict(rows, cards)
+    mark, headline, text = _verdict(rows, cards, diagnosis.noise_is_coloured)
     doubts = [str(check) for check in diagnosis.checks if check.certainty == "suspected"]
     return {
         "verdict": diagnosis.verdict,
@@ -115,7 +115,7 @@ def joint_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 
 def _verdict(
-    rows: Sequence[dict[str, Any]], cards: Sequence[dict[str, Any]]
+    rows: Sequence[dict[str, Any]], cards: Sequence[dict[str, Any]], coloured: bool
 ) -> tuple[str, str, str]:
     """Mark, headline and text of the banner."""
     material = [row["joint"] for row in rows if row["material"]]
@@ -163,7 +163,13 @@ def _verdict(
             "The error there is much larger than the noise, and no effect of the catalogue "
             "explains it. What is known about it stands under “What is left”.",
         )
-    if any(row["ratios"][1] > FAILS for row in rows):
+    if coloured:
+        text = (
+            "The error on data that the fit has not seen is about as many times the fast noise on "
+            "every joint: noise of the torque that is correlated in time. An effect would be larger "
+            "on some joints than on others."
+        )
+    elif any(row["ratios"][1] > FAILS for row in rows):
         text = (
             "The error on data that the fit has not seen exceeds the noise of the sensors, but is "
             "small against the torque of the joints; healthy robots leave as much."
@@ -376,6 +382,8 @@ def _left(diagnosis: Diagnosis, rows: Sequence[dict[str, Any]]) -> str:
     others = [row["joint"] for row in left[3:]]
     more = f"; {joints_told(sorted(others))} too" if others else ""
     text = f"Still above the noise: {listed(parts)}{more}."
-    if not any(row["material"] for row in rows):
+    if diagnosis.noise_is_coloured:
+        text += " It is alike on every joint, as noise is that is correlated in time."
+    elif not any(row["material"] for row in rows):
         text += " That is small against the torque of the joint; healthy robots leave as much."
     return text
