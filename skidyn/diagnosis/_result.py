@@ -178,7 +178,7 @@ class Diagnosis:
 
     @property
     def noise_is_coloured(self) -> bool:
-        """Whether the error exceeds the fast noise on all joints alike, as correlated noise does."""
+        """Whether the error exceeds fast noise on all joints alike, as correlated noise does."""
         return self.parts is not None and self.parts.coloured
 
     @property

@@ -166,8 +166,8 @@ def _verdict(
     if coloured:
         text = (
             "The error on data that the fit has not seen is about as many times the fast noise on "
-            "every joint: noise of the torque that is correlated in time. An effect would be larger "
-            "on some joints than on others."
+            "every joint: noise of the torque that is correlated in time. An effect would be "
+            "larger on some joints than on others."
         )
     elif any(row["ratios"][1] > FAILS for row in rows):
         text = (
