@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.datasets import load_panda, load_planar_arm, load_scara, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
 from skidyn.identification import RBDRegressor
 
@@ -44,3 +44,56 @@ def test_slow_remainder_of_a_thousandth_of_the_range_is_not_told(log, wandering)
     torque[:, 1] += 0.001 * np.ptp(log.y[:, 1]) * wandering
 
     assert diagnose(RBDRegressor(log.robot), log.X, torque).verdict == "complete"
+
+
+@pytest.fixture(scope="module")
+def with_coloured_noise():
+    """A Panda with nothing hidden and noise that is correlated over some tenths of a second."""
+    log = make_hidden_effect_log(
+        load_panda(), None, noise="low", n_trajectories=6, duration=4.0, random_state=0
+    )
+    steps = np.random.default_rng(2).normal(size=log.y.shape)
+    slow = lfilter([1.0], [1.0, -0.97], steps, axis=0)
+    slow /= slow.std(0)
+    noise = diagnose(RBDRegressor(log.robot), log.X, log.y).noise
+    return log, noise, slow
+
+
+def test_noise_that_is_correlated_on_all_joints_alike_is_no_effect(with_coloured_noise):
+    log, noise, slow = with_coloured_noise
+
+    found = diagnose(RBDRegressor(log.robot), log.X, log.y + 2 * noise * slow)
+
+    assert found.noise_is_coloured
+    assert found.verdict == "complete"
+    assert found.to_dict()["noise_is_coloured"]
+    assert "every joint" in found.story()["text"]
+
+
+def test_as_much_on_one_joint_is_told(with_coloured_noise):
+    log, noise, slow = with_coloured_noise
+    torque = log.y.copy()
+    torque[:, 2] += 6 * noise[2] * slow[:, 2]
+
+    found = diagnose(RBDRegressor(log.robot), log.X, torque)
+
+    assert not found.noise_is_coloured
+    assert found.verdict == "unknown"
+    assert found.unexplained["joints"] == [3]
+
+
+def test_noise_of_positions_is_felt_by_rotors():
+    log = make_hidden_effect_log(
+        load_scara(), None, noise="low", n_trajectories=4, duration=4.0, random_state=0
+    )
+    X, torque = log.X.copy(), log.y.copy()
+    rng = np.random.default_rng(0)
+    for j in range(log.robot.n_joints):
+        X[f"q{j + 1}"] += 2e-5 * rng.normal(size=len(X))
+    with_rotors = torque + 0.5 * X[[f"ddq{j + 1}" for j in range(4)]].to_numpy()
+    model = RBDRegressor(log.robot, ("viscous", "coulomb", "rotor_inertia"))
+
+    light = diagnose(model, X, torque)
+    heavy = diagnose(model, X, with_rotors)
+
+    assert np.all(heavy.parts.position_noise > light.parts.position_noise)

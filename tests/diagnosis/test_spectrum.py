@@ -6,7 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from skidyn.diagnosis import find_lines
+from skidyn.datasets import load_scara, make_hidden_effect_log
+from skidyn.diagnosis import diagnose, find_lines
+from skidyn.identification import RBDRegressor
 
 
 def test_a_ripple_is_found_with_its_waves_and_size(missing):
@@ -38,3 +40,19 @@ def test_fewer_than_two_waves_within_the_motion_are_no_ripple(missing):
     lines = [line for line in find_lines(narrow, residual) if line.joint == 1]
 
     assert all(line.term.shape["N"] * np.ptp(q[:, 1]) > 3.9 * np.pi for line in lines)
+
+
+def test_a_ball_screw_is_named_with_its_lead():
+    log = make_hidden_effect_log(
+        load_scara(), None, noise="low", n_trajectories=6, duration=4.0, random_state=0
+    )
+    slider = log.robot.joint_types.index("prismatic")
+    torque = log.y.copy()
+    wave = np.sin(2 * np.pi / 0.005 * log.X[f"q{slider + 1}"].to_numpy())
+    torque[:, slider] += 0.3 * np.std(torque[:, slider]) * wave
+
+    (found,) = diagnose(RBDRegressor(log.robot), log.X, torque).findings
+
+    assert (found.kind, found.joints) == ("torque_ripple", (slider + 1,))
+    assert found.parameters["N"]["value"] == pytest.approx(2 * np.pi / 0.005, rel=0.01)
+    assert found.parameters["N"]["unit"] == "1/m"

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Loads that some recordings have."""
 
-from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+import numpy as np
+
+from skidyn.datasets import load_panda, load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import Settings, diagnose, split_effects
 from skidyn.identification import RBDRegressor
 
@@ -17,3 +19,20 @@ def test_the_recordings_with_a_payload_are_told_from_the_others():
 
     assert split.candidate.term.trajectories == tuple(sorted(log.parameters["trajectories"]))
     assert (split.drop > 0).all()  # in every quarter of the recordings
+
+
+def test_a_force_beside_the_origin_of_the_tool_is_told_with_its_moment():
+    log = make_hidden_effect_log(
+        load_panda(), None, noise="low", n_trajectories=6, duration=4.0, random_state=0
+    )
+    own = (log.X["trajectory"] == 3).to_numpy()
+    q = log.X[[f"q{j + 1}" for j in range(7)]].to_numpy()
+    wrench = np.array([8.0, -3.0, 5.0, 0.4, 0.3, -0.5])
+    torque = log.y.copy()
+    torque[own] -= np.einsum("iaj,a->ij", log.robot.jacobian(q[own]), wrench)
+
+    (found,) = diagnose(RBDRegressor(log.robot), log.X, torque).findings
+
+    assert (found.kind, found.trajectories) == ("external_wrench", (3,))
+    told = [found.parameters[f"{what}_{a}"]["value"] for what in ("force", "moment") for a in "xyz"]
+    np.testing.assert_allclose(told, wrench, atol=0.2)

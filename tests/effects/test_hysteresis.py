@@ -2,6 +2,7 @@
 """States of hysteresis against formulas written step by step."""
 
 import numpy as np
+import pytest
 
 from skidyn.effects import dahl_state, get_effect, stop_state
 
@@ -39,7 +40,8 @@ def test_a_rest_does_not_break_a_stroke():
     )
 
 
-def test_dahl_with_exponent_two_by_small_steps(signals, columns_of):
+@pytest.mark.parametrize("exponent", [0.7, 1.6, 2.0])
+def test_dahl_with_another_exponent_by_small_steps(signals, columns_of, exponent):
     q, way = signals.q[:, 0], 0.05
     expected = np.zeros(len(q))
     for rows in signals.segments:
@@ -47,9 +49,9 @@ def test_dahl_with_exponent_two_by_small_steps(signals, columns_of):
         for i in range(rows.start + 1, rows.stop):
             step = (q[i] - q[i - 1]) / 200
             for _ in range(200):
-                state += step / way * (1 - state * np.sign(step)) ** 2
+                state += step / way * max(1 - state * np.sign(step), 0.0) ** exponent
             expected[i] = state
-    found = columns_of("dahl", signals, presliding=way, exponent=2.0)[:, 0]
+    found = columns_of("dahl", signals, presliding=way, exponent=exponent)[:, 0]
     np.testing.assert_allclose(found, expected, atol=5e-3)
 
 

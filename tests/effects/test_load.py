@@ -20,9 +20,17 @@ def test_a_gear_that_loses_only_while_it_drives(signals, columns_of):
 
 
 def test_a_loss_that_grows_with_load_and_speed(signals, columns_of):
-    load = np.ones_like(signals.q)
-    loaded = signals.with_(load=3.0 * load)
+    loaded = signals.with_(load=3.0 * np.ones_like(signals.q))
 
     friction = columns_of("load_dependent_friction", loaded, viscous=1.0)
 
     np.testing.assert_allclose(friction[:, 0], 3.0 * loaded.dq[:, 0])
+
+
+def test_the_drive_carries_its_own_friction_as_well(signals, columns_of):
+    shape = {"friction": 0.4, "damping": 0.2}
+    own = signals.with_(load=signals.load + 0.4 * signals.sign + 0.2 * signals.dq)
+
+    friction = columns_of("load_dependent_friction", signals, **shape)
+
+    np.testing.assert_allclose(friction, columns_of("load_dependent_friction", own))

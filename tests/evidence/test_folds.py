@@ -76,6 +76,22 @@ def test_a_prior_pulls_all_fits(rows):
     assert np.vstack([whole, left]) == pytest.approx(np.tile([1.0, 2.0, 3.0], (5, 1)), rel=1e-5)
 
 
+def test_what_the_fold_left_out_tells_alone_stays_as_all_folds_have_it(rows):
+    folds, design, sigma, target = rows
+    for block, fold in zip(design, folds.fold, strict=True):
+        block[:, 1] *= np.where(fold == 2, 1.0, 1e-3)  # little is known of it without the third
+    grams, cross = fold_products(folds, design, sigma, target)
+    kept = np.zeros((4, 3), dtype=bool)
+    kept[2, 1] = True
+
+    whole, free = solve_left_out(grams, cross)
+    _, left = solve_left_out(grams, cross, kept=kept)
+
+    assert abs(free[2, 1] - whole[1]) > 10 * abs(left[2, 1] - whole[1])
+    assert left[2, 1] == pytest.approx(whole[1], abs=1e-3)
+    np.testing.assert_allclose(left[[0, 1, 3]], free[[0, 1, 3]])
+
+
 def test_a_column_that_vanishes_gets_no_coefficient():
     gram = np.diag([4.0, 0.0])
     assert Normal(gram, np.array([8.0, 0.0]), column_sizes(gram)).solution == pytest.approx([2, 0])
