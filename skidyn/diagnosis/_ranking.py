@@ -208,12 +208,13 @@ class RankingSearch(SearchState):
         if any(c.term.effect.search == "trajectories" for c in self.chosen):
             return []
         splits = split_effects(self.problem, self.kinds, self.blocks, self.sigma, self.target)
-        found = [
-            ([s.candidate], -float(s.drop.sum()) + 2 * s.candidate.width)
-            for s in splits
-            if s.drop.sum() > 0
-        ]
-        return [*found, *((self._each_by_itself(own[0]), rough) for own, rough in found)]
+        found = []
+        for split in splits:
+            if split.drop.sum() > 0:
+                own = [split.candidate]
+                own = self._each_by_itself(split.candidate) if split.apart else own
+                found.append((own, -float(split.drop.sum()) + 2 * sum(c.width for c in own)))
+        return found
 
     def _each_by_itself(self, candidate: Candidate) -> list[Candidate]:
         """What some recordings have, of another size in each of them."""

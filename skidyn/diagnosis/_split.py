@@ -34,10 +34,13 @@ class Split:
         Term with its trajectories.
     drop : ndarray of shape (4,)
         Held-out drop of squared error by quarter, in units of the noise.
+    apart : bool
+        Whether its trajectories were chosen for effects of another size in each of them.
     """
 
     candidate: Candidate
     drop: Array
+    apart: bool = False
 
 
 def split_effects(
@@ -47,7 +50,9 @@ def split_effects(
     sigma: Array,
     target: Sequence[Array],
 ) -> list[Split]:
-    """Best split of the trajectories for each kind of effect that needs one.
+    """Best splits of the trajectories for each kind of effect that needs one.
+
+    One for the same effect in all of its trajectories, and one for effects of their own.
 
     Parameters
     ----------
@@ -75,15 +80,17 @@ def split_effects(
         rows = {j: b / sigma[j] for j, b in problem.term_rows(term).items()}
         products = _Products.of(problem, felt_columns(problem, blocks, sigma), y, rows, names)
         own = products.own_estimates(effect.leading or term.width)
-        best: tuple[Array, list[Any]] | None = None
-        for chosen in _splits(effect.grows, own, names):
-            drop = products.drop(np.isin(names, chosen))
-            if best is None or drop.sum() > best[0].sum():
-                best = drop, chosen
-        if best is not None:
-            shape = {"trajectories": tuple(sorted(int(name) for name in best[1]))}
-            split = term.with_shape(**shape)
-            found.append(Split(Candidate(kind, split, _within(problem, term, best[1])), best[0]))
+        groups = _splits(effect.grows, own, names)
+        alone = {name: products.drop(names == name) for name in {n for g in groups for n in g}}
+        together = [(products.drop(np.isin(names, group)), group) for group in groups]
+        apart = [(np.sum([alone[name] for name in group], axis=0), group) for group in groups]
+        for drops, is_apart in ((together, False), (apart, True)):
+            if not drops:
+                continue
+            drop, chosen = max(drops, key=lambda item: float(item[0].sum()))
+            split = term.with_shape(trajectories=tuple(sorted(int(name) for name in chosen)))
+            rows = _within(problem, term, chosen)
+            found.append(Split(Candidate(kind, split, rows), drop, is_apart))
     return found
 
 
@@ -189,7 +196,9 @@ def _splits(grows: bool, own: Array, names: NDArray[Any]) -> list[list[Any]]:
     moved = away @ np.linalg.svd(away, full_matrices=False)[2][0]
     groups = _beyond_gaps(moved, names, sides=2)
     if not grows:
-        return groups  # a force acts in the smaller group
+        # A force acts in the smaller group; forces of several directions are all far from the rest.
+        far = _beyond_gaps(np.linalg.norm(away, axis=1), names, sides=1)
+        return groups + [group for group in far if len(group) <= len(names) / 2]
     # A payload adds mass, be it to most of the trajectories.
     mass = own[:, 0]
     lighter = [mass[inside].mean() < mass[~inside].mean() for inside in _members(groups, names)]

@@ -137,6 +137,8 @@ def loads(
     design = problem.design(blocks)
     offers = []
     for split in split_effects(problem, list_effects(), blocks, sigma, target):
+        if split.apart:
+            continue  # offered as one effect
         rows = split.candidate.rows
         before = _quarters(problem, design, sigma, target)
         wider = [np.hstack([a, rows[j]]) if j in rows else a for j, a in enumerate(design)]

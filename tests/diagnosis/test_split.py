@@ -15,7 +15,7 @@ def test_the_recordings_with_a_payload_are_told_from_the_others():
     fit = problem.fit_own()
     own = [problem.term_rows(t) for t in problem.terms]
 
-    (split,) = split_effects(problem, ["payload", "spring"], own, fit.noise, problem.target)
+    split, _ = split_effects(problem, ["payload", "spring"], own, fit.noise, problem.target)
 
     assert split.candidate.term.trajectories == tuple(sorted(log.parameters["trajectories"]))
     assert (split.drop > 0).all()  # in every quarter of the recordings
