@@ -95,6 +95,8 @@ class NonlinearSpring(Effect):
     forms = (
         {"low": 0.2, "high": 0.8},
         {"low": 0.4, "high": 0.6},
+        {"low": 0.1, "high": 0.5},
+        {"low": 0.5, "high": 0.9},
         {"rest": 0.3, "power": 5.0},
         {"rest": 0.5, "power": 5.0},
         {"rest": 0.7, "power": 5.0},
