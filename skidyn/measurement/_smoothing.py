@@ -3,7 +3,9 @@
 
 Dry friction turns where a joint does. What friction does when a joint turns (presliding) comes
 after it and takes a way; a low pass without delay spreads the step over the same time before and
-after, in all joints alike. Left alone, it gets the name of a presliding friction.
+after, in all joints alike. Left alone, it gets the name of a presliding friction. Friction that
+follows the speed, which falls or rises as the joint comes to rest, changes before the turn as well,
+but by the speed and not by time: it is fitted, too.
 """
 
 from __future__ import annotations
@@ -24,10 +26,13 @@ from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import measured_delay
 
-#: Standard deviations of the smoothing that are tried, s, and ways of presliding, rad (a tenth in
+#: Standard deviations of the smoothing that are tried, s (where the last one is best, the torque is
+#: merely slow), and ways of presliding, rad (a tenth in
 #: metres).
-WIDTHS = 0.01 * 2.0 ** np.arange(5)
+WIDTHS = 0.01 * 2.0 ** np.arange(6)
 WAYS = np.array([0.001 * 2.0**k for k in range(8)])
+#: Speeds, rad/s (a tenth in m/s), below which friction fades or grows, and by how many times.
+SPEEDS, TIMES = 0.02 * 2.0 ** np.arange(5), (1.0, 3.0, 10.0)
 #: Half of the time around a turn that is looked at, s, and the degree of what else is there.
 AROUND, DEGREE = 0.4, 3
 #: Turns of a joint, at least and at most; samples around each at least.
@@ -52,13 +57,13 @@ class Turns:
         Log-likelihood of friction that turns at once.
     smoothed : ndarray of shape (n_widths,)
         That of smoothed friction.
-    presliding : float
-        That of the best presliding.
+    other : float
+        That of the best other friction: of presliding, or of one that follows the speed.
     """
 
     step: float
     smoothed: Array
-    presliding: float
+    other: float
 
     @property
     def width(self) -> int:
@@ -68,7 +73,7 @@ class Turns:
     @property
     def gain(self) -> float:
         """What smoothing gains over what friction can do by itself, and over hardly any of it."""
-        friction = max(self.step, self.presliding, float(self.smoothed[0]))
+        friction = max(self.step, self.other, float(self.smoothed[0]))
         return float(self.smoothed.max()) - friction
 
 
@@ -90,13 +95,13 @@ class SmoothedTorque(Check):
         motion = smooth_motion(measurement.signals).signals  # noise would blur when a joint turns
         for k in np.flatnonzero(measurement.excited).tolist():
             turns = at_turns(motion, measurement.torque[:, k], k)
-            if turns is not None and max(turns.smoothed.max(), turns.presliding) > turns.step:
+            if turns is not None and max(turns.smoothed.max(), turns.other) > turns.step:
                 found[k] = turns
         widths = [turns.width for turns in found.values() if turns.gain > WORD]
         common = max(set(widths), key=widths.count) if widths else 0
         alike = [k for k, t in found.items() if t.width == common and t.gain > WORD]
         total = sum(turns.gain for turns in found.values() if turns.width == common)
-        if WIDTHS[common] < SHORTEST or total < LEAST:
+        if WIDTHS[common] < SHORTEST or common == len(WIDTHS) - 1 or total < LEAST:
             return
         if len(alike) < max(min(JOINTS, measurement.n_joints), AGREEING * len(found)):
             return
@@ -157,6 +162,11 @@ def at_turns(signals: Signals, torque: Array, joint: int) -> Turns | None:
     dahl = get_effect("dahl")
     ways = (WAYS * float(signals.unit[joint])).tolist()
     forms += [dahl.columns(signals, joint, presliding=way)[:, 0][index] for way in ways]
+    speed, side = dq[index], sign[index]
+    for fading in (SPEEDS * float(signals.unit[joint])).tolist():
+        forms.append(np.tanh(speed / fading))
+        near = np.exp(-((speed / fading) ** 2))
+        forms += [side * (1.0 + times * near) for times in TIMES]
     slow, _ = np.linalg.qr(np.vander(np.linspace(-1, 1, index.shape[1]), DEGREE + 1))
     left = _without(torque[index], slow)
     fits = [_likelihood(_without(form, slow), left) for form in forms]
