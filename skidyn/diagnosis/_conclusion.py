@@ -390,6 +390,7 @@ def _sure(finding: Finding, findings: Sequence[Finding], parts: Remainder, whole
         nameless=finding.kind != UNKNOWN and (beside or bool(parts.material[joints].any())),
         whole_recordings=whole,
         alike=finding.alike,
+        has_name=finding.kind != UNKNOWN,
     )
     return replace(finding, confidence=probability)
 

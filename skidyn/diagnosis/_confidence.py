@@ -23,6 +23,8 @@ NAMELESS, BLOCKS, ALIKE = -1.3, -0.5, -2.4
 COLOURED, LEAST, ENOUGH = 1.7, 0.003, 0.3
 #: No name is surer than the number of logs on which the weights were found allows.
 MOST = 0.98
+#: That something has no name is less sure: known effects have other formulas than the catalogue's.
+MOST_NAMELESS = 0.88
 
 
 def confidence(
@@ -33,6 +35,7 @@ def confidence(
     nameless: bool = False,
     whole_recordings: bool = True,
     alike: bool = False,
+    has_name: bool = True,
 ) -> float:
     """Probability that a name is right.
 
@@ -50,15 +53,17 @@ def confidence(
         Whether it was judged on whole recordings left out.
     alike : bool, default=False
         Whether a kind that acts on other joints explains as much.
+    has_name : bool, default=True
+        Whether it is a known effect, and not something without a name.
 
     Returns
     -------
     float
-        Between 0 and 0.98.
+        Between 0 and 0.98, or 0.88 without a name.
     """
     logit = CONSTANT + MARGIN * min(max(margin, 0.0), 1.0)
     logit += CORRELATED * float(np.log(max(inflation / COLOURED, 1.0)))
     logit += REMOVED * float(np.log10(min(max(removed, LEAST), ENOUGH) / ENOUGH))
     logit += NAMELESS * nameless + BLOCKS * (not whole_recordings)
     logit += ALIKE * alike
-    return min(MOST, float(1 / (1 + np.exp(-logit))))
+    return min(MOST if has_name else MOST_NAMELESS, float(1 / (1 + np.exp(-logit))))

@@ -64,7 +64,9 @@ class Followed(NamedTuple):
     sums: list[Sum]
 
 
-def followed_signals(problem: Problem, joint: int, residual: Array) -> Followed:
+def followed_signals(
+    problem: Problem, joint: int, residual: Array, *, accelerations: bool = True
+) -> Followed:
     """Sets of signals, and sums of positions, that the residual of a joint may be a function of.
 
     Parameters
@@ -75,10 +77,17 @@ def followed_signals(problem: Problem, joint: int, residual: Array) -> Followed:
         Joint, from 0.
     residual : ndarray of shape (n_samples,)
         Torque that the model leaves, N m or N.
+    accelerations : bool, default=True
+        Whether it may be a function of accelerations. Those of coarse positions are noise, which is
+        in the residual as well.
     """
     y = average_at_rows(problem, joint, residual)
     step = max(1, -(-len(y) // MOST_ROWS))
-    signals = {name: x[::step] for name, x in averaged_signals(problem, joint).items()}
+    signals = {
+        name: x[::step]
+        for name, x in averaged_signals(problem, joint).items()
+        if accelerations or not name.startswith("ddq")
+    }
     y = y[::step]
     # numbered without gaps: trajectories that were dropped must not leave an empty quarter below
     numbers, fold = np.unique(problem.fold[joint][::step], return_inverse=True)

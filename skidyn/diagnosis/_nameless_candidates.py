@@ -12,7 +12,7 @@ from skidyn._cores import each
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._clock import LOWEST, clock_line
-from skidyn.diagnosis._followed_signals import followed_signals
+from skidyn.diagnosis._followed_signals import Followed, followed_signals
 from skidyn.diagnosis._hypothesis import (
     UNKNOWN,
 )
@@ -31,7 +31,11 @@ Mask = NDArray[np.bool_]
 
 
 def nameless_candidates(
-    problem: Problem, residual: Array, *, followed_on: Collection[int] | None = None
+    problem: Problem,
+    residual: Array,
+    *,
+    followed_on: Collection[int] | None = None,
+    coarse: Collection[int] = (),
 ) -> list[Candidate]:
     """Nameless functions of the signals for every joint.
 
@@ -44,13 +48,20 @@ def nameless_candidates(
     followed_on : collection of int, optional
         Joints, from 0, for which alone those are made whose signals are chosen by what the residual
         follows, and no others; all nameless functions of all joints by default.
+    coarse : collection of int, default=()
+        Joints, from 0, whose torque has more noise of positions than of its sensor: no function of
+        accelerations is made for them.
 
     Returns
     -------
     list of Candidate
     """
     looked_at = range(problem.n_joints) if followed_on is None else followed_on
-    found = each(lambda j: followed_signals(problem, j, residual[:, j]), looked_at)
+
+    def follow(j: int) -> Followed:
+        return followed_signals(problem, j, residual[:, j], accelerations=j not in coarse)
+
+    found = each(follow, looked_at)
     followed = dict(zip(looked_at, found, strict=True))
     made: list[tuple[Term, tuple[str, ...]]] = []
     for kind in nameless_kinds():
@@ -59,6 +70,8 @@ def nameless_candidates(
         for joints in effect.sites(problem.signals):
             joint = joints[0]
             if effect.search == "spectrum" or effect.not_shown(problem.signals, joint):
+                continue
+            if effect.drawn_against == "ddq" and joint in coarse:
                 continue
             if followed_on is not None and (effect.search != "screened" or joint not in followed):
                 continue

@@ -41,8 +41,9 @@ from skidyn.effects import get_effect
 Mask = NDArray[np.bool_]
 #: Places in the pool of what is added, and by how much the held-out error falls.
 _Greedy = tuple[list[int], float]
-#: Names of which other forms are tried.
-FORMS_TRIED = 2
+#: Names of which other forms are tried, and the share of the best score from which on the second
+#: is tried in any case.
+FORMS_TRIED, NEARLY = 2, 0.9
 
 
 class RankingSearch(SearchState):
@@ -67,13 +68,17 @@ class RankingSearch(SearchState):
     def _other_forms(self, ranking: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Other forms of the best names, where what these leave is no noise.
 
-        On the grid, the form of a kind that screens best need not be the one that fits best.
+        On the grid, the form of a kind that screens best need not be the one that fits best. So are
+        those of a name that explains nearly as much as the best one.
         """
         names = [h for h in ranking if h.kind != UNKNOWN and not within_recordings(h)]
+        names = sorted(names, key=lambda h: -h.score)[:FORMS_TRIED]
         found: list[list[Candidate]] = []
-        for h in sorted(names, key=lambda h: -h.score)[:FORMS_TRIED]:
-            forms = get_effect(h.kind).forms
-            if h.torque is None and forms and self._price(h.candidates) > self.settings.white:
+        for h in names:
+            if h.torque is not None or not get_effect(h.kind).forms:
+                continue
+            near = h is not names[0] and h.score > NEARLY * names[0].score
+            if near or self._price(h.candidates) > self.settings.white:
                 found += self._in_other_forms(h)
         return self._finals(found, refined=len(found))
 

@@ -20,8 +20,10 @@ from skidyn.diagnosis._hypothesis import (
     uses_the_fit,
 )
 from skidyn.diagnosis._nameless_candidates import nameless_candidates
+from skidyn.diagnosis._noise import sensor_noise
 from skidyn.diagnosis._profile import profile_error
 from skidyn.diagnosis._recordings import recording_candidates
+from skidyn.diagnosis._remainder import position_noise
 from skidyn.diagnosis._rule import (
     CONFINED,
     Settings,
@@ -67,7 +69,9 @@ class SearchState:
         self.nameless = nameless and bool(settings.max_findings)
         if self.nameless:
             self._followed = problem.torque - problem.explained(base)
-            self.pool += nameless_candidates(problem, self._followed)
+            sensor = np.nan_to_num(sensor_noise(problem.signals, self._followed))
+            self._coarse = np.flatnonzero(position_noise(problem, base) > sensor).tolist()
+            self.pool += nameless_candidates(problem, self._followed, coarse=self._coarse)
         self.by_recording = recording_candidates(problem, self.kinds)
         self.n_tests = max(1, len(self.pool) + len(self.by_recording))
         self.whole_pool = self.pool
@@ -168,7 +172,7 @@ class SearchState:
         self._followed = before.copy()
         self._followed[:, joints] = residual[:, joints]
         known = {c.term for c in self.whole_pool}
-        found = nameless_candidates(self.problem, residual, followed_on=joints)
+        found = nameless_candidates(self.problem, residual, followed_on=joints, coarse=self._coarse)
         new = [c for c in found if c.term not in known]
         self.pool, self.whole_pool = [*self.pool, *new], [*self.whole_pool, *new]
         self.n_tests += len(new)

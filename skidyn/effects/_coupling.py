@@ -64,7 +64,8 @@ class CoupledFriction(_PairEffect):
     """Friction of a shaft that turns with the sum of two joint velocities.
 
     The viscous part may grow with another ``power`` of the speed (1 where the shape has none), in
-    units of 1 rad/s or 1 m/s.
+    units of 1 rad/s or 1 m/s. In a ``differential`` two such shafts turn, one with the sum and one
+    with the difference of the velocities.
     """
 
     kind = "coupled_friction"
@@ -72,7 +73,7 @@ class CoupledFriction(_PairEffect):
     title = "Coupled friction"
     formula = r"F_v\,\dot x + F_c\,\mathrm{sign}\,\dot x,\quad \dot x = \dot q_i + r\,\dot q_j"
     coefficients = (Coefficient("Fc", "N m", sign=1), Coefficient("Fv", "N m s/rad", sign=1))
-    forms = ({"power": 2.0}, {"power": 0.5})
+    forms = ({"power": 2.0}, {"power": 0.5}, {"differential": 1.0})
     simplicity = 17
     rivals = ("viscous", "coulomb")
     separating_motion = "the two joints moved together, then against each other"
@@ -84,6 +85,15 @@ class CoupledFriction(_PairEffect):
         speed = signals.dq[:, i] + ratio * signals.dq[:, j]
         drag = np.sign(speed) * np.abs(speed) ** form.get("power", 1.0)
         return np.column_stack([np.tanh(speed / (SIGN_BLUR * signals.unit[i])), drag])
+
+    def torque_columns(
+        self, signals: Signals, joints: Sequence[int], **shape: Any
+    ) -> dict[int, Array]:
+        columns = super().torque_columns(signals, joints, **shape)
+        if "differential" in shape:
+            other = super().torque_columns(signals, joints, **shape | {"ratio": -shape["ratio"]})
+            return {j: block + other[j] for j, block in columns.items()}
+        return columns
 
 
 class CoupledInertia(_PairEffect):

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -33,7 +34,11 @@ class Viscous(Effect):
 
 
 class Coulomb(Effect):
-    """Dry friction of constant size against the motion."""
+    """Dry friction of constant size against the motion.
+
+    With ``rounding`` in its shape, in rad/s or m/s, it does not turn at once, but as the hyperbolic
+    tangent of the velocity over it.
+    """
 
     kind = "coulomb"
     by_recording = True
@@ -41,13 +46,24 @@ class Coulomb(Effect):
     title = "Coulomb friction"
     formula = r"F_c\,\mathrm{sign}(\dot q)"
     coefficients = (Coefficient("Fc", "N m", sign=1),)
+    shapes = (Shape("rounding", "rad/s", (), 1e-3, 1.0, has_interval=False),)
+    forms = ({"rounding": 0.05},)
     is_exact = True
     simplicity = 2
     rivals = ("stribeck", "dahl", "nonlinear_viscous")
     separating_motion = "slow sweeps with reversals, below 0.1 rad/s"
     reference = _ARMSTRONG
 
+    #: The plain form needs no search, although there is another.
+    has_shape = False
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        unit = float(signals.unit[joints[0]])
+        return [{}, *({"rounding": form["rounding"] * unit} for form in self.forms)]
+
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        if "rounding" in shape:
+            return np.tanh(signals.dq[:, [joint]] / shape["rounding"])
         return signals.sign[:, [joint]]
 
 

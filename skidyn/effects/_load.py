@@ -21,7 +21,7 @@ class LoadDependentFriction(Effect):
     the joint, as the efficiency of many gears does. One that is ``viscous`` grows with the speed,
     too, in units of 1 rad/s or 1 m/s, so that ``mu`` has no unit. Where the torque of the drive
     counts, the load has the ``friction`` (N m or N) and the ``damping`` beside it that the drive
-    has to overcome as well.
+    has to overcome as well. A preloaded gear feels what exceeds a ``threshold``, N m or N.
 
     The gear transmits what the bodies need at the joint; the torque that accelerates the rotor is
     spent before it, and is no part of the load.
@@ -36,6 +36,7 @@ class LoadDependentFriction(Effect):
         Shape("power", "1", (), 0.3, 3.0, scales=False),
         Shape("friction", "N m", (), 1e-9, np.inf, scales=False, has_interval=False),
         Shape("damping", "N m s/rad", (), 1e-9, np.inf, scales=False, has_interval=False),
+        Shape("threshold", "N m", (), 1e-9, np.inf, scales=False, has_interval=False),
     )
     forms = (
         {"power": 0.5},
@@ -44,6 +45,7 @@ class LoadDependentFriction(Effect):
         {"viscous": 1.0},
         {"friction": 0.3, "damping": 0.1},
         {"driving": 1.0, "friction": 0.3, "damping": 0.1},
+        {"threshold": 0.5},
     )
     needs = ("load",)
     simplicity = 7
@@ -67,6 +69,8 @@ class LoadDependentFriction(Effect):
             if "friction" in form:
                 form["friction"] *= typical
                 form["damping"] *= typical / max(speed, 1e-9)
+            if "threshold" in form:
+                form["threshold"] *= typical
             found.append(form | (reference if "power" in form else {}))
         return found
 
@@ -75,7 +79,8 @@ class LoadDependentFriction(Effect):
         reference, carried = shape.get("reference", 1.0), signals.load[:, joint]
         carried = carried + shape.get("friction", 0.0) * signals.sign[:, joint]
         carried = carried + shape.get("damping", 0.0) * signals.dq[:, joint]
-        load = reference * np.abs(carried / reference) ** shape.get("power", 1.0)
+        beyond = np.maximum(0.0, np.abs(carried) - shape.get("threshold", 0.0))
+        load = reference * (beyond / reference) ** shape.get("power", 1.0)
         friction: Array = load * (signals.dq if "viscous" in shape else signals.sign)[:, joint]
         if "driving" in shape:
             friction = friction * (carried * signals.dq[:, joint] > 0)

@@ -77,7 +77,8 @@ class Saturation(Effect):
     """The logged or delivered torque is cut off at a limit.
 
     With ``rounding`` in its shape the torque bends towards the limit before it: by the hyperbolic
-    tangent if that is 1.
+    tangent if that is 1. With a ``side`` it is cut off for positive (1) or negative torque (-1)
+    alone.
     """
 
     kind = "saturation"
@@ -87,7 +88,7 @@ class Saturation(Effect):
     coefficients = (Coefficient("share", "1", sign=1, is_share=True),)
     shapes = (Shape("limit", "N m", (0.97, 0.93, 0.88, 0.8, 0.7, 0.6), 1e-9, np.inf, scales=False),)
     #: A rounded limit is seen long before it is reached.
-    forms = ({"rounding": 1.0},)
+    forms = ({"rounding": 1.0}, {"side": 1.0}, {"side": -1.0})
     needs = ("model_torque",)
     simplicity = 15
     rivals = ("torque_gain",)
@@ -96,14 +97,18 @@ class Saturation(Effect):
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
         assert signals.model_torque is not None
-        highest = float(np.quantile(np.abs(signals.model_torque[:, joints[0]]), 0.999))
+        torque = signals.model_torque[:, joints[0]]
+        highest = float(np.quantile(np.abs(torque), 0.999))
         if not highest > 0:
             return []
-        sharp = [{"limit": share * highest} for share in self.shapes[0].grid]
-        rounded = [
-            {"limit": highest / share} | dict(form) for form in self.forms for share in (0.6, 0.9)
-        ]
-        return sharp + rounded
+        rounded, *sides = map(dict, self.forms)
+        shapes = [{"limit": share * highest} for share in self.shapes[0].grid]
+        shapes += [{"limit": highest / share} | rounded for share in (0.6, 0.9)]
+        for form in sides:
+            most = float(np.quantile(form["side"] * torque, 0.999))
+            shares = self.shapes[0].grid[1::2] if most > 0 else ()
+            shapes += [{"limit": share * most} | form for share in shares]
+        return shapes
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         assert signals.model_torque is not None
@@ -111,6 +116,9 @@ class Saturation(Effect):
         if "rounding" in shape:
             limit = shape["limit"]
             return np.asarray(limit * np.tanh(torque / limit) - torque)[:, None]
+        if "side" in shape:
+            side = shape["side"]
+            return np.asarray(-side * np.maximum(0.0, side * torque - shape["limit"]))[:, None]
         missing: Array = -np.sign(torque) * np.maximum(0.0, np.abs(torque) - shape["limit"])
         return missing[:, None]
 

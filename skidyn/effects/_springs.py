@@ -212,6 +212,7 @@ class EndStop(Effect):
         {"power": 1.0, "damping": 0.5},
         {"power": 1.5, "damping": 0.5},
         {"q_low": 0.0},
+        {"q_low": 0.0, "damping": 0.5},
     )
     simplicity = 10
     rivals = ("spring", "nonlinear_spring")
@@ -225,7 +226,7 @@ class EndStop(Effect):
             for share in (0.80, 0.84, 0.88, 0.92, 0.95)
             for side in (1.0, -1.0)
         ]
-        stiffening, *damped, _ = map(dict, self.forms)
+        stiffening, *damped, _, both_damped = map(dict, self.forms)
         some = [stops[k] for k in (2, 3, 6, 7)]
         softer = [
             stop | form | {"damping": form["damping"] / unit} for form in damped for stop in some
@@ -235,6 +236,8 @@ class EndStop(Effect):
             | {"side": 1.0}
             for share in (0.80, 0.88, 0.95)
         ]
+        slowing = {"damping": both_damped["damping"] / unit}
+        both += [ends | slowing for ends in both]
         return [*stops, *(stop | stiffening for stop in stops), *softer, *both]
 
     def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:

@@ -27,3 +27,7 @@ def test_margin_white_remainder_and_size_raise_it():
     assert confidence(0.6, 4.0, 0.05) > middle
     assert confidence(0.3, 2.0, 0.05) > middle
     assert confidence(0.3, 4.0, 0.2) > middle
+
+
+def test_that_something_has_no_name_is_less_sure():
+    assert confidence(1.0, 1.0, 0.3, has_name=False) < 0.9 < confidence(1.0, 1.0, 0.3)

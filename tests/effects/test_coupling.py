@@ -39,3 +39,12 @@ def test_coupled_drag_may_grow_with_a_power_of_the_speed(signals):
     columns = get_effect("coupled_friction").torque_columns(signals, (0, 1), ratio=1.0, power=2.0)
     speed = signals.dq.sum(axis=1)
     np.testing.assert_allclose(columns[0][:, 1], speed * np.abs(speed))
+
+
+def test_a_differential_has_a_shaft_for_the_sum_and_one_for_the_difference(signals):
+    effect = get_effect("coupled_friction")
+    both = effect.torque_columns(signals, (0, 1), ratio=1.0, differential=1.0)
+    one = effect.torque_columns(signals, (0, 1), ratio=1.0)
+    other = effect.torque_columns(signals, (0, 1), ratio=-1.0)
+    for joint in (0, 1):
+        np.testing.assert_allclose(both[joint], one[joint] + other[joint])

@@ -35,3 +35,8 @@ def test_stribeck_friction_may_fade_as_a_lorentz_curve(signals, columns_of):
     speed = np.abs(signals.dq[:, 0]) / 0.2
     fading = columns_of("stribeck", signals, vs=0.2, delta=2.0, lorentzian=1.0)[:, 0]
     np.testing.assert_allclose(fading, signals.sign[:, 0] / (1 + speed**2))
+
+
+def test_dry_friction_may_turn_gradually(signals, columns_of):
+    rounded = columns_of("coulomb", signals, rounding=0.1)[:, 0]
+    np.testing.assert_allclose(rounded, np.tanh(signals.dq[:, 0] / 0.1))

@@ -34,3 +34,9 @@ def test_the_drive_carries_its_own_friction_as_well(signals, columns_of):
     friction = columns_of("load_dependent_friction", signals, **shape)
 
     np.testing.assert_allclose(friction, columns_of("load_dependent_friction", own))
+
+
+def test_a_preloaded_gear_feels_what_exceeds_its_threshold(signals, columns_of):
+    beyond = np.maximum(0.0, np.abs(signals.load[:, 0]) - 0.3) * signals.sign[:, 0]
+    found = columns_of("load_dependent_friction", signals, threshold=0.3)
+    np.testing.assert_allclose(found[:, 0], beyond, atol=1e-12)

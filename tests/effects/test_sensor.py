@@ -2,6 +2,7 @@
 """Delay, saturation and gain of a torque."""
 
 import numpy as np
+import pytest
 
 from skidyn.effects import get_effect
 
@@ -31,3 +32,11 @@ def test_a_rounded_limit_is_approached(signals, columns_of):
     torque = signals.model_torque[:, 0]
     missing = columns_of("saturation", signals, limit=0.8, rounding=1.0)[:, 0]
     np.testing.assert_allclose(torque + missing, 0.8 * np.tanh(torque / 0.8))
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_limit_on_one_side_leaves_the_other_alone(signals, columns_of, side):
+    torque = signals.model_torque[:, 0]
+    cut = torque + columns_of("saturation", signals, limit=0.4, side=side)[:, 0]
+    expected = np.minimum(torque, 0.4) if side > 0 else np.maximum(torque, -0.4)
+    np.testing.assert_allclose(cut, expected)

@@ -73,3 +73,12 @@ def test_a_spring_that_stiffens_exponentially(signals, columns_of):
     x = signals.q[:, 0] - 0.1
     rubber = columns_of("nonlinear_spring", signals, rest=0.1, scale=0.2) @ [0.0, 0.0, 3.0, 0.0]
     np.testing.assert_allclose(rubber, 3 * 0.2**3 * np.sinh(x / 0.2))
+
+
+def test_dampers_at_both_ends(signals, columns_of):
+    ends = {"side": 1.0, "q_lim": 0.3, "q_low": -0.3}
+    plain = columns_of("end_stop", signals, **ends)[:, 0]
+    damped = columns_of("end_stop", signals, damping=0.5, **ends)[:, 0]
+    side = np.sign(plain)
+    factor = np.maximum(0.0, 1.0 + 0.5 * side * signals.dq[:, 0])
+    np.testing.assert_allclose(damped, plain * factor)
