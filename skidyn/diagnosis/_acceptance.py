@@ -40,11 +40,17 @@ class JudgingSearch(RankingSearch):
                 best
             ):
                 continue
-            if best.errors.shape != rival.errors.shape:
-                continue  # one is of some recordings, judged on other folds
-            variance = best.errors.sum(0) / np.maximum(self.problem.rows.counts, 1)
+            errors = best.errors
+            if errors.shape != rival.errors.shape:
+                if within_recordings(best) or within_recordings(rival):
+                    continue  # one is of some recordings, judged on other folds
+                # one shows in one recording alone: both are judged by parts of recordings
+                errors = self._errors(best, within=True)
+                if errors.shape != rival.errors.shape:
+                    continue
+            variance = errors.sum(0) / np.maximum(self.problem.rows.counts, 1)
             variance = np.where(variance > 0, variance, 1.0)  # a joint that rests
-            behind = ((rival.errors - best.errors) / variance).sum(1)
+            behind = ((rival.errors - errors) / variance).sum(1)
             error = behind.std(ddof=1) * np.sqrt(len(behind))
             cap = self.settings.simpler_share * best.score
             # What a parameter must gain for another model (G. Schwarz 1978, Annals of Statistics
@@ -54,7 +60,16 @@ class JudgingSearch(RankingSearch):
             near = behind.sum() < min(max(error, least), cap)
             if near or (behind.sum() < error and self._encompassed(best, rival)):
                 best = rival
+            elif best.is_further_form and not rival.is_further_form:
+                if self._as_good(rival.errors, errors, best):
+                    best = rival
         return self._simplest_of_family(best, ranking)
+
+    def _as_good(self, plain: Array, errors: Array, further: Hypothesis) -> bool:
+        """Whether a plain formula leaves no more than it may of what a further form removes."""
+        left = errors.sum(0)
+        removed = left * np.expm1(np.maximum(further.gain, 0) / self._counts)
+        return self._good_enough(plain.sum(0), left, removed, further.joints)
 
     def _encompassed(self, best: Hypothesis, rival: Hypothesis) -> bool:
         """Whether a further form says nothing beside a simpler explanation, which says it all [1]_.

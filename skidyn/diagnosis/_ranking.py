@@ -43,7 +43,7 @@ Mask = NDArray[np.bool_]
 _Greedy = tuple[list[int], float]
 #: Names of which other forms are tried, and the share of the best score from which on the second
 #: is tried in any case.
-FORMS_TRIED, NEARLY = 2, 0.9
+FORMS_TRIED, NEARLY = 3, 0.9
 
 
 class RankingSearch(SearchState):

@@ -63,7 +63,7 @@ class Coulomb(Effect):
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         if "rounding" in shape:
-            return np.tanh(signals.dq[:, [joint]] / shape["rounding"])
+            return np.asarray(np.tanh(signals.dq[:, [joint]] / shape["rounding"]))
         return signals.sign[:, [joint]]
 
 
