@@ -210,7 +210,7 @@ class Settings:
     least_share: float = 0.006
     least_drop: float = 0.002
     form_tolerance: float = 0.015
-    further_tolerance: float = 0.005
+    further_tolerance: float = 0.0075
     exact_tolerance: float = 0.0015
     nameless_tolerance: float = 0.15
     alike: float = 0.005

@@ -83,7 +83,9 @@ def split_effects(
         groups = _splits(effect.grows, own, names)
         alone = {name: products.drop(names == name) for name in {n for g in groups for n in g}}
         together = [(products.drop(np.isin(names, group)), group) for group in groups]
-        apart = [(np.sum([alone[name] for name in group], axis=0), group) for group in groups]
+        # Of another size in most recordings is what any slow torque that is missing leaves.
+        few = [group for group in groups if len(group) <= len(names) / 2]
+        apart = [(np.sum([alone[name] for name in group], axis=0), group) for group in few]
         for drops, is_apart in ((together, False), (apart, True)):
             if not drops:
                 continue

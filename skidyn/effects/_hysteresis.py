@@ -319,9 +319,9 @@ class MaxwellSlip(PathMemory):
     title = "Maxwell-slip friction"
     formula = r"\sum_i F_i\,h_i,\quad \dot h_i = \dot q/\delta_i\ \text{while}\ |h_i| < 1"
     coefficients = (
-        Coefficient("F1", "N m", sign=1),
-        Coefficient("F2", "N m", sign=1),
-        Coefficient("F3", "N m", sign=1),
+        Coefficient("F1", "N m"),
+        Coefficient("F2", "N m"),
+        Coefficient("F3", "N m"),
     )
     forms = ({"spread": 5.0},)
     shapes = (
