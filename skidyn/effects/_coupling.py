@@ -145,6 +145,14 @@ class CouplingSpring(_PairEffect):
                 shape["x0"] = float(x.min() + x.max()) / 2
         return shapes
 
+    def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
+        if not super().admissible(signals, joints, shape):
+            return False
+        if "x0" not in shape:
+            return True
+        x = signals.q[:, joints[0]] + shape["ratio"] * signals.q[:, joints[1]]
+        return bool(x.min() < shape["x0"] < x.max())  # where it is slack was seen
+
     def coupled_columns(
         self, signals: Signals, i: int, j: int, ratio: float, **form: float
     ) -> Array:

@@ -35,6 +35,14 @@ def test_a_spring_between_two_joints_that_stiffens(signals):
     np.testing.assert_allclose(blocks[1], -blocks[0])
 
 
+def test_where_a_spring_between_two_joints_is_slack_was_seen(signals):
+    effect, x = get_effect("coupling_spring"), signals.q.sum(axis=1)
+    shape = {"ratio": 1.0, "power": 3.0}
+    assert effect.admissible(signals, (0, 1), {**shape, "x0": float(np.median(x))})
+    assert not effect.admissible(signals, (0, 1), {**shape, "x0": float(x.max()) + 0.1})
+    assert effect.admissible(signals, (0, 1), {"ratio": 1.0})
+
+
 def test_coupled_drag_may_grow_with_a_power_of_the_speed(signals):
     columns = get_effect("coupled_friction").torque_columns(signals, (0, 1), ratio=1.0, power=2.0)
     speed = signals.dq.sum(axis=1)
