@@ -34,10 +34,7 @@ class JudgingSearch(RankingSearch):
             return None
         best = self._named(ranking)
         for rival in ranking[1:]:
-            if best.errors is None or rival.errors is None:
-                continue
-            own = best.is_further_form and not rival.is_further_form
-            if rival.kind == best.kind and not (own and rival.joints == best.joints):
+            if best.errors is None or rival.errors is None or rival.kind == best.kind:
                 continue  # forms of one kind have one name: the best fit is taken
             if rival.n_parameters > best.n_parameters or simplicity_of(rival) >= simplicity_of(
                 best
@@ -60,11 +57,12 @@ class JudgingSearch(RankingSearch):
             # 6), with what is left as correlated as it is.
             least = np.log(self.problem.rows.counts[list(best.joints)].sum())
             least *= self._price(best.candidates)
-            near = behind.sum() < min(max(error, least), cap) and rival.kind != best.kind
+            near = behind.sum() < min(max(error, least), cap)
             if near or (behind.sum() < error and self._encompassed(best, rival)):
                 best = rival
             elif best.is_further_form and not rival.is_further_form:
-                if self._as_good(rival.errors, errors, best):
+                simpler = simplicity_of(rival) < get_effect(best.kind).simplicity
+                if simpler and self._as_good(rival.errors, errors, best):
                     best = rival
         return self._simplest_of_family(best, ranking)
 

@@ -84,7 +84,7 @@ def split_effects(
         alone = {name: products.drop(names == name) for name in {n for g in groups for n in g}}
         together = [(products.drop(np.isin(names, group)), group) for group in groups]
         # Of another size in most recordings is what any slow torque that is missing leaves.
-        few = [group for group in groups if len(group) <= len(names) / 2]
+        few = [group for group in groups if 3 * len(group) <= 2 * len(names)]
         apart = [(np.sum([alone[name] for name in group], axis=0), group) for group in few]
         for drops, is_apart in ((together, False), (apart, True)):
             if not drops:
