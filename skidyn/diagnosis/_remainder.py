@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn._signals import Array
+from skidyn._signals import Array, Signals
 from skidyn.diagnosis._noise import MEDIAN, sensor_noise
 from skidyn.diagnosis._rule import (
     COLOURED_ALIKE,
@@ -178,21 +178,27 @@ def position_noise(problem: Problem, fit: Fit | None = None) -> Array:
     quiet = np.zeros(problem.n_joints)
     if robot is None or signals is None or motion.half_width == 0:
         return quiet
-    taken = np.median(np.abs(signals.q - motion.signals.q), axis=0) / MEDIAN
-    part = slice(0, min(signals.n_samples, MOST_SAMPLES))
-    smooth = motion.signals.take(part)
-    rng = np.random.default_rng(0)
-    noise = rng.normal(size=smooth.q.shape) * taken
-    for k, step in enumerate(map(position_step, signals.q.T)):
-        if np.isfinite(step):
-            counted = smooth.q[:, k] / step + rng.uniform()
-            noise[:, k] = step * (np.round(counted) - counted)
-    shaken = smooth_motion(smooth.with_(q=smooth.q + noise))
-    again = smooth_motion(smooth)
+    shaken, again = signals.once(
+        ("shaken motion", motion.half_width), lambda: _shaken(signals, motion)
+    )
     use = shaken.valid & again.valid
     change = np.where(use, _torque(problem, fit, shaken) - _torque(problem, fit, again), 0.0)
     counts = np.maximum(use.sum(0), 1)
     return np.asarray(np.sqrt(np.sum(change**2, axis=0) / counts))
+
+
+def _shaken(logged: Signals, motion: SmoothedMotion) -> tuple[SmoothedMotion, SmoothedMotion]:
+    """The smoothed motion with the noise of positions, and without, both smoothed again."""
+    taken = np.median(np.abs(logged.q - motion.signals.q), axis=0) / MEDIAN
+    part = slice(0, min(logged.n_samples, MOST_SAMPLES))
+    smooth = motion.signals.take(part)
+    rng = np.random.default_rng(0)
+    noise = rng.normal(size=smooth.q.shape) * taken
+    for k, step in enumerate(map(position_step, logged.q.T)):
+        if np.isfinite(step):
+            counted = smooth.q[:, k] / step + rng.uniform()
+            noise[:, k] = step * (np.round(counted) - counted)
+    return smooth_motion(smooth.with_(q=smooth.q + noise)), smooth_motion(smooth)
 
 
 def _torque(problem: Problem, fit: Fit | None, motion: SmoothedMotion) -> Array:

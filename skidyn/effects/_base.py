@@ -214,8 +214,12 @@ class Effect:
 
     @property
     def has_shape(self) -> bool:
-        """Whether the columns depend on a shape that has to be given or found."""
-        return bool(self.shapes) or type(self).grid is not Effect.grid
+        """Whether the columns depend on a shape that has to be given or found.
+
+        What only further forms have need not be: the plain form stands without it.
+        """
+        plain = any(shape.name not in self.form_names for shape in self.shapes)
+        return plain or type(self).grid is not Effect.grid
 
     @property
     def form_names(self) -> frozenset[str]:
@@ -343,7 +347,13 @@ class Effect:
             axes.append([value * unit for value in shape.grid])
         names = [shape.name for shape in plain]
         shapes = [dict(zip(names, values, strict=True)) for values in itertools.product(*axes)]
-        return [shape | dict(form) for form in ({}, *self.forms) for shape in shapes]
+        scaled = {shape.name for shape in self.shapes if shape.scales}
+        unit = float(signals.unit[joints[0]])
+        forms = [
+            {name: x * unit if name in scaled else x for name, x in form.items()}
+            for form in ({}, *self.forms)
+        ]
+        return [shape | form for form in forms for shape in shapes]
 
     def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
         """Whether shape parameters lie where this data can tell them from a simpler effect.

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -53,13 +52,6 @@ class Coulomb(Effect):
     rivals = ("stribeck", "dahl", "nonlinear_viscous")
     separating_motion = "slow sweeps with reversals, below 0.1 rad/s"
     reference = _ARMSTRONG
-
-    #: The plain form needs no search, although there is another.
-    has_shape = False
-
-    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        unit = float(signals.unit[joints[0]])
-        return [{}, *({"rounding": form["rounding"] * unit} for form in self.forms)]
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         if "rounding" in shape:
@@ -115,9 +107,6 @@ class AsymmetricFriction(Effect):
     rivals = ("offset", "viscous")
     separating_motion = "equal sweeps in both directions at two speeds or more"
     reference = "Janot, Gautier, Brunot (2019), Nonlinear System Identification Benchmarks (EMPS)."
-
-    #: The plain form needs no search, although there are others.
-    has_shape = False
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         speed = np.abs(signals.dq[:, joint]) ** shape.get("power", 1.0)

@@ -59,9 +59,6 @@ class TemperatureFriction(Effect):
     separating_motion = "the same sweep on the cold and on the warm robot"
     reference = _BITTENCOURT
 
-    #: The plain form needs no search, although there are others.
-    has_shape = False
-
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         warm = _warmth(signals, joint, **shape)
         dq = signals.dq[:, joint]
@@ -90,9 +87,6 @@ class TemperatureOffset(Effect):
     rivals = ("offset", "temperature_friction")
     separating_motion = "one pose held or one sweep repeated while the robot warms up"
     reference = _BITTENCOURT
-
-    #: The plain form needs no search, although there are others.
-    has_shape = False
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         warm = _warmth(signals, joint, **shape)

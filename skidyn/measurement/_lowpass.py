@@ -3,19 +3,51 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 from scipy.signal import lfilter
 
 from skidyn._signals import Array
+from skidyn.measurement._check import Check
 from skidyn.measurement._delay import NEAR, JointFit
 from skidyn.measurement._fits import Fits, robust_likelihood
+from skidyn.measurement._suspicion import Suspicion
 
 #: Time constants that are tried, in lags that a delay in its place has; steps of their logarithm
 #: that are halved, and the least one.
 TRIED, STEP, LEAST_STEP = (0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0), 0.1, 0.005
+
+
+def suspect_lowpass(
+    check: Check, what: str, column: str, constant: float, evidence: str, joints: Iterable[int] = ()
+) -> Suspicion:
+    """Suspicion that a channel went through a low pass, with the remedy that takes it out.
+
+    Parameters
+    ----------
+    check : Check
+        Under whose name it is said.
+    what : str
+        The channel in words.
+    column : str
+        Its name in the remedy, such as ``"tau"`` or ``"q2"``.
+    constant : float, s
+        Time constant.
+    evidence : str
+        What speaks for it.
+    joints : iterable of int, default=()
+        Joints, from 0.
+    """
+    value = float(f"{constant:.3g}")
+    return check.suspicion(
+        f"{what} went through a low pass of about {0.5 / np.pi / constant:.2g} Hz",
+        evidence,
+        "suspected",
+        joints,
+        (f"--lowpass {column}={value:g}", f"lowpass={{'{column}': {value:g}}}"),
+    )
 
 
 def without_lowpass(time: Array, values: Array, constant: float) -> Array:

@@ -13,7 +13,7 @@ from skidyn.measurement._check import Check
 from skidyn.measurement._copies import copied_columns
 from skidyn.measurement._delay import Delay, RunDelay, find_delay, refined_lag
 from skidyn.measurement._fits import Fits, Reading, fit_admissible, friction
-from skidyn.measurement._lowpass import lowpass_of_torque
+from skidyn.measurement._lowpass import lowpass_of_torque, suspect_lowpass
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import reversals
 from skidyn.measurement._readings import DECISIVE, HALF, Change, find_changes
@@ -464,16 +464,12 @@ class TorqueDelay(Check):
     def _filtered(
         self, what: str, column: str, constant: float, lag: float, joints: Iterable[int] = ()
     ) -> Suspicion:
-        value = float(f"{constant:.3g}")
-        return self.suspicion(
-            f"the {what} went through a low pass of about {0.5 / np.pi / constant:.2g} Hz",
-            f"bodies, friction and rotor inertia explain it better without a low pass of first "
+        evidence = (
+            "bodies, friction and rotor inertia explain it better without a low pass of first "
             f"order with a time constant of {1e3 * constant:.1f} ms than with a delay, which would "
-            f"be {1e3 * lag:.1f} ms",
-            "suspected",
-            joints,
-            (f"--lowpass {column}={value:g}", f"lowpass={{'{column}': {value:g}}}"),
+            f"be {1e3 * lag:.1f} ms"
         )
+        return suspect_lowpass(self, f"the {what}", column, constant, evidence, joints)
 
 
 def _lowpass(fits: Fits, lag: float, late: Sequence[int]) -> float | None:

@@ -12,7 +12,7 @@ import numpy as np
 from skidyn._signals import Array, Signals
 from skidyn.measurement._check import Check
 from skidyn.measurement._fits import Reading
-from skidyn.measurement._lowpass import TRIED, summit, without_lowpass
+from skidyn.measurement._lowpass import TRIED, summit, suspect_lowpass, without_lowpass
 from skidyn.measurement._measurement import ALIKE, Measurement
 from skidyn.measurement._measures import velocity_consistency
 from skidyn.measurement._suspicion import Suspicion
@@ -261,15 +261,11 @@ class VelocityDelay(Check):
     def _filtered(
         self, what: str, other: str, column: str, constant: float, joints: Iterable[int] = ()
     ) -> Suspicion:
-        value = float(f"{constant:.3g}")
-        return self.suspicion(
-            f"{what} went through a low pass of about {0.5 / np.pi / constant:.2g} Hz",
+        evidence = (
             f"without one of first order with a time constant of {1e3 * constant:.1f} ms it agrees "
-            f"with the {other}, and far better than at any delay",
-            "suspected",
-            joints,
-            (f"--lowpass {column}={value:g}", f"lowpass={{'{column}': {value:g}}}"),
+            f"with the {other}, and far better than at any delay"
         )
+        return suspect_lowpass(self, what, column, constant, evidence, joints)
 
     def _single(self, measurement: Measurement, lags: dict[int, float]) -> Iterator[Suspicion]:
         """Joints whose velocity is late or early by itself."""
