@@ -36,35 +36,58 @@ class JudgingSearch(RankingSearch):
         for rival in ranking[1:]:
             if best.errors is None or rival.errors is None or rival.kind == best.kind:
                 continue  # forms of one kind have one name: the best fit is taken
-            if rival.n_parameters > best.n_parameters or simplicity_of(rival) >= simplicity_of(
-                best
+            part = self._on_joints_of(rival, best)
+            if (
+                part.errors is None
+                or rival.n_parameters > part.n_parameters
+                or simplicity_of(rival) >= simplicity_of(part)
             ):
                 continue
-            errors = best.errors
+            errors = part.errors
             if errors.shape != rival.errors.shape:
                 if within_recordings(best) or within_recordings(rival):
                     continue  # one is of some recordings, judged on other folds
                 # one shows in one recording alone: both are judged by parts of recordings
-                errors = self._errors(best, within=True)
+                errors = self._errors(part, within=True)
                 if errors.shape != rival.errors.shape:
                     continue
             variance = errors.sum(0) / np.maximum(self.problem.rows.counts, 1)
             variance = np.where(variance > 0, variance, 1.0)  # a joint that rests
             behind = ((rival.errors - errors) / variance).sum(1)
             error = behind.std(ddof=1) * np.sqrt(len(behind))
-            cap = self.settings.simpler_share * best.score
+            cap = self.settings.simpler_share * part.score
             # What a parameter must gain for another model (G. Schwarz 1978, Annals of Statistics
             # 6), with what is left as correlated as it is.
-            least = np.log(self.problem.rows.counts[list(best.joints)].sum())
-            least *= self._price(best.candidates)
+            least = np.log(self.problem.rows.counts[list(part.joints)].sum())
+            least *= self._price(part.candidates)
             near = behind.sum() < min(max(error, least), cap)
-            if near or (behind.sum() < error and self._encompassed(best, rival)):
+            if near or (behind.sum() < error and self._encompassed(part, rival)):
                 best = rival
-            elif best.is_further_form and not rival.is_further_form:
-                simpler = simplicity_of(rival) < get_effect(best.kind).simplicity
-                if simpler and self._as_good(rival.errors, errors, best):
+            elif part.is_further_form and not rival.is_further_form:
+                simpler = simplicity_of(rival) < get_effect(part.kind).simplicity
+                if simpler and self._as_good(rival.errors, errors, part):
                     best = rival
         return self._simplest_of_family(best, ranking)
+
+    def _on_joints_of(self, rival: Hypothesis, best: Hypothesis) -> Hypothesis:
+        """The terms of a further form on the joints of a rival that has fewer of them.
+
+        Joint by joint, a simpler effect may do as well as a form that is free on all of them. What
+        is not made of terms of single joints is compared as it is.
+        """
+        apart = all(len(c.joints) == 1 for h in (rival, best) for c in h.candidates)
+        fewer = set(rival.joints) < set(best.joints)
+        if not (best.is_further_form and apart and fewer) or within_recordings(rival):
+            return best
+        own = [c for c in best.candidates if c.joints[0] in rival.joints]
+        within = any(map(self.is_judged_within, best.candidates))
+        errors = self._errors(replace(best, candidates=tuple(own)), within)
+        gain = np.where(np.isin(np.arange(len(best.gain)), rival.joints), best.gain, 0.0)
+        count = self._n_parameters(own)
+        score = float(gain.sum()) - 2 * self._price(own) * count
+        return replace(
+            best, candidates=tuple(own), gain=gain, score=score, n_parameters=count, errors=errors
+        )
 
     def _as_good(self, plain: Array, errors: Array, further: Hypothesis) -> bool:
         """Whether a plain formula leaves no more than it may of what a further form removes."""

@@ -77,3 +77,10 @@ def test_friction_that_falls_while_a_gear_warms_up_is_one_drift(arm_log):
     kinds = found_in(load_planar_arm(), arm_log.X, torque)
 
     assert kinds == {"friction_drift": {1}}
+
+
+def test_stops_of_two_joints_are_stops_where_one_recording_alone_reaches_one_of_them():
+    robot = load_scara()
+    log = make_hidden_effect_log(robot, "end_stop", joints=(1, 4), noise="high", random_state=0)
+
+    assert found_in(robot, log.X, log.y) == {"end_stop": {1, 4}}
