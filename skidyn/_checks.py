@@ -95,9 +95,14 @@ def require_columns(
         missing = sorted(set(range(1, n_joints + 1)) - found)
         surplus = sorted(found - set(range(1, n_joints + 1)))
         if missing:
+            servos = (
+                " Position servos need no torque but their commands (cmd1..): skidyn diagnose "
+                "--controller fit; in Python needs_torque=False and servo_torque."
+            )
             raise LogError(
                 f"{source} lacks {', '.join(f'{quantity}{k}' for k in missing)}: {n_joints} joints "
                 f"need {quantity}1..{quantity}{n_joints}. It has: {', '.join(names)}."
+                f"{servos if quantity == 'tau' and not found else ''}"
             )
         if surplus:
             raise LogError(

@@ -3,6 +3,7 @@
 
 import os
 from pathlib import Path
+from types import SimpleNamespace
 
 # One thread per worker: pytest-xdist already uses the cores, and results must not depend on how
 # many there are. Set before NumPy and torch read them.
@@ -40,3 +41,43 @@ def saved(tmp_path):
         return tmp_path / name
 
     return save
+
+
+@pytest.fixture(scope="session")
+def servo_log():
+    """Makes the log of a planar arm behind servos, by the coefficients of what it hides."""
+    return _servo_log
+
+
+@pytest.fixture(scope="session")
+def sticky_servo():
+    """An arm behind servos whose second joint sticks: robot, log, controller."""
+    from skidyn.effects import Term
+
+    return _servo_log({Term("stribeck", (2,), {"vs": 0.1, "delta": 2.0}): 0.15})
+
+
+def _servo_log(terms):
+    """A planar arm behind servos, with rounded positions and no torque."""
+    import numpy as np
+
+    from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+    from skidyn.identification import RBDRegressor
+    from skidyn.simulation import Controller, simulate
+
+    servo = Controller((200.0, 12.0), (12.0, 0.6), follows_velocity=False)
+    friction = {"viscous": (0.4, 0.03), "coulomb": (0.8, 0.06)}
+    encoder = 2 * np.pi / 2**14
+    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=4, duration=2.0)
+    truth = RBDRegressor(log.robot, [*friction, *terms], "nominal").fit(log.X, log.y)
+    for term in truth.effect_terms_:
+        size = terms[term] if term in terms else friction[term.kind][term.places[0]]
+        truth.effect_coefficients_[term] = np.array([size])
+    wanted = log.X.assign(q_ref1=log.X["q1"], q_ref2=log.X["q2"])
+    moved = simulate(truth, wanted, controller=servo, step=2.5e-3)
+    for j in (1, 2):
+        moved[f"q{j}"] = np.round(moved[f"q{j}"] / encoder) * encoder
+        for _, run in moved.groupby("trajectory"):
+            moved.loc[run.index, f"dq{j}"] = np.gradient(run[f"q{j}"], run["time"])
+    columns = ["time", "trajectory", "q1", "q2", "dq1", "dq2", "q_ref1", "q_ref2"]
+    return SimpleNamespace(robot=log.robot, log=moved[columns], controller=servo)

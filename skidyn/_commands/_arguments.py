@@ -199,6 +199,16 @@ def with_log(parser: Any, urdf_required: bool = True) -> None:
     )
 
 
+def with_controller(parser: Any, text: str) -> None:
+    """The controller that follows the commanded positions of a log."""
+    parser.add_argument(
+        "--controller",
+        metavar="fit|JSON",
+        help=f"{text}, through this controller: fit finds it from the log (fit-shared: one gain "
+        'for all joints), \'{"stiffness": 40, "damping": 2}\' gives it (N m/rad, N m s/rad)',
+    )
+
+
 def with_report(parser: Any) -> None:
     """A report of skidyn diagnose, which names the log and the model."""
     parser.add_argument(

@@ -10,10 +10,16 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from skidyn._commands._arguments import JsonFile, Page, command, with_log
-from skidyn._commands._input import read_model_and_log
+from skidyn._commands._arguments import JsonFile, Page, command, with_controller, with_log
+from skidyn._commands._input import read_driven, read_model, read_robot
 from skidyn._commands._kept import Kept, noting
-from skidyn._commands._output import print_json, provenance, run_diagnosis, working
+from skidyn._commands._output import (
+    explain_motion,
+    print_json,
+    provenance,
+    run_diagnosis,
+    working,
+)
 from skidyn._commands._story import answer_lines
 from skidyn._exceptions import LogWarning
 from skidyn._writing import write_json
@@ -26,6 +32,12 @@ Compare a model with a log and learn which physical effect it lacks.
 LOG is a table with the columns time, trajectory, q1.., dq1.., tau1.. (optional ddq1.., temp1..);
 other names through --columns '{"q": ["pos_a", "pos_b"]}'. --model says what the model has already:
 rigid_body and kinds of the catalogue (skidyn effects lists them).
+
+A log of position servos needs no torque, but their commands (cmd1.. or q_ref1..): the torque is the
+gain of the servo times its error, and joints are simulated along their commands, too.
+
+  skidyn diagnose servos.csv --urdf robot.urdf --controller fit \\
+      --model rigid_body,viscous,coulomb,rotor_inertia
 """
 
 
@@ -42,6 +54,7 @@ def add_parser(commands: Any) -> None:
         action="store_true",
         help="also judge findings by the simulated motion; those that worsen it are not added",
     )
+    with_controller(parser, "name effects by the motion of servos along their commands, too")
     parser.add_argument(
         "--no-cache",
         action="store_true",
@@ -89,11 +102,14 @@ def run(options: argparse.Namespace) -> None:
 def _answer(options: argparse.Namespace) -> dict[str, Any]:
     """What is found, as values that can be kept."""
     with noting() as noted:
-        model, frame, tau = read_model_and_log(options, check=False)
-        diagnosis = run_diagnosis(model, frame, tau, options)
+        robot = read_robot(options)
+        frame, tau, controller = read_driven(options, robot, check=False)
+        diagnosis = run_diagnosis(read_model(options, robot), frame, tau, options)
+        explain_motion(diagnosis, controller, frame, options)
         if options.simulate:
+            driven: dict[str, Any] = {} if controller is None else {"controller": controller}
             with working("Simulating", options):
-                diagnosis.judge_by_simulation()
+                diagnosis.judge_by_simulation(**driven)
         page = None
         if options.html:
             from skidyn.report import summarize
@@ -117,7 +133,9 @@ def _next(answer: dict[str, Any], options: argparse.Namespace) -> list[str]:
             return []
         return ["next: the same with --out report.json --html report.html keeps this as a page"]
     report = shlex.quote(options.out)
-    named = [line for line in answer["story"]["findings"] if line["kind"] != "unknown"]
+    story = answer["story"]
+    seen = (story["servo_motion"] or {"findings": []})["findings"]
+    named = [line for line in [*story["findings"], *seen] if line["kind"] != "unknown"]
     lines = []
     if named:
         joints = ",".join(map(str, named[0]["joints"]))

@@ -7,6 +7,7 @@ import argparse
 import json
 import re
 import warnings
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,26 +21,71 @@ if TYPE_CHECKING:
 
     from skidyn.identification import RBDRegressor
     from skidyn.robots import Robot
+    from skidyn.simulation import Controller
 
 
 def read_model_and_log(
     options: argparse.Namespace, *, check: bool = True
 ) -> tuple[RBDRegressor, pd.DataFrame, Any]:
     """The model that the options describe, the log, and its torques."""
+    robot = read_robot(options)
+    frame, tau, _ = read_driven(options, robot, check=check)
+    return read_model(options, robot), frame, tau
+
+
+def read_driven(
+    options: argparse.Namespace, robot: Robot, *, check: bool = True
+) -> tuple[pd.DataFrame, Any, Controller | None]:
+    """The log, its torques or those of its servos, and the controller that the options give."""
+    from skidyn.simulation import servo_torque
+
+    text = getattr(options, "controller", None)
+    if text is None:
+        frame = read_frame(options, robot, check=check)
+        return frame, torque_of(frame, robot), None
+    frame = read_frame(options, robot, check=check, needs_torque=False)
+    controller = read_controller(text, robot, frame)
+    measured = "tau1" in frame
+    tau = torque_of(frame, robot) if measured else servo_torque(controller, frame)
+    return frame, tau, controller
+
+
+def torque_of(frame: pd.DataFrame, robot: Robot) -> Any:
+    """The logged torques, shape (n_samples, n_joints)."""
+    return frame[[f"tau{j + 1}" for j in range(robot.n_joints)]].to_numpy()
+
+
+def read_controller(text: str, robot: Robot, frame: pd.DataFrame) -> Controller:
+    """The controller that is given, or that of the log: by its torque, or by the robot's weight."""
+    from skidyn.simulation import Controller, fit_controller, fit_servo
+
+    word = text.strip()
+    if word == "fit" and "tau1" in frame:
+        return fit_controller(frame, torque_of(frame, robot))
+    if word in ("fit", "fit-shared"):
+        return fit_servo(robot, frame, shared=word != "fit")
+    gains = json_option("controller", text)
+    names = {field.name for field in fields(Controller)}
+    if not isinstance(gains, dict) or "stiffness" not in gains or not set(gains) <= names:
+        raise SkidynError(
+            f"--controller is {text}; expected fit, or stiffness (N m/rad) and what else of "
+            f"{', '.join(sorted(names))} it has, as JSON; fit-shared finds one gain for all joints"
+        )
+    return Controller(**gains).checked(robot.n_joints)
+
+
+def read_model(options: argparse.Namespace, robot: Robot) -> Any:
+    """The model that the options describe."""
     from skidyn._persistence import load_model
     from skidyn.identification import RBDRegressor
 
-    robot = read_robot(options)
-    frame = read_frame(options, robot, check=check)
-    tau = frame[[f"tau{j + 1}" for j in range(robot.n_joints)]].to_numpy()
     if options.model.endswith(".skops"):
-        return load_model(options.model), frame, tau
+        return load_model(options.model)
     kinds = [kind.strip() for kind in options.model.split(",") if kind.strip()]
     if "rigid_body" not in kinds:
         raise SkidynError("--model must contain rigid_body; it may add kinds of the catalogue")
     effects = tuple(kind for kind in kinds if kind != "rigid_body")
-    model = RBDRegressor(robot, effects, "nominal" if options.nominal else "identified")
-    return model, frame, tau
+    return RBDRegressor(robot, effects, "nominal" if options.nominal else "identified")
 
 
 def read_frame(

@@ -11,7 +11,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from skidyn._exceptions import LogError
 from skidyn._progress import listening
+from skidyn._text import digits
 from skidyn._writing import replacing
 
 if TYPE_CHECKING:
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
 
     from skidyn.diagnosis import Comparison, Diagnosis
     from skidyn.identification import RBDRegressor
+    from skidyn.simulation import Controller
 
 
 def run_diagnosis(
@@ -45,6 +48,32 @@ def run_diagnosis(
             force=force,
             n_jobs=getattr(options, "jobs", -1),
         )
+
+
+def explain_motion(
+    diagnosis: Diagnosis, controller: Controller | None, frame: Any, options: argparse.Namespace
+) -> None:
+    """Name what the motion lacks that a controller leads to; nothing where none is given."""
+    if controller is None:
+        return
+    if "tau1" not in frame:
+        diagnosis.warnings.append(_torque_told(controller, len(diagnosis.joint_names)))
+    with working("Simulating the servos", options):
+        try:
+            diagnosis.explain_servo_motion(controller)
+        except LogError as error:
+            diagnosis.warnings.append(f"The motion of the servos was not looked at: {error}.")
+
+
+def _torque_told(controller: Controller, n_joints: int) -> str:
+    """Where the torque of a log without one comes from."""
+    gains = [digits(gain) for gain in controller.checked(n_joints).stiffness]
+    shown = gains[0] if len(set(gains)) == 1 else ", ".join(gains)
+    late = f", {1e3 * controller.delay:.3g} ms late" if controller.delay else ""
+    return (
+        f"The torque is that of the servos, gain times error of position{late}: {shown} N m/rad "
+        "(N/m for sliders)."
+    )
 
 
 def write_page(diagnosis: Diagnosis, html: str | None, provenance: dict[str, Any]) -> None:
@@ -114,6 +143,7 @@ RECORDED: dict[str, tuple[type, ...]] = {
         ("unwrap", "drop_repeated", "split_leaps", "restore_gravity", "force"), (bool, type(None))
     ),
     "resample": (float, int, type(None)),
+    "controller": (str, type(None)),
 }
 
 

@@ -8,8 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from skidyn._commands._arguments import Page, command, with_report
-from skidyn._commands._input import read_model_and_log, recorded_options
-from skidyn._commands._output import print_json, provenance, run_diagnosis, write_page
+from skidyn._commands._input import read_driven, read_model, read_robot, recorded_options
+from skidyn._commands._output import (
+    explain_motion,
+    print_json,
+    provenance,
+    run_diagnosis,
+    write_page,
+)
 
 DESCRIPTION = """\
 Turn a report into one HTML page that needs no network. The log is read anew and the diagnosis run
@@ -29,8 +35,10 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> None:
     options = recorded_options(options)
-    model, frame, tau = read_model_and_log(options, check=False)  # a diagnosis checks it
-    diagnosis = run_diagnosis(model, frame, tau, options)
+    robot = read_robot(options)
+    frame, tau, controller = read_driven(options, robot, check=False)  # a diagnosis checks it
+    diagnosis = run_diagnosis(read_model(options, robot), frame, tau, options)
+    explain_motion(diagnosis, controller, frame, options)
     write_page(diagnosis, options.html, provenance(options))
     page = str(Path(options.html).resolve())
     if options.json:

@@ -5,12 +5,17 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from skidyn._commands._arguments import Input, Output, command, with_joints
-from skidyn._commands._input import embedded_robot, joint_numbers, json_option, read_frame
+from skidyn._commands._arguments import Input, Output, command, with_controller, with_joints
+from skidyn._commands._input import (
+    embedded_robot,
+    joint_numbers,
+    read_controller,
+    read_frame,
+    torque_of,
+)
 from skidyn._commands._output import print_json, working, write_table
 from skidyn._exceptions import SkidynError
 
@@ -70,11 +75,8 @@ def add_parser(commands: Any) -> None:
     along.add_argument(
         "--engine", default="own", choices=("own", "mujoco"), help="default: %(default)s"
     )
-    along.add_argument(
-        "--controller",
-        metavar="JSON",
-        help="drive the model by the commanded positions of the log, not by its torque, through "
-        'this controller: \'{"stiffness": 40, "damping": 2}\', or fit, to find it from the log',
+    with_controller(
+        along, "drive the model by the commanded positions of the log, not by its torque"
     )
     along.add_argument("--columns", metavar="JSON", help="which columns hold which signals")
     along.add_argument("--units", metavar="JSON", help="units that are not SI")
@@ -105,9 +107,9 @@ def _along(options: argparse.Namespace) -> None:
     said: dict[str, Any] = {"horizon": options.horizon or None, "engine": options.engine}
     tau = None
     if options.controller is None:
-        tau = _torque(frame, robot)
+        tau = torque_of(frame, robot)
     else:
-        said["controller"] = _controller(options.controller, robot, frame)
+        said["controller"] = read_controller(options.controller, robot, frame)
     with working("Simulating", options):
         found = simulation_errors(model, frame, tau, **said)
         if options.out is not None:
@@ -119,28 +121,6 @@ def _along(options: argparse.Namespace) -> None:
     print(found.text)
     if options.out is not None:
         print(f"simulated motion written: {Path(options.out).resolve()}")
-
-
-def _torque(frame: Any, robot: Any) -> Any:
-    return frame[[f"tau{j + 1}" for j in range(robot.n_joints)]].to_numpy()
-
-
-def _controller(text: str, robot: Any, frame: Any) -> Any:
-    """The controller that is given, or that of the log: by its torque, or by the robot's weight."""
-    from skidyn.simulation import Controller, fit_controller, fit_servo
-
-    if text.strip() == "fit":
-        if "tau1" in frame:
-            return fit_controller(frame, _torque(frame, robot))
-        return fit_servo(robot, frame)
-    gains = json_option("controller", text)
-    names = {field.name for field in fields(Controller)}
-    if not isinstance(gains, dict) or "stiffness" not in gains or not set(gains) <= names:
-        raise SkidynError(
-            f"--controller is {text}; expected fit, or stiffness (N m/rad) and what else of "
-            f"{', '.join(sorted(names))} it has, as JSON"
-        )
-    return Controller(**gains).checked(robot.n_joints)
 
 
 def _hidden(options: argparse.Namespace) -> None:

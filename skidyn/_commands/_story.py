@@ -50,6 +50,7 @@ def story_lines(story: Mapping[str, Any], failures: Sequence[Any] = ()) -> Itera
         yield f"  {k}. {line['what']} on {line['where']}{size}; {line['sure']}{when}"
     yield from where_lines(failures)
     yield from motion_lines(story.get("simulation"))
+    yield from servo_lines(story.get("servo_motion"))
     if any(row["speaks"] for row in story["joints"]):
         yield ""
         yield story["left"]
@@ -88,6 +89,17 @@ def motion_lines(motion: Mapping[str, Any] | None) -> Iterator[str]:
         yield f"  {name:{width}s}{place} {unit:3s}  {speed} {unit + '/s':5s}{coasting:>9s} {unit}"
     if motion["text"]:
         yield f"  {motion['text']}"
+
+
+def servo_lines(motion: Mapping[str, Any] | None) -> Iterator[str]:
+    """What the motion of servos named; none where no controller was given."""
+    if motion is None:
+        return
+    yield ""
+    yield motion["heading"]
+    for line in motion["findings"]:
+        yield f"  {line['what']} on {line['where']}: {line['size']}; {line['evidence']}"
+    yield f"  {motion['text']}"
 
 
 def where_lines(failures: Sequence[Any]) -> Iterator[str]:

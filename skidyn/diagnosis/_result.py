@@ -96,6 +96,8 @@ class Diagnosis:
         :meth:`judge_by_simulation`.
     in_turn : InTurn or None
         What :meth:`judge_by_simulation` found for every finding and for all together.
+    servo_motion : list of ServoFinding or None
+        What :meth:`explain_servo_motion` named; None before.
 
     Examples
     --------
@@ -128,11 +130,13 @@ class Diagnosis:
     opened: Opened | None = field(repr=False, default=None)
     vetoed: list[Finding] = field(repr=False, default_factory=list)
     in_turn: InTurn | None = field(repr=False, default=None)
+    servo_motion: list[ServoFinding] | None = None
 
     def __repr__(self) -> str:
         units = ["N" if slides else "N m" for slides in self.problem.signals.prismatic]
         errors = zip(self.joint_names, self.rmse_before, self.rmse_after, units, strict=True)
         lines = [f"Diagnosis: {self.verdict}", *(f.sentence for f in self.findings)]
+        lines += [found.sentence for found in self.servo_motion or ()]
         lines += [f"error of {n}: {a:.4g} -> {b:.4g} {unit}" for n, a, b, unit in errors]
         return "\n  ".join([*lines, *(f"note: {note}" for note in self.warnings)])
 
@@ -196,7 +200,8 @@ class Diagnosis:
             ``where``, ``size``, ``sure``, ``change``); ``joints`` with ``before``, ``after`` and
             ``noise`` (N m or N) and ``speaks`` where there is something to say; ``quiet``,
             ``left``, ``doubts`` about the log and other ``warnings``; ``simulation`` with errors
-            of the simulated motion, after :meth:`judge_by_simulation`.
+            of the simulated motion, after :meth:`judge_by_simulation`; ``servo_motion`` with what
+            :meth:`explain_servo_motion` named.
         """
         return {**story(self), "simulation": simulated(self.in_turn, self.findings)}
 
@@ -301,7 +306,9 @@ class Diagnosis:
         that have no finding with a name yet, or one of the hysteresis family, are simulated in
         their loops (:func:`skidyn.simulation.explain_servo_motion`), beside those whose gear is
         known to give way. What is named there takes the place of nameless functions and hysteresis
-        on its joint; :attr:`findings` stay as they are.
+        on its joint; :attr:`findings` stay as they are. It is kept in :attr:`servo_motion`, stands
+        in the report and on the page, and a diagnosis without any other finding is no longer
+        ``"complete"``.
 
         Parameters
         ----------
@@ -317,7 +324,9 @@ class Diagnosis:
         Raises
         ------
         SkidynError
-            The model is no RBDRegressor, the log has no commands, or it is too short.
+            The model is no RBDRegressor, or the log has no commands.
+        LogError
+            The log is too short.
         """
         if not isinstance(self.base_model, RBDRegressor):
             raise SkidynError(
@@ -334,11 +343,14 @@ class Diagnosis:
             gears |= set(finding.joints) if effect.moves_link else set()
         # A link that moves by itself is felt by other joints, which must not be told to do so.
         joints = [j for j in range(1, len(self.joint_names) + 1) if j in gears or j not in named]
-        if not set(joints) - gears:
-            return []
-        model = clone(self.base_model).fit(*self.data)
-        found = explain_servo_motion(model, self.data[0], controller, joints=joints)
-        return [f for f in found if f.joint not in gears]
+        found = []
+        if set(joints) - gears:
+            model = clone(self.base_model).fit(*self.data)
+            found = explain_servo_motion(model, self.data[0], controller, joints=joints)
+        self.servo_motion = [f for f in found if f.joint not in gears]
+        if not self.findings and self.verdict != "unknown":
+            self.verdict = "missing" if self.servo_motion else "complete"
+        return self.servo_motion
 
     @property
     def simulation(self) -> SimulationVerdict | None:
@@ -441,4 +453,7 @@ class Diagnosis:
             "warnings": list(self.warnings),
             "checks": [check.to_dict() for check in self.checks],
             "simulation": report_of(self.in_turn),
+            "servo_motion": None
+            if self.servo_motion is None
+            else [found.to_dict() for found in self.servo_motion],
         }

@@ -12,11 +12,14 @@ from skidyn._text import digits, fall, give_or_take, inside, joints_told, listed
 from skidyn.diagnosis._failures import FAILS
 from skidyn.diagnosis._findings import rival_title
 from skidyn.diagnosis._rule import GUESS
+from skidyn.diagnosis._servo_motion import servo_motion_told
 
 if TYPE_CHECKING:
     from skidyn.diagnosis._findings import Finding
     from skidyn.diagnosis._result import Diagnosis
 
+#: Mark of a model that lacks nothing.
+SOUND = "✓"
 #: An error that changes by less than this share is the same.
 SAME = 0.02
 #: Confidence below which a name is doubtful.
@@ -45,12 +48,19 @@ def story(diagnosis: Diagnosis) -> dict[str, Any]:
         same for every finding, ``joints`` (a row each, with
         ``speaks`` where it is not at its noise), ``quiet`` (a sentence on the others) and
         ``left`` (a sentence on what stays), ``doubts`` (what is suspected of the log, to be
-        looked at before a name is believed) and other ``warnings``.
+        looked at before a name is believed) and other ``warnings``; ``servo_motion`` with what the
+        motion of servos named.
     """
     rows = joint_rows(diagnosis)
     cards = [_line(diagnosis, k, rows) for k in range(len(diagnosis.findings))]
     mark, headline, text = _verdict(rows, cards, diagnosis.noise_is_coloured)
     doubts = [str(check) for check in diagnosis.checks if check.certainty == "suspected"]
+    motion = servo_motion_told(diagnosis.servo_motion, diagnosis.findings)
+    if motion is not None and motion["findings"]:
+        shown = listed([*map(_what_and_where, motion["findings"])])
+        told = headline if cards or mark != SOUND else f"{headline} in the torque"
+        headline = f"{told}; the motion of the servos shows {shown}"
+        mark = "!" if mark == SOUND else mark
     return {
         "verdict": diagnosis.verdict,
         "mark": "?" if doubts else mark,
@@ -63,6 +73,7 @@ def story(diagnosis: Diagnosis) -> dict[str, Any]:
         "left": _left(diagnosis, rows),
         "doubts": doubts,
         "warnings": [note for note in diagnosis.warnings if note not in doubts],
+        "servo_motion": motion,
     }
 
 
@@ -176,7 +187,7 @@ def _verdict(
         )
     else:
         text = "On every joint the error on data that the fit has not seen is like the noise."
-    return "✓", "Nothing significant is missing", text
+    return SOUND, "Nothing significant is missing", text
 
 
 def _what_and_where(line: dict[str, Any]) -> str:

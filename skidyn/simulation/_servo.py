@@ -143,8 +143,9 @@ def fit_servo(robot: Robot, log: Any, *, shared: bool = False) -> Controller:
         names = ", ".join(robot.joint_names[j] for j in hidden)
         raise SkidynError(
             f"this log does not show the servo gain of {names}: the error of position does not "
-            "follow the robot's weight there. Give shared=True if all joints have the same servo, "
-            "or a Controller with the gain that you know"
+            "follow the robot's weight there. Give --controller fit-shared (in Python: "
+            "shared=True) if all joints have the same servo, or a Controller with the gain that "
+            "you know"
         )
     return Controller(stiffness=1.0 / value, damping=0.0, delay=delay, follows_velocity=False)
 

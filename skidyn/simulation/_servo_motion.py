@@ -11,15 +11,16 @@ judged on the other half.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 
 from skidyn._columns import names_of_table, resolve_columns
-from skidyn._exceptions import SkidynError
+from skidyn._exceptions import LogError, SkidynError
 from skidyn._progress import track
 from skidyn._signals import Array
+from skidyn._text import inside, measure
 from skidyn.effects import get_effect
 from skidyn.forward import Controller, JointLoop, Task, read_task
 
@@ -58,12 +59,14 @@ class ServoFinding:
         The next best explanation of this joint.
     beside : float
         Error that the next best explanation leaves, rad or m.
+    unit : {"rad", "m"}, default="rad"
+        That of the joint's position.
 
     Examples
     --------
     >>> found = ServoFinding("coulomb", 2, {"Fc": 0.31}, 0.012, 0.002, "viscous", 0.009)
     >>> found.sentence.split(":")[0]
-    'Coulomb friction of joint 2 (Fc 0.31)'
+    'Coulomb friction of joint 2 (Fc = 0.31 N m)'
     """
 
     kind: str
@@ -73,18 +76,44 @@ class ServoFinding:
     after: float
     rival: str
     beside: float
+    unit: Literal["rad", "m"] = "rad"
+
+    @property
+    def title(self) -> str:
+        """The effect in words."""
+        return get_effect(self.kind).title
+
+    @property
+    def size(self) -> str:
+        """Its parameters with their units."""
+        units = get_effect(self.kind).units(self.unit == "m")
+        return ", ".join(measure(k, v, units.get(k, "")) for k, v in self.parameters.items())
 
     @property
     def sentence(self) -> str:
         """In words."""
-        title = get_effect(self.kind).title
-        sizes = ", ".join(f"{name} {value:.3g}" for name, value in self.parameters.items())
-        other = get_effect(self.rival).title
-        return (
-            f"{title} of joint {self.joint} ({sizes}): the simulated motion errs by "
-            f"{1e3 * self.after:.3g} in place of {1e3 * self.before:.3g} mrad (mm of a slider); "
-            f"with {other[:1].lower() + other[1:]} it would be {1e3 * self.beside:.3g}."
+        return f"{self.title} of joint {self.joint} ({self.size}): {self.evidence}."
+
+    @property
+    def evidence(self) -> str:
+        """What it does to the simulated motion, and what the next best explanation does."""
+        before, after, beside = (
+            f"{1e3 * error:.3g}" for error in (self.before, self.after, self.beside)
         )
+        return (
+            f"the simulated motion errs by {after} in place of {before} m{self.unit}; with "
+            f"{inside(get_effect(self.rival).title)} it would be {beside} m{self.unit}"
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """As in the report of a diagnosis.
+
+        Returns
+        -------
+        dict
+            The parameters above, and ``sentence``.
+        """
+        return {**asdict(self), "sentence": self.sentence}
 
     def __str__(self) -> str:
         return self.sentence
@@ -127,7 +156,9 @@ def explain_servo_motion(
     Raises
     ------
     SkidynError
-        A column is missing, or the log is too short.
+        A column is missing.
+    LogError
+        The log is too short.
 
     See Also
     --------
@@ -147,7 +178,7 @@ def explain_servo_motion(
     task = read_task(model, X, None, controller, PIECE)
     pieces = len(task.windows.rows)
     if pieces < FEWEST_PIECES:
-        raise SkidynError(
+        raise LogError(
             f"the log holds {pieces} piece(s) of {PIECE:g} s; effects are judged on pieces left "
             f"out, which takes {FEWEST_PIECES}"
         )
@@ -160,7 +191,8 @@ def explain_servo_motion(
     least = STANDS_OUT * np.maximum(_encoder_noise(model.robot_, X, task.signals.q), SMALLEST)
     failing = [j - 1 for j in wanted if errors[j - 1] > least[j - 1]]
     found = [_name(loops[j], plain[j], j + 1) for j in track(failing, "Comparing effects")]
-    named = [f for f in found if f is not None]
+    slides = [kind == "prismatic" for kind in model.robot_.joint_types]
+    named = [replace(f, unit="m" if slides[f.joint - 1] else "rad") for f in found if f is not None]
     return sorted(named, key=lambda f: f.after / f.before)[:1]
 
 
@@ -355,7 +387,11 @@ def _said(kind: str, values: dict[str, float]) -> dict[str, float]:
         return {"gap": 2 * values["gap"]}
     if kind == "dahl":  # the catalogue calls the way so
         return {"presliding": values["coulomb"] / values["presliding"]}
-    names = {"late": "delay", "square": "c"}
+    if kind == "joint_elasticity":
+        return {"K": 1.0 / values["compliance"]}
+    if kind == "nonlinear_viscous":
+        return {"c": values["square"], "power": 2.0}
+    names = {"late": "delay"}
     own = [k for k in _LAWS[kind] if k not in ("motor", "damping")]
     return {names.get(k, k): values[k] for k in own}
 

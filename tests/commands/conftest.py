@@ -75,3 +75,19 @@ def report(work, tmp_path_factory):
     finally:
         os.chdir(before)
     return folder / "report.json"
+
+
+@pytest.fixture(scope="session")
+def servo_diagnosed(sticky_servo, tmp_path_factory):
+    """A folder with a log of servos without torque, diagnosed, and the words that did it."""
+    pytest.importorskip("jinja2", reason="needs skidyn[report]")
+    folder = tmp_path_factory.mktemp("servos")
+    urdf = files("skidyn.datasets").joinpath("robots", "planar_arm.urdf").read_text("utf-8")
+    (folder / "arm.urdf").write_text(urdf, encoding="utf-8")
+    sticky_servo.log.to_csv(folder / "log.csv", index=False)
+    gains = '{"stiffness": [200, 12], "damping": [12, 0.6], "follows_velocity": false}'
+    words = ["diagnose", str(folder / "log.csv"), "--urdf", str(folder / "arm.urdf")]
+    words += ["--controller", gains, "--effects", "spring"]
+    words += ["--out", str(folder / "report.json"), "--html", str(folder / "report.html")]
+    assert cli.main(words) == cli.DONE
+    return words

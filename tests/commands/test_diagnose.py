@@ -7,6 +7,7 @@ import json
 import signal
 import subprocess
 import sys
+from importlib import resources
 from pathlib import Path
 
 import pytest
@@ -99,3 +100,44 @@ def test_diagnose_stops_with_the_remedy_unless_forced(flipped, tmp_path, capsys)
         report = json.load(file)
     assert report["checks"][0]["certainty"] == "certain"
     assert report["provenance"]["options"]["force"] is True
+
+
+def test_servos_without_torque_are_diagnosed_by_their_motion(servo_diagnosed, capsys):
+    folder = Path(servo_diagnosed[1]).parent
+    report = json.loads((folder / "report.json").read_text("utf-8"))
+    (found,) = report["servo_motion"]
+    assert (found["kind"], found["joint"]) == ("stribeck", 2)
+    jsonschema = pytest.importorskip("jsonschema")
+    schema = resources.files("skidyn.report").joinpath("diagnosis.schema.json")
+    jsonschema.validate(report, json.loads(schema.read_text()))
+    page = (folder / "report.html").read_text("utf-8")
+    assert '<section id="servos">' in page and 'href="#servos"' in page
+    assert main(servo_diagnosed) == cli.DONE  # the answer that was kept
+    told = capsys.readouterr().out
+    assert "the motion of the servos shows Stribeck friction on joint 2" in told
+    assert "Stribeck friction on joint 2: dF = 0.1" in told
+    assert "The torque is that of the servos" in told
+    assert "--effect stribeck --joints 2" in told
+
+
+def test_a_report_of_servos_is_read_again_with_its_controller(servo_diagnosed, run):
+    report = Path(servo_diagnosed[1]).parent / "report.json"
+    code, errors = run("add", "--from", report, "--effect", "stribeck", "--joints", "2")
+    assert code == cli.DONE and errors["after"][1] < errors["before"][1]
+
+
+def test_servos_are_read_by_their_weight_or_by_the_measured_torque(tmp_path, run, capsys):
+    servo = LOG[LOG["trajectory"] <= 2].copy()
+    for j in (1, 2):  # a servo of 40 N m/rad: its error is the torque over its gain
+        servo[f"q_ref{j}"] = servo[f"q{j}"] + servo[f"tau{j}"] / 40.0
+    servo.to_csv(tmp_path / "whole.csv", index=False)
+    servo.drop(columns=["tau1", "tau2"]).to_csv(tmp_path / "bare.csv", index=False)
+    words = ("--urdf", URDF, "--effects", "spring")
+    for name, by_weight in (("whole", False), ("bare", True)):
+        code, report = run("diagnose", tmp_path / f"{name}.csv", *words, "--controller", "fit")
+        assert code == cli.DONE and report["servo_motion"] is None
+        told = " ".join(report["warnings"])
+        assert "the log holds 2 piece(s)" in told
+        assert ("The torque is that of the servos" in told) == by_weight
+    assert main(["diagnose", str(tmp_path / "bare.csv"), *words]) == cli.BAD_INPUT
+    assert "--controller fit" in capsys.readouterr().err

@@ -107,7 +107,7 @@ def make_diagnosis(verdict="missing", joint_names=("shoulder", "elbow", "slider"
         budget=[dict(share) for _ in range(n)], warnings=["one trajectory has 3 repeated rows"],
         regimes=REGIMES, base_model=None, data=(), checks=[], parts=None,
         sensor_noise=np.full(n, 0.2), remainder=np.zeros(n), remainder_inflation=np.ones(n),
-        in_turn=None, noise_is_coloured=False,
+        in_turn=None, servo_motion=None, noise_is_coloured=False,
     )  # fmt: skip
     result.error_map = lambda after=False: error_map(
         result.comparison_after if after else result.comparison

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the motion of servos says beside the torque, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from skidyn._text import inside, joints_told, listed
+from skidyn.effects import get_effect
+
+if TYPE_CHECKING:
+    from skidyn.diagnosis._findings import Finding
+    from skidyn.simulation import ServoFinding
+
+
+def servo_motion_told(
+    named: Sequence[ServoFinding] | None, findings: Sequence[Finding]
+) -> dict[str, Any] | None:
+    """What the motion of servos named, for the first screen and the page.
+
+    Parameters
+    ----------
+    named : sequence of ServoFinding or None
+        None where no motion of servos was looked at.
+    findings : sequence of Finding
+        What the torque lacks.
+
+    Returns
+    -------
+    dict or None
+        ``heading``, ``text``, and for each of ``findings`` ``kind``, ``joints``, ``what``,
+        ``where``, ``size``, ``evidence``, and the ``errors`` of the simulated position (``model``
+        and ``error`` in mrad or mm, ``unit``) with friction alone, with it and with its rival.
+    """
+    if named is None:
+        return None
+    told = [
+        {
+            "kind": found.kind,
+            "joints": [found.joint],
+            "what": found.title,
+            "where": joints_told([found.joint]),
+            "size": found.size,
+            "evidence": found.evidence,
+            "errors": [
+                {"model": model, "error": 1e3 * error, "unit": f"m{found.unit}"}
+                for model, error in (
+                    ("friction alone", found.before),
+                    (inside(found.title), found.after),
+                    (inside(get_effect(found.rival).title), found.beside),
+                )
+            ],
+        }
+        for found in named
+    ]
+    return {
+        "heading": "Motion of the servos, each joint simulated along its command",
+        "text": _text(named, findings),
+        "findings": told,
+    }
+
+
+def _text(named: Sequence[ServoFinding], findings: Sequence[Finding]) -> str:
+    if not named:
+        return "It asks for no effect beside friction and what is named above."
+    same = [
+        f"{inside(finding.title)} on {joints_told(finding.joints)}"
+        for finding in findings
+        if {found.joint for found in named} & set(finding.joints)
+        and (finding.kind == "unknown" or get_effect(finding.kind).family == "hysteresis")
+    ]
+    if not same:
+        return "The torque does not show it."
+    return f"It takes the place of a finding that the torque could not name: {listed(same)}."

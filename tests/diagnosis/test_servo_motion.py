@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the motion of servos names stands in the story of a diagnosis."""
+
+import pytest
+
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.diagnosis import diagnose
+from skidyn.identification import RBDRegressor
+from skidyn.simulation import ServoFinding
+
+STICTION = ServoFinding("stribeck", 2, {"dF": 0.15}, 0.004, 0.001, "dahl", 0.003)
+
+
+@pytest.fixture(scope="module")
+def diagnosis():
+    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=3, duration=4.0)
+    return diagnose(RBDRegressor(log.robot, ("viscous", "coulomb")), log.X, log.y, effects=())
+
+
+def test_the_headline_says_what_the_motion_names(diagnosis, monkeypatch):
+    assert diagnosis.story()["servo_motion"] is None
+    before = diagnosis.story()["headline"]
+    monkeypatch.setattr(diagnosis, "servo_motion", [STICTION])
+    story = diagnosis.story()
+    assert story["headline"] == (
+        f"{before} in the torque; the motion of the servos shows Stribeck friction on joint 2"
+    )
+    assert story["mark"] == "!"
+    (line,) = story["servo_motion"]["findings"]
+    assert (line["what"], line["where"], line["size"]) == (
+        "Stribeck friction", "joint 2", "dF = 0.15 N m"
+    )  # fmt: skip
+    assert [row["error"] for row in line["errors"]] == pytest.approx([4.0, 1.0, 3.0])
+    assert story["servo_motion"]["text"] == "The torque does not show it."
+    assert STICTION.sentence in repr(diagnosis)
+    assert line["evidence"] in diagnosis._repr_html_()
+
+
+def test_a_motion_that_names_nothing_changes_no_verdict(diagnosis, monkeypatch):
+    before = diagnosis.story()
+    monkeypatch.setattr(diagnosis, "servo_motion", [])
+    story = diagnosis.story()
+    assert (story["headline"], story["mark"]) == (before["headline"], before["mark"])
+    assert story["servo_motion"]["findings"] == []
