@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from skidyn._commands._arguments import JsonFile, Page, command, with_controller, with_log
-from skidyn._commands._input import read_driven, read_model, read_robot
+from skidyn._commands._input import read_driven
 from skidyn._commands._kept import Kept, noting
 from skidyn._commands._output import (
     explain_motion,
@@ -102,9 +102,8 @@ def run(options: argparse.Namespace) -> None:
 def _answer(options: argparse.Namespace) -> dict[str, Any]:
     """What is found, as values that can be kept."""
     with noting() as noted:
-        robot = read_robot(options)
-        frame, tau, controller = read_driven(options, robot, check=False)
-        diagnosis = run_diagnosis(read_model(options, robot), frame, tau, options)
+        model, frame, tau, controller = read_driven(options, check=False)
+        diagnosis = run_diagnosis(model, frame, tau, options)
         explain_motion(diagnosis, controller, frame, options)
         if options.simulate:
             driven: dict[str, Any] = {} if controller is None else {"controller": controller}

@@ -28,26 +28,42 @@ def read_model_and_log(
     options: argparse.Namespace, *, check: bool = True
 ) -> tuple[RBDRegressor, pd.DataFrame, Any]:
     """The model that the options describe, the log, and its torques."""
-    robot = read_robot(options)
-    frame, tau, _ = read_driven(options, robot, check=check)
-    return read_model(options, robot), frame, tau
+    return read_driven(options, check=check)[:3]
 
 
 def read_driven(
-    options: argparse.Namespace, robot: Robot, *, check: bool = True
+    options: argparse.Namespace, *, check: bool = True
+) -> tuple[RBDRegressor, pd.DataFrame, Any, Controller | None]:
+    """The same with the controller that the options give; the torques may be its own."""
+    from skidyn._persistence import load_model
+    from skidyn.identification import RBDRegressor
+
+    robot = read_robot(options)
+    frame, tau, controller = _log(options, robot, check)
+    if options.model.endswith(".skops"):
+        return load_model(options.model), frame, tau, controller
+    kinds = [kind.strip() for kind in options.model.split(",") if kind.strip()]
+    if "rigid_body" not in kinds:
+        raise SkidynError("--model must contain rigid_body; it may add kinds of the catalogue")
+    effects = tuple(kind for kind in kinds if kind != "rigid_body")
+    model = RBDRegressor(robot, effects, "nominal" if options.nominal else "identified")
+    return model, frame, tau, controller
+
+
+def _log(
+    options: argparse.Namespace, robot: Robot, check: bool
 ) -> tuple[pd.DataFrame, Any, Controller | None]:
     """The log, its torques or those of its servos, and the controller that the options give."""
+    text = getattr(options, "controller", None)
+    frame = read_frame(options, robot, check=check, needs_torque=text is None)
+    if text is None:
+        return frame, torque_of(frame, robot), None
+    controller = read_controller(text, robot, frame)
+    if "tau1" in frame:
+        return frame, torque_of(frame, robot), controller
     from skidyn.simulation import servo_torque
 
-    text = getattr(options, "controller", None)
-    if text is None:
-        frame = read_frame(options, robot, check=check)
-        return frame, torque_of(frame, robot), None
-    frame = read_frame(options, robot, check=check, needs_torque=False)
-    controller = read_controller(text, robot, frame)
-    measured = "tau1" in frame
-    tau = torque_of(frame, robot) if measured else servo_torque(controller, frame)
-    return frame, tau, controller
+    return frame, servo_torque(controller, frame), controller
 
 
 def torque_of(frame: pd.DataFrame, robot: Robot) -> Any:
@@ -72,20 +88,6 @@ def read_controller(text: str, robot: Robot, frame: pd.DataFrame) -> Controller:
             f"{', '.join(sorted(names))} it has, as JSON; fit-shared finds one gain for all joints"
         )
     return Controller(**gains).checked(robot.n_joints)
-
-
-def read_model(options: argparse.Namespace, robot: Robot) -> Any:
-    """The model that the options describe."""
-    from skidyn._persistence import load_model
-    from skidyn.identification import RBDRegressor
-
-    if options.model.endswith(".skops"):
-        return load_model(options.model)
-    kinds = [kind.strip() for kind in options.model.split(",") if kind.strip()]
-    if "rigid_body" not in kinds:
-        raise SkidynError("--model must contain rigid_body; it may add kinds of the catalogue")
-    effects = tuple(kind for kind in kinds if kind != "rigid_body")
-    return RBDRegressor(robot, effects, "nominal" if options.nominal else "identified")
 
 
 def read_frame(

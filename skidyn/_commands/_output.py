@@ -57,7 +57,7 @@ def explain_motion(
     if controller is None:
         return
     if "tau1" not in frame:
-        diagnosis.warnings.append(_torque_told(controller, len(diagnosis.joint_names)))
+        diagnosis.warnings.insert(0, _torque_told(controller, len(diagnosis.joint_names)))
     with working("Simulating the servos", options):
         try:
             diagnosis.explain_servo_motion(controller)

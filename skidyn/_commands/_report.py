@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from skidyn._commands._arguments import Page, command, with_report
-from skidyn._commands._input import read_driven, read_model, read_robot, recorded_options
+from skidyn._commands._input import read_driven, recorded_options
 from skidyn._commands._output import (
     explain_motion,
     print_json,
@@ -35,9 +35,8 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> None:
     options = recorded_options(options)
-    robot = read_robot(options)
-    frame, tau, controller = read_driven(options, robot, check=False)  # a diagnosis checks it
-    diagnosis = run_diagnosis(read_model(options, robot), frame, tau, options)
+    model, frame, tau, controller = read_driven(options, check=False)  # a diagnosis checks it
+    diagnosis = run_diagnosis(model, frame, tau, options)
     explain_motion(diagnosis, controller, frame, options)
     write_page(diagnosis, options.html, provenance(options))
     page = str(Path(options.html).resolve())

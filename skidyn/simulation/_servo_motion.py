@@ -100,10 +100,10 @@ class ServoFinding:
         before, after, beside = (
             f"{1e3 * error:.3g}" for error in (self.before, self.after, self.beside)
         )
-        return (
-            f"the simulated motion errs by {after} in place of {before} m{self.unit}; with "
-            f"{inside(get_effect(self.rival).title)} it would be {beside} m{self.unit}"
-        )
+        said = f"the simulated motion errs by {after} in place of {before} m{self.unit}"
+        if self.beside >= self.before:
+            return f"{said}; no other effect lowers that"
+        return f"{said}; with {inside(get_effect(self.rival).title)} it would be {beside}"
 
     def to_dict(self) -> dict[str, Any]:
         """As in the report of a diagnosis.
