@@ -17,6 +17,7 @@ from figaroh.tools.regressor import build_regressor_basic
 PACKAGE = "figaroh"
 #: In figaroh's order of its columns beside the rigid body.
 KINDS = ("viscous", "coulomb", "rotor_inertia", "offset")
+VALUES = dict(zip(KINDS, ("Fv", "Fc", "Ia", "tau0"), strict=True))
 SAMPLES = 4000
 LIMIT = 10.0
 #: A joint rests below this share of the speed that it exceeds in 5 % of the log.
@@ -68,7 +69,12 @@ def answer(log, robot) -> dict:
     whole, drives = identify(model, log.motion, log.use)
     sizes = np.array([np.abs(rows.base).mean() for rows in log.joints])
     effects = [
-        {"kind": kind, "joints": [j + 1], "parameters": {}, "size": float(abs(value) / sizes[j])}
+        {
+            "kind": kind,
+            "joints": [j + 1],
+            "parameters": {VALUES[kind]: value},
+            "size": float(abs(value) / sizes[j]),
+        }
         for (kind, j), (value, deviation) in drives.items()
         if kind not in log.base_model and deviation < LIMIT
     ]

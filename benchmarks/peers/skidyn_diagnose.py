@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``skidyn.diagnosis.diagnose`` with its default options."""
+"""``skidyn.diagnosis.diagnose`` with default options; clocks as the check of the log advises."""
 
 import numpy as np
+from _prepare import read_as_told
 
 from skidyn.diagnosis import diagnose
 from skidyn.identification import RBDRegressor
-from skidyn.logs import read_log
 from skidyn.robots import Robot
 
 PACKAGE = "skidyn"
@@ -14,7 +14,7 @@ KEYS = ("kind", "joints", "variables", "trajectories", "confidence")
 
 def answer(log, robot) -> dict:
     robot = Robot.from_urdf(robot)
-    frame = read_log([str(log.folder / "log.parquet")], robot=robot)
+    frame = read_as_told(log.folder, robot)
     torques = [f"tau{j + 1}" for j in range(robot.n_joints)]
     part = frame[log.use]
     base = [kind for kind in log.base_model if kind != "rigid_body"]

@@ -21,6 +21,8 @@ import math
 import os
 import subprocess
 import sys
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +32,7 @@ from skidyn.datasets import SuiteCase, hidden_effect_suite, score_answers, wilso
 
 HERE = Path(__file__).parent
 PEERS = HERE.parent / "peers"
+CONTENTS = ("nothing", "one", "two", "nameless", "once")
 
 
 def make(folder: Path, case: SuiteCase) -> dict:
@@ -75,60 +78,116 @@ def score(truths: list[dict], answers: list[dict]) -> dict:
     return {"version": ", ".join(sorted(versions)), "cases": cases}
 
 
+@dataclass(frozen=True)
+class Figure:
+    """A column of the table: a share of logs with its interval, or a number, less being better."""
+
+    title: str
+    of: Callable[[list[dict]], list[float]]
+    share: bool = False
+    middle: Callable[[list[float]], float] = np.mean
+    digits: int = 2
+
+
+def _solved(*contents: str) -> Callable[[list[dict]], list[float]]:
+    return lambda cases: [
+        c["solved"] for c in cases if c["counts"] and c["content"] in (contents or CONTENTS)
+    ]
+
+
+def _kept(name: str) -> Callable[[list[dict]], list[float]]:
+    return lambda cases: [c[name] for c in cases if c.get(name) is not None]
+
+
+def _geometric(values: list[float]) -> float:
+    return math.exp(np.mean(np.log(values)))
+
+
+FIGURES = (
+    Figure("solved", _solved(), share=True),
+    Figure("named", _solved("one", "two", "once"), share=True),
+    Figure("unknown told", _solved("nameless"), share=True),
+    Figure("silent", _solved("nothing"), share=True),
+    Figure("clean", lambda cases: [c["clean"] for c in cases if c["counts"]], share=True),
+    Figure("false", _kept("false_claims")),
+    Figure("value", _kept("parameter_error"), middle=np.median, digits=3),
+    Figure("error", _kept("error_held_out"), middle=_geometric),
+    Figure("s", _kept("seconds"), middle=np.median, digits=1),
+)
+#: Says nothing, ever: it is printed, but nobody is compared with it.
+YARDSTICK = "silence"
+
+
 def print_table(peers: dict[str, dict]) -> None:
     """Every peer a line, skidyn's first, and who solves what; nothing is rerun."""
     peers = dict(sorted(peers.items(), key=lambda item: not item[0].startswith("skidyn")))
     first = next(iter(peers.values()))["cases"]
-    print(f"{len(first)} logs; solved with its Wilson interval of 95 %\n")
-    heads = ("solved", "clean", "false", "silent", "value", "error", "s")
-    print(f"{'':20s}" + "".join(f"{h:>{20 if h == 'solved' else 8}s}" for h in heads))
+    counted = [c for c in first if c["counts"]]
+    print(f"{len(first)} logs, {len(counted)} count; shares with Wilson intervals of 95 %\n")
+    print(f"{'':18s}" + "".join(f"{f.title:>{17 if f.share else 8}s}" for f in FIGURES))
+    cells = {}
     for name, peer in peers.items():
-        cases = peer["cases"]
-        counted = [c for c in cases if c["counts"]]
-        solved = sum(c["solved"] for c in counted)
-        low, high = wilson_interval(solved, len(counted))
-        quiet = [c["solved"] for c in cases if c["content"] == "nothing"]
-        values = [c["parameter_error"] for c in cases if c["parameter_error"] is not None]
-        errors = [c["error_held_out"] for c in cases if c.get("error_held_out")]
-        seconds = [c["seconds"] for c in cases if "seconds" in c]
-        cells = [
-            _mean([c["clean"] for c in counted]),
-            _mean([c["false_claims"] for c in cases]),
-            _mean(quiet),
-            f"{np.median(values):.3f}" if values else "",
-            f"{math.exp(np.mean(np.log(errors))):.2f}" if errors else "",
-            f"{np.median(seconds):.1f}" if seconds else "",
-        ]
-        share = f"{solved / len(counted):.2f} ({low:.2f}, {high:.2f})"
-        print(f"{name:20s}{share:>20s}" + "".join(f"{c:>8s}" for c in cells))
-        faults = [c for c in cases if c.get("fault")]
+        values = [f.of(peer["cases"]) for f in FIGURES]
+        told = [_cell(f, v) for f, v in zip(FIGURES, values, strict=True)]
+        print(f"{name:18s}" + "".join(told))
+        for figure, value in zip(FIGURES, values, strict=True):
+            if value:
+                number = round(float(figure.middle(value)), figure.digits)
+                cells.setdefault(figure.title, {})[name] = -number if figure.share else number
+        faults = [c for c in peer["cases"] if c.get("fault")]
         if faults:
-            print(f"{'':22s}failed on {len(faults)}, first: {faults[0]['fault'][:90]}")
-    _print_groups(peers)
+            print(f"{'':20s}failed on {len(faults)}, first: {faults[0]['fault'][:90]}")
+    cells |= _print_groups(peers)
+    _print_best(next(iter(peers)), cells)
     versions = sorted({p["version"] for p in peers.values() if p["version"]})
     print("versions: " + ", ".join(versions))
 
 
-def _print_groups(peers: dict[str, dict]) -> None:
+def _cell(figure: Figure, values: list[float]) -> str:
+    if not values:
+        return " " * (17 if figure.share else 8)
+    told = f"{figure.middle(values):.{figure.digits}f}"
+    if not figure.share:
+        return f"{told:>8s}"
+    low, high = wilson_interval(sum(values), len(values))
+    return f"{f'{told} ({low:.2f} {high:.2f})':>17s}"
+
+
+def _print_groups(peers: dict[str, dict]) -> dict[str, dict[str, float]]:
+    """Share solved by what is hidden and by tier; returned with its sign turned."""
     names = list(peers)
     groups: dict[str, list[int]] = {}
     for k, case in enumerate(peers[names[0]]["cases"]):
         if case["counts"]:
-            for group in (case["content"], f"tier {case['tier']}", "all"):
+            for group in (case["content"], f"tier {case['tier']}"):
                 groups.setdefault(group, []).append(k)
     print("\nsolved, by what is hidden and by tier (logs that count)")
-    print(f"{'':16s}" + "".join(f"{n[:14]:>16s}" for n in ("", *names))[12:])
-    best = 0
-    for group in sorted(groups, key=lambda g: (g == "all", g)):
+    print(f"{'':20s}" + "".join(f"{n[:13]:>14s}" for n in names))
+    cells = {}
+    for group in sorted(groups):
         rows = groups[group]
         shares = [np.mean([peers[n]["cases"][k]["solved"] for k in rows]) for n in names]
-        print(f"{group:16s}{len(rows):4d}" + "".join(f"{s:16.2f}" for s in shares))
-        best += shares[0] >= max(shares)
-    print(f"\n{names[0]} is best or tied in {best} of {len(groups)} rows")
+        print(f"{group:16s}{len(rows):4d}" + "".join(f"{s:14.2f}" for s in shares))
+        if group not in ("nothing", "nameless"):  # which the first table has
+            cells[group] = {n: -round(float(s), 2) for n, s in zip(names, shares, strict=True)}
+    return cells
 
 
-def _mean(values: list[float]) -> str:
-    return f"{np.mean(values):.2f}" if values else ""
+def _print_best(name: str, cells: dict[str, dict[str, float]]) -> None:
+    """In how many cells, of those in which another has a figure, a peer is best or tied."""
+    rivals = {
+        title: {n: v for n, v in row.items() if n not in (name, YARDSTICK)}
+        for title, row in cells.items()
+        if name in row
+    }
+    met = {title: row for title, row in rivals.items() if row}
+    lost = [title for title, row in met.items() if cells[title][name] > min(row.values())]
+    print(f"\n{name} is best or tied in {len(met) - len(lost)} of {len(met)} cells")
+    for title in lost:
+        other, value = min(met[title].items(), key=lambda item: item[1])
+        print(f"  lost: {title}, {abs(cells[title][name]):g} against {abs(value):g} of {other}")
+    if alone := [title for title in rivals if title not in met]:
+        print(f"  no other has a figure: {', '.join(alone)}")
 
 
 def main() -> None:

@@ -15,14 +15,18 @@ Array = NDArray[np.float64]
 
 
 def viscous(s: Setting) -> Hidden:
-    j = s.some(s.n_joints)
-    return Hidden("viscous", j, {"Fv": s.viscous[j]}, "Fv*dq", ("Fv",), missing_from_base="viscous")
+    return _lacking(s, "viscous", "Fv", s.viscous, "Fv*dq")
 
 
 def coulomb(s: Setting) -> Hidden:
-    j = s.some(s.n_joints)
-    formula = "Fc*sign(dq)"
-    return Hidden("coulomb", j, {"Fc": s.coulomb[j]}, formula, ("Fc",), missing_from_base="coulomb")
+    return _lacking(s, "coulomb", "Fc", s.coulomb, "Fc*sign(dq)")
+
+
+def _lacking(s: Setting, kind: str, name: str, sizes: Array, formula: str) -> Hidden:
+    """Friction that all joints have and the base model lacks."""
+    s.some(s.n_joints)  # drawn for nothing, so that the numbers drawn after it stay frozen
+    j = list(range(s.n_joints))
+    return Hidden(kind, j, {name: sizes}, formula, (name,), missing_from_base=kind)
 
 
 def stribeck(s: Setting) -> Hidden:
