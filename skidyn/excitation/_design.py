@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from itertools import count
 from typing import TYPE_CHECKING, Any, Literal
@@ -23,6 +23,9 @@ from skidyn.robots import Robot
 
 if TYPE_CHECKING:
     import torch
+
+#: Middle pose, and weights of the basis.
+Motion = tuple[Array, Array]
 
 #: Samples at which a candidate's torques are judged, and rates in Hz at which its kinematic limits
 #: are kept meanwhile and all limits at the end.
@@ -139,7 +142,7 @@ def design_excitation(
     bounds = (limits or MotionLimits()).resolved(known.robot)
     before = recorded_information(known, recorded)
     search = _Search.prepare(known, basis, bounds, before, criterion, random_state)
-    excitation = _first_within(known, basis, bounds, search.ranked(iterations))
+    excitation = _best_within(known, basis, search, iterations)
     time, q, dq, ddq = excitation.sample(CHECK_RATE)
     matrix = known.information(q, dq, ddq, duration) + before
     sign, log_determinant = np.linalg.slogdet(matrix)
@@ -200,18 +203,20 @@ class _Search:
         size = torch.stack(shown).mean(0).diagonal().sqrt()
         return replace(search, scale=torch.where(size > 0, size, torch.ones_like(size)))
 
-    def ranked(self, iterations: int) -> Iterator[tuple[Array, Array]]:
-        """Middle and weights of the motions that were found, the best first."""
+    def ranked(self, iterations: int) -> tuple[list[Motion], list[Motion]]:
+        """Middle and weights of the motions that were descended to, and of the starts by worth."""
         import torch
 
         starts = sorted(self.starts, key=self._worth)
         followed = starts[:FOLLOWED] if iterations else []
         found = [self._descended(x, iterations, k / FOLLOWED) for k, x in enumerate(followed)]
-        found.sort(key=self._worth)
+
+        def motion(x: Array) -> Motion:
+            middle, weights = self.motion(torch.from_numpy(x))
+            return middle.numpy(), weights.numpy()
+
         with torch.no_grad():
-            for x in (*found, *starts):
-                middle, weights = self.motion(torch.from_numpy(x))
-                yield middle.numpy(), weights.numpy()
+            return [motion(x) for x in found], [motion(x) for x in starts]
 
     def _worth(self, x: Array) -> float:
         """Loss under the last penalty: what breaks a limit has to shrink in the end."""
@@ -284,10 +289,14 @@ class _Search:
 
     def loss(self, x: torch.Tensor, penalty: float) -> torch.Tensor:
         """What is minimised."""
+        states = self.states(x)
+        return self.score(self.information(*states)) + penalty * self._violation(*states)
+
+    def score(self, information: torch.Tensor) -> torch.Tensor:
+        """The criterion, the less the better."""
         import torch
 
-        states = self.states(x)
-        matrix = self.information(*states) / self.scale[:, None] / self.scale
+        matrix = information / self.scale[:, None] / self.scale
         score = -torch.logdet(matrix + RIDGE * torch.eye(len(matrix), dtype=matrix.dtype))
         if self.criterion == "condition":
             size = matrix.diagonal().clamp_min(RIDGE).sqrt()
@@ -295,7 +304,7 @@ class _Search:
             ratio = 0.5 * (values[-1].log() - values[0].clamp_min(1e-14).log())
             # It is blind to the size of a motion, which a small share of the other is not.
             score = ratio + SIZE * score / len(matrix)
-        return score + penalty * self._violation(*states)
+        return score
 
     def _violation(self, q: torch.Tensor, dq: torch.Tensor, ddq: torch.Tensor) -> torch.Tensor:
         """How far torque and workspace limits are broken: mean squares, zero where they hold."""
@@ -358,28 +367,52 @@ def _full(excitation: Excitation, limits: MotionLimits) -> Excitation:
     )
 
 
-def _first_within(
-    model: Model,
-    basis: FourierBasis | QuinticBasis,
-    limits: MotionLimits,
-    candidates: Iterable[tuple[Array, Array]],
+def _best_within(
+    model: Model, basis: FourierBasis | QuinticBasis, search: _Search, iterations: int
 ) -> Excitation:
-    """The first motion, with smaller strokes where need be, that keeps every limit."""
+    """The best motion that keeps every limit, with smaller strokes where need be.
+
+    Smaller strokes cost one motion much more than another, so that motions are compared with them;
+    of random starts, the first will do.
+    """
+    import torch
+
+    def score(excitation: Excitation) -> float:
+        _, *states = excitation.sample(DRAFT_RATE)
+        return float(search.score(search.information(*map(torch.from_numpy, states))))
+
+    found, starts = search.ranked(iterations)
     broken: list[str] = []
-    for middle, weights in candidates:
-        whole = _full(Excitation(model.robot, basis, middle, weights), limits)
-        shares = (SMALLEST, *np.linspace(1.0, SMALLEST, 40))
-        for share in shares:
-            trial = replace(whole, weights=share * whole.weights)
-            broken = broken_limits(model, trial, limits)
-            if broken and share == SMALLEST:
-                break  # the pose itself breaks a limit
-            if not broken and share > SMALLEST:
-                return trial
+    allowed = []
+    for middle, weights in found:
+        trial, broken = _within(model, Excitation(model.robot, basis, middle, weights), search)
+        allowed += [trial] if trial else []
+    if allowed:
+        return min(allowed, key=score)
+    for middle, weights in starts:
+        trial, broken = _within(model, Excitation(model.robot, basis, middle, weights), search)
+        if trial:
+            return trial
     raise SkidynError(
         f"no motion was found that keeps the limits of {' and '.join(broken)}; widen them, or "
         "narrow the position limits to poses that are allowed"
     )
+
+
+def _within(
+    model: Model, excitation: Excitation, search: _Search
+) -> tuple[Excitation | None, list[str]]:
+    """The motion with strokes as large as the limits allow, or the limits that its pose breaks."""
+    whole = _full(excitation, search.limits)
+    broken = broken_limits(model, replace(whole, weights=SMALLEST * whole.weights), search.limits)
+    if broken:
+        return None, broken  # the pose itself breaks a limit
+    for share in np.linspace(1.0, SMALLEST, 40)[:-1]:
+        trial = replace(whole, weights=share * whole.weights)
+        broken = broken_limits(model, trial, search.limits)
+        if not broken:
+            return trial, []
+    return None, broken
 
 
 def broken_limits(model: Model, excitation: Excitation, limits: MotionLimits) -> list[str]:
