@@ -88,13 +88,18 @@ class ReconsideringSearch(JudgingSearch):
         """Let every kind compete again for what earlier findings explain, beside the newest."""
         replaced = False
         for old in [h for h in self.findings if h is not newest and h.torque is None]:
-            step = self._competed_again(old)
-            if step is not None:
+            for _ in range(self.settings.repeated):
+                step = self._competed_again(old)
+                if step is None or step.added is None:
+                    if set(old.joints) & set(newest.joints):
+                        self._settled(old, steps)
+                    break
                 replaced = True
                 steps[:] = [step if s.added is old else s for s in steps]
-                newest = self._settled(newest, steps)
-            elif set(old.joints) & set(newest.joints):
-                self._settled(old, steps)
+                newest, old = self._settled(newest, steps), step.added
+                # What follows the fit had followed a model with the wrong name in it.
+                if not any(map(uses_the_fit, newest.candidates)):
+                    break
         if replaced and newest.kind == UNKNOWN and newest.torque is None:
             # What stood beside the wrong name without one may have one beside the right name.
             step = self._competed_again(newest)
