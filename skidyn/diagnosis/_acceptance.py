@@ -43,17 +43,15 @@ class JudgingSearch(RankingSearch):
                 or simplicity_of(rival) >= simplicity_of(part)
             ):
                 continue
-            errors = part.errors
-            if errors.shape != rival.errors.shape:
+            errors, own = part.errors, rival.errors
+            if errors.shape != own.shape:
                 if within_recordings(best) or within_recordings(rival):
                     continue  # one is of some recordings, judged on other folds
                 # one shows in one recording alone: both are judged by parts of recordings
-                errors = self._errors(part, within=True)
-                if errors.shape != rival.errors.shape:
-                    continue
+                errors, own = (self._errors(h, within=True) for h in (part, rival))
             variance = errors.sum(0) / np.maximum(self.problem.rows.counts, 1)
             variance = np.where(variance > 0, variance, 1.0)  # a joint that rests
-            behind = ((rival.errors - errors) / variance).sum(1)
+            behind = ((own - errors) / variance).sum(1)
             error = behind.std(ddof=1) * np.sqrt(len(behind))
             cap = self.settings.simpler_share * part.score
             # What a parameter must gain for another model (G. Schwarz 1978, Annals of Statistics
@@ -65,7 +63,7 @@ class JudgingSearch(RankingSearch):
                 best = rival
             elif part.is_further_form and not rival.is_further_form:
                 simpler = simplicity_of(rival) < get_effect(part.kind).simplicity
-                if simpler and self._as_good(rival.errors, errors, part):
+                if simpler and self._as_good(own, errors, part):
                     best = rival
         return self._simplest_of_family(best, ranking)
 
