@@ -360,3 +360,26 @@ class JudgingSearch(RankingSearch):
             and h.score >= (1 - self.settings.alike) * best.score
             for h in rivals
         )
+
+    def _elsewhere(self, best: Hypothesis) -> tuple[tuple[int, ...], ...]:
+        """Other pairs of joints on which a coupling explains as much.
+
+        Where axes are parallel, bodies take up what couples one pair in place of another.
+        """
+        if best.kind == UNKNOWN or within_recordings(best):
+            return ()
+        found = []
+        sites = {c.joints for c in best.candidates}
+        for own in (c for c in best.candidates if len(c.joints) == 2):
+            drops = {
+                i: drop
+                for i, (c, drop) in enumerate(zip(self.pool, self._drops, strict=True))
+                if c.kind == best.kind and c.joints not in sites and set(c.joints) & set(own.joints)
+            }
+            rest = [c for c in best.candidates if c is not own]
+            for joints in sorted({self.pool[i].joints for i in drops}):
+                at = max((i for i in drops if self.pool[i].joints == joints), key=drops.__getitem__)
+                (other,) = self._finals([[*rest, self.pool[at]]]) or (None,)
+                if other and best.score - other.score < self.settings.least_gain:
+                    found.append(joints)
+        return tuple(found)

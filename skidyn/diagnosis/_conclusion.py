@@ -265,6 +265,7 @@ def _guess(diagnosis: Diagnosis) -> tuple[Hypothesis, list[Candidate]] | None:
 
     def is_sure(finding: Finding) -> bool:
         likely = (finding.confidence or 1.0) * (2 if finding.alike else 1)
+        likely *= 1 + len(finding.elsewhere)
         return max(likely, finding.error_drop) >= GUESS
 
     sure = {term: is_sure(f) for f in diagnosis.findings for term in f.terms}
@@ -392,7 +393,8 @@ def _sure(finding: Finding, findings: Sequence[Finding], parts: Remainder, whole
         alike=finding.alike,
         has_name=finding.kind != UNKNOWN,
     )
-    return replace(finding, confidence=probability)
+    # One of several pairs of joints that explain the same is right.
+    return replace(finding, confidence=probability / (1 + len(finding.elsewhere)))
 
 
 def _episodic(

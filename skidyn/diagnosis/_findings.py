@@ -67,6 +67,8 @@ class Finding:
         Effect and partial residual against its main signal, for each joint.
     alike : bool
         Whether a kind that acts on other joints explains as much.
+    elsewhere : tuple of tuple of int
+        Other pairs of joints, counted from 1, on which the same effect explains as much.
 
     Examples
     --------
@@ -93,6 +95,7 @@ class Finding:
     when: list[Episode] = field(default_factory=list)
     curves: list[dict[str, Any]] = field(default_factory=list, repr=False)
     alike: bool = False
+    elsewhere: tuple[tuple[int, ...], ...] = ()
 
     def _repr_html_(self) -> str:
         from skidyn.diagnosis._notebook import finding_card
@@ -116,6 +119,7 @@ class Finding:
             "q_value": self.q_value,
             "rivals": list(self.rivals),
             "separating_motion": self.separating_motion,
+            "elsewhere": [list(joints) for joints in self.elsewhere],
             "margin": self.margin,
             "confidence": self.confidence,
             "trajectories": None if self.trajectories is None else list(self.trajectories),
@@ -194,6 +198,9 @@ def make_finding(
             * bool(effect.separating_motion)
             + "."
         )
+    elsewhere = tuple(tuple(j + 1 for j in pair) for pair in hypothesis.elsewhere)
+    if elsewhere:
+        sentence += f" It would explain as much on {pairs_of(elsewhere)}."
     for u in formulas:
         assert u.proposal is not None
         sentence += f" A formula that does the same on joint {u.joint}: {u.proposal.text}."
@@ -215,7 +222,13 @@ def make_finding(
         None,
         term.trajectories,
         alike=hypothesis.alike,
+        elsewhere=elsewhere,
     )
+
+
+def pairs_of(pairs: Sequence[Sequence[int]]) -> str:
+    """Pairs of joints inside a sentence."""
+    return listed([f"joints {' and '.join(map(str, joints))}" for joints in pairs], "or")
 
 
 def _joints(problem: Problem, hypothesis: Hypothesis, candidate: Candidate) -> tuple[int, ...]:

@@ -42,6 +42,8 @@ class Hypothesis:
     alike : bool
         Whether a kind that acts on other joints explains as much, so that nothing in the data tells
         them apart: a plane that a slider touches and the slider's own stop, for example.
+    elsewhere : tuple of tuple of int
+        Other pairs of joints, from 0, on which the same kind explains as much.
     errors : ndarray of shape (n_folds, n_joints) or None
         Held-out squared error with it; None where it was judged otherwise.
     torque : ndarray of shape (n_samples, n_joints) or None
@@ -57,6 +59,7 @@ class Hypothesis:
     tried: int = 1
     margin: float = 1.0
     alike: bool = False
+    elsewhere: tuple[tuple[int, ...], ...] = ()
     errors: Array | None = None
     torque: Array | None = None
 

@@ -44,7 +44,8 @@ class ReconsideringSearch(JudgingSearch):
             if judged is not None:
                 rivals = rivals_among(judged, offered)
                 margin, alike = margin_over(judged, rivals), self._alike(judged, rivals)
-                return replace(judged, margin=margin, alike=alike)
+                elsewhere = self._elsewhere(judged)
+                return replace(judged, margin=margin, alike=alike, elsewhere=elsewhere)
         return None
 
     def _first_of_two_names(self, best: Hypothesis, ranking: list[Hypothesis]) -> Hypothesis:

@@ -10,7 +10,7 @@ import numpy as np
 
 from skidyn._text import digits, fall, give_or_take, inside, joints_told, listed, raised, times
 from skidyn.diagnosis._failures import FAILS
-from skidyn.diagnosis._findings import rival_title
+from skidyn.diagnosis._findings import pairs_of, rival_title
 from skidyn.diagnosis._rule import GUESS
 from skidyn.diagnosis._servo_motion import servo_motion_told
 
@@ -297,10 +297,13 @@ def sure(finding: Finding) -> str:
     share = confidence(finding)
     family = finding.title.partition(", best described by ")
     named = f"that it is {inside(family[0])}" if family[1] else "of the name"
+    named += " and of its joints" * bool(finding.elsewhere)
     text = "" if share is None else f"{min(share, 0.99):.0%} sure {named}"
     if finding.rivals:
         rivals = listed([rival_title(kind) for kind in finding.rivals], "or")
         text += f"{'; ' if text else ''}this data cannot separate it from {rivals}"
+    elif finding.elsewhere:
+        text += f"; on {pairs_of(finding.elsewhere)} it would explain as much"
     elif finding.kind == "unknown":
         text = "no effect of the catalogue explains it"
     elif not text:

@@ -84,3 +84,19 @@ def test_stops_of_two_joints_are_stops_where_one_recording_alone_reaches_one_of_
     log = make_hidden_effect_log(robot, "end_stop", joints=(1, 4), noise="high", random_state=0)
 
     assert found_in(robot, log.X, log.y) == {"end_stop": {1, 4}}
+
+
+def test_a_coupling_that_bodies_make_the_same_on_another_pair_of_joints_names_both_pairs():
+    robot = load_scara()
+    log = make_hidden_effect_log(
+        robot, "coupled_inertia", joints=(1, 4), noise="low", random_state=3
+    )
+    model = RBDRegressor(robot, effects=["viscous", "coulomb", "rotor_inertia"])
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        (finding,) = diagnose(model, log.X, log.y).findings
+
+    assert {finding.joints, *finding.elsewhere} == {(1, 4), (2, 4)}
+    assert finding.confidence < 0.5
+    assert "as much on joints" in finding.sentence
