@@ -54,6 +54,8 @@ class RunDelay:
         Root mean square of what it leaves over the noise of the other recordings.
     before : float
         That at the lag of the other recordings.
+    usual : float, s
+        Lag of the other recordings.
     """
 
     lag: float
@@ -62,6 +64,7 @@ class RunDelay:
     agreeing: float
     left: float = 1.0
     before: float = 1.0
+    usual: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -240,7 +243,7 @@ def _of_runs(squares: Mapping[int, list[Array]], counts: Mapping[int, int]) -> d
         agreeing = float(weight[near].sum()) / total
         left, before = (np.sqrt(2 * float(whole[run][x]) / counts[run]) for x in (there, here))
         found[run] = RunDelay(
-            lag - usual, error, float(gains.sum()), agreeing, float(left), float(before)
+            lag - usual, error, float(gains.sum()), agreeing, float(left), float(before), usual
         )
     return found
 

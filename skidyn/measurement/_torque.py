@@ -497,6 +497,7 @@ def late_runs(found: Delay) -> dict[int, RunDelay]:
         run: one
         for run, one in found.runs.items()
         if abs(one.lag) > max(APART, ERRORS * one.error)
+        and abs(one.usual + one.lag) > abs(one.usual)  # in time itself, it is not the odd one
         and one.gain > RUN_SURE
         and one.agreeing >= AGREEING
         and one.before > (TIMES if one.agreeing < ALL_AGREE else FEWER) * one.left

@@ -55,6 +55,14 @@ def test_a_torque_far_beyond_the_effort_limit(arm, recorded, told_of):
     assert told.joints == (2,) and told.remedy.option == "--gain tau2=0.001"
 
 
+def test_an_effort_limit_that_the_weight_of_the_links_exceeds_is_what_is_wrong(
+    arm, recorded, told_of
+):
+    largest = recorded.frame[["tau1", "tau2"]].abs().max().to_numpy()
+    robot = replace(arm, effort_limits=largest * [0.02, 2])
+    assert "torque_scale" not in told_of(recorded.frame, robot)
+
+
 @pytest.mark.parametrize("factor", [0.5, 4.0])
 def test_a_rate_that_is_wrong_in_clock_and_velocities(factor, told_of):
     robot = load_ur5()
