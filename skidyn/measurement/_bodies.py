@@ -210,7 +210,7 @@ class TorqueScale(Check):
                 f"it is {told} times that of the stated bodies, and {fitted} times that of bodies "
                 "that explain the other joints"
             )
-        # A torque that bodies make at this scale is within what the joint holds: the limit is wrong.
+        # A torque that bodies make at this scale is one that the joint holds: the limit is wrong.
         usual = {k for k, gain in gains.items() if USUAL[0] <= gain <= USUAL[1]}
         far = _beyond_limits(measurement).items()
         beyond = {k: times for k, times in far if k not in found and k not in usual}
