@@ -9,7 +9,6 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
-from sklearn.base import clone
 
 from skidyn._exceptions import EffectError, SkidynError
 from skidyn._signals import Array
@@ -40,6 +39,9 @@ from skidyn.simulation import (
 
 #: How the sentence on a finding begins that the model for simulation is without.
 _VETO = "Not in the completed model, because it worsens the simulated motion:"
+
+#: Findings that every servo may have, beside which its motion may lack another effect.
+_PLAIN = ("offset", "rotor_inertia")
 
 Verdict = Literal["complete", "missing", "unknown"]
 
@@ -337,7 +339,7 @@ class Diagnosis:
         gears: set[int] = set()
         for finding in self.findings:
             effect = None if finding.kind == "unknown" else get_effect(finding.kind)
-            if effect is None or finding.kind == "offset" or effect.family == "hysteresis":
+            if effect is None or finding.kind in _PLAIN or effect.family == "hysteresis":
                 continue
             named |= set(finding.joints)
             gears |= set(finding.joints) if effect.moves_link else set()
@@ -345,7 +347,8 @@ class Diagnosis:
         joints = [j for j in range(1, len(self.joint_names) + 1) if j in gears or j not in named]
         found = []
         if set(joints) - gears:
-            model = clone(self.base_model).fit(*self.data)
+            rotors = [t for f in self.findings if f.kind == "rotor_inertia" for t in f.terms]
+            model = self.base_model.with_effects(rotors).fit(*self.data)
             found = explain_servo_motion(model, self.data[0], controller, joints=joints)
         self.servo_motion = [f for f in found if f.joint not in gears]
         if not self.findings and self.verdict != "unknown":

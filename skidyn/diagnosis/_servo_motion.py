@@ -63,7 +63,7 @@ def servo_motion_told(
 
 def _text(named: Sequence[ServoFinding], findings: Sequence[Finding]) -> str:
     if not named:
-        return "It asks for no effect beside friction and what is named above."
+        return f"It asks for no effect beside friction{' and the findings' if findings else ''}."
     same = [
         f"{inside(finding.title)} on {joints_told(finding.joints)}"
         for finding in findings

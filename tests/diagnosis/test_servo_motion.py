@@ -6,7 +6,7 @@ import pytest
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
 from skidyn.identification import RBDRegressor
-from skidyn.simulation import ServoFinding
+from skidyn.simulation import Controller, ServoFinding
 
 STICTION = ServoFinding("stribeck", 2, {"dF": 0.15}, 0.004, 0.001, "dahl", 0.003)
 
@@ -42,3 +42,22 @@ def test_a_motion_that_names_nothing_changes_no_verdict(diagnosis, monkeypatch):
     story = diagnosis.story()
     assert (story["headline"], story["mark"]) == (before["headline"], before["mark"])
     assert story["servo_motion"]["findings"] == []
+
+
+def test_a_joint_whose_rotor_was_forgotten_may_still_get_a_name(monkeypatch):
+    log = make_hidden_effect_log(
+        load_planar_arm(), "rotor_inertia", joints=[2], n_trajectories=3, duration=4.0
+    )
+    model = RBDRegressor(log.robot, ("viscous", "coulomb"))
+    found = diagnose(model, log.X, log.y, effects=["rotor_inertia"])
+    assert [(f.kind, f.joints) for f in found.findings] == [("rotor_inertia", (2,))]
+    asked = []
+
+    def explain(model, X, controller, *, joints):
+        asked.append((joints, model.effect_terms_[-1].kind))
+        return []
+
+    monkeypatch.setattr("skidyn.diagnosis._result.explain_servo_motion", explain)
+    assert found.explain_servo_motion(Controller(40.0)) == []
+    assert asked == [([1, 2], "rotor_inertia")]
+    assert found.verdict == "missing"
