@@ -34,6 +34,8 @@ STANDS_OUT, SMALLEST = 2.5, 2e-5
 #: Share of the squared error that a finding must remove, held out, and more than that
 #: share of the pieces on which it must help.
 LEAST_DROP, LEAST_PIECES = 0.3, 0.5
+#: The simulation with the finding must err by less than this share of what the command itself errs.
+NEARER = 0.5
 #: Half of a play, as share of the way, from which a second fit starts.
 FARTHER = 0.02
 #: The best other explanation must leave so much of that to it.
@@ -134,7 +136,8 @@ def explain_servo_motion(
     direction, or with the square of the speed, presliding, delay, elasticity and backlash compete.
     Each is fitted to half of the pieces of the log and judged on the others. One effect is named,
     that which removes the largest share of the squared error: a link that moves by itself is felt
-    by other joints.
+    by other joints. Nothing is named where the simulation errs by half as much as the command
+    itself, or more: then the gains are wrong, or the bodies.
 
     Parameters
     ----------
@@ -192,7 +195,11 @@ def explain_servo_motion(
     failing = [j - 1 for j in wanted if errors[j - 1] > least[j - 1]]
     found = [_name(loops[j], plain[j], j + 1) for j in track(failing, "Comparing effects")]
     slides = [kind == "prismatic" for kind in model.robot_.joint_types]
-    named = [replace(f, unit="m" if slides[f.joint - 1] else "rad") for f in found if f is not None]
+    named = [
+        replace(f, unit="m" if slides[f.joint - 1] else "rad")
+        for f in found
+        if f is not None and f.after < NEARER * _command_error(loops[f.joint - 1])
+    ]
     return sorted(named, key=lambda f: f.after / f.before)[:1]
 
 
@@ -202,6 +209,11 @@ def _encoder_noise(robot: Any, X: Any, smooth: Array) -> Array:
     columns = resolve_columns(names, len(names), robot.joint_names, require_acceleration=False)
     logged = np.column_stack([np.asarray(X[names[k]], dtype=float) for k in columns.q])
     return np.asarray(np.std(logged - smooth, axis=0))
+
+
+def _command_error(loop: JointLoop) -> float:
+    """Error of the command as a prediction of the position."""
+    return float(np.sqrt(np.mean((loop.command - loop.q)[loop.valid] ** 2)))
 
 
 def _name(loop: JointLoop, plain: _Fit, joint: int) -> ServoFinding | None:

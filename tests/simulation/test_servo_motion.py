@@ -6,7 +6,7 @@ import pytest
 from skidyn.diagnosis import diagnose
 from skidyn.exceptions import LogError, SkidynError
 from skidyn.identification import RBDRegressor
-from skidyn.simulation import explain_servo_motion, servo_torque
+from skidyn.simulation import Controller, explain_servo_motion, servo_torque
 
 FRICTION = ("viscous", "coulomb")
 
@@ -43,6 +43,11 @@ def test_stiction_is_named_on_its_joint_with_its_size(diagnosis):
 def test_nothing_is_named_where_friction_is_all(servo_log):
     smooth = servo_log({})
     assert explain_servo_motion(fitted(smooth), smooth.log, smooth.controller) == []
+
+
+def test_nothing_is_named_where_the_gain_is_wrong(sticky_servo):
+    wrong = Controller((200.0, 0.3 * 12.0), (12.0, 0.6), follows_velocity=False)
+    assert explain_servo_motion(fitted(sticky_servo), sticky_servo.log, wrong, joints=[2]) == []
 
 
 def test_a_diagnosis_keeps_what_the_motion_names(diagnosis):
