@@ -305,7 +305,8 @@ class Diagnosis:
         """Name what the motion of position servos lacks where the torque does not say it.
 
         A torque that was made from a servo's error hides what lasts hundredths of a second. Joints
-        that have no finding with a name yet, or one of the hysteresis family, are simulated in
+        that have no finding with a name yet, or one of the hysteresis family, of rotor inertia, of
+        an offset or of a torque that the controller limits, are simulated in
         their loops (:func:`skidyn.simulation.explain_servo_motion`), beside those whose gear is
         known to give way. What is named there takes the place of nameless functions and hysteresis
         on its joint; :attr:`findings` stay as they are. It is kept in :attr:`servo_motion`, stands
@@ -337,9 +338,13 @@ class Diagnosis:
             )
         named: set[int] = set()
         gears: set[int] = set()
+        # A limit that the controller has is simulated, and is no name of what moves the joint.
+        limited = np.isfinite(controller.checked(len(self.joint_names)).limit)
         for finding in self.findings:
             effect = None if finding.kind == "unknown" else get_effect(finding.kind)
             if effect is None or finding.kind in _PLAIN or effect.family == "hysteresis":
+                continue
+            if finding.kind == "saturation" and all(limited[j - 1] for j in finding.joints):
                 continue
             named |= set(finding.joints)
             gears |= set(finding.joints) if effect.moves_link else set()

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the motion of servos names stands in the story of a diagnosis."""
 
+import numpy as np
 import pytest
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
@@ -61,3 +62,22 @@ def test_a_joint_whose_rotor_was_forgotten_may_still_get_a_name(monkeypatch):
     assert found.explain_servo_motion(Controller(40.0)) == []
     assert asked == [([1, 2], "rotor_inertia")]
     assert found.verdict == "missing"
+
+
+def test_a_limit_that_the_controller_has_is_no_name(monkeypatch):
+    log = make_hidden_effect_log(
+        load_planar_arm(), "saturation", joints=[2], n_trajectories=3, duration=4.0
+    )
+    model = RBDRegressor(log.robot, ("viscous", "coulomb"))
+    found = diagnose(model, log.X, log.y, effects=["saturation"], force=True)
+    assert [(f.kind, f.joints) for f in found.findings] == [("saturation", (2,))]
+    asked = []
+
+    def explain(model, X, controller, *, joints):
+        asked.append(joints)
+        return []
+
+    monkeypatch.setattr("skidyn.diagnosis._result.explain_servo_motion", explain)
+    for limit in (np.inf, 5.0):
+        found.explain_servo_motion(Controller(40.0, limit=limit))
+    assert asked == [[1], [1, 2]]
