@@ -14,6 +14,7 @@ from skidyn.diagnosis._hypothesis import (
     UNKNOWN,
     Hypothesis,
     family_of,
+    grouped_by_joints,
     simplicity_of,
     within_recordings,
 )
@@ -225,14 +226,14 @@ class JudgingSearch(RankingSearch):
         """What differs between recordings: more than chance together, each by itself at 5 %.
 
         Each recording by itself would have to stand out of all candidates, and one that does not
-        would spoil the test of the others.
+        would spoil the test of the others. What all recordings have is partly what bodies do:
+        one after the other is the one that the others are held against.
         """
-        kept = [
-            c
-            for c in hypothesis.candidates
-            if self.chance(c, [*self.chosen, *(o for o in hypothesis.candidates if o is not c)])
-            <= self.settings.member
-        ]
+        kept: list[Candidate] = []
+        parts = grouped_by_joints(hypothesis.candidates)
+        for part in parts:
+            others = [*self.chosen, *(c for p in parts if p is not part for c in p)]
+            kept += self._each_beside_the_others(part, others)
         if not kept:
             return None
         rows = rows_together(kept, self.problem.rows.counts)
@@ -242,6 +243,18 @@ class JudgingSearch(RankingSearch):
         chances = (chance,) * len(kept)
         tried = self.tried(kept[0])
         return replace(hypothesis, candidates=tuple(kept), chances=chances, tried=tried)
+
+    def _each_beside_the_others(
+        self, rest: list[Candidate], others: Sequence[Candidate]
+    ) -> list[Candidate]:
+        """Those of some recordings that are more than chance at 5 % beside the rest of them."""
+        while rest:
+            chances = [self.chance(c, [*others, *(o for o in rest if o is not c)]) for c in rest]
+            worst = int(np.argmax(chances))
+            if chances[worst] <= self.settings.member:
+                return rest
+            rest = [c for i, c in enumerate(rest) if i != worst]
+        return rest
 
     def shadow(self, hypothesis: Hypothesis) -> bool:
         """Whether an explanation is so small that earlier ones' imperfect formulas may leave it."""

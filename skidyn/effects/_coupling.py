@@ -118,8 +118,10 @@ class CoupledInertia(_PairEffect):
 class CouplingSpring(_PairEffect):
     """Spring or hose between two joints.
 
-    One that stiffens has ``power`` 3 in its shape, and the coupled coordinate ``x0`` at which it is
-    slack; coordinates are in units of 1 rad or 1 m then, so that the unit of the stiffness stays.
+    One that is not linear has in its shape the coupled coordinate ``x0`` at which it is slack, and
+    ``power`` 3, coordinates in units of 1 rad or 1 m so that the unit of the stiffness stays; or a
+    distance from there beyond which it grows stiff as a hyperbolic sine (``stiffening``), or
+    yields as a hyperbolic tangent (``softening``).
     """
 
     kind = "coupling_spring"
@@ -129,8 +131,14 @@ class CouplingSpring(_PairEffect):
     shapes = (
         _RATIO,
         Shape("x0", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
+        Shape("stiffening", "rad", (), 0.05, 2.0),
+        Shape("softening", "rad", (), 0.05, 2.0),
     )
-    forms = ({"x0": 0.0, "power": 3.0},)
+    forms = (
+        {"x0": 0.0, "power": 3.0},
+        {"x0": 0.0, "stiffening": 0.4},
+        {"x0": 0.0, "softening": 0.4},
+    )
     simplicity = 16
     rivals = ("spring",)
     separating_motion = "slow motion of the two joints together, then against each other"
@@ -143,6 +151,8 @@ class CouplingSpring(_PairEffect):
             if "x0" in shape:
                 x = signals.q[:, i] + shape["ratio"] * signals.q[:, j]
                 shape["x0"] = float(x.min() + x.max()) / 2
+            for name in {"stiffening", "softening"} & set(shape):
+                shape[name] *= float(signals.unit[i])
         return shapes
 
     def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
@@ -157,5 +167,10 @@ class CouplingSpring(_PairEffect):
         self, signals: Signals, i: int, j: int, ratio: float, **form: float
     ) -> Array:
         x = signals.q[:, i] + ratio * signals.q[:, j] - form.get("x0", 0.0)
-        force = np.sign(x) * np.abs(x) ** form.get("power", 1.0)
+        if "stiffening" in form:
+            force = form["stiffening"] * np.sinh(x / form["stiffening"])
+        elif "softening" in form:
+            force = form["softening"] * np.tanh(x / form["softening"])
+        else:
+            force = np.sign(x) * np.abs(x) ** form.get("power", 1.0)
         return np.column_stack([force, np.ones_like(x)])

@@ -35,6 +35,17 @@ def test_a_spring_between_two_joints_that_stiffens(signals):
     np.testing.assert_allclose(blocks[1], -blocks[0])
 
 
+@pytest.mark.parametrize(("form", "curve"), [("stiffening", np.sinh), ("softening", np.tanh)])
+def test_a_spring_between_two_joints_that_stiffens_or_yields_beyond_a_distance(
+    form, curve, signals
+):
+    shape = {"ratio": -1.0, "x0": 0.2, form: 0.5}
+    columns = get_effect("coupling_spring").torque_columns(signals, (0, 1), **shape)
+    x = signals.q[:, 0] - signals.q[:, 1] - 0.2
+    np.testing.assert_allclose(columns[0][:, 0], 0.5 * curve(x / 0.5))
+    np.testing.assert_allclose(columns[1], -columns[0])
+
+
 def test_where_a_spring_between_two_joints_is_slack_was_seen(signals):
     effect, x = get_effect("coupling_spring"), signals.q.sum(axis=1)
     shape = {"ratio": 1.0, "power": 3.0}
