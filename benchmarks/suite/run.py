@@ -121,13 +121,17 @@ YARDSTICK = "silence"
 def print_table(peers: dict[str, dict]) -> None:
     """Every peer a line, skidyn's first, and who solves what; nothing is rerun."""
     peers = dict(sorted(peers.items(), key=lambda item: not item[0].startswith("skidyn")))
+    common = _judged_by_all(peers)
     first = next(iter(peers.values()))["cases"]
     counted = [c for c in first if c["counts"]]
-    print(f"{len(first)} logs, {len(counted)} count; shares with Wilson intervals of 95 %\n")
+    print(f"{len(first)} logs, {len(counted)} count; shares with Wilson intervals of 95 %")
+    print(f"error: on the {len(common)} logs where it is known of every peer that predicts\n")
     print(f"{'':18s}" + "".join(f"{f.title:>{17 if f.share else 8}s}" for f in FIGURES))
     cells = {}
     for name, peer in peers.items():
-        values = [f.of(peer["cases"]) for f in FIGURES]
+        errors = {"error_held_out": None}
+        cases = [c if c["case"] in common else c | errors for c in peer["cases"]]
+        values = [f.of(cases) for f in FIGURES]
         told = [_cell(f, v) for f, v in zip(FIGURES, values, strict=True)]
         print(f"{name:18s}" + "".join(told))
         for figure, value in zip(FIGURES, values, strict=True):
@@ -141,6 +145,14 @@ def print_table(peers: dict[str, dict]) -> None:
     _print_best(next(iter(peers)), cells)
     versions = sorted({p["version"] for p in peers.values() if p["version"]})
     print("versions: " + ", ".join(versions))
+
+
+def _judged_by_all(peers: dict[str, dict]) -> set[str]:
+    """Logs on which every peer that predicts was judged on trajectories left out."""
+    judged = [
+        {c["case"] for c in peer["cases"] if c.get("error_held_out")} for peer in peers.values()
+    ]
+    return set.intersection(*(logs for logs in judged if logs)) if any(judged) else set()
 
 
 def _cell(figure: Figure, values: list[float]) -> str:
