@@ -55,10 +55,10 @@ class JudgingSearch(RankingSearch):
             behind = ((own - errors) / variance).sum(1)
             error = behind.std(ddof=1) * np.sqrt(len(behind))
             cap = self.settings.simpler_share * part.score
-            # What a parameter must gain for another model (G. Schwarz 1978, Annals of Statistics
-            # 6), with what is left as correlated as it is.
+            # What every further parameter must gain (G. Schwarz 1978, Annals of Statistics 6), with
+            # what is left as correlated as it is.
             least = np.log(self.problem.rows.counts[list(part.joints)].sum())
-            least *= self._price(part.candidates)
+            least *= self._price(part.candidates) * max(1, part.n_parameters - rival.n_parameters)
             near = behind.sum() < min(max(error, least), cap)
             if near or (behind.sum() < error and self._encompassed(part, rival)):
                 best = rival
