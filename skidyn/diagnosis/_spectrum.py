@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
+from scipy.optimize import minimize_scalar
 
 from skidyn._signals import Array
 from skidyn.diagnosis._clock import clock_line
@@ -28,6 +29,9 @@ SLOWEST = 8.0
 LEAST_HEIGHT = 8.0
 #: Width in bins of the running median that gives the local noise level.
 MEDIAN_WIDTH = 161
+#: Waves within the range of a joint from which they do not look like what bodies do, and places
+#: of that range over which fewer are fitted.
+MANY, PLACES = 8.0, 400
 
 
 @dataclass(frozen=True)
@@ -88,6 +92,7 @@ def find_lines(
             chance = min(1.0, 2 * HIGHEST * float(np.exp(-height)))
             if not significant(chance):
                 continue
+            waves = _refined_wave(q[use], r[use], waves)
             term = Term.at("torque_ripple", (joint,), {"N": waves / unit})
             line = _test_line(problem, term, chance, 2 * HIGHEST, use, r, fold)
             weak = _explained_share(r[use], line.torque[use]) <= 0.2
@@ -166,6 +171,34 @@ def _strongest_wave(q: Array, r: Array, lowest: float, highest: float, count: in
         strength.append(float(np.abs(turned.sum())))
         turned *= turn
     return float(np.linspace(lowest, highest, count)[int(np.argmax(strength))])
+
+
+def _refined_wave(q: Array, r: Array, waves: float) -> float:
+    """Waves that explain most of a signal beside what bodies and springs do of so few of them.
+
+    A wave that is no longer many times in the range of q is not orthogonal to the functions that
+    the model has taken out of the signal, so that its peak has moved.
+    """
+    span = float(np.ptp(q))
+    if waves * span > MANY * 2 * np.pi:
+        return waves
+    bins = np.minimum(((q - q.min()) / span * PLACES).astype(int), PLACES - 1)
+    count = np.bincount(bins, minlength=PLACES)
+    held = count > 0
+    x = np.bincount(bins, q, PLACES)[held] / count[held]
+    weight = np.sqrt(count[held])
+    y = np.bincount(bins, r, PLACES)[held] / weight
+
+    def left(tried: float) -> float:
+        wave = [np.sin(tried * x), np.cos(tried * x)]
+        block = np.column_stack([np.ones_like(x), x, np.sin(x), np.cos(x), *wave])
+        block *= weight[:, None]
+        return float(np.sum((y - block @ np.linalg.lstsq(block, y, rcond=None)[0]) ** 2))
+
+    width = np.pi / span  # half the distance of waves that the range tells apart
+    lowest = max(waves - width, WITHIN_RANGE * 2 * width)
+    found = minimize_scalar(left, bounds=(lowest, waves + width), method="bounded")
+    return float(found.x) if found.fun < left(waves) else waves
 
 
 def sample_blocks(problem: Problem) -> tuple[NDArray[np.int64], int]:

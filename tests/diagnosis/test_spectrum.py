@@ -42,6 +42,21 @@ def test_fewer_than_two_waves_within_the_motion_are_no_ripple(missing):
     assert all(line.term.shape["N"] * np.ptp(q[:, 1]) > 3.9 * np.pi for line in lines)
 
 
+def test_a_ripple_of_which_few_waves_lie_within_the_motion_has_their_number(missing):
+    problem = missing.problem
+    q, rng = problem.signals.q, np.random.default_rng(0)
+    many = 3.2 * 2 * np.pi / np.ptp(q[:, 1])
+    residual = 0.01 * rng.normal(size=q.shape)
+    residual[:, 1] += 0.2 * np.sin(many * q[:, 1])
+    bodies = np.column_stack([np.ones(len(q)), np.sin(q[:, 1]), np.cos(q[:, 1]), q[:, 1]])
+    taken = np.linalg.lstsq(bodies, residual[:, 1], rcond=None)[0]
+    residual[:, 1] -= bodies @ taken
+
+    (line,) = [line for line in find_lines(problem, residual) if line.joint == 1][:1]
+
+    assert line.term.shape["N"] == pytest.approx(many, rel=0.003)
+
+
 def test_a_ball_screw_is_named_with_its_lead():
     log = make_hidden_effect_log(
         load_scara(), None, noise="low", n_trajectories=6, duration=4.0, random_state=0
