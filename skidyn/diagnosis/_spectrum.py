@@ -29,6 +29,9 @@ SLOWEST = 8.0
 LEAST_HEIGHT = 8.0
 #: Width in bins of the running median that gives the local noise level.
 MEDIAN_WIDTH = 161
+#: Blocks of samples that a line is tested by at least: a wave turns so often that what stands beside
+#: it is forgotten within a part of a second.
+LINE_BLOCKS = 60
 #: Waves within the range of a joint from which they do not look like what bodies do, and places
 #: of that range over which fewer are fitted.
 MANY, PLACES = 8.0, 400
@@ -202,12 +205,13 @@ def _refined_wave(q: Array, r: Array, waves: float) -> float:
 
 
 def sample_blocks(problem: Problem) -> tuple[NDArray[np.int64], int]:
-    """Block of half a second of every sample, and their number."""
+    """Block of every sample, half a second long or shorter where there are few, and their number."""
     index: NDArray[np.int64] = np.zeros(problem.signals.n_samples, dtype=np.int64)
+    clocks = [problem.signals.clock[rows] for rows in problem.signals.segments]
+    length = min(SHORTEST_BLOCK, sum(float(np.ptp(clock)) for clock in clocks) / LINE_BLOCKS)
     count = 0
-    for rows in problem.signals.segments:
-        clock = problem.signals.clock[rows]
-        index[rows] = count + ((clock - clock[0]) / SHORTEST_BLOCK).astype(np.int64)
+    for rows, clock in zip(problem.signals.segments, clocks, strict=True):
+        index[rows] = count + ((clock - clock[0]) / length).astype(np.int64)
         count = int(index[rows].max()) + 1
     return index, count
 
@@ -233,7 +237,7 @@ def _test_line(
     total, right = sum(grams), sum(cross)
     both = np.linalg.lstsq(total, right, rcond=None)[0]
     left = (r - block @ both)[use]
-    steps, count = problem.signals.once("half seconds", lambda: sample_blocks(problem))
+    steps, count = problem.signals.once("blocks of samples", lambda: sample_blocks(problem))
     sums: Array = np.stack([np.bincount(steps[use], z * left, count) for z in block[use].T], axis=1)
     by_blocks = chance_of_score(np.asarray(right), sums[np.any(sums != 0, axis=1)])
     chance = max(chance, min(1.0, tried * by_blocks))
