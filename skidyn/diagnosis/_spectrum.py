@@ -29,8 +29,8 @@ SLOWEST = 8.0
 LEAST_HEIGHT = 8.0
 #: Width in bins of the running median that gives the local noise level.
 MEDIAN_WIDTH = 161
-#: Blocks of samples that a line is tested by at least: a wave turns so often that what stands beside
-#: it is forgotten within a part of a second.
+#: Blocks of samples that a line is tested by at least: a wave turns so often that what stands
+#: beside it is forgotten within a part of a second.
 LINE_BLOCKS = 60
 #: Waves within the range of a joint from which they do not look like what bodies do, and places
 #: of that range over which fewer are fitted.
@@ -205,7 +205,7 @@ def _refined_wave(q: Array, r: Array, waves: float) -> float:
 
 
 def sample_blocks(problem: Problem) -> tuple[NDArray[np.int64], int]:
-    """Block of every sample, half a second long or shorter where there are few, and their number."""
+    """Block of every sample, half a second long or less in a short log, and their number."""
     index: NDArray[np.int64] = np.zeros(problem.signals.n_samples, dtype=np.int64)
     clocks = [problem.signals.clock[rows] for rows in problem.signals.segments]
     length = min(SHORTEST_BLOCK, sum(float(np.ptp(clock)) for clock in clocks) / LINE_BLOCKS)
