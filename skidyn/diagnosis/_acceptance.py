@@ -379,20 +379,20 @@ class JudgingSearch(RankingSearch):
 
         Where axes are parallel, bodies take up what couples one pair in place of another.
         """
-        if best.kind == UNKNOWN or within_recordings(best):
+        pairs = [c for c in best.candidates if len(c.joints) == 2]
+        if best.kind == UNKNOWN or within_recordings(best) or not pairs:
             return ()
-        found = []
         sites = {c.joints for c in best.candidates}
-        for own in (c for c in best.candidates if len(c.joints) == 2):
-            drops = {
-                i: drop
-                for i, (c, drop) in enumerate(zip(self.pool, self._drops, strict=True))
-                if c.kind == best.kind and c.joints not in sites and set(c.joints) & set(own.joints)
-            }
+        others = self.strongest(
+            lambda c: c.joints, lambda c: c.kind == best.kind and c.joints not in sites
+        )
+        found: list[tuple[int, ...]] = []
+        for own in pairs:
             rest = [c for c in best.candidates if c is not own]
-            for joints in sorted({self.pool[i].joints for i in drops}):
-                at = max((i for i in drops if self.pool[i].joints == joints), key=drops.__getitem__)
-                (other,) = self._finals([[*rest, self.pool[at]]]) or (None,)
-                if other and best.score - other.score < self.settings.least_gain:
-                    found.append(joints)
+            near = [others[joints] for joints in sorted(others) if set(joints) & set(own.joints)]
+            found += [
+                h.candidates[-1].joints
+                for h in self._finals([[*rest, other] for other in near], refined=len(near))
+                if best.score - h.score < self.settings.least_gain
+            ]
         return tuple(found)

@@ -50,21 +50,13 @@ def notebook(story: Mapping[str, Any]) -> str:
     motion = story.get("simulation")
     moved = "" if motion is None else f"{motion['heading']}. {motion['text']}"
     servos = story.get("servo_motion")
-    seen = "" if servos is None else " ".join([f"{servos['heading']}.", *_servo_lines(servos)])
+    seen = ""
+    if servos is not None:
+        sentences = [f["sentence"] for f in servos["findings"]]
+        seen = " ".join([f"{servos['heading']}.", *sentences, servos["text"]])
     last = [text for text in (story["quiet"], story["left"], moved, seen) if text]
     parts += [f"<p style='margin:.2em 0'>{escape(text)}</p>" for text in last]
     return f"<div>{''.join(parts)}</div>"
-
-
-def _servo_lines(servos: Mapping[str, Any]) -> list[str]:
-    """What the motion of servos named, a sentence each."""
-    return [
-        *(
-            f"{f['what']} on {f['where']} ({f['size']}): {f['evidence']}."
-            for f in servos["findings"]
-        ),
-        servos["text"],
-    ]
 
 
 def finding_card(finding: Finding) -> str:

@@ -85,20 +85,30 @@ class RankingSearch(SearchState):
     def _in_other_forms(self, hypothesis: Hypothesis) -> list[list[Candidate]]:
         """The terms of a hypothesis, all of them in each other form of its kind."""
         names = get_effect(hypothesis.kind).form_names
-        best: dict[frozenset[str], dict[tuple[int, ...], int]] = {}
         sites = {c.joints: names & set(c.term.shape) for c in hypothesis.candidates}
-        for i, other in enumerate(self.pool):
-            if other.kind != hypothesis.kind or other.joints not in sites:
-                continue
-            form = names & set(other.term.shape)
-            at = best.setdefault(form, {})
-            if other.joints not in at or self._drops[i] > self._drops[at[other.joints]]:
-                at[other.joints] = i
+        strongest = self.strongest(
+            lambda c: (names & set(c.term.shape), c.joints),
+            lambda c: c.kind == hypothesis.kind and c.joints in sites,
+        )
         return [
-            [self.pool[at[joints]] for joints in sites]
-            for form, at in best.items()
-            if set(at) == set(sites) and any(form != own for own in sites.values())
+            [strongest[form, joints] for joints in sites]
+            for form in dict.fromkeys(form for form, _ in strongest)
+            if all((form, joints) in strongest for joints in sites)
+            and any(form != own for own in sites.values())
         ]
+
+    def strongest(
+        self, group: Callable[[Candidate], Any], wanted: Callable[[Candidate], bool]
+    ) -> dict[Any, Candidate]:
+        """Of each group of candidates, the one that removes most by itself."""
+        best: dict[Any, int] = {}
+        for i, candidate in enumerate(self.pool):
+            if not wanted(candidate):
+                continue
+            key = group(candidate)
+            if key not in best or self._drops[i] > self._drops[best[key]]:
+                best[key] = i
+        return {key: self.pool[i] for key, i in best.items()}
 
     def _holds_in_all(self, own: Hypothesis, ranking: Sequence[Hypothesis]) -> bool:
         """Whether what differs between many recordings is nearly had by what is alike in all."""

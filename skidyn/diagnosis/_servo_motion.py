@@ -30,8 +30,9 @@ def servo_motion_told(
     -------
     dict or None
         ``heading``, ``text``, and for each of ``findings`` ``kind``, ``joints``, ``what``,
-        ``where``, ``size``, ``evidence``, and the ``errors`` of the simulated position (``model``
-        and ``error`` in mrad or mm, ``unit``) with friction alone, with it and with its rival.
+        ``where``, ``size``, ``evidence``, ``sentence``, and the ``errors`` of the simulated
+        position (``model`` and ``error`` in mrad or mm, ``unit``) with friction alone, with it and
+        with its rival.
     """
     if named is None:
         return None
@@ -43,6 +44,7 @@ def servo_motion_told(
             "where": joints_told([found.joint]),
             "size": found.size,
             "evidence": found.evidence,
+            "sentence": found.sentence,
             "errors": [
                 {"model": model, "error": 1e3 * error, "unit": f"m{found.unit}"}
                 for model, error in (

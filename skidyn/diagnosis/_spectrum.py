@@ -208,7 +208,8 @@ def sample_blocks(problem: Problem) -> tuple[NDArray[np.int64], int]:
     """Block of every sample, half a second long or less in a short log, and their number."""
     index: NDArray[np.int64] = np.zeros(problem.signals.n_samples, dtype=np.int64)
     clocks = [problem.signals.clock[rows] for rows in problem.signals.segments]
-    length = min(SHORTEST_BLOCK, sum(float(np.ptp(clock)) for clock in clocks) / LINE_BLOCKS)
+    span = sum(float(np.ptp(clock)) for clock in clocks)
+    length = min(SHORTEST_BLOCK, span / LINE_BLOCKS) or SHORTEST_BLOCK  # samples that stand alone
     count = 0
     for rows, clock in zip(problem.signals.segments, clocks, strict=True):
         index[rows] = count + ((clock - clock[0]) / length).astype(np.int64)

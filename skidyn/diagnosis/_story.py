@@ -299,11 +299,12 @@ def sure(finding: Finding) -> str:
     named = f"that it is {inside(family[0])}" if family[1] else "of the name"
     named += " and of its joints" * bool(finding.elsewhere)
     text = "" if share is None else f"{min(share, 0.99):.0%} sure {named}"
+    if finding.elsewhere:
+        pairs = f"on {pairs_of(finding.elsewhere)} it would explain as much"
+        text += f"{'; ' if text else ''}{pairs}"
     if finding.rivals:
         rivals = listed([rival_title(kind) for kind in finding.rivals], "or")
         text += f"{'; ' if text else ''}this data cannot separate it from {rivals}"
-    elif finding.elsewhere:
-        text += f"; on {pairs_of(finding.elsewhere)} it would explain as much"
     elif finding.kind == "unknown":
         text = "no effect of the catalogue explains it"
     elif not text:
