@@ -28,6 +28,7 @@ from skidyn._signals import Array, Signals
 from skidyn.effects import TermSum
 from skidyn.forward import Controller, ForwardModel, Task, commanded, make_windows, run
 from skidyn.identification._regression import Regression, Solution
+from skidyn.robots import find_base_parameters
 
 #: Step of the simulation, s; logs that are faster are thinned, their torque averaged.
 STEP = 5e-3
@@ -77,6 +78,8 @@ def refine_by_simulation(
     """
     if signals.time is None:
         raise SkidynError("estimator='output_error' simulates and needs the column 'time' (s) in X")
+    if model.consistent:
+        solution = _as_stored(model, regression, solution)
     thin, driven, rows = _thinned(signals, torque)
     windows = make_windows(thin, horizon)
     if controller is None or reference is None:
@@ -109,6 +112,16 @@ def refine_by_simulation(
     spread = coefficients + others  # what no simulation changes keeps its own spread
     spread[:, error.free] = left
     return replace(solution, coefficients=coefficients, left_out=spread, parameters=None)
+
+
+def _as_stored(model: Any, regression: Regression, solution: Solution) -> Solution:
+    """The solution moved to the bodies that the model holds, which can exist and so can move."""
+    base = find_base_parameters(model.robot_)
+    where = np.searchsorted(base.index, regression.rigid_index)
+    coefficients = model.coef_.copy()
+    coefficients[: regression.n_rigid] -= base.values(model.robot_.inertial_parameters)[where]
+    moved = coefficients - solution.coefficients
+    return replace(solution, coefficients=coefficients, left_out=solution.left_out + moved)
 
 
 def _steps(slope: Array, residual: Array) -> Array:

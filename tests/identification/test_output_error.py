@@ -98,6 +98,21 @@ def test_consistent_on_request(clean):
     assert np.all(is_consistent(model.inertial_parameters_))
 
 
+def test_consistent_starts_from_bodies_that_can_move(clean):
+    """Where least squares ends with a negative inertia, nothing could be simulated."""
+    X = clean.X[clean.frame["trajectory"] == 1]
+    bodies = clean.robot.inertial_parameters.copy()
+    bodies[-1, 4:] *= -3.0
+    q, dq = (X[[f"{k}1", f"{k}2"]].to_numpy() for k in ("q", "dq"))
+    ddq = np.gradient(dq, X["time"], axis=0)
+    torque = clean.robot.inverse_dynamics(q, dq, ddq, parameters=bodies)
+    words = {"estimator": "output_error", "horizon": 0.25}
+    with pytest.raises(SkidynError, match="such bodies cannot move"):
+        RBDRegressor(clean.robot, **words).fit(X, torque)
+    model = RBDRegressor(clean.robot, consistent=True, **words).fit(X, torque)
+    assert np.all(is_consistent(model.inertial_parameters_))
+
+
 def test_needs_time_and_whole_rows(clean):
     X = pd.DataFrame(np.random.default_rng(0).normal(size=(200, 6)))
     X.columns = [f"{s}{j}" for s in ("q", "dq", "ddq") for j in (1, 2)]
