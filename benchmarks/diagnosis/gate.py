@@ -2,15 +2,24 @@
 """How often ``skidyn compare --fail-above`` fails on unchanged and on changed robots.
 
     python benchmarks/diagnosis/gate.py [--runs 50] [--limit 1.5] [--robots planar_arm,ur5]
+    python benchmarks/diagnosis/gate.py --as-a-user
 
 Each run is one robot with other link parameters, recorded twice on different motions. Unchanged:
 the second recording is of the same robot. Changed: it has an effect of the usual size on one joint.
+``--as-a-user`` writes a healthy recording of a UR5 and two of the next night, one with hysteresis
+on joint 2, and runs the command line on them: exit code, failures in the JUnit file, seconds.
 """
 
 from __future__ import annotations
 
 import argparse
+import resource
+import subprocess
+import sys
+import tempfile
 import time
+from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -50,12 +59,47 @@ def ratios(robot, change: str | None, seed: int) -> np.ndarray:
     return drift(model, X1[new], y1[new], X0[usual], y0[usual], moving=moving).ratio
 
 
+def as_a_user(limit: float) -> None:
+    """The gate from the command line, on an unchanged and on a drifted robot."""
+    from skidyn.datasets import __file__ as datasets
+
+    urdf = Path(datasets).parent / "robots" / "ur5.urdf"
+    nights = {"unchanged": {}, "drifted": {"effect": "dahl", "joints": [2]}}
+    with tempfile.TemporaryDirectory() as folder:
+        healthy, tonight = Path(folder, "healthy.csv"), Path(folder, "tonight.csv")
+        for name, effect in nights.items():
+            words = {"effect": None} | effect
+            log = make_hidden_effect_log(
+                load_ur5(), n_trajectories=2 * N, duration=10.0, random_state=3, **words
+            )
+            late = log.frame["trajectory"] > N
+            if not effect:
+                log.frame[~late].to_csv(healthy, index=False)
+            log.frame[late].to_csv(tonight, index=False)
+            junit, start = Path(folder, "gate.xml"), time.perf_counter()
+            files = ["--urdf", urdf, "--against", healthy, "--junit", junit]
+            words = [sys.executable, "-m", "skidyn", "compare", tonight, *files]
+            before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+            done = subprocess.run([*words, "--fail-above", str(limit)], stdout=subprocess.DEVNULL)
+            used = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+            failures = ElementTree.parse(junit).getroot().findall(".//testcase[failure]")
+            joints = ", ".join(case.get("name") for case in failures) or "none"
+            print(
+                f"{name:10s} {late.sum()} rows, exit code {done.returncode}, failed: {joints}; "
+                f"{time.perf_counter() - start:.0f} s, {used:.1f} s of the processor"
+            )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=50)
     parser.add_argument("--limit", type=float, default=1.5)
     parser.add_argument("--robots", default=",".join(ROBOTS))
+    parser.add_argument("--as-a-user", action="store_true", help="only: run the command line")
     options = parser.parse_args()
+    if options.as_a_user:
+        as_a_user(options.limit)
+        return
     print(f"limit {options.limit:g}; share of runs that fail, interval of 95 %; largest ratio")
     for name in options.robots.split(","):
         robot, start = ROBOTS[name](), time.perf_counter()

@@ -2,12 +2,13 @@
 """A UR10e and a Panda identified by mujoco.sysid and by skidyn, both simulated by MuJoCo.
 
     pip install "mujoco[sysid]"
-    SKIDYN_DATA=FOLDER python benchmarks/identification/beside_mujoco.py [--iterations 10]
+    SKIDYN_DATA=FOLDER python benchmarks/identification/beside_mujoco.py [--iterations 40]
 
 mujoco.sysid fits inertias (its pseudo-inertia parametrisation, which keeps bodies possible), dry
 friction, damping and armature of every joint so that rollouts of a quarter of a second from
 recorded states follow the recording, started from the URDF. skidyn fits ``RBDRegressor`` with the
-same effects and bodies that can exist, and exports it as MJCF. Both models are then run by MuJoCo
+same effects and bodies that can exist, once by least squares of the torque and once by simulating
+the same quarters of a second (``output_error``), and exports it as MJCF. All are then run by MuJoCo
 under the torque of recordings that neither saw, in pieces of a quarter of a second; the error is
 that of the position at the pieces' ends, in mrad, beside the URDF's own. Needs the data of
 ``ur10e.py``; the Panda's one run is divided after two thirds.
@@ -21,6 +22,7 @@ import sys
 import tempfile
 import time
 import warnings
+from functools import partial
 from pathlib import Path
 
 import mujoco
@@ -163,10 +165,11 @@ def with_mujoco(path: Path, n: int, train, iterations: int):
     return sysid.apply_param_modifiers(best, spec)
 
 
-def with_skidyn(path: Path, n: int, train, _):
+def with_skidyn(path: Path, n: int, train, _, estimator: str = "weighted"):
     """Description with the parameters that skidyn finds."""
     names = [f"tau{j + 1}" for j in range(n)]
-    model = RBDRegressor(Robot.from_urdf(path), EFFECTS, consistent=True).fit(train, train[names])
+    words = {"consistent": True, "estimator": estimator, "horizon": PIECE}
+    model = RBDRegressor(Robot.from_urdf(path), EFFECTS, **words).fit(train, train[names])
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "model.xml")
         write_mjcf(model, file)
@@ -195,8 +198,9 @@ def error(model, path: Path, n: int, test) -> np.ndarray:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--iterations", type=int, default=10)
+    parser.add_argument("--iterations", type=int, default=40)
     parser.add_argument("--robots", default="ur10e,panda")
+    parser.add_argument("--only", default="", help="methods whose names begin so")
     options = parser.parse_args()
     if not DATA.is_dir():
         sys.exit("set SKIDYN_DATA to the folder that holds ur10e/ and panda/")
@@ -204,14 +208,21 @@ def main() -> None:
     for name in options.robots.split(","):
         path, n, train, test = {"ur10e": ur10e, "panda": panda}[name]()
         print(f"{name}: position after {PIECE:g} s, mrad, joints 1 to {n}; mean; CPU s of the fit")
-        methods = {"as described": as_described, "mujoco.sysid": with_mujoco, "skidyn": with_skidyn}
+        methods = {
+            "as described": as_described,
+            "mujoco.sysid": with_mujoco,
+            "skidyn": with_skidyn,
+            "skidyn, output error": partial(with_skidyn, estimator="output_error"),
+        }
         for title, method in methods.items():
+            if not title.startswith(options.only):
+                continue
             start = time.process_time()
             model = method(path, n, train, options.iterations)
             seconds = time.process_time() - start
             miss = error(model, path, n, test)
             cells = "".join(f"{e:8.1f}" for e in miss)
-            print(f"  {title:14s}{cells}{miss.mean():9.1f}{seconds:8.1f}", flush=True)
+            print(f"  {title:20s}{cells}{miss.mean():9.1f}{seconds:8.1f}", flush=True)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A Gaussian process on what the base model leaves: one length per signal, noise fitted with it.
 
-Fitted to 400 rows of each joint, as exact inference takes the cube of their number.
+Fitted to 250 rows of each joint, as exact inference takes the cube of their number.
 """
 
 from _answers import by_signals
@@ -11,7 +11,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 PACKAGE = "scikit-learn"
-ROWS = 400
+ROWS = 250
 
 
 class Process:

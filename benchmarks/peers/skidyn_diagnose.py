@@ -30,4 +30,5 @@ def answer(log, robot) -> dict:
         torque = found.model.predict(frame.drop(columns=torques))
         return [rows.from_samples(torque[:, j]) for j, rows in enumerate(other.joints)]
 
-    return {"verdict": report["verdict"], "effects": effects, "predict": predict}
+    said = {"verdict": report["verdict"], "effects": effects}
+    return said | {"predict": predict, "model": found.model}

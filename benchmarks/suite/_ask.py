@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One peer, many cases: ``python _ask.py PEER.py SECONDS CASE ...``, in the peer's environment."""
+"""One peer, many cases, in the peer's environment.
+
+    python _ask.py PEER.py {answers,errors} SECONDS CASE ...
+
+``answers`` are to whole logs; ``errors`` need a second fit, without the last two trajectories.
+"""
 
 from __future__ import annotations
 
@@ -51,9 +56,39 @@ def ask(peer, case: Path, seconds: float) -> dict:
             said |= peer.answer(whole, whole.urdf)
     except Exception as error:  # a peer's fault must not end the comparison
         said["fault"] = f"{type(error).__name__}: {error}"
+    said.pop("model", None)  # of the whole log
     if said.pop("predict", None) is not None:
         said["error_held_out"] = None
     return said | {"seconds": time.process_time() - start}
+
+
+def judge(peer, case: Path, out: Path, seconds: float) -> dict:
+    """The answer in a file, with its error on trajectories left out if it came in time."""
+    said = json.loads(out.read_text())
+    _, train, test = read(case)
+    start = time.process_time()
+    try:
+        with _limit(seconds):
+            fitted = peer.answer(train, train.urdf)
+            said["error_held_out"] = held_out_error(fitted, test)
+        keep_model(fitted.get("model"), case.parents[1] / "models" / peer.__name__ / case.name)
+    except Exception as error:  # a peer's fault must not end the comparison
+        del said["error_held_out"]
+        said["fault_again"] = f"{type(error).__name__}: {error}"
+    return said | {"seconds_again": time.process_time() - start}
+
+
+def keep_model(model, name: Path) -> None:
+    """The model that answers, for its simulation: numbers as JSON, or a model of skidyn's."""
+    if model is None:
+        return
+    name.parent.mkdir(parents=True, exist_ok=True)
+    if isinstance(model, dict):
+        name.with_suffix(".json").write_text(json.dumps(model))
+    else:
+        import skidyn  # a peer that has such a model has the package too
+
+        skidyn.save_model(name.with_suffix(".skops"), model)
 
 
 @contextlib.contextmanager
@@ -71,26 +106,18 @@ def _limit(seconds: float):
 
 def main() -> None:
     warnings.simplefilter("ignore")
-    file, seconds, cases = Path(sys.argv[1]), float(sys.argv[2]), [Path(w) for w in sys.argv[3:]]
+    file, stage, seconds = Path(sys.argv[1]), sys.argv[2], float(sys.argv[3])
+    cases = [Path(word) for word in sys.argv[4:]]
     peer = load(file)
     folder = cases[0].parents[1] / "answers" / file.stem
     folder.mkdir(parents=True, exist_ok=True)
-    answers = {case: folder / f"{case.name}.json" for case in cases}
     with contextlib.redirect_stdout(io.StringIO()):
-        for case, out in answers.items():
-            if not out.exists():
-                out.write_text(json.dumps(ask(peer, case, seconds), indent=1))
-        for case, out in answers.items():  # after all answers, which count for more
-            said = json.loads(out.read_text())
-            if said.get("error_held_out", 0) is None:
-                _, train, test = read(case)
-                try:
-                    with _limit(seconds):
-                        fitted = peer.answer(train, train.urdf)
-                        said["error_held_out"] = held_out_error(fitted, test)
-                except TimeoutError:
-                    del said["error_held_out"]
-                out.write_text(json.dumps(said, indent=1))
+        for case in cases:
+            out = folder / f"{case.name}.json"
+            said = (
+                judge(peer, case, out, seconds) if stage == "errors" else ask(peer, case, seconds)
+            )
+            out.write_text(json.dumps(said, indent=1))
 
 
 if __name__ == "__main__":

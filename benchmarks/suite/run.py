@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Make the suite, let every peer answer the same logs, print who is right.
 
-    python benchmarks/suite/run.py FOLDER [--seed 2026] [--logs 60] [--peers skidyn_diagnose,lasso]
+    python benchmarks/suite/run.py FOLDER [--seed 2026] [--logs 60] [--jobs 2] [--peers NAMES]
     python benchmarks/suite/run.py --table benchmarks/suite/results.json
 
 A peer is a file of ``benchmarks/peers`` with ``PACKAGE`` and ``answer(log, robot) -> dict``; add
-your own. It runs in a process of its own, ``--seconds`` a log at most, by ``--python`` of an
-environment that has its package (peers need no skidyn, but for its own). FOLDER receives ``cases``
-(what a tool may see), ``truth``, ``prepared`` and ``answers/PEER``; what is there is not made
-again, so that an interrupted run goes on. Answers of a tool that is no Python: one JSON per case
+your own. It runs in processes of its own, of one thread each and ``--jobs`` at a time, with
+``--seconds`` of the processor a log at most, by ``--python`` of an environment that has its package
+(peers need no skidyn, but for its own). FOLDER receives ``cases`` (what a tool may see), ``truth``,
+``prepared``, ``answers/PEER``, ``models/PEER`` and ``simulated``; what is there is not made again,
+so that an interrupted run goes on. Answers of a tool that is no Python: one JSON per case
 into ``FOLDER/answers/NAME``, then ``--peers NAME``. ``--keep`` writes the scores, and ``--table``
 prints what was kept.
 """
@@ -19,9 +20,12 @@ import argparse
 import json
 import math
 import os
+import resource
 import subprocess
 import sys
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -35,36 +39,89 @@ PEERS = HERE.parent / "peers"
 CONTENTS = ("nothing", "one", "two", "nameless", "once")
 
 
-def make(folder: Path, case: SuiteCase) -> dict:
-    """Truth of the case; simulated and prepared for peers unless it is there."""
-    from _prepare import prepare
-
-    file = folder / "truth" / f"{case.name}.json"
-    if not file.exists():
-        case.write(folder)
-    prepare(folder / "cases" / case.name)
-    return json.loads(file.read_text())
+#: Cases that one process takes, one after the other.
+CHUNK = 6
 
 
-def ask(folder: Path, peer: str, cases: list[str], python: str, seconds: float) -> list[dict]:
-    """The peer's answers; what the folder lacks of them is made in a process of its own."""
-    files = {case: folder / "answers" / peer / f"{case}.json" for case in cases}
-    missing = [folder / "cases" / case for case, file in files.items() if not _whole(file)]
-    source = PEERS / f"{peer}.py"
-    if missing and source.exists():
-        threads = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-        words = [python, HERE / "_ask.py", source, str(seconds), *missing]
-        if subprocess.run(words, env=os.environ | threads, stdout=subprocess.DEVNULL).returncode:
-            print(f"{peer} did not answer every case", file=sys.stderr)
-    return [json.loads(file.read_text()) for file in files.values() if file.exists()]
+def in_processes(tasks: Iterable[list], jobs: int) -> None:
+    """Run commands, ``jobs`` at a time, each on one thread; a failure is told and ends nothing."""
+    threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+
+    def run(words: list) -> None:
+        done = subprocess.run(words, env=os.environ | threads, stdout=subprocess.DEVNULL)
+        if done.returncode:
+            print(f"failed: {' '.join(map(str, words[1:5]))} ...", file=sys.stderr)
+
+    with ThreadPoolExecutor(jobs) as pool:
+        list(pool.map(run, tasks))
 
 
-def _whole(file: Path) -> bool:
-    """Whether nothing is missing of an answer, its error on held-out trajectories included."""
-    return file.exists() and json.loads(file.read_text()).get("error_held_out", 0) is not None
+def chunks(cases: list[Path]) -> list[list[Path]]:
+    """Cases in portions for one process each."""
+    return [cases[k : k + CHUNK] for k in range(0, len(cases), CHUNK)]
 
 
-def score(truths: list[dict], answers: list[dict]) -> dict:
+def make(folder: Path, suite: list[SuiteCase], jobs: int) -> list[dict]:
+    """Truths of the cases, which are simulated and prepared for peers unless they are there."""
+    missing = [
+        str(case.entropy[1])
+        for case in suite
+        if not (folder / "prepared" / f"{case.name}.npz").exists()
+        or not (folder / "truth" / f"{case.name}.json").exists()
+    ]
+    words = [sys.executable, HERE / "_make.py", folder, str(suite[0].entropy[0])]
+    in_processes([[*words, *some] for some in chunks(missing)], jobs)
+    return [json.loads((folder / "truth" / f"{case.name}.json").read_text()) for case in suite]
+
+
+def ask(
+    folder: Path, peers: dict[str, str], cases: list[str], seconds: float, jobs: int
+) -> dict[str, list[dict]]:
+    """Answers of every peer, by the Python of each; what the folder lacks of them is made."""
+    files = {peer: [folder / "answers" / peer / f"{case}.json" for case in cases] for peer in peers}
+    for stage, lacks in (("answers", _unanswered), ("errors", _unjudged)):
+        tasks = []
+        for peer, python in peers.items():
+            source = PEERS / f"{peer}.py"
+            missing = [folder / "cases" / file.stem for file in files[peer] if lacks(file)]
+            if source.exists():  # the others were answered by a tool elsewhere
+                words = [python, HERE / "_ask.py", source, stage, str(seconds)]
+                tasks += [[*words, *some] for some in chunks(missing)]
+        in_processes(tasks, jobs)
+    return {
+        peer: [json.loads(file.read_text()) for file in own if file.exists()]
+        for peer, own in files.items()
+    }
+
+
+def simulate(folder: Path, cases: list[str], jobs: int) -> dict[str, dict]:
+    """Errors of the motion of every peer's model that can be run, case by case."""
+    if not (folder / "models").exists():
+        return {}
+    every = {
+        case: {f.parent.name for f in (folder / "models").glob(f"*/{case}.*")} for case in cases
+    }
+    files = {case: folder / "simulated" / f"{case}.json" for case in cases if every[case]}
+    old = [
+        case
+        for case, file in files.items()
+        if not file.exists() or set(json.loads(file.read_text())) != every[case]
+    ]
+    words = [sys.executable, HERE / "_simulated.py", folder]
+    in_processes([[*words, *some] for some in chunks(old)], jobs)
+    return {case: json.loads(f.read_text()) for case, f in files.items() if f.exists()}
+
+
+def _unanswered(file: Path) -> bool:
+    return not file.exists()
+
+
+def _unjudged(file: Path) -> bool:
+    """Whether an answer that predicts lacks its error on held-out trajectories."""
+    return file.exists() and json.loads(file.read_text()).get("error_held_out", 0) is None
+
+
+def score(peer: str, truths: list[dict], answers: list[dict], motions: dict[str, dict]) -> dict:
     """What is kept of a peer: its score on every case, times, errors, version."""
     judged = score_answers(truths, answers)
     given = {a["case"]: a for a in answers}
@@ -72,7 +129,11 @@ def score(truths: list[dict], answers: list[dict]) -> dict:
     cases = []
     for c in judged.cases:
         said = given.get(c["case"], {})
-        extra = {k: said[k] for k in ("seconds", "error_held_out", "fault") if k in said}
+        keys_said = ("seconds", "seconds_again", "error_held_out", "fault")
+        extra = {k: said[k] for k in keys_said if k in said}
+        motion = motions.get(c["case"], {}).get(peer)
+        if motion is not None:
+            extra["error_motion" if isinstance(motion, float) else "not_simulated"] = motion
         cases.append({k: c[k] for k in (*keys, "parameter_error")} | extra)
     versions = {a["version"] for a in answers if "version" in a}
     return {"version": ", ".join(sorted(versions)), "cases": cases}
@@ -112,8 +173,10 @@ FIGURES = (
     Figure("false", _kept("false_claims")),
     Figure("value", _kept("parameter_error"), middle=np.median, digits=3),
     Figure("error", _kept("error_held_out"), middle=_geometric),
+    Figure("motion", _kept("error_motion"), middle=_geometric),
     Figure("s", _kept("seconds"), middle=np.median, digits=1),
 )
+_SECONDS = ("seconds", "seconds_again")
 #: Says nothing, ever: it is printed, but nobody is compared with it.
 YARDSTICK = "silence"
 
@@ -121,16 +184,19 @@ YARDSTICK = "silence"
 def print_table(peers: dict[str, dict]) -> None:
     """Every peer a line, skidyn's first, and who solves what; nothing is rerun."""
     peers = dict(sorted(peers.items(), key=lambda item: not item[0].startswith("skidyn")))
-    common = _judged_by_all(peers)
+    common = {key: _judged_by_all(peers, key) for key in ("error_held_out", "error_motion")}
     first = next(iter(peers.values()))["cases"]
     counted = [c for c in first if c["counts"]]
     print(f"{len(first)} logs, {len(counted)} count; shares with Wilson intervals of 95 %")
-    print(f"error: on the {len(common)} logs where it is known of every peer that predicts\n")
+    print(f"error: on the {len(common['error_held_out'])} logs where all that predict have it")
+    print(f"motion: on the {len(common['error_motion'])} logs where all that run have it\n")
     print(f"{'':18s}" + "".join(f"{f.title:>{17 if f.share else 8}s}" for f in FIGURES))
     cells = {}
     for name, peer in peers.items():
-        errors = {"error_held_out": None}
-        cases = [c if c["case"] in common else c | errors for c in peer["cases"]]
+        cases = [
+            c | {key: None for key, logs in common.items() if c["case"] not in logs}
+            for c in peer["cases"]
+        ]
         values = [f.of(cases) for f in FIGURES]
         told = [_cell(f, v) for f, v in zip(FIGURES, values, strict=True)]
         print(f"{name:18s}" + "".join(told))
@@ -145,13 +211,13 @@ def print_table(peers: dict[str, dict]) -> None:
     _print_best(next(iter(peers)), cells)
     versions = sorted({p["version"] for p in peers.values() if p["version"]})
     print("versions: " + ", ".join(versions))
+    every = [c.get(k, 0.0) for p in peers.values() for c in p["cases"] for k in _SECONDS]
+    print(f"processor time of all answers, with those for the errors: {sum(every):.0f} s")
 
 
-def _judged_by_all(peers: dict[str, dict]) -> set[str]:
-    """Logs on which every peer that predicts was judged on trajectories left out."""
-    judged = [
-        {c["case"] for c in peer["cases"] if c.get("error_held_out")} for peer in peers.values()
-    ]
+def _judged_by_all(peers: dict[str, dict], key: str) -> set[str]:
+    """Logs on which every peer that has such an error at all has it."""
+    judged = [{c["case"] for c in peer["cases"] if c.get(key)} for peer in peers.values()]
     return set.intersection(*(logs for logs in judged if logs)) if any(judged) else set()
 
 
@@ -210,8 +276,9 @@ def main() -> None:
     parser.add_argument("--peers", default="", help="all by default, skidyn's first")
     parser.add_argument("--python", default=sys.executable, help="of the peers but skidyn's")
     parser.add_argument(
-        "--seconds", type=float, default=180.0, help="of the processor, limit of a peer on a log"
+        "--seconds", type=float, default=60.0, help="of the processor, limit of a peer on a log"
     )
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes at a time")
     parser.add_argument("--keep", type=Path, metavar="JSON", help="add the scores to this file")
     parser.add_argument("--table", type=Path, metavar="JSON", help="print kept scores, run nothing")
     options = parser.parse_args()
@@ -223,18 +290,29 @@ def main() -> None:
     every = sorted((p.stem for p in PEERS.glob("*.py")), key=lambda n: (n[:6] != "skidyn", n))
     peers = options.peers.split(",") if options.peers else every
     suite = hidden_effect_suite(options.seed, options.logs)
-    truths = [make(options.folder, case) for case in suite]
-    answers = {}
-    for peer in peers:
-        python = sys.executable if peer.startswith("skidyn") else options.python
-        words = options.folder, peer, [case.name for case in suite], python, options.seconds
-        answers[peer] = ask(*words)
-    scores = {peer: score(truths, said) for peer, said in answers.items()}
+    start = time.time()
+    truths = make(options.folder, suite, options.jobs)
+    made = _processor()
+    pythons = {p: sys.executable if p.startswith("skidyn") else options.python for p in peers}
+    names = [case.name for case in suite]
+    answers = ask(options.folder, pythons, names, options.seconds, options.jobs)
+    motions = simulate(options.folder, names, options.jobs)
+    scores = {peer: score(peer, truths, said, motions) for peer, said in answers.items()}
     if options.keep:
         old = json.loads(options.keep.read_text())["peers"] if options.keep.exists() else {}
         write_json(options.keep, {"seed": options.seed, "peers": old | scores})
     print(f"seed {options.seed}, ", end="")
     print_table(scores)
+    print(
+        f"this run: {(time.time() - start) / 60:.0f} min on {options.jobs} cores; "
+        f"{_processor():.0f} s of the processor, {made:.0f} of them for the logs"
+    )
+
+
+def _processor() -> float:
+    """Processor time of all processes that have ended, s."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 if __name__ == "__main__":
