@@ -25,7 +25,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
-from spoils import SPOILS, Spoiled
+from spoils import SPOILS, NoJointMovesError, Spoiled
 from spoils_of_channels import CHANNELS
 from spoils_of_clocks import CLOCKS
 from spoils_of_joints import JOINTS
@@ -186,7 +186,10 @@ def main() -> None:
         for i in sorted({(turn * taken + k) % len(cases) for k in range(taken)}):
             case = cases[i]
             rng = np.random.default_rng([options.seed, i])
-            spoiled = MISTAKES[name](case.frame, case.robot, rng)
+            try:
+                spoiled = MISTAKES[name](case.frame, case.robot, rng)
+            except NoJointMovesError:
+                continue
             if spoiled is None:  # a robot that cannot make this mistake
                 continue
             n += 1

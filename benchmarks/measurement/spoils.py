@@ -49,6 +49,10 @@ class Spoiled:
 Spoil = Callable[[pd.DataFrame, Robot, np.random.Generator], Spoiled | None]
 
 
+class NoJointMovesError(Exception):
+    """No joint of a log moves that a mistake could be made with."""
+
+
 def columns(quantity: str, n: int) -> list[str]:
     return [f"{quantity}{k + 1}" for k in range(n)]
 
@@ -66,11 +70,19 @@ def in_runs(log: pd.DataFrame, names: list[str], change: Callable) -> pd.DataFra
 
 
 def moved(log: pd.DataFrame, robot: Robot, rng: np.random.Generator, turning: bool = False) -> int:
-    """A joint that moves and has torque."""
+    """A joint that moves and has torque.
+
+    Raises
+    ------
+    NoJointMovesError
+        If none does: the mistake cannot be made in this log.
+    """
     span = np.array([np.ptp(log[f"q{k + 1}"]) for k in range(robot.n_joints)])
     able = span > 0.05
     if turning:
         able &= np.array([kind == "revolute" for kind in robot.joint_types])
+    if not able.any():
+        raise NoJointMovesError
     return int(rng.choice(np.flatnonzero(able)))
 
 

@@ -226,7 +226,7 @@ class ClockJitter(Check):
     suspects = "stamps that jitter around samples that were taken at even steps"
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
-        signals = measurement.signals
+        signals = measurement.whole
         if measurement.same_stamps:
             yield self.suspicion(
                 "the time stamps are too coarse for the samples",
@@ -295,7 +295,7 @@ def _gained_by_torque(measurement: Measurement) -> float | None:
         return None
     from skidyn.measurement._fits import Reading, make_fits  # with it all columns of the evidence
 
-    signals = measurement.signals
+    signals = measurement.whole
     even = signals.with_(time=regular_clock(signals.clock, signals.trajectory))
     other = make_fits(even, measurement.torque, fits.robot)
     if other is None or other.moving.shape != fits.moving.shape:

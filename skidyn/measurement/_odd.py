@@ -14,7 +14,7 @@ from skidyn._signals import Array
 from skidyn.measurement._bodies import USUAL, Explained, explained
 from skidyn.measurement._check import Check
 from skidyn.measurement._duel import left_by_effects
-from skidyn.measurement._fits import SAMPLES, Fits, Reading, student
+from skidyn.measurement._fits import SAMPLES, Fits, Reading, robust_likelihood, student
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import asked_changes
@@ -209,9 +209,21 @@ def _zero_of(fits: Fits, run: int) -> tuple[int, float, float] | None:
     worst = max(before, key=lambda k: before[k], default=None)
     if worst is None or value - plain < SURE or abs(angle) < LEAST_ZERO:
         return None
+    # bodies that know of this recording as well may explain it without another zero
+    elsewhere, everywhere = fits.only(~rows).residuals(bodies, Reading()), fits.bodies()[0]
+    here = own.residuals(bodies, Reading(zero=((joint, angle),)))
+    known = fits.residuals(everywhere, Reading())
+    gain = sum(
+        (robust_likelihood(np.r_[elsewhere[k], here[k]]) - robust_likelihood(known[k]))
+        / inflation[k]
+        for k in known
+        if k in elsewhere and k in here
+    )
     without, left = left_by_effects(fits, worst, rows)
+    if gain < (SURE if after[worst] > BETTER * left else LEAST):
+        return None
     share = after[worst] / before[worst]
-    return (joint, angle, value - plain) if share < min(LEFT, BETTER * left / without) else None
+    return (joint, angle, float(gain)) if share < min(LEFT, BETTER * left / without) else None
 
 
 def _rows_of(fits: Fits, run: int) -> NDArray[np.bool_]:

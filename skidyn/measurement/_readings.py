@@ -69,6 +69,8 @@ class Change:
         With this change and those found before it.
     gain, confirmed : float
         Log-likelihood gained with the bodies of the description, and with identified ones.
+    untuned : float
+        What it gains in few rows, of a zero at the best of the angles that all joints are tried at.
     drop : float
         Share of the residual's spread that it takes off, of the joint that gains most.
     rivals : tuple of str
@@ -84,6 +86,7 @@ class Change:
     reading: Reading
     gain: float = 0.0
     confirmed: float = 0.0
+    untuned: float = 0.0
     drop: float = 0.0
     rivals: tuple[str, ...] = ()
     other: str = ""
@@ -138,7 +141,8 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
         if rough_gain > 0:
             there = fits.nominal(change.reading)
             gain = float(there.margin(here).sum())
-            judged.append(replace(change, gain=gain, drop=_drop(here, there)))
+            drop = _drop(here, there)
+            judged.append(replace(change, gain=gain, untuned=rough_gain, drop=drop))
     judged = [
         c
         for c in judged
@@ -176,7 +180,10 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
         if strong and (plain or confirmed >= NEEDED[change.kind]):
             alike = [c for c in judged if c.kind != change.kind and _same_place(c, change)]
             within = max(TIED, RIVALS * change.gain)
-            rivals = tuple(dict.fromkeys(c.kind for c in alike if change.gain - c.gain < within))
+            alike = [
+                c for c in alike if change.gain - c.gain < within or _but_for_angle(c, change)
+            ]
+            rivals = tuple(dict.fromkeys(c.kind for c in alike))
             accepted.append(replace(change, confirmed=confirmed, rivals=rivals))
     while accepted:
         best = _first(accepted)
@@ -192,9 +199,22 @@ def _first(accepted: list[Change]) -> Change:
     # both are likelihoods of the same torque; turning all of it round changes nothing identified
     first = max(accepted, key=lambda c: c.gain + c.confirmed)
     close = max(TIED, ALIKE * first.gain)
-    tied = [c for c in accepted if c.gain + c.confirmed >= first.gain + first.confirmed - close]
+    tied = [
+        c
+        for c in accepted
+        if c.gain + c.confirmed >= first.gain + first.confirmed - close or _but_for_angle(c, first)
+    ]
     # an angle that is free fits at least as well as one that is not
     return next((c for c in tied if c.kind != "zero"), first) if first.kind == "zero" else first
+
+
+def _but_for_angle(change: Change, zero: Change) -> bool:
+    """Whether a change gains what a zero does before its angle is fitted.
+
+    A robot upside down is one whose first joint, about a level axis, is half a turn off.
+    """
+    fixed = zero.kind == "zero" and change.kind == "gravity"
+    return fixed and change.untuned > zero.untuned - TIED
 
 
 def _against_effects(fits: Fits, reading: Reading, here: Outcome, change: Change) -> Change | None:

@@ -100,3 +100,9 @@ def test_an_angle_against_the_base(joint):
     told = {s.check: s for s in check_log(log.frame.assign(**sums), log.robot).checks}["reading"]
     assert told.remedy.option == f"--summed q{joint}=q{joint - 1}"
     assert told.joints == (joint,) and told.certainty == "certain"
+
+
+def test_upside_down_goes_before_a_first_joint_half_a_turn_off(arm, recorded, told_of):
+    told = told_of(recorded.frame, replace(arm, gravity=-arm.gravity))["reading"]
+    assert told.remedy.option == "--gravity=0,0,-9.81" and told.certainty == "suspected"
+    assert "zero" in told.evidence
