@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 
 class SkidynError(ValueError):
     """Root of skidyn's errors.
@@ -65,6 +68,32 @@ class LogError(SkidynError):
     ...     print(error)
     nowhere.csv: no such file.
     """
+
+
+class MisreadLogError(LogError):
+    """A log is certainly not what its names and units say.
+
+    Parameters
+    ----------
+    message : str
+        What is wrong, and the options that fix it.
+    suspicions : sequence of Suspicion
+        What is certain.
+
+    Examples
+    --------
+    >>> from skidyn.exceptions import MisreadLogError
+    >>> from skidyn.measurement import Suspicion, refuse_certain
+    >>> try:
+    ...     refuse_certain([Suspicion("clock_unit", "time is in ms", "steps of 10 s", "certain")])
+    ... except MisreadLogError as error:
+    ...     print(error.suspicions[0].check)
+    clock_unit
+    """
+
+    def __init__(self, message: str, suspicions: Sequence[Any] = ()) -> None:
+        super().__init__(message)
+        self.suspicions = tuple(suspicions)
 
 
 class RobotDescriptionError(SkidynError):

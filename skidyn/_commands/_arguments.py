@@ -164,9 +164,11 @@ def with_remedies(parser: Any) -> None:
     )
     fix.add_argument(
         "--clock",
-        choices=("recorded", "regular"),
-        default="recorded",
-        help="regular: samples were taken at even steps and only the time stamps jitter",
+        choices=("auto", "recorded", "regular"),
+        default="auto",
+        help="regular: samples were taken at even steps and only the time stamps jitter; recorded: "
+        "the stamps are right; auto (default): the stamps, but even steps for a diagnosis if they "
+        "certainly jitter",
     )
     fix.add_argument(
         "--drop-repeated", action="store_true", help="leave out rows that repeat the one before"

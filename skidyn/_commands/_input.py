@@ -132,7 +132,7 @@ def reading(options: argparse.Namespace) -> dict[str, Any]:
     }
     # what was not said is left to read_log, so that a script made of this holds nothing else
     always = ("columns", "units", "drive_gains", "rate")
-    unsaid: tuple[Any, ...] = (None, False, [], "recorded")
+    unsaid: tuple[Any, ...] = (None, False, [], "recorded", "auto")
     return {k: v for k, v in arguments.items() if k in always or v not in unsaid}
 
 

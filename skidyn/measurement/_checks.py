@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from skidyn._exceptions import LogError
+from skidyn._exceptions import MisreadLogError
 from skidyn.measurement._around_zero import DeadBand, TaredTorque
 from skidyn.measurement._axes import Axes
 from skidyn.measurement._bodies import (
@@ -184,7 +184,7 @@ def refuse_certain(found: list[Suspicion]) -> None:
 
     Raises
     ------
-    LogError
+    MisreadLogError
         With the suspicions that are certain, and the option that fixes each.
 
     Examples
@@ -194,9 +194,10 @@ def refuse_certain(found: list[Suspicion]) -> None:
     """
     certain = [s for s in found if s.certainty == "certain"]
     if certain:
-        raise LogError(
+        raise MisreadLogError(
             "the log is not what its names and units say, so that any effect found "
             "in it would be wrong. "
             + " ".join(map(str, certain))
-            + " To go on all the same: --force (in Python: force=True)."
+            + " To go on all the same: --force (in Python: force=True).",
+            certain,
         )

@@ -10,6 +10,7 @@ import sys
 from importlib import resources
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from skidyn import cli, datasets
@@ -100,6 +101,24 @@ def test_diagnose_stops_with_the_remedy_unless_forced(flipped, tmp_path, capsys)
         report = json.load(file)
     assert report["checks"][0]["certainty"] == "certain"
     assert report["provenance"]["options"]["force"] is True
+
+
+def test_stamps_that_certainly_jitter_are_replaced_by_even_steps_and_this_is_told(tmp_path, capsys):
+    path, out = str(tmp_path / "log.csv"), str(tmp_path / "report.json")
+    noise = np.random.default_rng(0).uniform(-1e-3, 1e-3, len(LOG))
+    LOG.assign(time=LOG["time"] + noise).to_csv(path, index=False)
+    words = ["diagnose", path, "--urdf", URDF, "--out", out]
+    for _ in range(2):  # the second answer is the one that was kept
+        assert main(words) == 0
+        assert "the time stamps jitter" in capsys.readouterr().out
+        report = json.loads(Path(out).read_text("utf-8"))
+        assert report["verdict"] == "complete"
+        assert report["provenance"]["options"]["clock"] == "regular"
+        told = report["checks"][0]
+        assert (told["check"], told["certainty"]) == ("clock_jitter", "noted")
+        assert "even steps were taken" in told["evidence"]
+    assert main([*words, "--clock", "recorded"]) == 2
+    assert "--clock regular" in capsys.readouterr().err
 
 
 def test_servos_without_torque_are_diagnosed_by_their_motion(servo_diagnosed, capsys):
