@@ -241,6 +241,21 @@ class Effect:
         """Whether it acts on the torque of the whole model, as a sensor does."""
         return "model_torque" in self.needs
 
+    def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
+        """What is fitted linearly with some shape, one per column.
+
+        Parameters
+        ----------
+        shape : mapping
+            Shape parameters.
+
+        Returns
+        -------
+        tuple of Coefficient
+            :attr:`coefficients` by default. A further form may have more of them.
+        """
+        return self.coefficients
+
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         """Columns of the effect on its own joint.
 

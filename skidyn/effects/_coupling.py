@@ -121,7 +121,8 @@ class CouplingSpring(_PairEffect):
     One that is not linear has in its shape the coupled coordinate ``x0`` at which it is slack, and
     ``power`` 3, coordinates in units of 1 rad or 1 m so that the unit of the stiffness stays; or a
     distance from there beyond which it grows stiff as a hyperbolic sine (``stiffening``), or
-    yields as a hyperbolic tangent (``softening``).
+    yields as a hyperbolic tangent (``softening``). A cable or hose that can only pull acts on one
+    ``side`` of ``x0``.
     """
 
     kind = "coupling_spring"
@@ -138,6 +139,8 @@ class CouplingSpring(_PairEffect):
         {"x0": 0.0, "power": 3.0},
         {"x0": 0.0, "stiffening": 0.4},
         {"x0": 0.0, "softening": 0.4},
+        {"x0": 0.0, "side": 1.0},
+        {"x0": 0.0, "side": -1.0},
     )
     simplicity = 16
     rivals = ("spring",)
@@ -171,6 +174,8 @@ class CouplingSpring(_PairEffect):
             force = form["stiffening"] * np.sinh(x / form["stiffening"])
         elif "softening" in form:
             force = form["softening"] * np.tanh(x / form["softening"])
+        elif "side" in form:
+            force = form["side"] * np.maximum(form["side"] * x, 0.0)
         else:
             force = np.sign(x) * np.abs(x) ** form.get("power", 1.0)
         return np.column_stack([force, np.ones_like(x)])

@@ -93,7 +93,8 @@ class AsymmetricFriction(Effect):
     """The part of friction that has another size in each direction.
 
     It grows with the speed, or with another ``power`` of it (1 where the shape has none); speeds
-    are in units of 1 rad/s or 1 m/s, so that the unit of the coefficient stays.
+    are in units of 1 rad/s or 1 m/s, so that the unit of the coefficient stays. With a ``side`` (1
+    or -1) it is that of one direction of motion alone.
     """
 
     kind = "asymmetric_friction"
@@ -102,15 +103,21 @@ class AsymmetricFriction(Effect):
     formula = r"\Delta F_v\,|\dot q|^p + \Delta F_c"
     coefficients = (Coefficient("dFv", "N m s/rad"), Coefficient("dFc", "N m"))
     shapes = (Shape("power", "1", (), 0.3, 3.0, scales=False),)
-    forms = ({"power": 2.0}, {"power": 0.5})
+    forms = (
+        {"power": 2.0},
+        {"power": 0.5},
+        {"power": 2.0, "side": 1.0},
+        {"power": 2.0, "side": -1.0},
+    )
     simplicity = 11
     rivals = ("offset", "viscous")
     separating_motion = "equal sweeps in both directions at two speeds or more"
     reference = "Janot, Gautier, Brunot (2019), Nonlinear System Identification Benchmarks (EMPS)."
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        speed = np.abs(signals.dq[:, joint]) ** shape.get("power", 1.0)
-        return np.column_stack([speed, np.ones(signals.n_samples)])
+        dq, side = signals.dq[:, joint], shape.get("side")
+        speed = np.abs(dq) if side is None else np.maximum(0.0, side * dq)
+        return np.column_stack([speed ** shape.get("power", 1.0), np.ones(signals.n_samples)])
 
 
 class NonlinearViscous(Effect):

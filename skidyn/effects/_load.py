@@ -21,7 +21,8 @@ class LoadDependentFriction(Effect):
     the joint, as the efficiency of many gears does. One that is ``viscous`` grows with the speed,
     too, in units of 1 rad/s or 1 m/s, so that ``mu`` has no unit. Where the torque of the drive
     counts, the load has the ``friction`` (N m or N) and the ``damping`` beside it that the drive
-    has to overcome as well. A preloaded gear feels what exceeds a ``threshold``, N m or N.
+    has to overcome as well. A preloaded gear feels what exceeds a ``threshold``, N m or N; one flank
+    that rubs feels load of one sign (``side``, 1 or -1).
 
     The gear transmits what the bodies need at the joint; the torque that accelerates the rotor is
     spent before it, and is no part of the load.
@@ -46,6 +47,8 @@ class LoadDependentFriction(Effect):
         {"friction": 0.3, "damping": 0.1},
         {"driving": 1.0, "friction": 0.3, "damping": 0.1},
         {"threshold": 0.5},
+        {"side": 1.0},
+        {"side": -1.0},
     )
     needs = ("load",)
     simplicity = 7
@@ -80,6 +83,8 @@ class LoadDependentFriction(Effect):
         carried = carried + shape.get("friction", 0.0) * signals.sign[:, joint]
         carried = carried + shape.get("damping", 0.0) * signals.dq[:, joint]
         beyond = np.maximum(0.0, np.abs(carried) - shape.get("threshold", 0.0))
+        if "side" in shape:
+            beyond = np.where(shape["side"] * carried > 0, beyond, 0.0)
         load = reference * (beyond / reference) ** shape.get("power", 1.0)
         friction: Array = load * (signals.dq if "viscous" in shape else signals.sign)[:, joint]
         if "driving" in shape:

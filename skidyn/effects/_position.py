@@ -15,8 +15,8 @@ from skidyn.effects._base import Array, Coefficient, Effect, Shape
 class PositionDependentFriction(Effect):
     """Dry friction whose level changes along the joint's travel.
 
-    It follows a wave, or is higher (lower) at one spot ``place`` of some ``width`` by a dry part
-    ``dFc`` and a viscous part ``dFv``.
+    It follows a wave, a wave and that of twice its number (``overtone``), or is higher (lower) at
+    one spot ``place`` of some ``width`` by a dry part ``dFc`` and a viscous part ``dFv``.
     """
 
     kind = "position_dependent_friction"
@@ -32,7 +32,8 @@ class PositionDependentFriction(Effect):
         Shape("width", "rad", (), 1e-3, 10.0),
     )
     #: Where a spot is looked for, and its width, as shares of the travel.
-    forms = tuple({"place": k / 8, "width": w} for w in (0.06, 0.15) for k in range(1, 8))
+    spots = tuple({"place": k / 8, "width": w} for w in (0.06, 0.15) for k in range(1, 8))
+    forms = ({"overtone": 1.0}, *spots)
     simplicity = 22
     rivals = ("load_dependent_friction", "coulomb")
     separating_motion = "slow sweeps over the whole travel in both directions"
@@ -44,9 +45,17 @@ class PositionDependentFriction(Effect):
         low, span = float(q.min()), float(np.ptp(q))
         spots = [
             {"place": low + span * form["place"], "width": span * form["width"]}
-            for form in self.forms
+            for form in self.spots
         ]
-        return [*({"n": n} for n in waves), *spots]
+        # one wave and two over the travel: friction that rises and falls in no regular way
+        own = (2 * np.pi / span, 4 * np.pi / span) if span > 0 else ()
+        rich = [{"n": n, "overtone": 1.0} for n in (*waves, *own)]
+        return [*({"n": n} for n in waves), *rich, *spots]
+
+    def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
+        if "overtone" not in shape:
+            return self.coefficients
+        return (*self.coefficients, Coefficient("a2", "N m"), Coefficient("b2", "N m"))
 
     def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
         return super().travel(signals, joints, shape) if "place" in shape else 1.0
@@ -56,21 +65,25 @@ class PositionDependentFriction(Effect):
         if "place" in shape:
             near = np.exp(-0.5 * ((q - shape["place"]) / shape["width"]) ** 2)
             return np.column_stack([near * sign, near * signals.dq[:, joint]])
-        phase = shape["n"] * q
-        return np.column_stack([np.cos(phase) * sign, np.sin(phase) * sign])
+        phases = [shape["n"] * q] + [2 * shape["n"] * q] * ("overtone" in shape)
+        return np.column_stack([wave(p) * sign for p in phases for wave in (np.cos, np.sin)])
 
     def parameters(
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
     ) -> dict[str, Any]:
-        a, b = map(float, coefficients)
+        a, b, *more = map(float, coefficients)
         if "place" in shape:
             return {"dFc": a, "dFv": b, **shape}
-        return {"A": float(np.hypot(a, b)), "phase": float(np.arctan2(b, a)), **shape}
+        told = {"A": float(np.hypot(a, b)), "phase": float(np.arctan2(b, a)), **shape}
+        if more:
+            told |= {"A2": float(np.hypot(*more)), "phase2": float(np.arctan2(*more[::-1]))}
+        return told
 
     def units(self, prismatic: bool = False) -> dict[str, str]:
         torque, length = ("N", "m") if prismatic else ("N m", "rad")
         spot = {"dFc": torque, "dFv": f"{torque} s/{length}", "place": length, "width": length}
-        return {"A": torque, "phase": "rad", "n": f"1/{length}"} | spot
+        wave = {"A": torque, "phase": "rad", "n": f"1/{length}", "A2": torque, "phase2": "rad"}
+        return wave | spot
 
 
 class TorqueRipple(Effect):

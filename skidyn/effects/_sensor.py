@@ -27,6 +27,7 @@ class TorqueGain(Effect):
     coefficients = (Coefficient("epsilon", "1"),)
     forms = ({"sign": 1.0}, {"sign": -1.0})
     needs = ("model_torque",)
+    by_recording = True
     simplicity = 5
     rivals = ("payload", "load_dependent_friction")
     separating_motion = "a known payload carried through the same motion"

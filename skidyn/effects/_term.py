@@ -116,7 +116,7 @@ class Term:
     @property
     def coefficients(self) -> tuple[Coefficient, ...]:
         """What is fitted linearly, one per column."""
-        return self.effect.coefficients
+        return self.effect.coefficients_of(self.shape)
 
     @property
     def width(self) -> int:
@@ -172,6 +172,13 @@ class Term:
         where the effect cannot be tried without the robot.
         """
         return _is_pointwise(self.effect, self)
+
+    @property
+    def follows_position(self) -> bool:
+        """Whether it is a force over the joint's own position, as of springs and stops."""
+        effect = self.effect
+        own = effect.scope == "joint" and effect.drawn_against == "q" and effect.search == "grid"
+        return own and not effect.nameless and not self.is_dry
 
     def with_shape(self, **values: Any) -> Term:
         """The same effect on the same joints with some shape parameters changed or added.

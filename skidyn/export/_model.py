@@ -161,10 +161,9 @@ def _sliding(robot: Robot) -> np.ndarray:
 
 def describe_term(model: RBDRegressor, term: Term) -> dict[str, Any]:
     """An effect as plain data, complete: coefficients by name, with units."""
-    effect = term.effect
     robot = model.robot_
     prismatic = bool(_sliding(robot)[list(term.places)].all())
-    turns = {c.name: c.unit for c in effect.coefficients}
+    turns = {c.name: c.unit for c in term.coefficients}
     units = {
         name: unit.replace("N m", "N").replace("rad", "m") if prismatic else unit
         for name, unit in turns.items()

@@ -348,7 +348,7 @@ def _parameters(model: RBDRegressor | Robot, robot: Robot, held: Sequence[Term])
 def _add_coefficients(values: dict[str, dict[str, Any]], model: RBDRegressor, term: Term) -> None:
     """A term's numbers in the place of its joint; a second of its kind gets a number."""
     (j,), number = term.places, 1
-    names = [c.name for c in term.effect.coefficients]
+    names = [c.name for c in term.coefficients]
     own = dict(zip(names, model.effect_coefficients_[term], strict=True))
     own |= {k: v for k, v in term.shape.items() if isinstance(v, int | float)}
     while True:

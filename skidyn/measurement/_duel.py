@@ -164,7 +164,8 @@ def _likely(
         ]
         if tried:
             gain, columns = max(tried, key=lambda pair: pair[0])
-            counted = sum(not c.is_zero for c in effect.coefficients)
+            zeros = sum(c.is_zero for c in effect.coefficients)
+            counted = columns.count - zeros
             counted += sum(s.name not in effect.form_names for s in effect.shapes)
             cost = COST * counted
             promising.append((gain - cost, effect, columns, cost))
@@ -177,11 +178,10 @@ def _shapes(
 ) -> Iterator[ExtraColumns]:
     """Columns of an effect on some joints, in all shapes of its grid."""
     signals, fits = bodies.signals, bodies.fits
-    positive = tuple(k for k, c in enumerate(effect.coefficients) if c.sign == 1)
-    spread = np.full(len(effect.coefficients), np.inf)
-    if effect.kind == "payload" and signals.robot is not None:  # it is but another body
+    body = effect.kind == "payload" and signals.robot is not None  # it is but another body
+    if body:
         masses = np.asarray(signals.robot.inertial_parameters, dtype=float).reshape(-1, 10)[:, 0]
-        positive, spread = (0,), CARRIED * float(masses.sum()) * AWAY**POWERS
+        known = CARRIED * float(masses.sum()) * AWAY**POWERS
     for site in effect.sites(signals):
         if not set(site) & set(joints):
             continue
@@ -192,6 +192,13 @@ def _shapes(
         for shape in grid:
             if not effect.admissible(signals, site, shape):
                 continue
+            coefficients = effect.coefficients_of(shape)
+            if len(coefficients) > len(effect.coefficients):
+                continue  # a form with more of them takes the place of anything in a simple motion
+            spread = known if body else np.full(len(coefficients), np.inf)
+            # what one recording lacks of a load, the others may carry: its mass is negative then
+            signs = [rows is None, *[False] * 9] if body else [c.sign == 1 for c in coefficients]
+            positive = tuple(np.flatnonzero(signs).tolist())
             columns = {
                 j: fits.average(np.asarray(values))
                 for j, values in effect.torque_columns(signals, site, **shape).items()

@@ -67,3 +67,11 @@ def test_a_differential_has_a_shaft_for_the_sum_and_one_for_the_difference(signa
     other = effect.torque_columns(signals, (0, 1), ratio=-1.0)
     for joint in (0, 1):
         np.testing.assert_allclose(both[joint], one[joint] + other[joint])
+
+
+def test_a_cable_between_two_joints_only_pulls(signals):
+    effect, x = get_effect("coupling_spring"), signals.q[:, 0] + 0.5 * signals.q[:, 1] - 0.1
+    for side in (1.0, -1.0):
+        columns = effect.torque_columns(signals, (0, 1), ratio=0.5, x0=0.1, side=side)
+        np.testing.assert_allclose(columns[0][:, 0], np.where(side * x > 0, x, 0.0))
+        np.testing.assert_allclose(columns[1], 0.5 * columns[0])

@@ -40,3 +40,10 @@ def test_stribeck_friction_may_fade_as_a_lorentz_curve(signals, columns_of):
 def test_dry_friction_may_turn_gradually(signals, columns_of):
     rounded = columns_of("coulomb", signals, rounding=0.1)[:, 0]
     np.testing.assert_allclose(rounded, np.tanh(signals.dq[:, 0] / 0.1))
+
+
+def test_friction_of_one_direction_alone(signals, columns_of):
+    dq = signals.dq[:, 0]
+    for side in (1.0, -1.0):
+        columns = columns_of("asymmetric_friction", signals, power=2.0, side=side)
+        np.testing.assert_allclose(columns[:, 0], np.where(side * dq > 0, dq**2, 0.0))

@@ -40,3 +40,10 @@ def test_a_preloaded_gear_feels_what_exceeds_its_threshold(signals, columns_of):
     beyond = np.maximum(0.0, np.abs(signals.load[:, 0]) - 0.3) * signals.sign[:, 0]
     found = columns_of("load_dependent_friction", signals, threshold=0.3)
     np.testing.assert_allclose(found[:, 0], beyond, atol=1e-12)
+
+
+def test_one_flank_feels_load_of_one_sign(signals, columns_of):
+    load = signals.load[:, 0]
+    found = [columns_of("load_dependent_friction", signals, side=s)[:, 0] for s in (1.0, -1.0)]
+    np.testing.assert_allclose(sum(found), columns_of("load_dependent_friction", signals)[:, 0])
+    assert np.all(found[0][load < 0] == 0) and np.all(found[1][load > 0] == 0)

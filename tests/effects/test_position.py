@@ -28,3 +28,16 @@ def test_friction_in_one_spot_of_the_travel(signals):
     found = effect.parameters(np.array([1.0, 2.0]), {"place": 0.2, "width": 0.05})
     assert found == {"dFc": 1.0, "dFv": 2.0, "place": 0.2, "width": 0.05}
     assert set(found) <= set(effect.units())
+
+
+def test_friction_along_the_travel_may_have_an_overtone(signals):
+    effect, shape = get_effect("position_dependent_friction"), {"n": 2.0, "overtone": 1.0}
+    values = np.array([0.3, -0.4, 0.0, 0.2])
+    assert [c.name for c in effect.coefficients_of(shape)] == ["a", "b", "a2", "b2"]
+    found, q = effect.parameters(values, shape), signals.q[:, 0]
+    waves = [found["A"] * np.cos(2 * q - found["phase"]), 0.2 * np.sin(4 * q)]
+    np.testing.assert_allclose(
+        effect.columns(signals, 0, **shape) @ values, sum(waves) * signals.sign[:, 0], atol=1e-12
+    )
+    assert (found["A2"], found["phase2"]) == (0.2, np.pi / 2)
+    assert set(found) - set(shape) <= set(effect.units())
