@@ -268,6 +268,62 @@ class JudgingSearch(RankingSearch):
         most = self._mostly_small(joints, hypothesis.gain, own, 0.5 * self.left)
         return not known or most or self._price(hypothesis.candidates) > settings.white
 
+    def without_pieces(self, hypothesis: Hypothesis) -> Hypothesis:
+        """The hypothesis without terms that are but pieces of a force that was found before.
+
+        A spring and a stop on one joint that are found after each other are mostly one force over
+        its position, of another form, above all where the second does little, or where the first
+        has no name. A hypothesis of nothing but pieces is returned as it is.
+
+        Parameters
+        ----------
+        hypothesis : Hypothesis
+            Known effect that would be added.
+        """
+        own = self._removed(self.left, hypothesis.gain)
+        small = own < self.settings.nameless_tolerance * (self.start - self.left)
+        kept = [
+            k
+            for k, c in enumerate(hypothesis.candidates)
+            if not all(self._holds_force(hypothesis, j, bool(small[j])) for j in c.joints)
+        ]
+        if not 0 < len(kept) < len(hypothesis.candidates):
+            return hypothesis
+        return replace(
+            hypothesis,
+            candidates=tuple(hypothesis.candidates[k] for k in kept),
+            chances=tuple(hypothesis.chances[k] for k in kept),
+        )
+
+    def is_piece(self, hypothesis: Hypothesis) -> bool:
+        """Whether it is nothing but pieces of forces over the position that were found before."""
+        own = self._removed(self.left, hypothesis.gain)
+        small = own < self.settings.nameless_tolerance * (self.start - self.left)
+        return all(self._holds_force(hypothesis, j, bool(small[j])) for j in hypothesis.joints)
+
+    def _holds_force(self, hypothesis: Hypothesis, joint: int, small: bool) -> bool:
+        """Whether a force over the position of a joint was found that this is a piece of."""
+        return self.of_one_position(hypothesis, joint) and any(
+            self.of_one_position(h, joint) and (small or h.kind == UNKNOWN) for h in self.findings
+        )
+
+    def of_one_position(self, hypothesis: Hypothesis, joint: int) -> bool:
+        """Whether on a joint it is a force over the position of this joint, in all recordings.
+
+        Parameters
+        ----------
+        hypothesis : Hypothesis
+            A known effect, or a function without a name.
+        joint : int
+            Joint, from 0.
+        """
+        if within_recordings(hypothesis) or joint not in hypothesis.joints:
+            return False
+        if hypothesis.kind == UNKNOWN:
+            return hypothesis.torque is None and hypothesis.variables == (f"q{joint + 1}",)
+        own = [c.term for c in hypothesis.candidates if joint in c.joints]
+        return all(term.follows_position for term in own)
+
     def _tolerance(self, beside: Hypothesis) -> Array:
         """Share of the squared error removed so far that formulas may have left, by joint.
 

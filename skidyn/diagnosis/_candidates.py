@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array
+from skidyn.diagnosis._rule import NEGLIGIBLE
 from skidyn.effects import Term, get_effect
 from skidyn.evidence import Problem
 
@@ -63,6 +64,24 @@ class Candidate:
     def is_further_form(self) -> bool:
         """Whether the formula is another one than the plain one of its kind."""
         return self.term.is_further_form
+
+    def allows(self, coefficients: Array) -> bool:
+        """Whether physics allows coefficients; those that are nothing beside the rest have any sign.
+
+        Parameters
+        ----------
+        coefficients : ndarray of shape (n_coefficients,)
+            Fitted values.
+
+        Returns
+        -------
+        bool
+        """
+        size = np.asarray(sum(np.sqrt(np.sum(rows**2, axis=0)) for rows in self.rows.values()))
+        nothing = NEGLIGIBLE * float(np.abs(coefficients * size).max())
+        bounded = np.isfinite(self.lowest)
+        short = (self.lowest - coefficients)[bounded] * size[bounded]
+        return not np.any(short > nothing)
 
     @property
     def joints(self) -> tuple[int, ...]:

@@ -89,6 +89,7 @@ def conclude(
         fixed = parameter_intervals(problem, terms, result.fit.noise, shapes=False)
         useless = _useless(result.findings, comparisons, history, least_drop)
         useless = useless or _vague(problem, result.findings, fixed)
+        useless = useless or _impossible(result.findings, fixed)
         if useless is None:
             break
         result = _without(problem, result, *useless)
@@ -256,6 +257,27 @@ def _vague(
     return None
 
 
+def _impossible(
+    findings: Sequence[Hypothesis], intervals: dict[Term, dict[str, Any]]
+) -> tuple[Hypothesis, list[Candidate]] | None:
+    """The last finding with terms whose coefficients, beside all others, physics forbids.
+
+    A sign that was right when an effect was found may turn where what was found later, or a
+    function without a name on the same joint, takes its place.
+    """
+    for hypothesis in reversed(findings):
+        terms = []
+        for candidate in hypothesis.candidates:
+            told = intervals[candidate.term]
+            values = [told.get(c.name) for c in candidate.term.coefficients]
+            found = [v[0] for v in values if isinstance(v, tuple)]
+            if len(found) == len(values) and not candidate.allows(np.array(found)):
+                terms.append(candidate)
+        if terms:
+            return hypothesis, terms
+    return None
+
+
 def _guess(diagnosis: Diagnosis) -> tuple[Hypothesis, list[Candidate]] | None:
     """The last finding with terms that are more likely wrong than right, and these terms.
 
@@ -391,6 +413,8 @@ def _sure(finding: Finding, findings: Sequence[Finding], parts: Remainder, whole
         nameless=finding.kind != UNKNOWN and (beside or bool(parts.material[joints].any())),
         whole_recordings=whole,
         alike=finding.alike,
+        rivalled=bool(finding.rivals),
+        few=finding.trajectories is not None and all(t.effect.by_recording for t in finding.terms),
         has_name=finding.kind != UNKNOWN,
     )
     # One of several pairs of joints that explain the same is right.

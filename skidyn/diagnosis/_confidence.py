@@ -17,8 +17,13 @@ import numpy as np
 #: autocorrelation, of the decimal logarithm of the share of the error that is removed.
 CONSTANT, MARGIN, CORRELATED, REMOVED = 2.4, 1.8, -1.1, 1.8
 #: Weights of something without a name on the same joints, of folds that are blocks of time and not
-#: recordings, and of a kind on other joints that explains as much: one of the two.
-NAMELESS, BLOCKS, ALIKE = -1.3, -0.5, -2.4
+#: recordings, of a kind on other joints that explains as much: one of the two; and of one on the
+#: same joints that does, and is less simple.
+NAMELESS, BLOCKS, ALIKE, EQUALLED = -1.3, -0.5, -2.4, -0.5
+#: Weight of an effect that few recordings alone have, of which the plainest form alone was tried.
+FEW = -0.6
+#: Margin, up or down, within which another explanation of the same joints equals a name.
+EQUAL = 0.005
 #: Coloured noise inflates the variance so much; shares of the error between these count.
 COLOURED, LEAST, ENOUGH = 1.7, 0.003, 0.3
 #: No name is surer than the number of logs on which the weights were found allows.
@@ -35,6 +40,8 @@ def confidence(
     nameless: bool = False,
     whole_recordings: bool = True,
     alike: bool = False,
+    rivalled: bool = False,
+    few: bool = False,
     has_name: bool = True,
 ) -> float:
     """Probability that a name is right.
@@ -53,6 +60,10 @@ def confidence(
         Whether it was judged on whole recordings left out.
     alike : bool, default=False
         Whether a kind that acts on other joints explains as much.
+    rivalled : bool, default=False
+        Whether the data cannot separate it from another explanation of its joints.
+    few : bool, default=False
+        Whether few recordings alone have it, and other forms of it were not tried there.
     has_name : bool, default=True
         Whether it is a known effect, and not something without a name.
 
@@ -65,5 +76,5 @@ def confidence(
     logit += CORRELATED * float(np.log(max(inflation / COLOURED, 1.0)))
     logit += REMOVED * float(np.log10(min(max(removed, LEAST), ENOUGH) / ENOUGH))
     logit += NAMELESS * nameless + BLOCKS * (not whole_recordings)
-    logit += ALIKE * alike
+    logit += FEW * few + ALIKE * alike + EQUALLED * (rivalled and abs(margin) < EQUAL)
     return min(MOST if has_name else MOST_NAMELESS, float(1 / (1 + np.exp(-logit))))

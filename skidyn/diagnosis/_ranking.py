@@ -27,7 +27,6 @@ from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
 from skidyn.diagnosis._recordings import choose
 from skidyn.diagnosis._rule import (
     MASKED,
-    NEGLIGIBLE,
     RESOLVED,
     ROUNDS,
     Tester,
@@ -393,13 +392,7 @@ class RankingSearch(SearchState):
 
     def can_be(self, candidate: Candidate, others: Sequence[Candidate]) -> bool:
         """Whether a candidate's coefficients, beside others, are such as its effect can have."""
-        coefficients = self.tester(others).test(candidate.rows).coefficients
-        # what is nothing beside the rest of the effect has either sign
-        size = sum(np.sqrt(np.sum(rows**2, axis=0)) for rows in candidate.rows.values())
-        nothing = NEGLIGIBLE * float(np.abs(coefficients * size).max())
-        bounded = np.isfinite(candidate.lowest)
-        short = (candidate.lowest - coefficients)[bounded] * size[bounded]
-        return not np.any(short > nothing)
+        return candidate.allows(self.tester(others).test(candidate.rows).coefficients)
 
     def _same_or_own(self, chosen: Sequence[Candidate]) -> list[list[Candidate]]:
         """Effects of few recordings by their name, those of many without one.

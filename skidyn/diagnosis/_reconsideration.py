@@ -23,6 +23,7 @@ from skidyn.diagnosis._hypothesis import (
     within_recordings,
 )
 from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
+from skidyn.effects import get_effect
 
 
 class ReconsideringSearch(JudgingSearch):
@@ -32,14 +33,21 @@ class ReconsideringSearch(JudgingSearch):
         """The best explanation that the rule accepts, with the terms that it accepts."""
         offered = ranking
         ranking = list(ranking)
+        traced: set[int] = set()
         while (best := self.pick(ranking)) is not None:
             ranking.remove(best)
             if self._richer_known(best):
                 continue
+            forces = [j for j in best.joints if self.of_one_position(best, j)]
+            if traced & (set(best.joints) - set(forces)):
+                continue  # another trace of the same force, and a fainter one
             best = self._first_of_two_names(best, offered)
             simpler = self._at_its_limit(best)
             judged = None if simpler is None else self.judged(simpler)
-            if judged is not None and self.shadow(judged):
+            if judged is not None:
+                judged = self.without_pieces(judged)
+            if judged is not None and (self.is_piece(judged) or self.shadow(judged)):
+                traced |= set(judged.joints) if self.is_piece(judged) else set()
                 judged = self._beside_another_kind(judged)
             if judged is not None:
                 rivals = rivals_among(judged, offered)
@@ -55,6 +63,8 @@ class ReconsideringSearch(JudgingSearch):
             or best.errors is None
             or within_recordings(best)
             or self._reconsidering
+            # one force over the position of a joint is simpler than two that make it up
+            or all(self.of_one_position(best, j) for j in best.joints)
         ):
             return best
         left = best.errors.sum(0)
@@ -140,6 +150,9 @@ class ReconsideringSearch(JudgingSearch):
         self, old: Hypothesis, ranking: Sequence[Hypothesis], with_old: Array
     ) -> Hypothesis | None:
         """A known effect that does as well as a nameless one beside what was found later."""
+        own = set(old.joints)
+        if any(h.kind == UNKNOWN and own & set(h.joints) for h in self.findings):
+            return None  # what another function took up of this one speaks for no name
         removed = self.left - with_old
         for rival in self._names_on(old.joints, ranking):
             first = self.judged(rival)
@@ -164,8 +177,14 @@ class ReconsideringSearch(JudgingSearch):
         """
         if self._reconsidering or shadow.kind == UNKNOWN or within_recordings(shadow):
             return None
+        if shadow.torque is not None:
+            return None  # averaged rows do not show a line
         own = set(shadow.joints)
         for old in [h for h in self.findings if h.torque is None and own & set(h.joints)]:
+            if old.kind == UNKNOWN and all(
+                self.of_one_position(h, j) for h in (old, shadow) for j in shadow.joints
+            ):
+                continue  # two pieces of one function are no two names
             kept = self._state()
             before = self.left
             self.add(shadow)
@@ -184,6 +203,59 @@ class ReconsideringSearch(JudgingSearch):
                         return self.judged(found)
             self._restore(kept)
         return None
+
+    def name_alike(self, steps: list[Step]) -> None:
+        """Give joints the kind of another joint where that explains nearly as much.
+
+        Joints of one robot are built alike: what one of them has, another one has rather than
+        something else that looks like it there. Where either could be called as the other is, the
+        one that explains more names both.
+        """
+        for step in steps:
+            old = step.added
+            if old is None or old.kind == UNKNOWN or get_effect(old.kind).is_exact:
+                continue  # a formula that is exact, and explains as much, is right
+            for other in list(self.findings):
+                if old is other or not all(map(self._of_own_joints, (old, other))):
+                    continue
+                both = self._also(other, old.kind, steps) is not None
+                if set(old.joints) & set(other.joints) or (both and old.score > other.score):
+                    continue
+                same = self._also(old, other.kind, steps)
+                if same is None or same.kind == old.kind:
+                    continue
+                place = self.findings.index(old)
+                self.chosen = [c for c in self.chosen if c not in old.candidates]
+                judged = self.judged(same)
+                if judged is None or judged.joints != old.joints:
+                    self.chosen += old.candidates
+                    continue
+                margin = max(0.0, 1 - old.score / same.score)
+                new = replace(judged, margin=margin)
+                self.chosen += new.candidates
+                self.findings[place] = step.added = new
+                self.refit()
+                self.sigma = self.weights()
+                break
+
+    def _of_own_joints(self, finding: Hypothesis) -> bool:
+        """Whether it is a known effect, found on averaged rows, on single joints in all recordings."""
+        if finding not in self.findings or finding.kind == UNKNOWN or within_recordings(finding):
+            return False
+        effect = get_effect(finding.kind)
+        return finding.torque is None and effect.scope == "joint" and effect.search == "grid"
+
+    def _also(self, finding: Hypothesis, kind: str, steps: Sequence[Step]) -> Hypothesis | None:
+        """Another kind on the same joints that explains nearly as much as a finding."""
+        least = (1 - self.settings.simpler_share) * finding.score
+        near = [
+            h
+            for step in steps
+            if step.added is finding
+            for h in step.ranking
+            if h.kind == kind and h.joints == finding.joints and h.score >= least
+        ]
+        return max(near, key=lambda h: h.score, default=None)
 
     def withdraw(self, newest: Hypothesis | None = None) -> Hypothesis | None:
         """Take back what no longer holds beside all that was added after it.

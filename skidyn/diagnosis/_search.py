@@ -87,6 +87,7 @@ class _Search(ReconsideringSearch):
             self.reconsider(best, steps)
         self.sigma = self.weights()
         self.withdraw()
+        self.name_alike(steps)
         everywhere = range(self.problem.n_joints)
         inflation = variance_inflation(self.problem, self.fit.residual, everywhere)
         return SearchResult(

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What is tried depends on the log and on the model."""
 
+import numpy as np
+
 from skidyn.diagnosis import catalogue_candidates
 
 
@@ -16,3 +18,10 @@ def test_shapes_make_candidates_of_one_site(missing):
     sites = [c.site for c in candidates]
     assert len(sites) > len(set(sites)) == 2
     assert all(c.n_shapes > 0 and c.width == len(c.lowest) for c in candidates)
+
+
+def test_physics_forbids_a_stop_that_pulls(missing):
+    stop = next(
+        c for c in catalogue_candidates(missing.problem, ["end_stop"]) if not c.is_further_form
+    )
+    assert stop.allows(np.array([2.0])) and not stop.allows(np.array([-2.0]))

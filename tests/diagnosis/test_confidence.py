@@ -16,6 +16,7 @@ def test_a_clear_name_is_sure_but_never_certain():
         {"nameless": True},
         {"whole_recordings": False},
         {"alike": True},
+        {"few": True},
     ],
 )
 def test_what_speaks_against_a_name_lowers_it(against):
@@ -27,6 +28,11 @@ def test_margin_white_remainder_and_size_raise_it():
     assert confidence(0.6, 4.0, 0.05) > middle
     assert confidence(0.3, 2.0, 0.05) > middle
     assert confidence(0.3, 4.0, 0.2) > middle
+
+
+def test_an_equal_explanation_lowers_it_below_what_is_sure():
+    assert confidence(0.0, 1.0, 0.3) > 0.9 > confidence(0.0, 1.0, 0.3, rivalled=True)
+    assert confidence(0.1, 1.0, 0.3, rivalled=True) == confidence(0.1, 1.0, 0.3)
 
 
 def test_that_something_has_no_name_is_less_sure():

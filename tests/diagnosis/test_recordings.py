@@ -34,3 +34,12 @@ def test_a_sensor_zeroed_anew_before_each_recording(log):
     kinds, _ = found(log, log.X, torque)
 
     assert set(kinds) == {("offset", (2,))}  # one finding for every recording that differs
+
+
+def test_a_gain_that_changed_for_some_recordings(log):
+    torque = np.array(log.y)
+    torque[np.isin(log.X["trajectory"], [3, 7]), 1] *= 1.3
+
+    kinds, _ = found(log, log.X, torque)
+
+    assert set(kinds) == {("torque_gain", (2,))}

@@ -100,3 +100,22 @@ def test_a_coupling_that_bodies_make_the_same_on_another_pair_of_joints_names_bo
     assert {finding.joints, *finding.elsewhere} == {(1, 4), (2, 4)}
     assert finding.confidence < 0.5
     assert "as much on joints" in finding.sentence
+
+
+def test_a_narrow_bump_is_one_function_of_the_position_and_not_a_spring_and_a_stop(arm_log):
+    q = arm_log.X["q1"].to_numpy()
+    middle, span = np.median(q), np.ptp(q)
+    torque = np.array(arm_log.y)
+    torque[:, 0] += np.std(torque[:, 0]) * np.exp(-(((q - middle) / (0.12 * span)) ** 2))
+
+    assert found_in(load_planar_arm(), arm_log.X, torque) == {"unknown": {1}}
+
+
+def test_a_cable_that_only_pulls_between_two_joints(arm_log):
+    q = arm_log.X[["q1", "q2"]].to_numpy()
+    x = q[:, 0] - 0.8 * q[:, 1]
+    torque = np.array(arm_log.y)
+    pull = np.std(torque[:, 1]) * np.maximum(0.0, x - np.median(x))
+    torque += pull[:, None] * [1.0, -0.8]
+
+    assert found_in(load_planar_arm(), arm_log.X, torque) == {"coupling_spring": {1, 2}}
