@@ -66,7 +66,7 @@ class Candidate:
         return self.term.is_further_form
 
     def allows(self, coefficients: Array) -> bool:
-        """Whether physics allows coefficients; those that are nothing beside the rest have any sign.
+        """Whether physics allows coefficients; what is nothing beside the rest has any sign.
 
         Parameters
         ----------

@@ -239,7 +239,7 @@ class ReconsideringSearch(JudgingSearch):
                 break
 
     def _of_own_joints(self, finding: Hypothesis) -> bool:
-        """Whether it is a known effect, found on averaged rows, on single joints in all recordings."""
+        """Whether it is a known effect on single joints, found on averaged rows of all."""
         if finding not in self.findings or finding.kind == UNKNOWN or within_recordings(finding):
             return False
         effect = get_effect(finding.kind)

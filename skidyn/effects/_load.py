@@ -21,8 +21,8 @@ class LoadDependentFriction(Effect):
     the joint, as the efficiency of many gears does. One that is ``viscous`` grows with the speed,
     too, in units of 1 rad/s or 1 m/s, so that ``mu`` has no unit. Where the torque of the drive
     counts, the load has the ``friction`` (N m or N) and the ``damping`` beside it that the drive
-    has to overcome as well. A preloaded gear feels what exceeds a ``threshold``, N m or N; one flank
-    that rubs feels load of one sign (``side``, 1 or -1).
+    has to overcome as well. A preloaded gear feels what exceeds a ``threshold``, N m or N; one
+    flank that rubs feels load of one sign (``side``, 1 or -1).
 
     The gear transmits what the bodies need at the joint; the torque that accelerates the rotor is
     spent before it, and is no part of the load.

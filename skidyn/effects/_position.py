@@ -76,7 +76,8 @@ class PositionDependentFriction(Effect):
             return {"dFc": a, "dFv": b, **shape}
         told = {"A": float(np.hypot(a, b)), "phase": float(np.arctan2(b, a)), **shape}
         if more:
-            told |= {"A2": float(np.hypot(*more)), "phase2": float(np.arctan2(*more[::-1]))}
+            c, d = more
+            told |= {"A2": float(np.hypot(c, d)), "phase2": float(np.arctan2(d, c))}
         return told
 
     def units(self, prismatic: bool = False) -> dict[str, str]:

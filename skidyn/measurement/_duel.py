@@ -178,9 +178,9 @@ def _shapes(
 ) -> Iterator[ExtraColumns]:
     """Columns of an effect on some joints, in all shapes of its grid."""
     signals, fits = bodies.signals, bodies.fits
-    body = effect.kind == "payload" and signals.robot is not None  # it is but another body
-    if body:
-        masses = np.asarray(signals.robot.inertial_parameters, dtype=float).reshape(-1, 10)[:, 0]
+    robot = signals.robot if effect.kind == "payload" else None  # it is but another body
+    if robot is not None:
+        masses = np.asarray(robot.inertial_parameters, dtype=float).reshape(-1, 10)[:, 0]
         known = CARRIED * float(masses.sum()) * AWAY**POWERS
     for site in effect.sites(signals):
         if not set(site) & set(joints):
@@ -195,9 +195,11 @@ def _shapes(
             coefficients = effect.coefficients_of(shape)
             if len(coefficients) > len(effect.coefficients):
                 continue  # a form with more of them takes the place of anything in a simple motion
-            spread = known if body else np.full(len(coefficients), np.inf)
+            spread = known if robot is not None else np.full(len(coefficients), np.inf)
             # what one recording lacks of a load, the others may carry: its mass is negative then
-            signs = [rows is None, *[False] * 9] if body else [c.sign == 1 for c in coefficients]
+            signs = [c.sign == 1 for c in coefficients]
+            if robot is not None:
+                signs = [rows is None, *[False] * 9]
             positive = tuple(np.flatnonzero(signs).tolist())
             columns = {
                 j: fits.average(np.asarray(values))

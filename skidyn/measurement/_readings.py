@@ -180,9 +180,7 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
         if strong and (plain or confirmed >= NEEDED[change.kind]):
             alike = [c for c in judged if c.kind != change.kind and _same_place(c, change)]
             within = max(TIED, RIVALS * change.gain)
-            alike = [
-                c for c in alike if change.gain - c.gain < within or _but_for_angle(c, change)
-            ]
+            alike = [c for c in alike if change.gain - c.gain < within or _but_for_angle(c, change)]
             rivals = tuple(dict.fromkeys(c.kind for c in alike))
             accepted.append(replace(change, confirmed=confirmed, rivals=rivals))
     while accepted:
