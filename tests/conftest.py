@@ -57,8 +57,10 @@ def sticky_servo():
     return _servo_log({Term("stribeck", (2,), {"vs": 0.1, "delta": 2.0}): 0.15})
 
 
-def _servo_log(terms):
-    """A planar arm behind servos, with rounded positions and no torque."""
+def _servo_log(terms, **untold):
+    """A planar arm behind servos, with rounded positions, no torque, and what nobody was told."""
+    from dataclasses import replace
+
     import numpy as np
 
     from skidyn.datasets import load_planar_arm, make_hidden_effect_log
@@ -74,7 +76,7 @@ def _servo_log(terms):
         size = terms[term] if term in terms else friction[term.kind][term.places[0]]
         truth.effect_coefficients_[term] = np.array([size])
     wanted = log.X.assign(q_ref1=log.X["q1"], q_ref2=log.X["q2"])
-    moved = simulate(truth, wanted, controller=servo, step=2.5e-3)
+    moved = simulate(truth, wanted, controller=replace(servo, **untold), step=2.5e-3)
     for j in (1, 2):
         moved[f"q{j}"] = np.round(moved[f"q{j}"] / encoder) * encoder
         for _, run in moved.groupby("trajectory"):

@@ -108,13 +108,13 @@ def _answer(options: argparse.Namespace) -> dict[str, Any]:
     with noting() as noted:
         try:
             model, frame, tau, controller = read_driven(options, check=False)
-            diagnosis = run_diagnosis(model, frame, tau, options)
+            diagnosis = run_diagnosis(model, frame, tau, options, controller=controller)
         except MisreadLogError as error:
             if options.clock != "auto" or {s.check for s in error.suspicions} != {"clock_jitter"}:
                 raise
             options = argparse.Namespace(**vars(options) | {"clock": "regular"})
             model, frame, tau, controller = read_driven(options, check=False)
-            diagnosis = run_diagnosis(model, frame, tau, options)
+            diagnosis = run_diagnosis(model, frame, tau, options, controller=controller)
             mended = [_mended(jitter) for jitter in error.suspicions]
             diagnosis.checks[:0] = mended
             diagnosis.warnings[:0] = map(str, mended)
@@ -151,6 +151,8 @@ def _mended(jitter: Suspicion) -> Suspicion:
 
 def _next(answer: dict[str, Any], options: argparse.Namespace) -> list[str]:
     """The commands that may follow."""
+    from skidyn.simulation import SERVO_EFFECTS
+
     if not options.out:
         if options.html:
             return []
@@ -163,6 +165,9 @@ def _next(answer: dict[str, Any], options: argparse.Namespace) -> list[str]:
     if named:
         joints = ",".join(map(str, named[0]["joints"]))
         kind = named[0]["kind"]
+    if named and kind in SERVO_EFFECTS:
+        lines.append(f"next: the same with {named[0]['size']} in --controller")
+    elif named:
         lines.append(f"next: skidyn add --from {report} --effect {kind} --joints {joints}")
     if answer["rivals"]:
         lines.append(f"next: skidyn separate --from {report} --out motion.csv")

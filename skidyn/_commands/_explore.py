@@ -8,8 +8,8 @@ import json
 from pathlib import Path
 from typing import Any
 
-from skidyn._commands._arguments import command, with_log
-from skidyn._commands._input import covered_joints, read_model_and_log, reading
+from skidyn._commands._arguments import command, with_controller, with_log
+from skidyn._commands._input import covered_joints, read_driven, reading
 from skidyn._commands._output import working
 
 DESCRIPTION = """\
@@ -28,6 +28,7 @@ def add_parser(commands: Any) -> None:
     with_log(parser)
     parser.add_argument("--folder", default=".", help="where results are saved (default: here)")
     parser.add_argument("--port", type=int, default=0, help="port (default: a free one)")
+    with_controller(parser, "compute the torque of a log without from the commands of its servos")
     parser.add_argument("--no-browser", action="store_true", help="only print the address")
 
 
@@ -36,7 +37,7 @@ def run(options: argparse.Namespace) -> None:
 
     from skidyn.explorer import Session, serve
 
-    model, frame, tau = read_model_and_log(options)
+    model, frame, tau, controller = read_driven(options)
     with working("Preparing", options):
         session = Session(model, frame, tau)
 
@@ -56,6 +57,8 @@ def run(options: argparse.Namespace) -> None:
         urdf=str(Path(options.urdf).resolve()),
         joints=covered_joints(options),
         reading=reading(options),
+        # the script computes the torque only where the log has none
+        controller=None if "tau1" in frame else controller,
         port=options.port,
         ready=ready,
     )

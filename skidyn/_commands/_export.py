@@ -7,7 +7,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from skidyn._commands._arguments import Input, Output, command, with_log
+from skidyn._commands._arguments import Input, Output, command, with_controller, with_log
 from skidyn._commands._input import json_option, read_model_and_log
 from skidyn._commands._output import print_json, working
 from skidyn._exceptions import SkidynError
@@ -74,6 +74,7 @@ def add_parser(commands: Any) -> None:
         "--motor", metavar="JSON", help='constants of the servo, for bam: \'{"kt": 0.4, "R": 3}\''
     )
     parser.add_argument("--consistent", action="store_true", help="only physically possible bodies")
+    with_controller(parser, "compute the torque of a log without from the commands of its servos")
 
 
 def run(options: argparse.Namespace) -> None:

@@ -6,13 +6,13 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from skidyn._commands._arguments import JsonFile, command, with_log
-from skidyn._commands._input import read_model_and_log
+from skidyn._commands._arguments import JsonFile, command, with_controller, with_log
+from skidyn._commands._input import read_driven
 from skidyn._commands._output import parameters, print_json, working
 from skidyn._writing import write_json
 
 #: Those that need nothing but a log.
-ESTIMATORS = ("weighted", "ordinary", "robust", "ridge", "entropic")
+ESTIMATORS = ("weighted", "ordinary", "robust", "ridge", "entropic", "output_error")
 DESCRIPTION = """\
 Identify inertial parameters and effects together and print them with standard errors that hold for
 autocorrelated residuals. Single masses can rarely be identified: what is printed are the
@@ -21,6 +21,12 @@ combinations that can, how well the motion excites them, and which ones the data
   skidyn identify run*.csv --urdf robot.urdf --out parameters.json
   skidyn identify run*.csv --urdf robot.urdf --consistent     only physically possible bodies
   skidyn identify run*.csv --urdf robot.urdf --estimator robust
+
+output_error takes the parameters whose simulated motion is nearest to the logged one. A log of
+position servos needs no torque but their commands (cmd1.. or q_ref1..):
+
+  skidyn identify servos.csv --urdf robot.urdf --nominal --controller fit \\
+      --model rigid_body,viscous,coulomb,rotor_inertia --estimator output_error
 """
 
 
@@ -47,15 +53,21 @@ def add_parser(commands: Any) -> None:
         action="store_true",
         help="print only the parameters that the data determines well",
     )
+    with_controller(parser, "compute the torque of a log without from the commands of its servos")
 
 
 def run(options: argparse.Namespace) -> None:
-    model, frame, tau = read_model_and_log(options)
+    model, frame, tau, controller = read_driven(options)
     model.set_params(
         consistent=options.consistent, estimator=options.estimator, prior_std=options.prior_std
     )
+    driven: dict[str, Any] = {}
+    if controller is not None and options.estimator == "output_error":
+        # pieces would begin at velocities that are differences of positions
+        model.set_params(horizon=None)
+        driven["controller"] = controller
     with working("Identifying", options):
-        model.fit(frame, tau)
+        model.fit(frame, tau, **driven)
     content = parameters(model)
     if options.out:
         write_json(options.out, content)

@@ -25,7 +25,12 @@ if TYPE_CHECKING:
 
 
 def run_diagnosis(
-    model: Any, frame: Any, tau: Any, options: argparse.Namespace, kinds: Any = None
+    model: Any,
+    frame: Any,
+    tau: Any,
+    options: argparse.Namespace,
+    kinds: Any = None,
+    controller: Controller | None = None,
 ) -> Diagnosis:
     from skidyn.diagnosis import Settings, diagnose
 
@@ -41,12 +46,13 @@ def run_diagnosis(
         return diagnose(
             model,
             frame,
-            tau,
+            None if controller is not None and "tau1" not in frame else tau,
             effects=kinds,
             rate=rate,
             settings=settings,
             force=force,
             n_jobs=getattr(options, "jobs", -1),
+            controller=controller,
         )
 
 

@@ -43,6 +43,7 @@ from skidyn.measurement import (
     refuse_certain,
 )
 from skidyn.robots import Robot
+from skidyn.simulation import Controller, servo_torque
 
 #: Checks of the clock after which a wave in time may be of the logger.
 UNSTEADY = {"repeated_rows", "interpolated_rows", "clock_jitter"}
@@ -51,8 +52,9 @@ UNSTEADY = {"repeated_rows", "interpolated_rows", "clock_jitter"}
 def diagnose(
     model: Any,
     X: Any,
-    tau: Any,
+    tau: Any = None,
     *,
+    controller: Controller | None = None,
     robot: Robot | None = None,
     effects: Iterable[str] | None = None,
     trajectory: ColumnSpec = "auto",
@@ -76,8 +78,13 @@ def diagnose(
         ``Pipeline`` is a ``Pipeline``.
     X : DataFrame or array of shape (n_samples, n_features)
         Motion, following the X contract, with ``time`` and ``trajectory`` where they are known.
-    tau : array-like of shape (n_samples, n_joints)
-        Measured torque, N m (N for sliders).
+    tau : array-like of shape (n_samples, n_joints), optional
+        Measured torque, N m (N for sliders); may be left out with a controller.
+    controller : Controller, optional
+        Position servos from whose commands in X (``q_ref1..`` or ``cmd1..``) the torque is computed
+        where ``tau`` is None (:func:`skidyn.simulation.servo_torque`). There is no sensor then that
+        could be wrong, so that checks of it are left out, and a limit that all servos are known to
+        have is no effect.
     robot : Robot, optional
         Needed for regressors that have none of their own.
     effects : iterable of str, optional
@@ -116,7 +123,8 @@ def diagnose(
     EffectError
         The catalogue has no such effect.
     ValueError
-        ``settings``, ``smooth`` or ``n_jobs`` has no meaning.
+        ``settings``, ``smooth`` or ``n_jobs`` has no meaning, or neither torque nor controller is
+        given.
 
     Examples
     --------
@@ -128,6 +136,14 @@ def diagnose(
     [('stribeck', (2,))]
     """
     # many small matrices: more threads only wait for each other
+    of_servos = tau is None
+    if of_servos:
+        if controller is None:
+            raise ValueError(
+                "tau is None; pass the measured torque, or controller=Controller(...) for a log of "
+                "position servos without"
+            )
+        tau = servo_torque(controller, X)
     with threadpool_limits(1), cores(n_jobs):
         opened = open_model(model, X, tau)
         diagnosis = _diagnose(
@@ -143,7 +159,9 @@ def diagnose(
             settings or Settings(),
             force,
             sample_weight,
+            controller if of_servos else None,
         )
+        diagnosis.controller = controller
         if opened.outer:
             diagnosis.opened = opened
             diagnosis.__dict__.pop("model", None)
@@ -163,6 +181,7 @@ def _diagnose(
     settings: Settings,
     force: bool,
     sample_weight: Any,
+    servos: Controller | None,
 ) -> Diagnosis:
     if isinstance(effects, str):
         raise EffectError(f"effects={effects!r} is one word; write a list, effects=[{effects!r}]")
@@ -192,7 +211,16 @@ def _diagnose(
         )
     kinds = list_effects() if effects is None else list(effects)
     identified = getattr(model, "parameters", "identified") == "identified"
-    measurement = Measurement(signals, torque, robot, robot.joint_names, identified=identified)
+    if servos is not None and np.isfinite(servos.checked(robot.n_joints).limit).all():
+        kinds = [kind for kind in kinds if kind != "saturation"]
+    measurement = Measurement(
+        signals,
+        torque,
+        robot,
+        robot.joint_names,
+        identified=identified,
+        of_servos=servos is not None,
+    )
     once = ~copied_rows(signals, torque)
     judged, kept_weight = torque, weight
     if not once.all():

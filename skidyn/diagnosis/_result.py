@@ -29,6 +29,7 @@ from skidyn.identification import RBDRegressor
 from skidyn.measurement import Suspicion
 from skidyn.simulation import (
     HORIZON,
+    LAWS,
     Controller,
     InTurn,
     ServoFinding,
@@ -100,6 +101,8 @@ class Diagnosis:
         What :meth:`judge_by_simulation` found for every finding and for all together.
     servo_motion : list of ServoFinding or None
         What :meth:`explain_servo_motion` named; None before.
+    controller : Controller or None
+        Position servos that :func:`diagnose` was told of.
 
     Examples
     --------
@@ -133,6 +136,7 @@ class Diagnosis:
     vetoed: list[Finding] = field(repr=False, default_factory=list)
     in_turn: InTurn | None = field(repr=False, default=None)
     servo_motion: list[ServoFinding] | None = None
+    controller: Controller | None = field(default=None, repr=False)
 
     def __repr__(self) -> str:
         units = ["N" if slides else "N m" for slides in self.problem.signals.prismatic]
@@ -301,33 +305,33 @@ class Diagnosis:
         self.__dict__.pop("model", None)
         return verdicts
 
-    def explain_servo_motion(self, controller: Controller) -> list[ServoFinding]:
+    def explain_servo_motion(self, controller: Controller | None = None) -> list[ServoFinding]:
         """Name what the motion of position servos lacks where the torque does not say it.
 
         A torque that was made from a servo's error hides what lasts hundredths of a second. Joints
-        that have no finding with a name yet, or one of the hysteresis family, of rotor inertia, of
-        an offset or of a torque that the controller limits, are simulated in
-        their loops (:func:`skidyn.simulation.explain_servo_motion`), beside those whose gear is
-        known to give way. What is named there takes the place of nameless functions and hysteresis
+        are simulated in their loops (:func:`skidyn.simulation.explain_servo_motion`) with the
+        findings that such a simulation has, and without nameless functions, hysteresis, offsets
+        and a torque that the controller limits; joints with other findings are left out. What is
+        named there takes the place of nameless functions and hysteresis
         on its joint; :attr:`findings` stay as they are. It is kept in :attr:`servo_motion`, stands
         in the report and on the page, and a diagnosis without any other finding is no longer
         ``"complete"``.
 
         Parameters
         ----------
-        controller : Controller
+        controller : Controller, optional
             Gains, delay and limit of the servos; X must hold the commands ``q_ref1..`` or
-            ``cmd1..``.
+            ``cmd1..``. By default :attr:`controller`.
 
         Returns
         -------
         list of ServoFinding
-            One or none.
+            In the order in which they were taken.
 
         Raises
         ------
         SkidynError
-            The model is no RBDRegressor, or the log has no commands.
+            The model is no RBDRegressor, no controller is known, or the log has no commands.
         LogError
             The log is too short.
         """
@@ -336,8 +340,11 @@ class Diagnosis:
                 f"the model is {type(self.base_model).__name__}; a simulation needs the inertia of "
                 "an RBDRegressor"
             )
+        controller = self.controller if controller is None else controller
+        if controller is None:
+            raise SkidynError("controller is missing: gains of the servos, Controller(...)")
         named: set[int] = set()
-        gears: set[int] = set()
+        known: list[tuple[str, int]] = []
         # A limit that the controller has is simulated, and is no name of what moves the joint.
         limited = np.isfinite(controller.checked(len(self.joint_names)).limit)
         for finding in self.findings:
@@ -346,16 +353,20 @@ class Diagnosis:
                 continue
             if finding.kind == "saturation" and all(limited[j - 1] for j in finding.joints):
                 continue
-            named |= set(finding.joints)
-            gears |= set(finding.joints) if effect.moves_link else set()
-        # A link that moves by itself is felt by other joints, which must not be told to do so.
-        joints = [j for j in range(1, len(self.joint_names) + 1) if j in gears or j not in named]
-        found = []
-        if set(joints) - gears:
-            rotors = [t for f in self.findings if f.kind == "rotor_inertia" for t in f.terms]
-            model = self.base_model.with_effects(rotors).fit(*self.data)
-            found = explain_servo_motion(model, self.data[0], controller, joints=joints)
-        self.servo_motion = [f for f in found if f.joint not in gears]
+            if finding.kind in LAWS:
+                known += [(finding.kind, j) for j in finding.joints]
+            else:
+                named |= set(finding.joints)
+        joints = [j for j in range(1, len(self.joint_names) + 1) if j not in named]
+        found: list[ServoFinding] = []
+        if joints:
+            # Bodies that were fitted without what is known would be bent by it.
+            terms = [t for f in self.findings if f.kind in (*LAWS, *_PLAIN) for t in f.terms]
+            model = self.base_model.with_effects(terms).fit(*self.data)
+            found = explain_servo_motion(
+                model, self.data[0], controller, joints=joints, known=known
+            )
+        self.servo_motion = found
         if not self.findings and self.verdict != "unknown":
             self.verdict = "missing" if self.servo_motion else "complete"
         return self.servo_motion

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from skidyn._text import inside, joints_told, listed
 from skidyn.effects import get_effect
+from skidyn.simulation import title_of
 
 if TYPE_CHECKING:
     from skidyn.diagnosis._findings import Finding
@@ -50,7 +51,7 @@ def servo_motion_told(
                 for model, error in (
                     ("friction alone", found.before),
                     (inside(found.title), found.after),
-                    (inside(get_effect(found.rival).title), found.beside),
+                    (inside(title_of(found.rival)), found.beside),
                 )
             ],
         }
@@ -73,5 +74,6 @@ def _text(named: Sequence[ServoFinding], findings: Sequence[Finding]) -> str:
         and (finding.kind == "unknown" or get_effect(finding.kind).family == "hysteresis")
     ]
     if not same:
-        return "The torque does not show it."
-    return f"It takes the place of a finding that the torque could not name: {listed(same)}."
+        return f"The torque does not show {'it' if len(named) == 1 else 'them'}."
+    takes = "It takes" if len(named) == 1 else "They take"
+    return f"{takes} the place of what the torque could not name: {listed(same)}."

@@ -11,6 +11,7 @@ import numpy as np
 
 from skidyn.effects import Term
 from skidyn.identification import RBDRegressor
+from skidyn.simulation import Controller
 
 
 def script(
@@ -20,6 +21,7 @@ def script(
     urdf: str,
     joints: Sequence[str] | None,
     reading: Mapping[str, Any],
+    controller: Controller | None = None,
 ) -> str:
     """Python source that repeats the clicks.
 
@@ -37,23 +39,36 @@ def script(
         Joints the log covers.
     reading : mapping
         Further arguments of :func:`skidyn.logs.read_log`; None where not given.
+    controller : Controller, optional
+        Position servos whose torque is computed from their commands.
     """
     effects = ", ".join(_source(e) for e in model.effects)
     only = "" if joints is None else f", joints={list(joints)!r}"
     how = "".join(f", {k}={_plain(v)!r}" for k, v in reading.items() if v is not None)
+    torque = ['tau = log[[f"tau{j + 1}" for j in range(robot.n_joints)]].to_numpy()']
+    if controller is not None:
+        how += ", needs_torque=False"
+        gains = "".join(f", {k}={_plain(v)!r}" for k, v in vars(controller).items())[2:]
+        torque = [f"tau = servo_torque(Controller({gains.replace('inf', 'np.inf')}), log)"]
     lines = [
         '"""What was clicked in skidyn explore; prints the held-out errors that it showed."""',
         "",
+        *(["import numpy as np", ""] if "np." in torque[0] else []),
         "from skidyn import save_model",
         "from skidyn.logs import read_log",
         *(["from skidyn.effects import Term"] if "Term(" in effects else []),
         "from skidyn.explorer import Session",
         "from skidyn.identification import RBDRegressor",
         "from skidyn.robots import Robot",
+        *(
+            ["from skidyn.simulation import Controller, servo_torque"]
+            if controller is not None
+            else []
+        ),
         "",
         f"robot = Robot.from_file({str(urdf)!r}{only})",
         f"log = read_log({[str(name) for name in logs]!r}, robot=robot{how})",
-        'tau = log[[f"tau{j + 1}" for j in range(robot.n_joints)]].to_numpy()',
+        *torque,
         f"session = Session(RBDRegressor(robot, [{effects}]{_changed(model)}), log, tau)",
         *(f"session.add({kind!r}, joint={joint})" for kind, joint in clicks),
         "for step in session.history:",

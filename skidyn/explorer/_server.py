@@ -22,6 +22,7 @@ from skidyn._optional import import_optional
 from skidyn._progress import listening
 from skidyn.explorer._session import Session
 from skidyn.identification import RBDRegressor
+from skidyn.simulation import Controller
 
 #: What saving writes, into the folder chosen at the start.
 SAVED = ("model.skops", "explored.py", "report.html")
@@ -47,6 +48,8 @@ class Explorer:
         Joints the log covers, for the script.
     reading : mapping, optional
         Further arguments with which the log was read, for the script.
+    controller : Controller, optional
+        Position servos whose torque was computed from their commands, for the script.
     """
 
     def __init__(
@@ -57,7 +60,9 @@ class Explorer:
         urdf: str = "robot.urdf",
         joints: Sequence[str] | None = None,
         reading: Mapping[str, Any] | None = None,
+        controller: Controller | None = None,
     ) -> None:
+        self.controller = controller
         self.session, self.folder = session, Path(folder)
         self.logs, self.urdf = list(logs) or ["log.csv"], urdf
         self.joints, self.reading = joints, reading
@@ -163,7 +168,13 @@ class Explorer:
         self.session.refine()
         self.folder.mkdir(parents=True, exist_ok=True)
         self._saved = self.session.fitted_model()
-        text = self.session.script(self.logs, self.urdf, joints=self.joints, reading=self.reading)
+        text = self.session.script(
+            self.logs,
+            self.urdf,
+            joints=self.joints,
+            reading=self.reading,
+            controller=self.controller,
+        )
         files = [
             save_model(self.folder / "model.skops", self._saved),
             write_text(self.folder / "explored.py", text),
@@ -324,6 +335,7 @@ def serve(
     urdf: str = "robot.urdf",
     joints: Sequence[str] | None = None,
     reading: Mapping[str, Any] | None = None,
+    controller: Controller | None = None,
     port: int = 0,
     ready: Callable[[str], None] = print,
 ) -> None:
@@ -343,6 +355,8 @@ def serve(
         Joints the log covers, for the script.
     reading : mapping, optional
         Further arguments with which :func:`skidyn.logs.read_log` read the log, for the script.
+    controller : Controller, optional
+        Position servos whose torque was computed from their commands, for the script.
     port : int, default=0
         Port; a free one if 0.
     ready : callable, default=print
@@ -359,7 +373,7 @@ def serve(
     http://127.0.0.1:54321/?token=...
     """
     uvicorn = import_optional("uvicorn", extra="explore")
-    explorer = Explorer(session, Path(folder), logs, urdf, joints, reading)
+    explorer = Explorer(session, Path(folder), logs, urdf, joints, reading, controller)
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     listener.bind((HOST, port))

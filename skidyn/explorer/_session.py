@@ -18,6 +18,7 @@ from skidyn.explorer._seen import Seen
 from skidyn.explorer._state import is_fine
 from skidyn.explorer._sure import margin
 from skidyn.identification import RBDRegressor
+from skidyn.simulation import Controller
 
 #: Effects in a ranking.
 RANKED = 8
@@ -310,6 +311,7 @@ class Session(Seen):
         *,
         joints: Sequence[str] | None = None,
         reading: Mapping[str, Any] | None = None,
+        controller: Controller | None = None,
     ) -> str:
         """Python that does the same without a browser.
 
@@ -323,6 +325,8 @@ class Session(Seen):
             Joints the log covers, as given to :meth:`skidyn.robots.Robot.from_urdf`.
         reading : mapping, optional
             Further arguments with which :func:`skidyn.logs.read_log` read the log.
+        controller : Controller, optional
+            Position servos whose torque was computed from their commands.
 
         Returns
         -------
@@ -331,7 +335,7 @@ class Session(Seen):
             the model.
         """
         clicks = [(entry["added"], entry["joint"]) for entry in self.history[1:]]
-        return script(self.model, clicks, logs, urdf, joints, reading or {})
+        return script(self.model, clicks, logs, urdf, joints, reading or {}, controller)
 
     def check_place(self, joint: int, trajectory: int) -> None:
         """Raise unless there are such a joint, counted from 1, and such a trajectory.

@@ -42,7 +42,7 @@ LOST = 1.0
 
 _ALL = (
     "viscous", "coulomb", "offset", "inertia", "weight", "dF", "vs", "mu", "dFc", "square",
-    "presliding", "late", "compliance", "damping", "gap", "motor",
+    "presliding", "late", "compliance", "damping", "gap", "motor", "deadband",
 )  # fmt: skip
 
 
@@ -169,12 +169,27 @@ class JointLoop:
             effects: ``dF`` and ``vs`` (Stribeck), ``mu`` (load), ``dFc`` (direction), ``square``
             (viscous friction that grows with the speed), ``presliding`` (stiffness of a Dahl
             model), ``late`` (s); ``compliance`` and ``damping`` (ratio) of the gear, ``gap`` (half
-            of its play), with ``motor``, the share of the inertia that is the motor's.
+            of its play), with ``motor``, the share of the inertia that is the motor's. Of the
+            servo: ``deadband`` (rad, m) beside the given one.
 
         Returns
         -------
         ndarray of shape (n_models, n_samples, n_pieces)
         """
+        return self._run(parameters)[0]
+
+    def twist(self, parameters: Mapping[str, float]) -> Array:
+        """Motor minus link along a simulation of a gear, shape (n_samples, n_pieces), rad or m.
+
+        Parameters
+        ----------
+        parameters : dict of str to float
+            As of :meth:`run`, with ``compliance``.
+        """
+        return np.asarray(self._run({k: np.array([v]) for k, v in parameters.items()})[1][0])
+
+    def _run(self, parameters: Mapping[str, Array]) -> tuple[Array, Array]:
+        """Positions of the motor, and how far the link is behind it; empty without a gear."""
         given = {k: np.asarray(v, dtype=float)[:, None] for k, v in parameters.items()}
         n_models = len(next(iter(given.values())))
         p = {k: given.get(k, np.zeros((n_models, 1))) for k in _ALL}
@@ -182,12 +197,19 @@ class JointLoop:
         n_samples, n_pieces = self.q.shape
         q = np.tile(self.q[0], (n_models, 1))
         v = np.tile(self.dq[0], (n_models, 1))
+        more = p["inertia"] * self.size
         gear = _Gear(self, p) if "compliance" in given else None
         dahl = "presliding" in given
         bent = np.sign(v) * p["coulomb"]
         if gear is not None:
             gear.hang(0, q, v, True)
-        result = np.empty((n_models, n_samples, n_pieces))
+        result = np.empty((n_samples, n_models, n_pieces))
+        behind = np.empty(result.shape if gear is not None else (0, n_models, 0))
+        servo_of = _Servo(self, p)
+        limit, limited = self.limit, bool(np.isfinite(self.limit))
+        dry_of = _Dry(self, p)
+        heavier, squares = 1 + p["weight"], bool(p["square"].any())
+        offset, brake = 2 * p["offset"], np.maximum(p["coulomb"], TINY)
         held = np.asarray(self.held.any(axis=1))
         parts = np.ceil(np.diff(self.time, axis=0).max(axis=1) / STEP - 1e-9).astype(int)
         for i in range(n_samples):
@@ -197,73 +219,102 @@ class JointLoop:
                 bent = np.where(back, np.sign(v) * p["coulomb"], bent)
                 if gear is not None:
                     gear.hang(i, q, v, back)
-            result[:, i] = q
+            result[i] = q
+            if gear is not None:
+                behind[i] = q - gear.y
             if i == n_samples - 1:
                 break
             n_parts = max(1, int(parts[i]))
             h = (self.time[i + 1] - self.time[i]) / n_parts
             half = h / 2
+            (r1, d1), bias1 = command.at(i, 0.0), self.bias[i]
             for part in range(n_parts):
                 a, b = part / n_parts, (part + 1) / n_parts
-                (r0, d0), (r1, d1) = command.at(i, a), command.at(i, b)
-                bias = (1 + p["weight"]) * (self._at(self.bias, i, a) + self._at(self.bias, i, b))
-                m = self._at(self.inertia, i, a) + p["inertia"] * self.size
-                drag = p["viscous"] + p["square"] * np.abs(v)
-                servo = self._servo(r0 - q) + self.damping * (d0 - v)
-                drive = np.clip(servo, -self.limit, self.limit) - drag * v + 2 * p["offset"]
+                (r0, d0), (r1, d1) = (r1, d1), command.at(i, b)
+                bias0, bias1 = bias1, self._at(self.bias, i, b)
+                bias = heavier * (bias0 + bias1)
+                m = self._at(self.inertia, i, a) + more
+                drag = p["viscous"] + p["square"] * np.abs(v) if squares else p["viscous"]
+                servo = servo_of.torque(r0 - q) + self.damping * (d0 - v)
+                if limited:
+                    servo = np.minimum(np.maximum(servo, -limit), limit)
+                drive = servo - drag * v + offset
                 if gear is None:
                     push, mass = m * v + half * (drive - bias), m + half * drag
                 else:
                     push, mass = gear.push(half, q, v, m, bias)
                     push, mass = push + half * drive, mass + half * drag
-                dry = h * self._dry(i, v, r1 - q, p)
                 if dahl:
-                    dry = 0.0 * dry
-                    yields = 1 - bent * np.sign(v) / np.maximum(p["coulomb"], TINY)
+                    dry: Any = 0.0
+                    yields = 1 - bent * np.sign(v) / brake
                     push = push - h * bent
                     mass = mass + h * half * p["presliding"] * np.maximum(yields, 0.0)
+                else:
+                    dry = h * dry_of.level(i, v, r1 - q)
                 # The servo at the end of the step, without its damping and what moves until then.
                 error = r1 - q - half * v
-                pull = push + half * (self._servo(error) + self.damping * d1)
-                stiffer = half * (self.damping + half * self._slope(error))
+                pull = push + half * (servo_of.torque(error) + self.damping * d1)
+                stiffer = half * (self.damping + half * servo_of.slope(error))
                 new = _held(pull, dry) / (mass + stiffer)
-                servo = self._servo(error - half * new) + self.damping * (d1 - new)
-                beyond = np.abs(servo) > self.limit
-                if beyond.any():
-                    most = np.clip(servo, -self.limit, self.limit)
-                    new = np.where(beyond, _held(push + half * most, dry) / mass, new)
+                if limited:
+                    servo = servo_of.torque(error - half * new) + self.damping * (d1 - new)
+                    beyond = np.abs(servo) > limit
+                    if beyond.any():
+                        most = np.clip(servo, -limit, limit)
+                        new = np.where(beyond, _held(push + half * most, dry) / mass, new)
                 if gear is not None:
                     gear.move(half, new)
                 way = half * (v + new)
                 if dahl:
-                    turn = np.abs(way) * bent / np.maximum(p["coulomb"], TINY)
+                    turn = np.abs(way) * bent / brake
                     bent = bent + p["presliding"] * (way - turn)
                     bent = np.clip(bent, -p["coulomb"], p["coulomb"])
                 q, v = q + way, new
-        return result
+        return np.moveaxis(result, 0, 1), np.moveaxis(behind, 0, 1)
 
     @staticmethod
     def _at(values: Array, i: int, share: float) -> Array:
         """Values at a share of the way from sample i to the next."""
         return np.asarray((1 - share) * values[i] + share * values[i + 1])
 
-    def _dry(self, i: int, v: Array, ahead: Array, p: Mapping[str, Array]) -> Array:
-        """Level of dry friction; at rest its direction is that in which the servo pulls."""
-        level = p["coulomb"] + p["mu"] * np.abs(self.load[i])
-        if p["dF"].any():
-            level = level + p["dF"] * np.exp(-((v / np.maximum(p["vs"], TINY)) ** 2))
-        if p["dFc"].any():
-            level = level + p["dFc"] * np.sign(np.where(v == 0, ahead, v))
-        return np.asarray(np.maximum(level, 0.0) + np.zeros_like(v))
 
-    def _servo(self, error: Array) -> Array:
-        """Torque of an error of position."""
-        if self.deadband:
-            error = np.sign(error) * np.maximum(np.abs(error) - self.deadband, 0.0)
-        return self.stiffness * error
+class _Dry:
+    """Level of dry friction."""
 
-    def _slope(self, error: Array) -> Array:
-        return np.asarray(self.stiffness * (np.abs(error) >= self.deadband))
+    def __init__(self, loop: JointLoop, p: Mapping[str, Array]) -> None:
+        self.p, self.load = p, np.abs(loop.load)
+        self.fast = np.maximum(p["vs"], TINY)
+        self.sticks, self.leans = bool(p["dF"].any()), bool(p["dFc"].any())
+        self.loaded = bool(p["mu"].any())
+
+    def level(self, i: int, v: Array, ahead: Array) -> Array:
+        """At a sample; at rest its direction is that in which the servo pulls."""
+        level = self.p["coulomb"]
+        if self.loaded:
+            level = level + self.p["mu"] * self.load[i]
+        if self.sticks:
+            level = level + self.p["dF"] * np.exp(-((v / self.fast) ** 2))
+        if self.leans:
+            level = level + self.p["dFc"] * np.sign(np.where(v == 0, ahead, v))
+        return np.maximum(level, 0.0)
+
+
+class _Servo:
+    """Gain and deadband of the servo."""
+
+    def __init__(self, loop: JointLoop, p: Mapping[str, Array]) -> None:
+        self.gain, self.band = loop.stiffness, loop.deadband + p["deadband"]
+        self.any_band = bool(self.band.any())
+
+    def torque(self, error: Array) -> Array:
+        """Torque of an error of position, without damping."""
+        if self.any_band:
+            error = np.sign(error) * np.maximum(np.abs(error) - self.band, 0.0)
+        return self.gain * error
+
+    def slope(self, error: Array) -> Any:
+        """How the torque falls when the joint moves on."""
+        return self.gain * (np.abs(error) >= self.band) if self.any_band else self.gain
 
 
 class _Gear:
@@ -318,17 +369,29 @@ class _Command:
         self.late = late
         self.shifted = bool(np.any(late))
         if self.shifted:
-            shape = (len(late), *loop.q.shape)
-            self.command, self.rate = np.empty(shape), np.empty(shape)
-            for k in range(loop.q.shape[1]):
+            n_samples, n_pieces = loop.q.shape
+            self.command = np.empty((n_samples, len(late), n_pieces))
+            self.rate = np.zeros((n_samples, 1, 1))
+            moves = bool(loop.rate.any())
+            if moves:
+                self.rate = np.empty_like(self.command)
+            lags = np.unique(late)
+            models = [np.flatnonzero(late == lag) for lag in lags]
+            for k in range(n_pieces):
                 time = loop.time[:, k]
-                for m, lag in enumerate(late):
-                    self.command[m, :, k] = np.interp(time - lag, time, loop.command[:, k])
-                    self.rate[m, :, k] = np.interp(time - lag, time, loop.rate[:, k])
+                for lag, same in zip(lags, models, strict=True):
+                    wanted = np.interp(time - lag, time, loop.command[:, k])
+                    self.command[:, same, k] = wanted[:, None]
+                    if moves:
+                        rate = np.interp(time - lag, time, loop.rate[:, k])
+                        self.rate[:, same, k] = rate[:, None]
         else:
-            self.command, self.rate = loop.command[None], loop.rate[None]
+            self.command, self.rate = loop.command[:, None], loop.rate[:, None]
 
     def at(self, i: int, share: float) -> tuple[Array, Array]:
         """At a share of the way from sample i to the next."""
-        both = (self.command, self.rate)
-        return tuple(x[:, i] + share * (x[:, i + 1] - x[:, i]) for x in both)  # type: ignore[return-value]
+        wanted, rate = self.command, self.rate
+        return (
+            wanted[i] + share * (wanted[i + 1] - wanted[i]),
+            rate[i] + share * (rate[i + 1] - rate[i]),
+        )

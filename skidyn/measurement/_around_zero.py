@@ -34,6 +34,7 @@ class DeadBand(Check):
     """Torque or current that is zero below some size."""
 
     name = "dead_band"
+    of_sensor = True
     suspects = "torque or current that is reported as zero where it is small"
     misnames = True
 
@@ -87,6 +88,7 @@ class TaredTorque(Check):
     """Torque that was set to zero for each recording, with the gravity that it held there."""
 
     name = "tared_torque"
+    of_sensor = True
     suspects = "torque that was set to zero at the start of recordings, or whose mean was taken off"
     misnames = True
 

@@ -436,6 +436,7 @@ class NoFriction(Check):
     """Torque without friction."""
 
     name = "no_friction"
+    of_sensor = True
     suspects = "torque from which friction was taken off, or that was measured behind the gears"
     stage = 2
 
@@ -458,6 +459,7 @@ class ComputedTorque(Check):
     """Torque that equals a model: commanded or computed, not measured."""
 
     name = "computed_torque"
+    of_sensor = True
     suspects = "commanded or computed torque in the place of a measured one"
     stage = 2
 

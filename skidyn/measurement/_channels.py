@@ -85,6 +85,7 @@ class ConstantTorque(Check):
     """A torque that never changes: in the log, in a trajectory, or at the ends of trajectories."""
 
     name = "constant_torque"
+    of_sensor = True
     suspects = (
         "torque that is constant, in the whole log, in some trajectories, or before drives are "
         "enabled"
@@ -133,6 +134,7 @@ class ClippedTorque(Check):
     """A torque that stays at its extreme value."""
 
     name = "clipped_torque"
+    of_sensor = True
     suspects = "torque that is clipped: sensor or drive saturates"
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
@@ -152,6 +154,7 @@ class SmoothTorque(Check):
     """Torque without any noise: filtered before it was recorded, or computed."""
 
     name = "smooth_torque"
+    of_sensor = True
     suspects = "torque that was filtered before it was recorded, so that its noise is not known"
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
@@ -178,6 +181,7 @@ class HeldTorque(Check):
     """A torque that holds its last value while joints move on."""
 
     name = "held_torque"
+    of_sensor = True
     suspects = "torque that holds its last value: reported less often than the positions"
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:

@@ -32,6 +32,9 @@ class Check(ABC):
         Whether an effect that a diagnosis names would be that of the mistake, so that it names none
         where the check suspects something. Not where a missing effect may be taken for the
         mistake: a spring for a zero or a sign, a payload of one recording for an odd one.
+    of_sensor : bool
+        Whether it suspects the sensor of the torque; left out where the torque was computed from
+        the commands of servos, which have none.
 
     Examples
     --------
@@ -44,6 +47,7 @@ class Check(ABC):
     suspects: ClassVar[str]
     stage: ClassVar[int] = 0
     misnames: ClassVar[bool] = False
+    of_sensor: ClassVar[bool] = False
 
     @abstractmethod
     def look(self, measurement: Measurement) -> Iterable[Suspicion]:

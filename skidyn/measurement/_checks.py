@@ -106,7 +106,7 @@ def check_measurement(measurement: Measurement) -> list[Suspicion]:
 
     Checks that fit the robot are left out where columns are certainly in other units, and those
     that presume the right joints and signs where these are suspected: their fits would mean
-    nothing.
+    nothing. Checks of the torque's sensor are left out where servos have none.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def check_measurement(measurement: Measurement) -> list[Suspicion]:
     found: list[Suspicion] = []
     misread = 3  # the first stage that would fit columns that are read wrongly
     for check in CHECKS:
-        if check.stage >= misread:
+        if check.stage >= misread or (check.of_sensor and measurement.of_servos):
             continue
         measurement.readable = misread > 1
         told = list(check.look(measurement))

@@ -69,6 +69,7 @@ class CopiedTorque(Check):
     """A torque that is another channel of the log."""
 
     name = "copied_torque"
+    of_sensor = True
     suspects = "torque that is a copy of another channel: another torque, a position or a velocity"
     misnames = True
 

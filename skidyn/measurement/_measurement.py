@@ -50,6 +50,9 @@ class Measurement:
     identified : bool, optional
         Whether bodies are going to be identified, so that those of the description may be wrong; by
         default it is not known.
+    of_servos : bool, default=False
+        Whether the torque was computed from the commands of position servos: there is no sensor
+        that could be wrong.
     same_stamps : int, optional
         Rows that had the stamp of the row before although joints moved on; ``signals`` then have
         an even clock.
@@ -77,6 +80,7 @@ class Measurement:
     robot: Robot | None
     joint_names: Sequence[str]
     identified: bool | None = None
+    of_servos: bool = False
     same_stamps: int = 0
     unsigned: tuple[list[int], dict[int, float]] | None = field(default=None, repr=False)
     changes: list[Change] | None = field(default=None, repr=False)

@@ -81,6 +81,7 @@ class SmoothedTorque(Check):
     """Torque through a low pass without delay."""
 
     name = "smoothed_torque"
+    of_sensor = True
     suspects = "torque that was smoothed, so that friction seems to turn before and after the joint"
     stage = 2
     misnames = True

@@ -61,6 +61,7 @@ class UnsignedTorque(Check):
     """Magnitudes in the place of torques, as servos report their current."""
 
     name = "unsigned_torque"
+    of_sensor = True
     suspects = "torque or current without its sign"
     misnames = True
 
@@ -430,6 +431,10 @@ class TorqueDelay(Check):
             if abs(lag) < SMALLEST:
                 return
             ms = 1e3 * lag
+            if measurement.of_servos:
+                if lag < 0:
+                    yield self._late_command(-lag, found.error, int(alike.sum()))
+                return
             late = float(f"{lag + early:.5f}")
             yield self.suspicion(
                 f"torque is {'late' if ms > 0 else 'early'} against motion by about "
@@ -460,6 +465,17 @@ class TorqueDelay(Check):
                 [k],
                 (f"--late tau{k + 1}={lag:g}", f"late={{'tau{k + 1}': {lag:g}}}"),
             )
+
+    def _late_command(self, lag: float, error: float, n_alike: int) -> Suspicion:
+        """A torque of servos that is early: it follows from commands that have not arrived yet."""
+        return self.suspicion(
+            f"commands reach the servos later than the controller says, by about {1e3 * lag:.0f} "
+            "ms of delay or more",
+            "bodies, friction and rotor inertia explain the servos' torque best at that lag "
+            f"(standard error {1e3 * error:.1f} ms, alike in {n_alike} joints)",
+            "suspected",
+            remedy=("--controller fit, or its delay", "Controller(delay=...), fit_servo"),
+        )
 
     def _filtered(
         self, what: str, column: str, constant: float, lag: float, joints: Iterable[int] = ()

@@ -5,41 +5,55 @@ The torque that accelerates a link is known from positions that were differentia
 their noise. An effect that lasts hundredths of a second drowns in it, while the motion that it
 causes stands far above the noise of the encoder. So each joint is simulated in its loop, others as
 logged, with its friction alone and with one effect more; what is fitted to half of the pieces is
-judged on the other half.
+judged on the other half. The effect that helps most is taken, and the others compete again beside
+it. A link that moves by itself behind its gear is felt by the other joints: they are simulated
+along its motion, and not along that of its motor, once the gear is named.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from skidyn._columns import names_of_table, resolve_columns
 from skidyn._exceptions import LogError, SkidynError
 from skidyn._progress import track
 from skidyn._signals import Array
 from skidyn._text import inside, measure
-from skidyn.effects import get_effect
 from skidyn.forward import Controller, JointLoop, Task, read_task
+from skidyn.simulation._servo_fit import Fit, fit_all
+from skidyn.simulation._servo_laws import (
+    FRICTION,
+    GEARS,
+    LAWS,
+    Range,
+    rivals_of,
+    sizes_told,
+    starts_of,
+    title_of,
+    units_told,
+)
 
 #: Length of a piece, s, and fewest pieces.
 PIECE, FEWEST_PIECES = 6.0, 4
-#: Steps of a fit at most, the fall of the squared error that ends it, dampings tried at once.
-ROUNDS, SMALL = 10, 3e-3
-DAMPING = (0.0, 1e-3, 1e-2, 0.1, 1.0, 10.0)
 #: Times the noise of the positions, and least noise, rad or m, above which something is missing.
 STANDS_OUT, SMALLEST = 2.5, 2e-5
 #: Share of the squared error that a finding must remove, held out, and more than that
 #: share of the pieces on which it must help.
 LEAST_DROP, LEAST_PIECES = 0.3, 0.5
+#: The same of a second effect on a joint: what an effect that is not quite the true one leaves,
+#: others take a part of.
+SECOND_DROP = 0.6
 #: The simulation with the finding must err by less than this share of what the command itself errs.
 NEARER = 0.5
-#: Half of a play, as share of the way, from which a second fit starts.
-FARTHER = 0.02
 #: The best other explanation must leave so much of that to it.
 MARGIN = 0.15
+#: Effects of one joint at most.
+MOST = 2
 
 
 @dataclass(frozen=True)
@@ -49,7 +63,8 @@ class ServoFinding:
     Parameters
     ----------
     kind : str
-        Kind of the catalogue.
+        Kind of the catalogue; or ``"servo_deadband"``, which the controller lacks and not the
+        model.
     joint : int
         Joint, counted from 1.
     parameters : dict of str to float
@@ -83,12 +98,12 @@ class ServoFinding:
     @property
     def title(self) -> str:
         """The effect in words."""
-        return get_effect(self.kind).title
+        return title_of(self.kind)
 
     @property
     def size(self) -> str:
         """Its parameters with their units."""
-        units = get_effect(self.kind).units(self.unit == "m")
+        units = units_told(self.kind, self.unit == "m")
         return ", ".join(measure(k, v, units.get(k, "")) for k, v in self.parameters.items())
 
     @property
@@ -105,7 +120,7 @@ class ServoFinding:
         said = f"the simulated motion errs by {after} in place of {before} m{self.unit}"
         if self.beside >= self.before:
             return f"{said}; no other effect lowers that"
-        return f"{said}; with {inside(get_effect(self.rival).title)} it would be {beside}"
+        return f"{said}; with {inside(title_of(self.rival))} it would be {beside}"
 
     def to_dict(self) -> dict[str, Any]:
         """As in the report of a diagnosis.
@@ -127,17 +142,20 @@ def explain_servo_motion(
     controller: Controller,
     *,
     joints: Sequence[int] | None = None,
+    known: Sequence[tuple[str, int]] = (),
 ) -> list[ServoFinding]:
     """Name what the motion of position servos lacks in a simulation.
 
     Every joint is simulated along its command, with the bodies and rotor inertias of the model,
     the other joints as logged, and viscous and dry friction fitted to the motion. Where this errs
     by more than the positions are noisy, stiction, friction with the load, with the
-    direction, or with the square of the speed, presliding, delay, elasticity and backlash compete.
-    Each is fitted to half of the pieces of the log and judged on the others. One effect is named,
-    that which removes the largest share of the squared error: a link that moves by itself is felt
-    by other joints. Nothing is named where the simulation errs by half as much as the command
-    itself, or more: then the gains are wrong, or the bodies.
+    direction, or with the square of the speed, presliding, delay, elasticity and backlash compete,
+    and a deadband of the servo where the controller has none. Each is fitted to half of the pieces
+    of the log and judged on the others. The one that removes the largest share of the squared error
+    of a joint is taken; then the others compete beside it, on its joint and, along the motion of
+    its link, on the others, two on a joint at most. Nothing
+    is named where the simulation errs by half as much as the command itself, or more: then the
+    gains are wrong, or the bodies.
 
     Parameters
     ----------
@@ -150,11 +168,14 @@ def explain_servo_motion(
         Gains, delay and limit of the servos.
     joints : sequence of int, optional
         Joints, counted from 1, that may get a name; all by default.
+    known : sequence of (str, int)
+        Kinds and joints of effects that are part of the simulation from the start; those that this
+        simulation does not have are left out.
 
     Returns
     -------
     list of ServoFinding
-        One or none.
+        In the order in which they were taken.
 
     Raises
     ------
@@ -185,22 +206,151 @@ def explain_servo_motion(
             f"the log holds {pieces} piece(s) of {PIECE:g} s; effects are judged on pieces left "
             f"out, which takes {FEWEST_PIECES}"
         )
-    loops = _loops(model, task)
-    plain = [
-        _fit(loop, _FRICTION, _given(model, j))
-        for j, loop in enumerate(track(loops, "Simulating the servos"))
-    ]
-    errors = np.sqrt([_mean(fit) for fit in plain])
     least = STANDS_OUT * np.maximum(_encoder_noise(model.robot_, X, task.signals.q), SMALLEST)
-    failing = [j - 1 for j in wanted if errors[j - 1] > least[j - 1]]
-    found = [_name(loops[j], plain[j], j + 1) for j in track(failing, "Comparing effects")]
+    arm = _Arm(model, task, known, {j - 1 for j in wanted})
+    named: list[ServoFinding] = []
+    while True:
+        failing = [
+            joint
+            for joint in arm.joints
+            if joint.index + 1 in wanted
+            and len(joint.kinds) < MOST
+            and np.sqrt(joint.plain.mean) > least[joint.index]
+        ]
+        for joint in track(failing, "Comparing effects"):
+            joint.compare()
+        found = [(joint.answer, joint) for joint in failing if joint.answer is not None]
+        if not found:
+            break
+        answer, best = min(found, key=lambda pair: pair[0].ratio)
+        named.append(answer.finding)
+        again = arm.take(best)
+        named = [f for f in named if f.joint - 1 not in again or f.kind in GEARS]
     slides = [kind == "prismatic" for kind in model.robot_.joint_types]
-    named = [
-        replace(f, unit="m" if slides[f.joint - 1] else "rad")
-        for f in found
-        if f is not None and f.after < NEARER * _command_error(loops[f.joint - 1])
-    ]
-    return sorted(named, key=lambda f: f.after / f.before)[:1]
+    return [replace(f, unit="m" if slides[f.joint - 1] else "rad") for f in named]
+
+
+@dataclass(frozen=True)
+class _Answer:
+    """What explains a joint best."""
+
+    finding: ServoFinding
+    fit: Fit
+    law: dict[str, Range]
+
+    @property
+    def ratio(self) -> float:
+        return self.finding.after / self.finding.before
+
+
+@dataclass
+class _Joint:
+    """A joint with what is known of it."""
+
+    index: int
+    loop: JointLoop
+    given: tuple[str, ...]
+    start: dict[str, float]
+    kinds: tuple[str, ...] = ()
+    ranges: dict[str, Range] = field(default_factory=dict)
+    answer: _Answer | None = None
+    compared: bool = False
+
+    def restart(self, keep_gears: bool) -> None:
+        """Fit friction and what is known again."""
+        kept = tuple(k for k in self.kinds if keep_gears and k in GEARS)
+        self.kinds = (*self.given, *(k for k in kept if k not in self.given))
+        models = [FRICTION]
+        for kind in self.kinds:
+            models = [{**model, **law} for model in models for law in starts_of(kind)]
+        fits = fit_all(self.loop, models, self.start)
+        best = min(range(len(fits)), key=lambda k: fits[k].mean)
+        self.ranges, self.plain = models[best], fits[best]
+        self.answer, self.compared = None, False
+
+    def compare(self) -> None:
+        """Look for the effect that explains the motion."""
+        if not self.compared:
+            self.answer, self.compared = _name(self), True
+
+    def take(self) -> None:
+        """Let what was found be known."""
+        assert self.answer is not None
+        self.kinds = (*self.kinds, self.answer.finding.kind)
+        self.ranges = {**self.ranges, **self.answer.law}
+        self.plain = self.answer.fit
+        self.answer, self.compared = None, False
+
+
+class _Arm:
+    """All joints in their loops."""
+
+    def __init__(
+        self, model: Any, task: Task, known: Sequence[tuple[str, int]], wanted: set[int]
+    ) -> None:
+        self.model, self.task = model, task
+        self.behind: dict[int, Array] = {}
+        kinds = {
+            j: tuple(dict.fromkeys(k for k, joint in known if joint == j + 1 and k in LAWS))
+            for j in range(model.robot_.n_joints)
+        }
+        gears = [j for j in kinds if set(kinds[j]) & set(GEARS)]
+        self.joints = []
+        rest = [j for j in kinds if j not in gears and j in wanted]
+        for j in track([*gears, *rest], "Simulating the servos"):
+            joint = _Joint(j, self._loop(j), kinds[j], _given(model, j))
+            joint.restart(keep_gears=False)
+            self.joints.append(joint)
+            if j in gears:
+                self._see_link(joint)
+
+    def take(self, joint: _Joint) -> set[int]:
+        """Take what explains a joint; the joints that are looked at again for it."""
+        joint.take()
+        if joint.kinds[-1] not in GEARS:
+            return set()
+        self._see_link(joint)
+        others = [other for other in self.joints if other is not joint]
+        for other in others:
+            other.loop = self._loop(other.index)
+            other.restart(keep_gears=True)
+        return {other.index for other in others}
+
+    def _see_link(self, joint: _Joint) -> None:
+        """How far the link is behind its motor, on which its own load depends, too."""
+        self.behind[joint.index] = joint.loop.twist(joint.plain.values)
+        joint.loop = self._loop(joint.index)
+        (joint.plain,) = fit_all(joint.loop, [joint.ranges], joint.plain.values)
+        self.behind[joint.index] = joint.loop.twist(joint.plain.values)
+
+    def _loop(self, j: int) -> JointLoop:
+        """A joint in its loop, with bodies and rotor inertias of the model."""
+        model, robot, signals = self.model, self.model.robot_, self.task.signals
+        q, dq, ddq = signals.q.copy(), signals.dq.copy(), signals.ddq.copy()
+        rows = self.task.windows.rows
+        for other, twist in self.behind.items():
+            # A jump of the link where its motor is put back on the log is no motion.
+            held = next(x.loop.held for x in self.joints if x.index == other)
+            still = maximum_filter1d(held.astype(np.uint8), 7, axis=0) > 0
+            clock = self.task.windows.time.T
+            rate = np.stack([np.gradient(x, t) for x, t in zip(twist.T, clock.T, strict=True)])
+            rise = np.stack([np.gradient(x, t) for x, t in zip(rate, clock.T, strict=True)])
+            q[rows, other] -= twist.T
+            dq[rows, other] -= np.where(still.T, 0.0, rate)
+            ddq[rows, other] -= np.where(still.T, 0.0, rise)
+        bodies = model.inertial_parameters_
+        rigid = robot.inverse_dynamics(q, dq, ddq, parameters=bodies)[:, j]
+        turn = np.zeros_like(ddq)
+        turn[:, j] = 1.0
+        link = robot.inverse_dynamics(
+            q, np.zeros_like(dq), turn, parameters=bodies, gravity=(0.0, 0.0, 0.0)
+        )[:, j]
+        rotor = sum(
+            float(c[0])
+            for term, c in model.effect_coefficients_.items()
+            if term.kind == "rotor_inertia" and term.places == (j,)
+        )
+        return JointLoop.of(self.task, j, link + rotor, rigid - link * ddq[:, j], rigid)
 
 
 def _encoder_noise(robot: Any, X: Any, smooth: Array) -> Array:
@@ -216,216 +366,47 @@ def _command_error(loop: JointLoop) -> float:
     return float(np.sqrt(np.mean((loop.command - loop.q)[loop.valid] ** 2)))
 
 
-def _name(loop: JointLoop, plain: _Fit, joint: int) -> ServoFinding | None:
+def _name(joint: _Joint) -> _Answer | None:
     """The effect that explains the motion of a joint, if one does."""
-    tried = [(kind, {**_FRICTION, **law}) for kind, law in _LAWS.items()]
-    play = {**_FRICTION, **_LAWS["backlash"]}
-    tried.append(("backlash", {**play, "gap": replace(play["gap"], start=FARTHER)}))
+    loop, plain = joint.loop, joint.plain
+    start = {**joint.start, **plain.values}
+    tried = rivals_of(loop, joint.kinds)
     # All are fitted to one half; the best of each kind to the other half, too.
-    first: dict[str, tuple[_Fit, dict[str, _Range]]] = {}
-    for kind, ranges in tried:
-        fit = _fit(loop, ranges, plain, (0,))
-        if kind not in first or _mean(fit) < _mean(first[kind][0]):
-            first[kind] = fit, ranges
-    ranking = sorted(first, key=lambda kind: _mean(first[kind][0]))
+    fits = fit_all(loop, [{**joint.ranges, **law} for _, law in tried], start, (0,))
+    first: dict[str, tuple[Fit, dict[str, Range]]] = {}
+    for (kind, law), fit in zip(tried, fits, strict=True):
+        if kind not in first or fit.mean < first[kind][0].mean:
+            first[kind] = fit, law
+    ranking = sorted(first, key=lambda kind: first[kind][0].mean)
     odd = np.isfinite(first[ranking[0]][0].left_out)
-    if _mean(first[ranking[0]][0]) > (1 - LEAST_DROP / 2) * float(plain.left_out[odd].mean()):
+    least = SECOND_DROP if joint.kinds else LEAST_DROP
+    if first[ranking[0]][0].mean > (1 - least / 2) * float(plain.left_out[odd].mean()):
         return None
-    fits = {kind: _fit(loop, first[kind][1], plain) for kind in ranking[:2]}
-    ranking = sorted(fits, key=lambda kind: _mean(fits[kind]))
-    drops = [1.0 - _mean(fits[kind]) / _mean(plain) for kind in ranking]
-    best, other = ranking
+    ranking = ranking[:2]
+    both = fit_all(loop, [{**joint.ranges, **first[kind][1]} for kind in ranking], start)
+    whole = dict(zip(ranking, both, strict=True))
+    best, other = sorted(whole, key=lambda kind: whole[kind].mean)
+    drops = [1.0 - whole[kind].mean / plain.mean for kind in (best, other)]
     if drops[0] - drops[1] < MARGIN * drops[0]:
-        if ranking != ["backlash", "joint_elasticity"]:
+        if (best, other) != ("backlash", "joint_elasticity"):
             return None
         best, other = other, best  # a gear with play is elastic, too; without is simpler
-    before, after = plain.left_out, fits[best].left_out
-    if 1.0 - _mean(fits[best]) / _mean(plain) < LEAST_DROP:
+    if 1.0 - whole[best].mean / plain.mean < least:
         return None
-    if float(np.mean(after < before)) <= LEAST_PIECES:
+    if float(np.mean(whole[best].left_out < plain.left_out)) <= LEAST_PIECES:
         return None
-    sizes = [float(np.sqrt(_mean(fit))) for fit in (plain, fits[best], fits[other])]
-    said = _said(best, fits[best].values)
-    return ServoFinding(best, joint, said, sizes[0], sizes[1], other, sizes[2])
+    before, after, beside = (float(np.sqrt(fit.mean)) for fit in (plain, whole[best], whole[other]))
+    if not after < NEARER * _command_error(loop):
+        return None
+    said = sizes_told(best, whole[best].values)
+    finding = ServoFinding(best, joint.index + 1, said, before, after, other, beside)
+    return _Answer(finding, whole[best], first[best][1])
 
 
-@dataclass(frozen=True)
-class _Range:
-    """Start, limits and size of a parameter, in units of :func:`_units`."""
-
-    start: float
-    low: float
-    high: float
-    size: float
-    unit: str = "one"
-
-
-_FRICTION = {
-    "viscous": _Range(0.5, -5.0, 20.0, 1.0, "drag"),
-    "coulomb": _Range(1.0, 0.0, 10.0, 1.0, "friction"),
-    "offset": _Range(0.0, -5.0, 5.0, 1.0, "friction"),
-    "inertia": _Range(0.0, -0.6, 1.0, 0.1),
-    "weight": _Range(0.0, -0.5, 0.5, 0.1),
-}
-_MOTOR = _Range(0.2, 0.02, 0.9, 0.1)
-_LAWS: dict[str, dict[str, _Range]] = {
-    "stribeck": {
-        "dF": _Range(0.5, 0.0, 10.0, 1.0, "friction"),
-        "vs": _Range(0.08, 0.01, 1.0, 0.1, "speed"),
-    },
-    "load_dependent_friction": {"mu": _Range(0.1, 0.0, 1.0, 0.1)},
-    "dahl": {"presliding": _Range(100.0, 5.0, 5e3, 100.0, "presliding")},
-    "time_delay": {"late": _Range(0.01, 0.0, 0.05, 0.01)},
-    "asymmetric_friction": {"dFc": _Range(0.0, -5.0, 5.0, 1.0, "friction")},
-    "nonlinear_viscous": {"square": _Range(0.0, -5.0, 5.0, 1.0, "square")},
-    "joint_elasticity": {
-        "compliance": _Range(1.2e-3, 1e-5, 0.2, 4e-4, "compliance"),
-        "damping": _Range(0.1, 0.0, 1.0, 0.1),
-        "motor": _MOTOR,
-    },
-    "backlash": {
-        "gap": _Range(0.006, 0.0, 0.1, 0.005, "way"),
-        "compliance": _Range(5e-4, 1e-5, 1e-2, 3e-4, "compliance"),
-        "motor": _MOTOR,
-    },
-}
-
-
-def _units(loop: JointLoop) -> dict[str, float]:
-    """What counts as one: a part of the joint's torque, its way, its speed."""
-    seen = loop.valid
-    torque = 0.05 * float(np.sqrt(np.mean(loop.torque[seen] ** 2))) + 1e-12
-    speed = float(np.std(loop.dq[seen])) + 1e-9
-    return {
-        "one": 1.0,
-        "friction": torque,
-        "drag": torque / speed,
-        "square": torque / speed**2,
-        "presliding": torque / (float(np.std(loop.q[seen])) + 1e-9),
-        "compliance": 1.0 / loop.size,
-        "speed": speed,
-        "way": float(np.std(loop.q[seen])) + 1e-9,
-    }
-
-
-@dataclass(frozen=True)
-class _Fit:
-    """Values of the parameters, and mean squared error of every piece, held out."""
-
-    values: dict[str, float]
-    left_out: Array
-
-
-def _fit(
-    loop: JointLoop, ranges: dict[str, _Range], plain: _Fit, parts: Sequence[int] = (0, 1)
-) -> _Fit:
-    """Fit to half of the pieces, judge on the other, and the other way round."""
-    units = _units(loop)
-    scale = np.array([units[r.unit] for r in ranges.values()])
-    table = np.array([(r.start, r.low, r.high, r.size) for r in ranges.values()]).T * scale
-    start, low, high, size = table
-    names = list(ranges)
-    known = [names.index(k) for k in plain.values]
-    start[known] = list(plain.values.values())
-    count = loop.q.shape[1]
-    halves = [np.arange(k, count, 2) for k in range(2)]
-    found = []
-    for k in parts:
-        start = _search(loop.only(halves[k]), names, start, low, high, size)
-        found.append(start)
-    left = np.full(count, np.nan)
-    for theta, k in zip(found, parts, strict=True):
-        other = halves[1 - k]
-        rest = loop.only(other)
-        error = rest.errors({k: theta[[i]] for i, k in enumerate(names)})[0]
-        left[other] = (error**2).sum(axis=0) / np.maximum(rest.valid.sum(axis=0), 1)
-    return _Fit(dict(zip(names, map(float, np.mean(found, axis=0)), strict=True)), left)
-
-
-def _mean(fit: _Fit) -> float:
-    return float(np.nanmean(fit.left_out))
-
-
-def _search(
-    loop: JointLoop, names: list[str], x: Array, low: Array, high: Array, size: Array
-) -> Array:
-    """Damped Gauss-Newton steps within limits; all models of a step are simulated together."""
-
-    def errors(thetas: Array) -> Array:
-        found = loop.errors({k: thetas[:, i] for i, k in enumerate(names)})
-        return found.reshape(len(thetas), -1)
-
-    x = np.clip(x, low, high)
-    for _ in range(ROUNDS):
-        step = np.where(x + 1e-2 * size > high, -1e-2, 1e-2) * size
-        here = errors(np.vstack([x, x + np.diag(step)]))
-        slope = (here[1:] - here[0]) / (step / size)[:, None]
-        cost = float(here[0] @ here[0])
-        gram, along = slope @ slope.T, slope @ here[0]
-        floor = 1e-9 * np.trace(gram) * np.eye(len(x)) + np.finfo(float).tiny * np.eye(len(x))
-        tried = np.array(
-            [
-                np.clip(
-                    x - size * np.linalg.solve(gram + d * np.diag(np.diag(gram)) + floor, along),
-                    low,
-                    high,
-                )
-                for d in DAMPING
-            ]
-        )
-        costs = (errors(tried) ** 2).sum(axis=1)
-        best = int(np.argmin(costs))
-        if not costs[best] < cost:
-            break
-        x = tried[best]
-        if costs[best] > (1 - SMALL) * cost:
-            break
-    return x
-
-
-def _given(model: Any, joint: int) -> _Fit:
+def _given(model: Any, joint: int) -> dict[str, float]:
     """Viscous and dry friction of the model, where the fit starts."""
-    values = {
+    return {
         term.kind: float(c[0])
         for term, c in model.effect_coefficients_.items()
         if term.kind in ("viscous", "coulomb") and term.places == (joint,)
     }
-    return _Fit(values, np.zeros(0))
-
-
-def _said(kind: str, values: dict[str, float]) -> dict[str, float]:
-    """Sizes of an effect as its catalogue calls them."""
-    if kind == "backlash":
-        return {"gap": 2 * values["gap"]}
-    if kind == "dahl":  # the catalogue calls the way so
-        return {"presliding": values["coulomb"] / values["presliding"]}
-    if kind == "joint_elasticity":
-        return {"K": 1.0 / values["compliance"]}
-    if kind == "nonlinear_viscous":
-        return {"c": values["square"], "power": 2.0}
-    names = {"late": "delay"}
-    own = [k for k in _LAWS[kind] if k not in ("motor", "damping")]
-    return {names.get(k, k): values[k] for k in own}
-
-
-def _loops(model: Any, task: Task) -> list[JointLoop]:
-    """Every joint in its loop, with bodies and rotor inertias of the model."""
-    robot, signals = model.robot_, task.signals
-    bodies = model.inertial_parameters_
-    rigid = robot.inverse_dynamics(signals.q, signals.dq, signals.ddq, parameters=bodies)
-    still = np.zeros_like(signals.dq)
-    loops = []
-    for j in range(robot.n_joints):
-        turn = np.zeros_like(signals.ddq)
-        turn[:, j] = 1.0
-        link = robot.inverse_dynamics(
-            signals.q, still, turn, parameters=bodies, gravity=(0.0, 0.0, 0.0)
-        )[:, j]
-        rotor = sum(
-            float(c[0])
-            for term, c in model.effect_coefficients_.items()
-            if term.kind == "rotor_inertia" and term.places == (j,)
-        )
-        bias = rigid[:, j] - link * signals.ddq[:, j]
-        loops.append(JointLoop.of(task, j, link + rotor, bias, rigid[:, j]))
-    return loops

@@ -107,3 +107,10 @@ def test_formats_that_can_be_written_are_and_the_others_are_named(work, tmp_path
         "model.c",
         "model.py",
     ]
+
+
+def test_a_model_of_servos_is_exported_without_torque(servo_diagnosed, run, tmp_path):
+    words = ["export", *servo_diagnosed[1:6], "--consistent", "--format", "urdf"]
+    code, left = run(*words, "--out", tmp_path / "new.urdf")
+    assert code == cli.DONE and list(left.values()) == [[]]
+    assert 'friction="0.' in (tmp_path / "new.urdf").read_text("utf-8")

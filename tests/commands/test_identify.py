@@ -25,3 +25,18 @@ def test_identify_by_any_estimator_and_only_what_is_essential(capsys, estimator,
     assert cli.main([*words, "--essential"]) == cli.DONE
     out = capsys.readouterr().out
     assert "condition number of the excitation" in out and "others left out" in out
+
+
+def test_servos_are_identified_without_torque(servo_diagnosed, run):
+    words = ["identify", *servo_diagnosed[1:6], "--nominal"]
+    code, found = run(*words)
+    sizes = {(e["kind"], tuple(e["joints"])): e["coefficients"][0] for e in found["effects"]}
+    assert code == cli.DONE
+    assert sizes["coulomb", (1,)] == pytest.approx(0.8, rel=0.1)
+    code, refined = run(*words, "--estimator", "output_error")
+    (one,) = [e for e in refined["effects"] if e["kind"] == "coulomb" and e["joints"] == [1]]
+    assert code == cli.DONE and one["coefficients"][0] == pytest.approx(0.8, rel=0.05)
+
+
+def test_without_torque_and_controller_the_log_is_refused(servo_diagnosed, run):
+    assert cli.main(["identify", *servo_diagnosed[1:4]]) == 2

@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the motion of servos names stands in the story of a diagnosis."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
+from skidyn.exceptions import SkidynError
 from skidyn.identification import RBDRegressor
-from skidyn.simulation import Controller, ServoFinding
+from skidyn.measurement import list_checks
+from skidyn.simulation import Controller, ServoFinding, servo_torque
 
 STICTION = ServoFinding("stribeck", 2, {"dF": 0.15}, 0.004, 0.001, "dahl", 0.003)
 
@@ -54,7 +58,7 @@ def test_a_joint_whose_rotor_was_forgotten_may_still_get_a_name(monkeypatch):
     assert [(f.kind, f.joints) for f in found.findings] == [("rotor_inertia", (2,))]
     asked = []
 
-    def explain(model, X, controller, *, joints):
+    def explain(model, X, controller, *, joints, known):
         asked.append((joints, model.effect_terms_[-1].kind))
         return []
 
@@ -73,7 +77,7 @@ def test_a_limit_that_the_controller_has_is_no_name(monkeypatch):
     assert [(f.kind, f.joints) for f in found.findings] == [("saturation", (2,))]
     asked = []
 
-    def explain(model, X, controller, *, joints):
+    def explain(model, X, controller, *, joints, known):
         asked.append(joints)
         return []
 
@@ -81,3 +85,18 @@ def test_a_limit_that_the_controller_has_is_no_name(monkeypatch):
     for limit in (np.inf, 5.0):
         found.explain_servo_motion(Controller(40.0, limit=limit))
     assert asked == [[1], [1, 2]]
+
+
+def test_a_torque_of_servos_has_no_sensor_that_could_be_wrong(sticky_servo):
+    log, servo = sticky_servo.log, sticky_servo.controller
+    limited = replace(servo, limit=100.0)
+    model = RBDRegressor(sticky_servo.robot, ("viscous", "coulomb"))
+    found = diagnose(model, log, controller=limited, effects=["saturation"])
+    assert found.findings == [] and found.controller is limited
+    assert {f.kind for f in found.explain_servo_motion()} == {"stribeck"}
+    sensors = {check.name for check in list_checks() if check.of_sensor}
+    assert not sensors & {check.check for check in found.checks}
+    with pytest.raises(ValueError, match="tau is None; pass the measured torque, or controller"):
+        diagnose(model, log)
+    with pytest.raises(SkidynError, match="controller is missing"):
+        diagnose(model, log, servo_torque(servo, log), effects=()).explain_servo_motion()

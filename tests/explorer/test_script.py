@@ -13,9 +13,11 @@ import skidyn.explorer
 from skidyn import cli
 from skidyn.datasets import load_planar_arm
 from skidyn.effects import Term, get_effect
+from skidyn.explorer import Session
 from skidyn.explorer._script import script
 from skidyn.explorer._server import Explorer
 from skidyn.identification import RBDRegressor
+from skidyn.simulation import servo_torque
 
 pandas = pytest.importorskip("pandas", reason="needs skidyn[io]")
 
@@ -105,3 +107,18 @@ def test_the_model_is_written_as_it_was_given():
     assert "from skidyn.effects import Term" in text
     assert "read_log(['a.csv'], robot=robot)" in text
     assert "session.add('spring', joint=2)" in text
+
+
+def test_the_script_of_servos_computes_their_torque(sticky_servo, arm, tmp_path, capsys):
+    sticky_servo.log.to_csv(tmp_path / "servos.csv", index=False)
+    model = RBDRegressor(sticky_servo.robot, ["viscous", "coulomb"])
+    servo = sticky_servo.controller.checked(2)
+    text = script(model, [], [str(tmp_path / "servos.csv")], str(arm), None, {}, servo)
+    assert "limit=[np.inf, np.inf]" in text and "needs_torque=False" in text
+    text = text.replace('"model.skops"', repr(str(tmp_path / "model.skops")))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        exec(compile(text, "explored.py", "exec"), {})
+    shown = Session(model, sticky_servo.log, servo_torque(servo, sticky_servo.log)).history
+    printed = [float(x) for x in capsys.readouterr().out.split()[-2:]]
+    assert printed == pytest.approx(shown[0]["rmse"], rel=1e-6)

@@ -4,6 +4,7 @@
 import pytest
 
 from skidyn.diagnosis import diagnose
+from skidyn.effects import Term
 from skidyn.exceptions import LogError, SkidynError
 from skidyn.identification import RBDRegressor
 from skidyn.simulation import Controller, explain_servo_motion, servo_torque
@@ -62,3 +63,23 @@ def test_a_joint_that_the_robot_lacks_and_a_short_log_are_refused(sticky_servo):
         explain_servo_motion(model, log, servo, joints=[3])
     with pytest.raises(LogError, match="holds 1 piece"):
         explain_servo_motion(model, log[log["trajectory"] == 1], servo)
+
+
+def test_a_deadband_that_nobody_was_told_is_named(servo_log):
+    loose = servo_log({}, deadband=(0.0, 0.01))
+    (found,) = explain_servo_motion(fitted(loose), loose.log, loose.controller)
+    assert (found.kind, found.joint) == ("servo_deadband", 2)
+    assert found.parameters == {"deadband": pytest.approx(0.01, rel=0.05)}
+    assert found.sentence.startswith("Deadband of the servo of joint 2 (deadband = 0.010 rad)")
+
+
+def test_effects_of_two_joints_are_named_one_after_the_other(servo_log):
+    shapes = {"vs": 0.1, "delta": 2.0}
+    sticky = servo_log({Term("stribeck", (1,), shapes): 2.0, Term("stribeck", (2,), shapes): 0.15})
+    found = explain_servo_motion(fitted(sticky), sticky.log, sticky.controller)
+    assert sorted((f.kind, f.joint) for f in found) == [("stribeck", 1), ("stribeck", 2)]
+
+
+def test_what_is_known_is_not_named_again(sticky_servo):
+    model, log, servo = fitted(sticky_servo), sticky_servo.log, sticky_servo.controller
+    assert explain_servo_motion(model, log, servo, known=[("stribeck", 2)]) == []

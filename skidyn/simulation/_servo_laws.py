@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Effects that compete for the motion of a servo, with their parameters and how they are told."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from skidyn.effects import get_effect
+from skidyn.forward import JointLoop
+
+#: Half of a play, as share of the way, and compliance, from which second fits start.
+FARTHER, SOFTER = 0.02, 5e-3
+
+
+@dataclass(frozen=True)
+class Range:
+    """Start, limits and size of a parameter, in units of :func:`units_of`."""
+
+    start: float
+    low: float
+    high: float
+    size: float
+    unit: str = "one"
+
+
+@dataclass(frozen=True)
+class ServoEffect:
+    """What a servo does by itself, which is no torque of the robot and so not in the catalogue.
+
+    Parameters
+    ----------
+    kind : str
+        Name.
+    title : str
+        The same in words.
+    parameter : str
+        Name of its size, which is that of the argument of :class:`~skidyn.forward.Controller`.
+    unit, unit_of_slider : str
+        Its unit.
+    """
+
+    kind: str
+    title: str
+    parameter: str
+    unit: str
+    unit_of_slider: str
+
+    def units(self, slides: bool) -> dict[str, str]:
+        """Unit of the size."""
+        return {self.parameter: self.unit_of_slider if slides else self.unit}
+
+
+#: Told as what the controller should have been given, and not as what a model lacks.
+SERVO_EFFECTS = {
+    "servo_deadband": ServoEffect("servo_deadband", "Deadband of the servo", "deadband", "rad", "m")
+}
+
+FRICTION = {
+    "viscous": Range(0.5, -5.0, 20.0, 1.0, "drag"),
+    "coulomb": Range(1.0, 0.0, 10.0, 1.0, "friction"),
+    "offset": Range(0.0, -5.0, 5.0, 1.0, "friction"),
+    "inertia": Range(0.0, -0.6, 1.0, 0.1),
+    "weight": Range(0.0, -0.5, 0.5, 0.1),
+}
+_MOTOR = Range(0.2, 0.02, 0.9, 0.1)
+LAWS: dict[str, dict[str, Range]] = {
+    "stribeck": {
+        "dF": Range(0.5, 0.0, 10.0, 1.0, "friction"),
+        "vs": Range(0.08, 0.01, 1.0, 0.1, "speed"),
+    },
+    "load_dependent_friction": {"mu": Range(0.1, 0.0, 1.0, 0.1)},
+    "dahl": {"presliding": Range(100.0, 5.0, 5e3, 100.0, "presliding")},
+    "time_delay": {"late": Range(0.01, 0.0, 0.05, 0.01)},
+    "asymmetric_friction": {"dFc": Range(0.0, -5.0, 5.0, 1.0, "friction")},
+    "nonlinear_viscous": {"square": Range(0.0, -5.0, 5.0, 1.0, "square")},
+    "joint_elasticity": {
+        "compliance": Range(1.2e-3, 1e-5, 0.2, 4e-4, "compliance"),
+        "damping": Range(0.1, 0.0, 1.0, 0.1),
+        "motor": _MOTOR,
+    },
+    "backlash": {
+        "gap": Range(0.006, 0.0, 0.1, 0.005, "way"),
+        "compliance": Range(5e-4, 1e-5, 1e-2, 3e-4, "compliance"),
+        "motor": _MOTOR,
+    },
+    "servo_deadband": {"deadband": Range(0.3, 0.0, 3.0, 0.1, "error")},
+}
+#: Effects of one group are one after the other in a gear; a second one would be the same again.
+GEARS = ("joint_elasticity", "backlash")
+
+
+def title_of(kind: str) -> str:
+    """The effect in words."""
+    return SERVO_EFFECTS[kind].title if kind in SERVO_EFFECTS else get_effect(kind).title
+
+
+def units_told(kind: str, slides: bool) -> dict[str, str]:
+    """Units of the sizes that are told of a kind."""
+    if kind in SERVO_EFFECTS:
+        return SERVO_EFFECTS[kind].units(slides)
+    return get_effect(kind).units(slides)
+
+
+def rivals_of(loop: JointLoop, known: tuple[str, ...]) -> list[tuple[str, dict[str, Range]]]:
+    """Kinds that may be missing beside those that are known, some from two starts.
+
+    Parameters
+    ----------
+    loop : JointLoop
+        The joint; where a deadband is known no other is fitted.
+    known : tuple of str
+        Kinds that are part of the loop already.
+    """
+    left_out = set(known)
+    if left_out & set(GEARS):
+        left_out |= set(GEARS)
+    if loop.deadband:
+        left_out.add("servo_deadband")
+    return [(kind, law) for kind in LAWS if kind not in left_out for law in starts_of(kind)]
+
+
+def starts_of(kind: str) -> list[dict[str, Range]]:
+    """Parameters of a kind; several where one start leads to a near minimum only."""
+    law = LAWS[kind]
+    if kind == "backlash":
+        return [law, {**law, "gap": replace(law["gap"], start=FARTHER)}]
+    if kind == "joint_elasticity":
+        return [law, {**law, "compliance": replace(law["compliance"], start=SOFTER)}]
+    return [law]
+
+
+def units_of(loop: JointLoop) -> dict[str, float]:
+    """What counts as one: a part of the joint's torque, its way, its speed."""
+    seen = loop.valid
+    torque = 0.05 * float(np.sqrt(np.mean(loop.torque[seen] ** 2))) + 1e-12
+    speed = float(np.std(loop.dq[seen])) + 1e-9
+    return {
+        "one": 1.0,
+        "friction": torque,
+        "drag": torque / speed,
+        "square": torque / speed**2,
+        "presliding": torque / (float(np.std(loop.q[seen])) + 1e-9),
+        "compliance": 1.0 / loop.size,
+        "speed": speed,
+        "way": float(np.std(loop.q[seen])) + 1e-9,
+        "error": float(np.median(np.abs((loop.command - loop.q)[seen]))) + 1e-9,
+    }
+
+
+def sizes_told(kind: str, values: dict[str, float]) -> dict[str, float]:
+    """Sizes of an effect as its catalogue calls them."""
+    if kind == "backlash":
+        return {"gap": 2 * values["gap"]}
+    if kind == "dahl":  # the catalogue calls the way so
+        return {"presliding": values["coulomb"] / values["presliding"]}
+    if kind == "joint_elasticity":
+        return {"K": 1.0 / values["compliance"]}
+    if kind == "nonlinear_viscous":
+        return {"c": values["square"], "power": 2.0}
+    names = {"late": "delay"}
+    own = [k for k in LAWS[kind] if k not in ("motor", "damping")]
+    return {names.get(k, k): values[k] for k in own}
