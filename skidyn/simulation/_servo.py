@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 from typing import Any
 
@@ -10,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._columns import command_columns, names_of_table, resolve_columns, trajectory_numbers
-from skidyn._exceptions import SkidynError
+from skidyn._exceptions import LogWarning, SkidynError
 from skidyn._signals import Array, Signals, signals_from
+from skidyn._text import listed
 from skidyn.evidence import smooth_motion
 from skidyn.forward import Controller
 from skidyn.robots import Robot
@@ -23,6 +25,8 @@ SEEN = 3.0
 #: Velocity (rad/s) below which dry friction may be anything up to its size, so that the error of
 #: position says nothing.
 RESTS = 0.03
+#: Share by which the gain of one recording may differ, and rows in motion that it takes.
+OTHER, LEAST_ROWS = 0.25, 200
 #: Blocks of time left out in turn for the standard error of a gain.
 BLOCKS = 10
 
@@ -98,6 +102,11 @@ def fit_servo(robot: Robot, log: Any, *, shared: bool = False) -> Controller:
     SkidynError
         A column is missing, or the log does not show the gain of a joint.
 
+    Warns
+    -----
+    LogWarning
+        The gain of one recording differs from that of all.
+
     References
     ----------
     .. [1] M. Duclusaud, G. Passault, V. Padois, O. Ly (2024), Extended friction models for the
@@ -136,8 +145,7 @@ def fit_servo(robot: Robot, log: Any, *, shared: bool = False) -> Controller:
         if left < best[0] * (1 - 1e-6):
             best = left, float(delay), inverse
     _, delay, inverse = best
-    value = inverse[0]
-    std = np.sqrt((BLOCKS - 1) / BLOCKS * np.sum((inverse[1:] - inverse[1:].mean(0)) ** 2, axis=0))
+    value, std = inverse[0], _std(inverse)
     hidden = np.flatnonzero(~(value > SEEN * std))
     if len(hidden):
         names = ", ".join(robot.joint_names[j] for j in hidden)
@@ -147,7 +155,58 @@ def fit_servo(robot: Robot, log: Any, *, shared: bool = False) -> Controller:
             "shared=True) if all joints have the same servo, or a Controller with the gain that "
             "you know"
         )
+    wanted, _ = _late(signals, reference, delay)
+    _warn_of_other_gains(
+        robot, signals.trajectory, designs, wanted - signals.q, moves, size, shared, inverse
+    )
     return Controller(stiffness=1.0 / value, damping=0.0, delay=delay, follows_velocity=False)
+
+
+def _std(inverse: Array) -> Array:
+    """Standard errors, from all rows and without one block each."""
+    spread = (inverse[1:] - inverse[1:].mean(axis=0)) ** 2
+    return np.asarray(np.sqrt((BLOCKS - 1) / BLOCKS * np.sum(spread, axis=0)))
+
+
+def _warn_of_other_gains(
+    robot: Robot,
+    trajectory: NDArray[np.int64],
+    designs: list[Array],
+    error: Array,
+    moves: NDArray[np.bool_],
+    size: Array,
+    shared: bool,
+    whole: Array,
+) -> None:
+    """Say so where the weight asks for another gain in one recording than in the others."""
+    names = np.unique(trajectory)
+    if len(names) < 2:
+        return
+    told = []
+    for name in names:
+        rows = trajectory == name
+        seen = np.flatnonzero(moves[rows].sum(axis=0) >= LEAST_ROWS)
+        if not len(seen):
+            continue
+        own = [designs[j][rows] for j in seen]
+        here = np.ix_(rows, seen)
+        inverse, _ = _inverse_gains(own, error[here], moves[here], size[seen], shared)
+        value, std, all_of = inverse[0], _std(inverse), whole[:, seen]
+        sure = np.hypot(std, _std(all_of))
+        apart = np.abs(value - all_of[0]) > np.maximum(SEEN * sure, OTHER * all_of[0])
+        for k in np.flatnonzero(apart & (value > SEEN * std))[: 1 if shared else None]:
+            what = "" if shared else f" of {robot.joint_names[seen[k]]}"
+            told.append(f"{1 / value[k]:.3g} N m/rad{what} in recording {name:g}")
+    if told:
+        all_ = ", ".join(f"{1 / v:.3g}" for v in (whole[0, :1] if shared else whole[0]))
+        warnings.warn(
+            f"the servo gain that follows the robot's weight differs between recordings: "
+            f"{listed(told)}, {all_} in all of them. Its gain was changed, or its torque "
+            "or speed is at a limit in some; take the recordings with the same "
+            "settings that ask for no more than the servo can give",
+            LogWarning,
+            stacklevel=3,
+        )
 
 
 def _inverse_gains(

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Logs of commands and positions: gain and delay are found, and models from motion alone move."""
 
+import warnings
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.effects import Term
-from skidyn.exceptions import SkidynError
+from skidyn.exceptions import LogWarning, SkidynError
 from skidyn.identification import RBDRegressor
 from skidyn.simulation import Controller, fit_servo, servo_torque, simulate, simulation_errors
 
@@ -39,6 +41,22 @@ def test_gain_and_delay_show_by_the_weight(servo_log):
     assert servo.delay == pytest.approx(DELAY, abs=0.011)
     shared = fit_servo(robot, log, shared=True)
     np.testing.assert_allclose(shared.stiffness, GAIN, rtol=0.1)
+
+
+def test_recordings_with_other_gains_are_told(servo_log):
+    robot, log = servo_log
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", LogWarning)
+        fit_servo(robot, log)
+    other = log.copy()
+    last = other["trajectory"] == 3
+    for j in (1, 2):  # half the gain needs twice the error
+        late = other.loc[last, f"q_ref{j}"].shift(
+            1, fill_value=other.loc[last, f"q_ref{j}"].iloc[0]
+        )
+        other.loc[last, f"q_ref{j}"] += late - other.loc[last, f"q{j}"]
+    with pytest.warns(LogWarning, match="differs between recordings: .* in recording 3,"):
+        fit_servo(robot, other, shared=True)
 
 
 def test_friction_from_motion_alone_improves_the_motion_of_a_new_log(servo_log):
