@@ -71,7 +71,10 @@ def one_recording(change: str, checks: tuple[str, ...]) -> Spoil:
             t = own["time"].to_numpy()
             values = {c: np.interp(t - lag, t, own[c]) for c in columns("tau", n)}
         elif change == "torque_order":
-            a, b = (int(x) for x in rng.choice(np.flatnonzero(able(log, robot)), 2, replace=False))
+            some = np.flatnonzero(able(log, robot))
+            if len(some) < 2:
+                return None
+            a, b = (int(x) for x in rng.choice(some, 2, replace=False))
             values = {f"tau{i + 1}": own[f"tau{j + 1}"].to_numpy() for i, j in ((a, b), (b, a))}
         elif change == "velocity_sign":
             k = moved(log, robot, rng) + 1

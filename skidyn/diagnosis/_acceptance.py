@@ -19,7 +19,7 @@ from skidyn.diagnosis._hypothesis import (
     within_recordings,
 )
 from skidyn.diagnosis._ranking import RankingSearch
-from skidyn.effects import get_effect
+from skidyn.effects import NamelessEffect, get_effect
 
 
 class JudgingSearch(RankingSearch):
@@ -42,6 +42,7 @@ class JudgingSearch(RankingSearch):
                 part.errors is None
                 or rival.n_parameters > part.n_parameters
                 or simplicity_of(rival) >= simplicity_of(part)
+                or self.denied(rival, best)
             ):
                 continue
             errors, own = part.errors, rival.errors
@@ -138,6 +139,8 @@ class JudgingSearch(RankingSearch):
                 continue
             if not single and best.score - rival.score < self.settings.least_gain:
                 return rival  # the function does not say enough more to be a finding beside it
+            if not single and self.denied(rival, best):
+                continue
             errors = rival.errors
             if errors.shape != best.errors.shape:
                 errors = self._errors(rival, within=single)
@@ -145,6 +148,20 @@ class JudgingSearch(RankingSearch):
             if self._good_enough(errors.sum(0), left, removed, joints, left_over):
                 return rival
         return best
+
+    def denied(self, name: Hypothesis, function: Hypothesis) -> bool:
+        """Whether what a function turned out to be cannot be what a known effect does.
+
+        Parameters
+        ----------
+        name, function : Hypothesis
+            Known effect, and function without a name, that explain about as much.
+        """
+        found = [(c.term.effect, c.term.shape) for c in function.candidates]
+        return any(
+            isinstance(effect, NamelessEffect) and effect.denies(get_effect(name.kind), shape)
+            for effect, shape in found
+        )
 
     def _good_enough(
         self,

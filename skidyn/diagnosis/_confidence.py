@@ -22,8 +22,9 @@ CONSTANT, MARGIN, CORRELATED, REMOVED = 2.4, 1.8, -1.1, 1.8
 NAMELESS, BLOCKS, ALIKE, EQUALLED = -1.3, -0.5, -2.4, -0.5
 #: Weight of an effect that few recordings alone have, of which the plainest form alone was tried.
 FEW = -0.6
-#: Margin, up or down, within which another explanation of the same joints equals a name.
-EQUAL = 0.005
+#: Margin below which another explanation of the same joints equals a name, or explains so much
+#: more; one that explains far more is of other joints, too.
+EQUAL, ABOVE = 0.005, 0.1
 #: Coloured noise inflates the variance so much; shares of the error between these count.
 COLOURED, LEAST, ENOUGH = 1.7, 0.003, 0.3
 #: No name is surer than the number of logs on which the weights were found allows.
@@ -76,5 +77,5 @@ def confidence(
     logit += CORRELATED * float(np.log(max(inflation / COLOURED, 1.0)))
     logit += REMOVED * float(np.log10(min(max(removed, LEAST), ENOUGH) / ENOUGH))
     logit += NAMELESS * nameless + BLOCKS * (not whole_recordings)
-    logit += FEW * few + ALIKE * alike + EQUALLED * (rivalled and abs(margin) < EQUAL)
+    logit += FEW * few + ALIKE * alike + EQUALLED * (rivalled and -ABOVE < margin < EQUAL)
     return min(MOST if has_name else MOST_NAMELESS, float(1 / (1 + np.exp(-logit))))

@@ -70,7 +70,7 @@ class ReconsideringSearch(JudgingSearch):
         left = best.errors.sum(0)
         removed = left * np.expm1(np.maximum(best.gain, 0) / self._counts)
         rivals = [h for h in ranking if h.errors is not None]
-        for rival in self._names_on(best.joints, rivals):
+        for rival in self._names_on(best, rivals):
             first = self.judged(rival)
             if first is None:
                 continue
@@ -90,10 +90,11 @@ class ReconsideringSearch(JudgingSearch):
                 return rival
         return best
 
-    def _names_on(self, joints: Sequence[int], ranking: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """The best few known effects that act on some joints in every recording."""
+    def _names_on(self, function: Hypothesis, ranking: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """The best few known effects that may be a function, in every recording."""
         names = [h for h in ranking if h.kind != UNKNOWN and not within_recordings(h)]
-        return [h for h in names if set(joints) <= set(h.joints)][: self.settings.refined]
+        names = [h for h in names if set(function.joints) <= set(h.joints)]
+        return [h for h in names if not self.denied(h, function)][: self.settings.refined]
 
     def reconsider(self, newest: Hypothesis, steps: list[Step]) -> None:
         """Let every kind compete again for what earlier findings explain, beside the newest."""
@@ -154,7 +155,7 @@ class ReconsideringSearch(JudgingSearch):
         if any(h.kind == UNKNOWN and own & set(h.joints) for h in self.findings):
             return None  # what another function took up of this one speaks for no name
         removed = self.left - with_old
-        for rival in self._names_on(old.joints, ranking):
+        for rival in self._names_on(old, ranking):
             first = self.judged(rival)
             if first is None:
                 continue

@@ -26,6 +26,9 @@ _REACHING = 3
 #: Share of the range over which the secant is taken that continues a function beyond its range.
 _SECANT = 0.15
 
+#: Difference between the shares of torque and of way from which no coupling stores the energy.
+_UNEQUAL = 0.2
+
 #: Highest order of a function of one signal.
 _ORDER = 12
 
@@ -74,6 +77,23 @@ class NamelessEffect(Effect):
             signal, _, of = name.partition("_")
             names.append(signal if not of else f"{signal}{(joint if of == 'own' else other) + 1}")
         return tuple(dict.fromkeys(names))
+
+    def denies(self, effect: Effect, shape: Mapping[str, Any]) -> bool:
+        """Whether what was found with some shape cannot be what a known effect does.
+
+        Parameters
+        ----------
+        effect : Effect
+            Known effect on the same joints.
+        shape : mapping
+            Shape parameters that were found.
+
+        Returns
+        -------
+        bool
+            False by default.
+        """
+        return False
 
     def others(self, signals: Signals, joint: int) -> list[dict[str, Any]]:
         """Grid over the other joints."""
@@ -425,8 +445,9 @@ def _weighted_sum(signals: Signals, names: Sequence[str], weights: Sequence[floa
 class TorqueBetweenTwoJoints(NamelessEffect):
     """A torque between two joints that depends on a sum of their positions.
 
-    The second joint feels what the first one feels, times the ratio: so it is where what lies
-    between them stores energy, as a cable that tightens or links that touch each other.
+    The second joint feels what the first one feels, times ``passed``. Where what lies between them
+    stores energy, as a cable that tightens or links that touch each other, that is the ratio, and
+    so it is where the shape has none; where it loses energy, or is driven, it may be another share.
     """
 
     is_of_one_number = True
@@ -445,6 +466,7 @@ class TorqueBetweenTwoJoints(NamelessEffect):
             scales=False,
             has_interval=False,
         ),
+        Shape("passed", "1", (), -np.inf, np.inf, spacing="linear", scales=False),
     )
     scope = "pair"
     softness = 2e-3
@@ -471,12 +493,18 @@ class TorqueBetweenTwoJoints(NamelessEffect):
             share = (high - low) / 2 / max(half[0] + abs(ratio) * half[1], 1e-300)
             shift = (low + high) / 2 - (middle[0] + ratio * middle[1])
             shape = {"middle": middle, "half": half, "share": share, "shift": shift}
-            found.append({"ratio": ratio, "other": joints[1]} | shape)
+            found.append({"ratio": ratio, "passed": ratio, "other": joints[1]} | shape)
         return found
 
     def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
         i, j = joints
         return float(signals.unit[i] / signals.unit[j])
+
+    def denies(self, effect: Effect, shape: Mapping[str, Any]) -> bool:
+        """What couples two joints passes on as much of its torque as of the way."""
+        ratio = shape["ratio"]
+        passed = shape.get("passed", ratio)
+        return effect.scope == "pair" and abs(passed - ratio) > _UNEQUAL * abs(ratio)
 
     def torque_columns(
         self, signals: Signals, joints: Sequence[int], **shape: Any
@@ -486,7 +514,7 @@ class TorqueBetweenTwoJoints(NamelessEffect):
         half = shape["share"] * (shape["half"][0] + abs(ratio) * shape["half"][1])
         total = signals.q[:, i] + ratio * signals.q[:, j]
         block = splines(total, middle - half, middle + half, len(self.coefficients))
-        return {i: block, j: ratio * block}
+        return {i: block, j: shape.get("passed", ratio) * block}
 
 
 class ClockPeriodic(NamelessEffect):

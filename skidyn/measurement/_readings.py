@@ -211,8 +211,10 @@ def _but_for_angle(change: Change, zero: Change) -> bool:
 
     A robot upside down is one whose first joint, about a level axis, is half a turn off.
     """
-    fixed = zero.kind == "zero" and change.kind == "gravity"
-    return fixed and change.untuned > zero.untuned - TIED
+    if zero.kind != "zero" or change.kind != "gravity" or change.reading.gravity is None:
+        return False
+    along = float(np.max(np.abs(change.reading.gravity))) > UPRIGHT * GRAVITY
+    return along and change.untuned > zero.untuned - TIED
 
 
 def _against_effects(fits: Fits, reading: Reading, here: Outcome, change: Change) -> Change | None:

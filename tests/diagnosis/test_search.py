@@ -119,3 +119,12 @@ def test_a_cable_that_only_pulls_between_two_joints(arm_log):
     torque += pull[:, None] * [1.0, -0.8]
 
     assert found_in(load_planar_arm(), arm_log.X, torque) == {"coupling_spring": {1, 2}}
+
+
+def test_what_passes_on_another_share_of_torque_than_of_way_is_no_spring(arm_log):
+    q = arm_log.X[["q1", "q2"]].to_numpy()
+    torque = np.array(arm_log.y)
+    pull = 0.5 * np.std(torque[:, 1]) * np.cos(q[:, 0] - q[:, 1])
+    torque += pull[:, None] * [1.0, -0.5]
+
+    assert found_in(load_planar_arm(), arm_log.X, torque) == {"unknown": {1, 2}}
