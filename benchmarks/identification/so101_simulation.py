@@ -8,6 +8,8 @@ its commands, put back on the log every second. Before: bodies of the URDF behin
 with viscous and dry friction, rotor inertia and offset.
 
     python benchmarks/identification/so101_simulation.py FOLDER
+
+``--gains`` prints only the gain and the delay that follow from each motion by itself.
 """
 
 import argparse
@@ -17,6 +19,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from skidyn.exceptions import SkidynError
 from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
 from skidyn.simulation import fit_servo, servo_torque, simulation_errors
@@ -42,10 +45,21 @@ def read(folder, number):
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
-    folder = parser.parse_args().folder
+    parser.add_argument("--gains", action="store_true", help="gain and delay by motion")
+    options = parser.parse_args()
+    folder = options.folder
     robot = Robot.from_urdf(folder / "so101.urdf")
     names = sorted(path.name for path in folder.iterdir() if path.is_dir())
     log = pd.concat([read(folder / m, k) for k, m in enumerate(names)], ignore_index=True)
+    if options.gains:
+        for k, name in enumerate(names):
+            try:
+                servo = fit_servo(robot, log[log["trajectory"] == k], shared=True)
+            except SkidynError:
+                print(f"{name:20s} shows no gain")
+                continue
+            print(f"{name:20s} {servo.stiffness[0]:8.1f} N m/rad {1e3 * servo.delay:6.0f} ms")
+        return
     X = log[[c for c in log if "ref" not in c]]
     print(f"{'held-out motion':20s} {'before, mrad':>12s} {'after, mrad':>12s} {'N m/rad':>8s}")
     for k, name in enumerate(names):

@@ -149,11 +149,15 @@ def fit_servo(robot: Robot, log: Any, *, shared: bool = False) -> Controller:
     hidden = np.flatnonzero(~(value > SEEN * std))
     if len(hidden):
         names = ", ".join(robot.joint_names[j] for j in hidden)
+        remedy = (
+            "Give a Controller with the gain that you know"
+            if shared
+            else "Give --controller fit-shared (in Python: shared=True) if all joints have the "
+            "same servo, or a Controller with the gain that you know"
+        )
         raise SkidynError(
             f"this log does not show the servo gain of {names}: the error of position does not "
-            "follow the robot's weight there. Give --controller fit-shared (in Python: "
-            "shared=True) if all joints have the same servo, or a Controller with the gain that "
-            "you know"
+            f"follow the robot's weight there. {remedy}"
         )
     wanted, _ = _late(signals, reference, delay)
     _warn_of_other_gains(
