@@ -160,10 +160,10 @@ def _unsigned(measurement: Measurement) -> tuple[list[int], dict[int, float]]:
             gain = _magnitude_gain(measurement.fits, k)
             if gain > LEAST:
                 gains[k] = gain
-    every = len(one_sided) >= 3 and set(moving) <= set(one_sided)
-    if every or max(gains.values(), default=0.0) > SURE:
+    enough = len(one_sided) >= 3 or max(gains.values(), default=0.0) > SURE
+    if enough and set(moving) <= set(one_sided):
         return one_sided, gains  # a recorder of magnitudes gives no column a sign
-    return sorted(gains), gains
+    return sorted(gains), gains  # gravity alone may give one a single sign
 
 
 def _magnitude_gain(fits: Fits, k: int) -> float:
