@@ -30,7 +30,7 @@ def test_every_option_with_choices_is_completed(tmp_path):
     with script.open("w") as file, redirect_stdout(file):
         assert cli.main(["completion", "bash"]) == cli.DONE
     wanted = {
-        "check --clock": {"recorded", "regular"},
+        "check --clock": {"auto", "recorded", "regular"},
         "diagnose --torque-sign": {"recorded", "command"},
         "export --format": {"c", "python", "onnx", "urdf", "mjcf", "usd", "bam", "ros2"},
         "simulate --robot": {"panda", "scara", "ur5"},
