@@ -233,6 +233,7 @@ PAGES: tuple[Page, ...] = (
                     "ColumnError",
                     "EffectError",
                     "LogError",
+                    "MisreadLogError",
                     "RobotDescriptionError",
                 ),
             ),
