@@ -23,7 +23,7 @@ def test_the_error_with_a_candidate_is_that_of_the_model_fitted_with_it(session)
         found = ranking.held_out(model, joint)
         assert np.sum(found.residual**2) == pytest.approx(fitted()[joint], rel=1e-5)
         terms = [ranking.candidates[i].term for i in found.index]
-        # the search does not hold out what one fold tells alone, as of a stop that one motion touches
+        # the search does not hold out what one fold tells alone, as of a stop touched in one motion
         shared = [not folds_alone(problem, term).any() for term in terms]
         order = [at for at in np.argsort(-found.drops()) if shared[at]]
         for at in np.array(order)[[0, 5, 40]]:
