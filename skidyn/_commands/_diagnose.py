@@ -25,7 +25,11 @@ from skidyn._exceptions import LogWarning, MisreadLogError
 from skidyn._writing import write_json
 
 if TYPE_CHECKING:
+    import pandas as pd
+
+    from skidyn.diagnosis import Diagnosis
     from skidyn.measurement import Suspicion
+    from skidyn.simulation import Controller
 
 DESCRIPTION = """\
 Compare a model with a log and learn which physical effect it lacks.
@@ -107,14 +111,12 @@ def _answer(options: argparse.Namespace) -> dict[str, Any]:
     """What is found, as values that can be kept."""
     with noting() as noted:
         try:
-            model, frame, tau, controller = read_driven(options, check=False)
-            diagnosis = run_diagnosis(model, frame, tau, options, controller=controller)
+            diagnosis, frame, controller = _diagnosed(options)
         except MisreadLogError as error:
             if options.clock != "auto" or {s.check for s in error.suspicions} != {"clock_jitter"}:
                 raise
             options = argparse.Namespace(**vars(options) | {"clock": "regular"})
-            model, frame, tau, controller = read_driven(options, check=False)
-            diagnosis = run_diagnosis(model, frame, tau, options, controller=controller)
+            diagnosis, frame, controller = _diagnosed(options)
             mended = [_mended(jitter) for jitter in error.suspicions]
             diagnosis.checks[:0] = mended
             diagnosis.warnings[:0] = map(str, mended)
@@ -140,6 +142,15 @@ def _answer(options: argparse.Namespace) -> dict[str, Any]:
     }
 
 
+def _diagnosed(
+    options: argparse.Namespace,
+) -> tuple[Diagnosis, pd.DataFrame, Controller | None]:
+    """The diagnosis of the log as the options have it read, the log and its controller."""
+    model, frame, tau, controller = read_driven(options, check=False)
+    diagnosis = run_diagnosis(model, frame, tau, options, controller=controller)
+    return diagnosis, frame, controller
+
+
 def _mended(jitter: Suspicion) -> Suspicion:
     """What is told of stamps in whose place even steps were taken."""
     evidence = (
@@ -151,8 +162,6 @@ def _mended(jitter: Suspicion) -> Suspicion:
 
 def _next(answer: dict[str, Any], options: argparse.Namespace) -> list[str]:
     """The commands that may follow."""
-    from skidyn.simulation import SERVO_EFFECTS
-
     if not options.out:
         if options.html:
             return []
@@ -162,13 +171,19 @@ def _next(answer: dict[str, Any], options: argparse.Namespace) -> list[str]:
     seen = (story["servo_motion"] or {"findings": []})["findings"]
     named = [line for line in [*story["findings"], *seen] if line["kind"] != "unknown"]
     lines = []
-    if named:
-        joints = ",".join(map(str, named[0]["joints"]))
-        kind = named[0]["kind"]
-    if named and kind in SERVO_EFFECTS:
+    if named and named[0] in seen and _is_of_servo(named[0]["kind"]):
         lines.append(f"next: the same with {named[0]['size']} in --controller")
     elif named:
+        joints = ",".join(map(str, named[0]["joints"]))
+        kind = named[0]["kind"]
         lines.append(f"next: skidyn add --from {report} --effect {kind} --joints {joints}")
     if answer["rivals"]:
         lines.append(f"next: skidyn separate --from {report} --out motion.csv")
     return lines
+
+
+def _is_of_servo(kind: str) -> bool:
+    """Whether the controller should have been given it, and no model lacks it."""
+    from skidyn.simulation import SERVO_EFFECTS  # an answer that was kept needs no simulation
+
+    return kind in SERVO_EFFECTS

@@ -285,17 +285,24 @@ class JudgingSearch(RankingSearch):
         most = self._mostly_small(joints, hypothesis.gain, own, 0.5 * self.left)
         return not known or most or self._price(hypothesis.candidates) > settings.white
 
-    def without_pieces(self, hypothesis: Hypothesis) -> Hypothesis:
+    def without_pieces(self, hypothesis: Hypothesis) -> tuple[Hypothesis, bool]:
         """The hypothesis without terms that are but pieces of a force that was found before.
 
         A spring and a stop on one joint that are found after each other are mostly one force over
         its position, of another form, above all where the second does little, or where the first
-        has no name. A hypothesis of nothing but pieces is returned as it is.
+        has no name.
 
         Parameters
         ----------
         hypothesis : Hypothesis
             Known effect that would be added.
+
+        Returns
+        -------
+        hypothesis : Hypothesis
+            As it was given where all of its terms are pieces, or none is.
+        is_piece : bool
+            Whether all of them are.
         """
         own = self._removed(self.left, hypothesis.gain)
         small = own < self.settings.nameless_tolerance * (self.start - self.left)
@@ -305,18 +312,13 @@ class JudgingSearch(RankingSearch):
             if not all(self._holds_force(hypothesis, j, bool(small[j])) for j in c.joints)
         ]
         if not 0 < len(kept) < len(hypothesis.candidates):
-            return hypothesis
-        return replace(
+            return hypothesis, not kept
+        rest = replace(
             hypothesis,
             candidates=tuple(hypothesis.candidates[k] for k in kept),
             chances=tuple(hypothesis.chances[k] for k in kept),
         )
-
-    def is_piece(self, hypothesis: Hypothesis) -> bool:
-        """Whether it is nothing but pieces of forces over the position that were found before."""
-        own = self._removed(self.left, hypothesis.gain)
-        small = own < self.settings.nameless_tolerance * (self.start - self.left)
-        return all(self._holds_force(hypothesis, j, bool(small[j])) for j in hypothesis.joints)
+        return rest, False
 
     def _holds_force(self, hypothesis: Hypothesis, joint: int, small: bool) -> bool:
         """Whether a force over the position of a joint was found that this is a piece of."""

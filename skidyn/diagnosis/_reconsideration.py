@@ -45,10 +45,10 @@ class ReconsideringSearch(JudgingSearch):
             simpler = self._at_its_limit(best)
             judged = None if simpler is None else self.judged(simpler)
             if judged is not None:
-                judged = self.without_pieces(judged)
-            if judged is not None and (self.is_piece(judged) or self.shadow(judged)):
-                traced |= set(judged.joints) if self.is_piece(judged) else set()
-                judged = self._beside_another_kind(judged)
+                judged, is_piece = self.without_pieces(judged)
+                traced |= set(judged.joints) if is_piece else set()
+                if is_piece or self.shadow(judged):
+                    judged = self._beside_another_kind(judged)
             if judged is not None:
                 rivals = rivals_among(judged, offered)
                 margin, alike = margin_over(judged, rivals), self._alike(judged, rivals)

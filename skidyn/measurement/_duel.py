@@ -195,12 +195,11 @@ def _shapes(
             coefficients = effect.coefficients_of(shape)
             if len(coefficients) > len(effect.coefficients):
                 continue  # a form with more of them takes the place of anything in a simple motion
-            spread = known if robot is not None else np.full(len(coefficients), np.inf)
-            # what one recording lacks of a load, the others may carry: its mass is negative then
-            signs = [c.sign == 1 for c in coefficients]
+            spread = np.full(len(coefficients), np.inf) if robot is None else known
+            positive = tuple(k for k, c in enumerate(coefficients) if c.sign == 1)
             if robot is not None:
-                signs = [rows is None, *[False] * 9]
-            positive = tuple(np.flatnonzero(signs).tolist())
+                # what one recording lacks of a load, the others may carry: its mass is negative
+                positive = (0,) if rows is None else ()
             columns = {
                 j: fits.average(np.asarray(values))
                 for j, values in effect.torque_columns(signals, site, **shape).items()
