@@ -3,11 +3,16 @@
 
 from skidyn._writing import write_json
 from skidyn.report._compare import summarize_comparison
-from skidyn.report._compare_html import render_comparison
-from skidyn.report._fleet import render_fleet, summarize_fleet, write_fleet
-from skidyn.report._html import render_html
+from skidyn.report._fleet import summarize_fleet
 from skidyn.report._summary import summarize
-from skidyn.report._write import write_comparison, write_html
+from skidyn.report._write import (
+    render_comparison,
+    render_fleet,
+    render_html,
+    write_comparison,
+    write_fleet,
+    write_html,
+)
 
 __all__ = [
     "render_comparison",

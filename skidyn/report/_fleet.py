@@ -1,19 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The page of a fleet: which robot deviates in which effect, and since when."""
+"""What the page of a fleet shows: which robot deviates in which effect, and since when."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from skidyn._plain import plain
 from skidyn._text import listed
 from skidyn._version import versions
-from skidyn._writing import write_text
-from skidyn.report._page import render_page
 from skidyn.report._picture import read_all
 from skidyn.report._words import coefficient_told, since_told
 
@@ -129,55 +125,3 @@ def _headline(report: dict[str, Any]) -> str:
 def _some(names: list[str]) -> str:
     more = [f"{len(names) - NAMED} more"] if len(names) > NAMED else []
     return listed([*names[:NAMED], *more])
-
-
-def render_fleet(summary: dict[str, Any]) -> str:
-    """Make the page of a fleet.
-
-    Parameters
-    ----------
-    summary : dict
-        From :func:`skidyn.report.summarize_fleet`.
-
-    Returns
-    -------
-    html : str
-        A whole page that loads nothing from anywhere. Every text of the summary is escaped.
-
-    Raises
-    ------
-    ImportError
-        Jinja2 is not installed (``pip install 'skidyn[report]'``).
-
-    Examples
-    --------
-    >>> from skidyn.report import render_fleet, summarize_fleet
-    >>> page = render_fleet(summarize_fleet(compare_fleet(evidence)))  # doctest: +SKIP
-    """
-    report = summary["report"]
-    return render_page(
-        "fleet", summary, f"{len(report['robots'])} robots · {len(report['columns'])} coefficients"
-    )
-
-
-def write_fleet(path: str | os.PathLike[str], summary: dict[str, Any]) -> Path:
-    """Write the page of a fleet.
-
-    Parameters
-    ----------
-    path : path
-        File to write; it is replaced in one step.
-    summary : dict
-        From :func:`skidyn.report.summarize_fleet`.
-
-    Returns
-    -------
-    path : Path
-        The file.
-
-    Examples
-    --------
-    >>> from skidyn.report import summarize_fleet, write_fleet
-    >>> write_fleet("fleet.html", summarize_fleet(compare_fleet(evidence)))  # doctest: +SKIP
-    """
-    return write_text(path, render_fleet(summary))

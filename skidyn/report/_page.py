@@ -39,11 +39,12 @@ def render_page(page: str, summary: Summary, sub: str) -> str:
         content = picture.show(summary, canvas)
         if content is None:
             continue
-        template = environment.get_template(f"_pages/{page}/{name}.html.jinja")
+        beside = "/".join(type(picture).__module__.split(".")[2:])
+        template = environment.get_template(f"{beside}.html.jinja")
         parts.append(template.render(s=summary, r=summary["report"], **content))
         contents += [(name, picture.title)] if picture.title else []
-        script = resources.files("skidyn.report").joinpath("_pages", page, f"{name}.js")
-        scripts += [f"_pages/{page}/{name}.js"] if script.is_file() else []
+        script = resources.files("skidyn.report").joinpath(f"{beside}.js")
+        scripts += [f"{beside}.js"] if script.is_file() else []
     return str(
         environment.get_template("templates/page.html.jinja").render(
             title=summary["title"],

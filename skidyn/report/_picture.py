@@ -3,7 +3,7 @@
 
 The module stands in the folder of its page, ``skidyn/report/_pages/<page>/<name>.py``, its template
 ``<name>.html.jinja`` and its script ``<name>.js`` beside it. Nothing else names it: a page is made
-of the pictures in its folder, in the order of their ``place``.
+of the pictures in its folder and in the folder ``every``, in the order of their ``place``.
 """
 
 from __future__ import annotations
@@ -115,16 +115,17 @@ def pictures(page: str) -> dict[str, Picture]:
     page : {"comparison", "diagnosis", "fleet"}
         Folder of ``skidyn/report/_pages``.
     """
-    package = import_module(f"skidyn.report._pages.{page}")
     found = {}
-    for entry in pkgutil.iter_modules(package.__path__):
-        module = import_module(f"{package.__name__}.{entry.name}")
-        own = (value for value in vars(module).values() if isinstance(value, type))
-        found[entry.name] = next(
-            kind()
-            for kind in own
-            if issubclass(kind, Picture) and kind.__module__ == module.__name__
-        )
+    for folder in (page, "every"):
+        package = import_module(f"skidyn.report._pages.{folder}")
+        for entry in pkgutil.iter_modules(package.__path__):
+            module = import_module(f"{package.__name__}.{entry.name}")
+            own = (value for value in vars(module).values() if isinstance(value, type))
+            found[entry.name] = next(
+                kind()
+                for kind in own
+                if issubclass(kind, Picture) and kind.__module__ == module.__name__
+            )
     return dict(sorted(found.items(), key=lambda item: item[1].place))
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writing reports to disk: whole or not at all."""
+"""Pages of a diagnosis, a comparison and a fleet: made, and written whole or not at all."""
 
 from __future__ import annotations
 
@@ -9,10 +9,96 @@ from typing import Any
 
 from skidyn._exceptions import SkidynError
 from skidyn._writing import writable, write_json, write_text
-from skidyn.report._compare_html import render_comparison
-from skidyn.report._html import render_html
+from skidyn.report._page import render_page
 
 PathLike = str | os.PathLike[str]
+
+
+def render_html(summary: dict[str, Any]) -> str:
+    """Make the report page.
+
+    Parameters
+    ----------
+    summary : dict
+        From :func:`skidyn.report.summarize`.
+
+    Returns
+    -------
+    html : str
+        A whole page that loads nothing from anywhere: styles, scripts, the plotting library and
+        numbers are inside. Every text of the summary is escaped.
+
+    Raises
+    ------
+    ImportError
+        Jinja2 is not installed (``pip install 'skidyn[report]'``).
+
+    Examples
+    --------
+    >>> from skidyn.report import render_html, summarize
+    >>> page = render_html(summarize(diagnosis))  # doctest: +SKIP
+    """
+    n_joints = len(summary["report"]["joints"])
+    return render_page("diagnosis", summary, f"{n_joints} joints · {_size(summary, ' · ')}")
+
+
+def render_comparison(summary: dict[str, Any]) -> str:
+    """Make the page of a comparison.
+
+    Parameters
+    ----------
+    summary : dict
+        From :func:`skidyn.report.summarize_comparison`.
+
+    Returns
+    -------
+    html : str
+        A whole page that loads nothing from anywhere. Every text of the summary is escaped.
+
+    Raises
+    ------
+    ImportError
+        Jinja2 is not installed (``pip install 'skidyn[report]'``).
+
+    Examples
+    --------
+    >>> from skidyn.report import render_comparison, summarize_comparison
+    >>> page = render_comparison(summarize_comparison(new, worn))  # doctest: +SKIP
+    """
+    report = summary["report"]
+    sides = (f"{side['name']} ({_size(side, ', ')})" for side in report["sides"])
+    return render_page(
+        "comparison", summary, f"{' against '.join(sides)} · {len(report['joints'])} joints"
+    )
+
+
+def render_fleet(summary: dict[str, Any]) -> str:
+    """Make the page of a fleet.
+
+    Parameters
+    ----------
+    summary : dict
+        From :func:`skidyn.report.summarize_fleet`.
+
+    Returns
+    -------
+    html : str
+        A whole page that loads nothing from anywhere. Every text of the summary is escaped.
+
+    Raises
+    ------
+    ImportError
+        Jinja2 is not installed (``pip install 'skidyn[report]'``).
+
+    Examples
+    --------
+    >>> from skidyn.report import render_fleet, summarize_fleet
+    >>> page = render_fleet(summarize_fleet(compare_fleet(evidence)))  # doctest: +SKIP
+    """
+    report = summary["report"]
+    return render_page(
+        "fleet", summary, f"{len(report['robots'])} robots · {len(report['columns'])} coefficients"
+    )
 
 
 def write_html(path: PathLike, summary: dict[str, Any]) -> Path:
@@ -71,3 +157,32 @@ def write_comparison(path: PathLike, summary: dict[str, Any]) -> tuple[Path, Pat
     writable(beside)  # neither without the other
     page = write_text(path, render_comparison(summary))
     return page, write_json(beside, summary["report"])
+
+
+def write_fleet(path: PathLike, summary: dict[str, Any]) -> Path:
+    """Write the page of a fleet.
+
+    Parameters
+    ----------
+    path : path
+        File to write; it is replaced in one step.
+    summary : dict
+        From :func:`skidyn.report.summarize_fleet`.
+
+    Returns
+    -------
+    path : Path
+        The file.
+
+    Examples
+    --------
+    >>> from skidyn.report import summarize_fleet, write_fleet
+    >>> write_fleet("fleet.html", summarize_fleet(compare_fleet(evidence)))  # doctest: +SKIP
+    """
+    return write_text(path, render_fleet(summary))
+
+
+def _size(log: dict[str, Any], between: str) -> str:
+    """How many trajectories and samples a log has."""
+    n = log["n_trajectories"]
+    return f"{n} trajector{'y' if n == 1 else 'ies'}{between}{log['n_samples']:,} samples"

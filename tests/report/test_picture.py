@@ -8,8 +8,9 @@ from skidyn.report._picture import Canvas, pictures
 
 @pytest.mark.parametrize("page", ["comparison", "diagnosis", "fleet"])
 def test_every_picture_is_a_module_and_a_template(page):
-    folder = resources.files("skidyn.report").joinpath("_pages", page)
-    names = {entry.name for entry in folder.iterdir()} - {"__init__.py", "__pycache__"}
+    folders = [resources.files("skidyn.report").joinpath("_pages", f) for f in (page, "every")]
+    names = {entry.name for folder in folders for entry in folder.iterdir()}
+    names -= {"__init__.py", "__pycache__"}
     found = pictures(page)
     assert names == {f"{name}.{end}" for name in found for end in ("py", "html.jinja")}
     places = [picture.place for picture in found.values()]
