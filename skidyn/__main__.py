@@ -11,7 +11,7 @@ def main() -> int:
 
         return run()
     except KeyboardInterrupt:
-        print("stopped; no file was left half written", file=sys.stderr)
+        print("stopped; no file was left incomplete", file=sys.stderr)
         return 130
 
 

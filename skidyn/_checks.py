@@ -50,8 +50,9 @@ def count_joints(frame: pd.DataFrame, source: str = "the log") -> int:
     )
     if not numbers:
         raise LogError(
-            f"{source} has no joint positions. Recognised are q1, q_<joint>, position_1 and alike; "
-            f"it has: {', '.join(map(str, frame.columns))}. Name them with "
+            f"{source} has no joint positions. Recognised names are q1, q_<joint>, position_1 "
+            "and similar ones; it has:"
+            f" {', '.join(map(str, frame.columns))}. Name them with "
             "columns={'q': ['first', 'second', ...]}."
         )
     if numbers != list(range(1, len(numbers) + 1)):
@@ -96,8 +97,8 @@ def require_columns(
         surplus = sorted(found - set(range(1, n_joints + 1)))
         if missing:
             servos = (
-                " Position servos need no torque but their commands (cmd1..): skidyn diagnose "
-                "--controller fit; in Python needs_torque=False and servo_torque."
+                " For position servos, their commands (cmd1..) can take the place of torque: "
+                "skidyn diagnose --controller fit; in Python needs_torque=False and servo_torque."
             )
             raise LogError(
                 f"{source} lacks {', '.join(f'{quantity}{k}' for k in missing)}: {n_joints} joints "
@@ -107,8 +108,8 @@ def require_columns(
         if surplus:
             raise LogError(
                 f"{source} has {', '.join(f'{quantity}{k}' for k in surplus)}, but positions of "
-                f"{n_joints} joint(s) only. Name the positions that are missing, or take the "
-                "columns to use with columns={...}."
+                f"{n_joints} joint(s) only. Name the missing positions, or select the columns to "
+                "use with columns={...}."
             )
 
 
@@ -118,7 +119,7 @@ def refuse_duplicates(names: Sequence[str], source: str) -> None:
     if twice:
         raise LogError(
             f"{source}: the column(s) {', '.join(twice)} occur more than once. Rename or remove "
-            "the surplus ones; which of them is meant cannot be known."
+            "the surplus ones; the intended column cannot be determined."
         )
 
 
@@ -150,8 +151,8 @@ def as_numbers(frame: pd.DataFrame, names: Sequence[str], source: str = "the log
             continue
         if column.dtype.kind == "M":
             raise LogError(
-                f"{source}: column {name!r} holds dates. Only the time column may; it is then "
-                "counted in seconds from its first row."
+                f"{source}: column {name!r} holds dates. Only the time column may hold dates; it "
+                "is then converted to seconds since its first row."
             )
         cells = column.to_numpy(dtype=object)
         for row, cell in enumerate(cells):
@@ -245,8 +246,8 @@ def check_time_order(
         raise LogError(
             f"{source}: time goes backwards in {len(back)} place(s), first in row {row} "
             f"({time[row]:.6g} s after {time[row - 1]:.6g} s, trajectory {trajectory[row]}). If a "
-            "new recording begins there, give the rows a trajectory column; if rows are in "
-            "disorder, sort them by time."
+            "new recording begins there, give the rows a trajectory column; if the rows are out "
+            "of order, sort them by time."
         )
     advances: np.ndarray = np.r_[True, ~(same & (steps == 0))]
     return advances

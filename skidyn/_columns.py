@@ -111,9 +111,9 @@ def resolve_columns(
     if len(rest) != 3 * n:
         keys = n_features - len(rest)
         raise ColumnError(
-            f"X has {n_features} columns; a robot with {n} joints needs {3 * n} by position "
-            f"(q, dq, ddq of {', '.join(joint_names)}) and {keys} key column(s) are declared. "
-            "Pass a DataFrame with the columns q1.., dq1.., ddq1.. (a Pipeline hands one on after "
+            f"X has {n_features} columns; a robot with {n} joints needs {3 * n} by position (q, "
+            f"dq, ddq of {', '.join(joint_names)}) and {keys} key column(s) are declared. Pass a "
+            "DataFrame with the columns q1.., dq1.., ddq1.. (a Pipeline passes one on after "
             "set_output(transform='pandas')), or declare key columns by position, for example "
             "trajectory=0."
         )
@@ -151,8 +151,8 @@ def key_columns(
         which = found[0] if names is None else repr(names[found[0]])
         raise ColumnError(
             f"trajectory={trajectory!r} and time={time!r} are both the column {which} of X. A "
-            "trajectory is one recording, numbered 0, 1, ..; give the columns of the two apart, "
-            "or None for what X does not have."
+            "trajectory is one recording, numbered 0, 1, ..; give a different column for each, "
+            "or None for one that X does not have."
         )
     return found
 

@@ -123,13 +123,13 @@ def match_names(
         raise LogError(
             f"{source} has {n} joints ({_listed(match.joint_names) or 'by number'}), the robot has "
             f"{len(robot_joints)} ({_listed(robot_joints)}). If the log covers part of the robot, "
-            "load it with Robot.from_urdf(..., joints=[...]); if it has further joints, say which "
-            "columns to take with columns={'q': [...], 'dq': [...], 'tau': [...]}."
+            "load it with Robot.from_urdf(..., joints=[...]); if it has further joints, select "
+            "the columns with columns={'q': [...], 'dq': [...], 'tau': [...]}."
         )
     if n > max(len(names), MANY_JOINTS):
         raise LogError(
-            f"{source} has a column of joint {n}, but only {len(names)} columns. Is its name "
-            "damaged? Rename it, or say which columns to take with columns={'q': [...]}."
+            f"{source} has a column of joint {n}, but only {len(names)} columns. Check its name; "
+            "rename it, or select the columns with columns={'q': [...]}."
         )
     if not match.joint_names:
         match.joint_names = list(robot_joints or [str(k + 1) for k in range(n)])
@@ -195,7 +195,7 @@ def _expand(
         pattern = before + "(.+)" + r"\1".join(after)  # wherever it stands, one name
         found = [name for name in names if re.fullmatch(pattern, name)]
         if not found:
-            raise LogError(f"columns: no column is like {value!r}. There are: {_listed(names)}.")
+            raise LogError(f"columns: no column matches {value!r}. There are: {_listed(names)}.")
         return list(found)
     value = value.replace("{i}", "{index}")
     if "{index}" in value:
@@ -259,7 +259,7 @@ class _Found(dict[Any, str]):
         for joint, names in self.others.items():
             both = _listed([self[joint], *names])
             raise LogError(
-                f"{source}: {both} are all {quantity} of joint {joint}. Say which to take with "
+                f"{source}: {both} are all {quantity} of joint {joint}. Select them with "
                 f"columns={{'{quantity}': [...]}}, or remove the surplus ones."
             )
 

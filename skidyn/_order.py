@@ -61,10 +61,11 @@ def refuse_shuffled(what: str, trajectory: NDArray[Any], time: Array | None) -> 
     """
     if order_in_time(trajectory, time) is not None:
         raise LogError(
-            f"{what} follows the motion from row to row, but the rows of X are not in the order of "
-            "time, as after train_test_split, KFold(shuffle=True), BaggingRegressor or "
-            "HalvingGridSearchCV over samples. Give whole trajectories in the order of time: split "
-            "by TrajectoryKFold, GroupKFold or GroupShuffleSplit, or apply it before the split"
+            f"{what} depends on preceding rows, but the rows of X are not in the order of time, "
+            "as after train_test_split, KFold(shuffle=True), BaggingRegressor or "
+            "HalvingGridSearchCV over samples. Give whole trajectories in the order of time: "
+            "split by TrajectoryKFold, GroupKFold or GroupShuffleSplit, or apply it before the "
+            "split"
         )
 
 

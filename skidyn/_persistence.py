@@ -155,9 +155,9 @@ def save_model(path: Any, model: Any) -> Path:
     lost = {name for loader, name in nodes if loader not in _LOADERS}
     if lost:
         raise SkidynError(
-            f"{type(model).__name__} cannot be stored: it holds {', '.join(sorted(lost))}, and "
-            "only data and classes are loaded again. Put a class with this method in its place."
-            f"{_instead(model)}"
+            f"{type(model).__name__} cannot be stored: it holds {', '.join(sorted(lost))}, but "
+            "only data and classes can be loaded again. Use a class with this method "
+            f"instead.{_instead(model)}"
         )
     return write_bytes(target, data)
 
@@ -165,7 +165,7 @@ def save_model(path: Any, model: Any) -> Path:
 def _instead(model: Any) -> str:
     """What of a search can be stored."""
     found = hasattr(model, "best_estimator_")
-    return " Store its best_estimator_, which is the model that was found." if found else ""
+    return " Store its best_estimator_ instead." if found else ""
 
 
 def load_model(path: str | os.PathLike[str], *, trusted: Iterable[str] = ()) -> Any:
@@ -211,8 +211,8 @@ def load_model(path: str | os.PathLike[str], *, trusted: Iterable[str] = ()) -> 
             raise
         except zipfile.BadZipFile as error:
             raise SkidynError(
-                f"{source}: not a skops file. Pickles and joblib files are refused, since loading "
-                "one can run any code; store models with skidyn.save_model"
+                f"{source}: not a skops file. Pickles and joblib files are refused because "
+                "loading one can run arbitrary code; store models with skidyn.save_model"
             ) from error
         except Exception as error:  # damaged archives raise whatever their content leads to
             raise SkidynError(f"{source}: cannot be loaded: {error}") from error
@@ -226,8 +226,8 @@ def load_model(path: str | os.PathLike[str], *, trusted: Iterable[str] = ()) -> 
         except Exception as error:  # damaged files raise whatever their content leads to
             raise SkidynError(f"{source}: cannot be loaded: {error}") from error
     raise SkidynError(
-        f"{source}: holds what is not trusted: {', '.join(foreign)}. Functions are never loaded; "
-        "if these are classes and you know where the file comes from, name them in trusted="
+        f"{source}: holds untrusted types: {', '.join(foreign)}. Functions are never loaded; if "
+        "these are classes and you trust the source of the file, list them in trusted="
     )
 
 

@@ -86,10 +86,12 @@ def writable(path: PathLike) -> Path:
         return target
     if not stat.S_ISREG(found.st_mode):
         raise SkidynError(
-            f"{path} is not a regular file, and would be replaced by one; name a file"
+            f"{path} is not a regular file and would be replaced by one; give another path"
         )
     if (found.st_dev, found.st_ino) in (_INPUTS.get() or ()):
-        raise SkidynError(f"{path} is read by this command and would be overwritten; name another")
+        raise SkidynError(
+            f"{path} is read by this command and would be overwritten; give another path"
+        )
     return target
 
 

@@ -19,20 +19,20 @@ from skidyn._exceptions import LogWarning, SkidynError
 DONE, FAILED, BAD_INPUT, STOPPED = 0, 1, 2, 130
 
 _DESCRIPTION = """\
-Robot inverse dynamics: compare a model with measurements, see where it fails, learn what is
-missing, add it and watch the error fall.
+Robot inverse dynamics: compare a model with measurements, see where it fails, identify missing
+effects, add them and see the error decrease.
 """
 _EPILOG = """\
-A first contact:
+First steps:
 
   skidyn demo                                             the whole loop on a simulated log
   skidyn check run1.csv --urdf robot.urdf                 is the log good enough?
   skidyn diagnose run*.csv --urdf robot.urdf --out report.json --html report.html
   skidyn add --from report.json --effect dahl --joints 1,4
 
-skidyn COMMAND --help explains each command with examples. --json prints any result for programs.
-Exit codes: 0 done, 1 failed --fail-above, 2 the input is at fault, 130 stopped by Ctrl-C. Files
-are written whole or not at all.
+skidyn COMMAND --help explains each command with examples. --json prints results as JSON. Exit
+codes: 0 done, 1 failed --fail-above, 2 invalid input, 130 stopped by Ctrl-C. Files are written
+completely or not at all.
 """
 
 
@@ -91,7 +91,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             _give_up_output()
         return BAD_INPUT
     except KeyboardInterrupt:
-        print("stopped; no file was left half written", file=sys.stderr)
+        print("stopped; no file was left incomplete", file=sys.stderr)
         return STOPPED
     else:
         return DONE if passed else FAILED

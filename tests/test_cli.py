@@ -84,4 +84,4 @@ def test_ctrl_c_while_modules_are_imported_is_one_line(module, how):
         [sys.executable, "-c", code, *words], capture_output=True, text=True, check=False
     )
     assert done.returncode == cli.STOPPED
-    assert done.stderr == "stopped; no file was left half written\n"
+    assert done.stderr == "stopped; no file was left incomplete\n"

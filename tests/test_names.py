@@ -78,7 +78,7 @@ def test_said_goes_before_guessed():
     [
         ({"position": "alpha"}, "'position' is not a signal of a log"),
         ({"q": 9}, "column 9, but the log has 2"),
-        ({"q": "pos_{joint}"}, "no column is like .pos_{joint}."),
+        ({"q": "pos_{joint}"}, "no column matches .pos_{joint}."),
         ({"time": ["a", "b"]}, "takes one column"),
     ],
 )

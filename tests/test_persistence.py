@@ -95,7 +95,7 @@ def test_pickles_are_refused_and_never_run(tmp_path):
 
 def test_foreign_types_need_to_be_named(tmp_path):
     file = skidyn.save_model(tmp_path / "m.skops", Foreign())
-    with pytest.raises(SkidynError, match=r"not trusted: .*Foreign"):
+    with pytest.raises(SkidynError, match=r"untrusted types: .*Foreign"):
         skidyn.load_model(file)
 
 

@@ -14,7 +14,7 @@ from skidyn._writing import write_json
 
 DESCRIPTION = """\
 Add an effect to a model that skidyn diagnose has judged, and print the held-out error before and
-after. The report holds where the log is, and which model it was.
+after. The report records the files of the log and the model.
 
   skidyn diagnose run*.csv --urdf robot.urdf --out report.json
   skidyn add --from report.json --effect dahl --joints 1,4 --out better.json
@@ -30,7 +30,7 @@ def add_parser(commands: Any) -> None:
         DESCRIPTION,
     )
     with_report(parser)
-    parser.add_argument("--effect", required=True, help="kind of the catalogue")
+    parser.add_argument("--effect", required=True, help="kind of effect in the catalogue")
     with_joints(parser, "joints that get the effect (default: all)")
     parser.add_argument(
         "--out", type=JsonFile, metavar="JSON", help="write the parameters of the better model"

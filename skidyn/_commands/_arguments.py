@@ -121,7 +121,9 @@ def with_reading(parser: Any) -> None:
         "--units", metavar="UNITS", help='units that are not SI: q=deg,time=ms or {"q": "deg"}'
     )
     parser.add_argument(
-        "--drive-gains", metavar="JSON", help="torque per ampere of each joint: logs of currents"
+        "--drive-gains",
+        metavar="JSON",
+        help="torque per ampere of each joint, for logs of currents",
     )
     parser.add_argument("--joints", help="joints the log covers, separated by commas")
     parser.add_argument("--rate", type=float, help="sampling rate in Hz of a log without time")
@@ -130,9 +132,11 @@ def with_reading(parser: Any) -> None:
 
 def with_remedies(parser: Any) -> None:
     """Remedies for a log whose signals are not what they seem; skidyn check says which."""
-    fix = parser.add_argument_group("remedies", "skidyn check says which of them a log needs")
+    fix = parser.add_argument_group("remedies", "skidyn check reports which of them a log needs")
     fix.add_argument(
-        "--gravity", metavar="X,Y,Z", help="gravity in the base frame, m/s^2 (robot on a wall)"
+        "--gravity",
+        metavar="X,Y,Z",
+        help="gravity in the base frame, m/s^2 (for a robot on a wall)",
     )
     fix.add_argument(
         "--flip",
@@ -142,18 +146,23 @@ def with_remedies(parser: Any) -> None:
     fix.add_argument(
         "--order",
         metavar="2,1,3",
-        help="for each joint the column that holds it, or of some: tau=2,1,3, motion=2,1,3",
+        help="for each joint the number of its column, for all or some quantities: tau=2,1,3, "
+        "motion=2,1,3",
     )
     fix.add_argument(
         "--gain", metavar="tau3=0.02", help="multiply columns or quantities by factors"
     )
     fix.add_argument(
-        "--summed", metavar="q3=q2", help="positions that hold that of another joint: q3=q2"
+        "--summed",
+        metavar="q3=q2",
+        help="positions that include the position of another joint: q3=q2",
     )
-    fix.add_argument("--zero", metavar="q2=1.57", help="what positions read at the robot's zero")
-    fix.add_argument("--late", metavar="tau=0.008", help="delays in s, to be taken out")
+    fix.add_argument("--zero", metavar="q2=1.57", help="recorded positions at the robot's zero")
+    fix.add_argument("--late", metavar="tau=0.008", help="delays in s that are removed")
     fix.add_argument(
-        "--lowpass", metavar="tau=0.04", help="time constants of low passes in s, to be undone"
+        "--lowpass",
+        metavar="tau=0.04",
+        help="time constants in s of low-pass filters that are undone",
     )
     fix.add_argument("--unwrap", action="store_true", help="remove jumps by whole turns")
     fix.add_argument(
@@ -167,8 +176,8 @@ def with_remedies(parser: Any) -> None:
         choices=("auto", "recorded", "regular"),
         default="auto",
         help="regular: samples were taken at even steps and only the time stamps jitter; recorded: "
-        "the stamps are right; auto (default): the stamps, but even steps for a diagnosis if they "
-        "certainly jitter",
+        "the stamps are correct; auto (default): the stamps are used, except that a diagnosis "
+        "uses even steps if the stamps certainly jitter",
     )
     fix.add_argument(
         "--drop-repeated", action="store_true", help="leave out rows that repeat the one before"
@@ -177,7 +186,9 @@ def with_remedies(parser: Any) -> None:
         "--split-leaps", action="store_true", help="begin a new trajectory where positions jump"
     )
     fix.add_argument(
-        "--restore-gravity", action="store_true", help="add gravity that was taken off the torque"
+        "--restore-gravity",
+        action="store_true",
+        help="add the gravity torque that was removed from the torque",
     )
     fix.add_argument(
         "--resample", type=float, metavar="HZ", help="average over even steps at this rate"
@@ -191,8 +202,8 @@ def with_log(parser: Any, urdf_required: bool = True) -> None:
         "--model",
         type=Input,
         default="rigid_body,viscous,coulomb",
-        help="what the model has, separated by commas (default: %(default)s), or a model stored as "
-        "*.skops",
+        help="components of the model, separated by commas (default: %(default)s), or a model "
+        "stored as *.skops",
     )
     parser.add_argument(
         "--nominal",

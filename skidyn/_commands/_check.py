@@ -13,17 +13,18 @@ from skidyn._commands._input import read_frame, read_robot
 from skidyn._commands._output import print_json, working
 
 DESCRIPTION = """\
-Check whether the signals of a log are what their names say. What would change the results most
-comes first, with its evidence and the option that fixes it: units, clock, repeated rows, and with
-the robot also signs and order of joints, gravity, torque without sign, currents taken for torques,
-and delay. Then follow the rate, the resolution, and how far and how often each joint was moved.
+Check whether the signals of a log agree with their names and units. Problems are listed by their
+influence on the results, with evidence and the option that fixes each: units, clock, repeated rows,
+and with a robot also signs and order of joints, gravity, torque without sign, currents taken for
+torques, and delay. A table then gives the rate, the resolution, and the range and number of
+reversals of each joint.
 
   skidyn check run1.csv run2.csv
   skidyn check run1.csv --urdf robot.urdf
 
-at rest: share of rows in which the joint stands still; at limit: share of rows at the extreme
-torque; dq/q': recorded velocity over differentiated position, 1 in a consistent log; delay: of
-the torque.
+at rest: share of rows in which the joint does not move; at limit: share of rows at the extreme
+torque; dq/q': ratio of recorded velocity to differentiated position, 1 in a consistent log; delay:
+delay of the torque.
 """
 
 

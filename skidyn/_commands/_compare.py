@@ -26,25 +26,26 @@ if TYPE_CHECKING:
     from skidyn.diagnosis import Diagnosis
 
 DESCRIPTION = """\
-Compare a model with a log: the error on motion that the fit has not seen, by joint and trajectory,
-and by regime (at rest, around reversals, slow, fast, loaded). Nothing is searched. --traces writes
-the torques and their difference for PlotJuggler, Foxglove, ROS 2 (.mcap) or Rerun (.rrd).
+Compare a model with a log: print the error on motion that was left out of the fit, by joint and
+trajectory, and by regime (at rest, around reversals, slow, fast, loaded). No effects are searched.
+--traces writes the torques and their difference for PlotJuggler, Foxglove, ROS 2 (.mcap) or Rerun
+(.rrd).
 
   skidyn compare run*.csv --urdf robot.urdf
   skidyn compare run*.csv --urdf robot.urdf --model rigid_body,viscous,coulomb,stribeck
   skidyn compare run*.csv --urdf robot.urdf --traces errors.mcap
 
-Compare two models, or two recordings, or two reports of skidyn diagnose, with each other: both are
-diagnosed, and their curves, errors, findings and coefficients are shown side by side, as a page and
-as JSON beside it.
+Compare two models, two recordings, or two reports of skidyn diagnose: both are diagnosed, and their
+curves, errors, findings and coefficients are shown side by side on a page and written to a JSON
+file beside it.
 
   skidyn compare run*.csv --urdf robot.urdf --against-model better.skops --html models.html
   skidyn compare new*.csv --urdf robot.urdf --against worn*.csv --html wear.html
   skidyn compare new.json worn.json --html wear.html
 
 A gate for tests: the model is fitted to a healthy recording, and the error of a joint on the new
-one must not exceed the given multiple of its usual error. Joints that fail are named, and the exit
-code is 1.
+recording must not exceed the given multiple of its usual error. If a joint fails, its name is
+printed and the exit code is 1.
 
   skidyn compare new*.csv --urdf robot.urdf --against healthy*.csv --fail-above 1.5
 """
@@ -65,12 +66,12 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--against-model", type=Input, metavar="MODEL", help="the other model, as --model"
     )
-    parser.add_argument("--names", metavar="A,B", help="names of the two on the page")
+    parser.add_argument("--names", metavar="A,B", help="names of the two sides on the page")
     parser.add_argument(
         "--html",
         type=Page,
         metavar="HTML",
-        help="page that compares the two; a JSON file of its numbers is written beside it",
+        help="page that compares both; a JSON file of its numbers is written beside it",
     )
     parser.add_argument(
         "--traces",
@@ -161,7 +162,7 @@ def _pair(options: argparse.Namespace) -> list[argparse.Namespace] | None:
         both = [argparse.Namespace(report=n, json=options.json, urdf=options.urdf) for n in reports]
         return [recorded_options(side) for side in both]
     if not options.urdf:
-        raise SkidynError("--urdf is missing: the description of the robot")
+        raise SkidynError("--urdf is missing: give the description of the robot")
     if not options.against and not options.against_model:
         return None
     other = {"logs": options.against or options.logs}

@@ -13,8 +13,8 @@ from skidyn._commands._input import embedded_robots
 from skidyn._commands._output import print_json
 
 DESCRIPTION = """\
-Print the script with which a shell completes commands, options, files, and kinds of effects, also
-in lists with commas.
+Print a script for shell completion of commands, options, files, and kinds of effects, including
+comma-separated lists.
 
   skidyn completion bash > ~/.local/share/bash-completion/completions/skidyn
   skidyn completion zsh > "${fpath[1]}/_skidyn"
@@ -23,7 +23,8 @@ To try it in a running bash:
 
   source <(skidyn completion bash)
 
-The script is made once and costs nothing afterwards. It needs shtab: pip install skidyn[shell]
+The script is generated once and needs no Python afterwards. Generating it requires shtab: pip
+install skidyn[shell]
 """
 
 #: What the values of arguments are, by their names in the options; all other files by their type.

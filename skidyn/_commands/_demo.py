@@ -15,8 +15,9 @@ from skidyn._text import digits
 MOVING = 0.05
 
 DESCRIPTION = """\
-The whole loop on a simulated Panda arm that hides two effects: compare, see where the model fails,
-learn what is missing, add it, and judge the better model on two trajectories put aside.
+Run the whole loop on a simulated Panda arm with two hidden effects: compare, see where the model
+fails, identify the missing effects, add them, and evaluate the better model on two trajectories
+that were put aside.
 
   skidyn demo --html demo.html
 """
@@ -34,7 +35,7 @@ def run(options: argparse.Namespace) -> None:
 
     say = (lambda *words: None) if options.json else print
     say("1. A Panda arm is simulated with two effects that no model below contains.")
-    say("   Two of its trajectories are put aside: nothing is fitted to them.")
+    say("   Two of its trajectories are put aside and not used in any fit.")
     log = load_demo_log()
     aside = log.X["trajectory"] >= log.X["trajectory"].max() - 1
     X, y, X_new, y_new = log.X[~aside], log.y[~aside], log.X[aside], log.y[aside]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``skidyn diagnose``: learn which effect is missing."""
+"""``skidyn diagnose``: identify missing effects."""
 
 from __future__ import annotations
 
@@ -32,16 +32,16 @@ if TYPE_CHECKING:
     from skidyn.simulation import Controller
 
 DESCRIPTION = """\
-Compare a model with a log and learn which physical effect it lacks.
+Compare a model with a log and identify the physical effects that it lacks.
 
   skidyn diagnose run1.csv run2.csv --urdf robot.urdf --out report.json --html report.html
 
 LOG is a table with the columns time, trajectory, q1.., dq1.., tau1.. (optional ddq1.., temp1..);
-other names through --columns '{"q": ["pos_a", "pos_b"]}'. --model says what the model has already:
-rigid_body and kinds of the catalogue (skidyn effects lists them).
+other names are given by --columns '{"q": ["pos_a", "pos_b"]}'. --model lists the components that
+the model has already: rigid_body and kinds of the catalogue (printed by skidyn effects).
 
-A log of position servos needs no torque, but their commands (cmd1.. or q_ref1..): the torque is the
-gain of the servo times its error, and joints are simulated along their commands, too.
+A log of position servos needs their commands (cmd1.. or q_ref1..) instead of torque: the torque is
+the gain of the servo times its position error. Joints are then also simulated along their commands.
 
   skidyn diagnose servos.csv --urdf robot.urdf --controller fit \\
       --model rigid_body,viscous,coulomb,rotor_inertia
@@ -49,30 +49,32 @@ gain of the servo times its error, and joints are simulated along their commands
 
 
 def add_parser(commands: Any) -> None:
-    parser = command(commands, "diagnose", run, "learn which effect is missing", DESCRIPTION)
+    parser = command(commands, "diagnose", run, "identify missing effects", DESCRIPTION)
     with_log(parser)
     parser.add_argument("--out", type=JsonFile, metavar="JSON", help="write the report as JSON")
     parser.add_argument("--html", type=Page, metavar="HTML", help="write the report as a page")
     parser.add_argument(
-        "--force", action="store_true", help="continue although a check found the log to be wrong"
+        "--force", action="store_true", help="continue although a check found an error in the log"
     )
     parser.add_argument(
         "--simulate",
         action="store_true",
-        help="also judge findings by the simulated motion; those that worsen it are not added",
+        help="also judge findings by the simulated motion; findings that worsen it are not added",
     )
-    with_controller(parser, "name effects by the motion of servos along their commands, too")
+    with_controller(parser, "also identify effects by the motion of servos along their commands")
     parser.add_argument(
         "--no-cache",
         action="store_true",
-        help="diagnose again although the same was asked before, and keep no answer beside the log",
+        help="repeat the diagnosis even if a stored result exists, and store no result beside "
+        "the log",
     )
     parser.add_argument(
         "--jobs",
         type=int,
         default=-1,
         metavar="N",
-        help="processes at most (default: one for each core; one on systems other than Linux)",
+        help="maximum number of processes (default: one for each core; one on systems other than "
+        "Linux)",
     )
     parser.add_argument("--effects", help="kinds to try, separated by commas (default: all)")
 
@@ -104,7 +106,7 @@ def run(options: argparse.Namespace) -> None:
     for line in _next(answer, options):
         print(line)
     if again:
-        print("This was asked before, and the answer kept; --no-cache diagnoses again.")
+        print("This is the stored result of an earlier identical diagnosis; --no-cache repeats it.")
 
 
 def _answer(options: argparse.Namespace) -> dict[str, Any]:
@@ -154,7 +156,7 @@ def _diagnosed(
 def _mended(jitter: Suspicion) -> Suspicion:
     """What is told of stamps in whose place even steps were taken."""
     evidence = (
-        f"{jitter.evidence}; even steps were taken, as --clock regular does (--clock recorded "
+        f"{jitter.evidence}; even steps were used, as with --clock regular (--clock recorded "
         "keeps the stamps)"
     )
     return replace(jitter, evidence=evidence, certainty="noted", remedy=None)
@@ -165,7 +167,7 @@ def _next(answer: dict[str, Any], options: argparse.Namespace) -> list[str]:
     if not options.out:
         if options.html:
             return []
-        return ["next: the same with --out report.json --html report.html keeps this as a page"]
+        return ["next: add --out report.json --html report.html to save this result as a page"]
     report = shlex.quote(options.out)
     story = answer["story"]
     seen = (story["servo_motion"] or {"findings": []})["findings"]

@@ -10,8 +10,8 @@ from skidyn._commands._arguments import command
 from skidyn._commands._output import print_json
 
 DESCRIPTION = """\
-List the kinds of effects that the diagnosis tries, and that --model and --effect understand. --json
-adds formula, coefficients with units, shape parameters with ranges, rivals and references.
+List the kinds of effects that the diagnosis tests and that --model and --effect accept. --json adds
+formula, coefficients with units, shape parameters with ranges, rivals and references.
 
   skidyn effects
   skidyn effects --json

@@ -13,16 +13,16 @@ from skidyn._commands._output import print_json, working
 from skidyn._exceptions import SkidynError
 
 DESCRIPTION = """\
-Design a motion from which the parameters of a robot can be identified, within its limits.
+Design a motion within the limits of a robot from which its parameters can be identified.
 
   skidyn excite --urdf robot.urdf --out motion.csv --duration 20
   skidyn excite --urdf robot.urdf --recorded run1.csv --out next.csv
   skidyn excite --urdf robot.urdf --limits '{"workspace": [[-1, 1], [-1, 1], [0.1, 2]]}' ...
 
 Every joint starts and ends at rest. Positions, velocities and torques stay within the limits of the
-URDF, or those of --limits. With --recorded, the motion shows what these logs do not, and the torque
-limits hold for the model that is fitted to them, friction included. Collisions are not checked: try
-the motion slowly at first. Then play it on the robot, log it, and run skidyn diagnose.
+URDF, or those of --limits. With --recorded, the motion complements these logs, and the torque
+limits apply to the model that is fitted to them, including friction. Collisions are not checked:
+run the motion slowly at first. Then run it on the robot, log it, and use skidyn diagnose.
 """
 
 
@@ -52,7 +52,7 @@ def add_parser(commands: Any) -> None:
         "--criterion",
         choices=("determinant", "condition"),
         default="determinant",
-        help="what is optimized (default: %(default)s)",
+        help="criterion to optimize (default: %(default)s)",
     )
     parser.add_argument(
         "--limits",
@@ -65,12 +65,12 @@ def add_parser(commands: Any) -> None:
         nargs="+",
         type=Input,
         metavar="LOG",
-        help="recordings already made, one or more files",
+        help="existing recordings, one or more files",
     )
     parser.add_argument(
         "--model",
         default="rigid_body,viscous,coulomb",
-        help="what is fitted to the recordings (default: %(default)s)",
+        help="components of the model fitted to the recordings (default: %(default)s)",
     )
     with_reading(parser)
 

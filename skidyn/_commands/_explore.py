@@ -13,13 +13,14 @@ from skidyn._commands._input import covered_joints, read_driven, reading
 from skidyn._commands._output import working
 
 DESCRIPTION = """\
-Do the loop by hand on a local page: see the measurement against the model, click where the model
-fails, see which effects would help there, add one and watch the error fall; undo; save.
+Run the loop by hand on a local page: view the measurement against the model, click where the model
+fails, see which effects would reduce the error there, add one and view the new error; undo; save.
 
   skidyn explore run*.csv --urdf robot.urdf --folder results
 
-The page is served on this machine alone, with a random token in its address; nothing leaves it.
-Saving writes model.skops, report.html and explored.py, a script that does the same. Ctrl-C stops.
+The page is served on this machine only, with a random token in its address; no data leaves the
+machine. Saving writes model.skops, report.html and explored.py, a script that repeats the steps.
+Ctrl-C stops the server.
 """
 
 
@@ -28,7 +29,9 @@ def add_parser(commands: Any) -> None:
     with_log(parser)
     parser.add_argument("--folder", default=".", help="where results are saved (default: here)")
     parser.add_argument("--port", type=int, default=0, help="port (default: a free one)")
-    with_controller(parser, "compute the torque of a log without from the commands of its servos")
+    with_controller(
+        parser, "compute the torque of a log without torque from the commands of its servos"
+    )
     parser.add_argument("--no-browser", action="store_true", help="only print the address")
 
 

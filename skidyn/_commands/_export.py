@@ -19,20 +19,22 @@ Fit a model to a log and write it for other tools.
   skidyn export run1.csv --urdf robot.urdf --format c --out model.c
   skidyn export run1.csv --urdf robot.urdf --format urdf,mjcf --consistent --out identified
 
-With --into, the numbers go into your own MJCF or URDF, whose other bytes stay as they are, or into
-a layer of text over your own USD stage:
+With --into, the numbers are written into a copy of your own MJCF or URDF, whose other bytes are
+unchanged, or into a text layer over your own USD stage:
 
   skidyn export run1.csv --urdf robot.urdf --format mjcf --into own.xml --consistent --out new.xml
 
-A ROS 2 package with a plugin of inverse_dynamics_solver is a new folder of the package's name; the
-friction of one joint goes to a file of BAM's for the servo that you name:
+The ros2 format writes a ROS 2 package with a plugin of inverse_dynamics_solver to a new folder with
+the name of the package; the bam format writes the friction of one joint to a BAM file for the given
+servo:
 
   skidyn export run1.csv --urdf robot.urdf --format ros2 --out robot_dynamics
   skidyn export run1.csv --urdf robot.urdf --format bam --servo elbow --actuator xl330 --out m1.json
 
-C, Python and ONNX get a function of q, dq, ddq for feedforward, which does not need skidyn.
-Several formats at once get the name of --out with their own suffix. What a format cannot hold (a
-URDF knows viscous and Coulomb friction only) is listed, and written to FILE.skidyn.json beside it.
+C, Python and ONNX files contain a function of q, dq, ddq for feedforward, which does not need
+skidyn. With several formats, each file has the name of --out with its own suffix. Effects that a
+format cannot represent (a URDF supports viscous and Coulomb friction only) are listed and written
+to FILE.skidyn.json beside it.
 """
 
 #: Suffix of the files of every format.
@@ -65,16 +67,20 @@ def add_parser(commands: Any) -> None:
         "--into",
         type=Input,
         metavar="FILE",
-        help="your own MJCF or URDF, of which --out becomes a copy; your own USD stage, over which "
-        "--out becomes a layer",
+        help="your own MJCF or URDF, which is copied to --out; or your own USD stage, over which "
+        "--out is a layer",
     )
     parser.add_argument("--servo", metavar="JOINT", help="joint of the servo, for bam")
-    parser.add_argument("--actuator", help="servo as BAM calls it, such as xl330, for bam")
+    parser.add_argument("--actuator", help="name of the servo in BAM, such as xl330, for bam")
     parser.add_argument(
         "--motor", metavar="JSON", help='constants of the servo, for bam: \'{"kt": 0.4, "R": 3}\''
     )
-    parser.add_argument("--consistent", action="store_true", help="only physically possible bodies")
-    with_controller(parser, "compute the torque of a log without from the commands of its servos")
+    parser.add_argument(
+        "--consistent", action="store_true", help="restrict bodies to physically consistent ones"
+    )
+    with_controller(
+        parser, "compute the torque of a log without torque from the commands of its servos"
+    )
 
 
 def run(options: argparse.Namespace) -> None:

@@ -34,8 +34,8 @@ def gate(options: argparse.Namespace) -> bool:
     n_trajectories = usual_frame["trajectory"].nunique()
     if n_trajectories < 2:
         raise SkidynError(
-            "--against has one trajectory, and the usual error is that on trajectories left out of "
-            "the fit: give at least two"
+            "--against has one trajectory, but the usual error is measured on trajectories left "
+            "out of the fit: give at least two"
         )
     folds = TrajectoryKFold(min(FOLDS, n_trajectories)).split(usual_frame, usual_tau)
     result = drift(
@@ -76,7 +76,7 @@ def _check(options: argparse.Namespace) -> None:
     if not options.against:
         raise SkidynError("--fail-above needs a healthy recording: --against LOG [LOG ...]")
     if not options.urdf:
-        raise SkidynError("--urdf is missing: the description of the robot")
+        raise SkidynError("--urdf is missing: give the description of the robot")
     if options.against_model or options.html or options.names or options.traces:
         raise SkidynError(
             "--fail-above makes no page: leave out --against-model, --html, --names, --traces"
@@ -94,7 +94,7 @@ def _moving(
 
 
 def _print(joints: list[dict[str, Any]], limit: float) -> None:
-    print("error on the new recording over the usual one, while the joint moves")
+    print("ratio of the error on the new recording to the usual error, while the joint moves")
     print(f"  {'':24s} {'usual':>10s} {'new':>10s} {'ratio':>7s}")
     for j in joints:
         mark = "  changed" if j["failed"] else ""

@@ -14,16 +14,17 @@ from skidyn._writing import write_json
 #: Those that need nothing but a log.
 ESTIMATORS = ("weighted", "ordinary", "robust", "ridge", "entropic", "output_error")
 DESCRIPTION = """\
-Identify inertial parameters and effects together and print them with standard errors that hold for
-autocorrelated residuals. Single masses can rarely be identified: what is printed are the
-combinations that can, how well the motion excites them, and which ones the data leaves open.
+Identify inertial parameters and effects together and print them with standard errors that are valid
+for autocorrelated residuals. Single masses can rarely be identified: the command prints the
+identifiable combinations, how well the motion excites them, and which ones the data does not
+determine.
 
   skidyn identify run*.csv --urdf robot.urdf --out parameters.json
   skidyn identify run*.csv --urdf robot.urdf --consistent     only physically possible bodies
   skidyn identify run*.csv --urdf robot.urdf --estimator robust
 
-output_error takes the parameters whose simulated motion is nearest to the logged one. A log of
-position servos needs no torque but their commands (cmd1.. or q_ref1..):
+output_error finds the parameters whose simulated motion is nearest to the logged one. A log of
+position servos needs their commands (cmd1.. or q_ref1..) instead of torque:
 
   skidyn identify servos.csv --urdf robot.urdf --nominal --controller fit \\
       --model rigid_body,viscous,coulomb,rotor_inertia --estimator output_error
@@ -34,26 +35,30 @@ def add_parser(commands: Any) -> None:
     parser = command(commands, "identify", run, "identify parameters and print them", DESCRIPTION)
     with_log(parser)
     parser.add_argument("--out", type=JsonFile, metavar="JSON", help="write the parameters as JSON")
-    parser.add_argument("--consistent", action="store_true", help="only physically possible bodies")
+    parser.add_argument(
+        "--consistent", action="store_true", help="restrict bodies to physically consistent ones"
+    )
     parser.add_argument(
         "--estimator",
         default="weighted",
         choices=ESTIMATORS,
-        help="how coefficients are found (default: %(default)s)",
+        help="estimator of the coefficients (default: %(default)s)",
     )
     parser.add_argument(
         "--prior-std",
         type=float,
         metavar="SHARE",
         help="relative uncertainty of the bodies of the URDF, for ridge and entropic; by default "
-        "what predicts best",
+        "the value that predicts best",
     )
     parser.add_argument(
         "--essential",
         action="store_true",
         help="print only the parameters that the data determines well",
     )
-    with_controller(parser, "compute the torque of a log without from the commands of its servos")
+    with_controller(
+        parser, "compute the torque of a log without torque from the commands of its servos"
+    )
 
 
 def run(options: argparse.Namespace) -> None:

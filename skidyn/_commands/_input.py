@@ -44,7 +44,9 @@ def read_driven(
         return load_model(options.model), frame, tau, controller
     kinds = [kind.strip() for kind in options.model.split(",") if kind.strip()]
     if "rigid_body" not in kinds:
-        raise SkidynError("--model must contain rigid_body; it may add kinds of the catalogue")
+        raise SkidynError(
+            "--model must contain rigid_body; it may also contain kinds of the catalogue"
+        )
     effects = tuple(kind for kind in kinds if kind != "rigid_body")
     model = RBDRegressor(robot, effects, "nominal" if options.nominal else "identified")
     return model, frame, tau, controller
@@ -84,8 +86,8 @@ def read_controller(text: str, robot: Robot, frame: pd.DataFrame) -> Controller:
     names = {field.name for field in fields(Controller)}
     if not isinstance(gains, dict) or "stiffness" not in gains or not set(gains) <= names:
         raise SkidynError(
-            f"--controller is {text}; expected fit, or stiffness (N m/rad) and what else of "
-            f"{', '.join(sorted(names))} it has, as JSON; fit-shared finds one gain for all joints"
+            f"--controller is {text}; expected fit, or stiffness (N m/rad) and optionally "
+            f"{', '.join(sorted(names))} as JSON; fit-shared estimates one gain for all joints"
         )
     return Controller(**gains).checked(robot.n_joints)
 
@@ -185,7 +187,7 @@ def order_option(text: str | None) -> Any:
     parts = re.split(r",?\s*(\w+)\s*=", text)
     if parts[0].strip():
         raise SkidynError(
-            f"--order {text}: {parts[0]!r} is of no quantity; expected such as 2,1,3 or "
+            f"--order {text}: {parts[0]!r} belongs to no quantity; expected for example 2,1,3 or "
             "motion=2,1,3,tau=3,2,1"
         )
     return {q: joint_numbers(numbers) for q, numbers in zip(parts[1::2], parts[2::2], strict=True)}
@@ -208,7 +210,7 @@ def read_robot(options: argparse.Namespace) -> Robot:
 
     path = Path(options.urdf)
     if not path.is_file():
-        raise SkidynError(f"no file {options.urdf}; --urdf names the description of the robot")
+        raise SkidynError(f"no file {options.urdf}; --urdf must name the description of the robot")
     gravity = getattr(options, "gravity", None)
     given: dict[str, Any] = {"joints": covered_joints(options)}
     if gravity is not None:

@@ -68,7 +68,7 @@ def explain_motion(
         try:
             diagnosis.explain_servo_motion(controller)
         except LogError as error:
-            diagnosis.warnings.append(f"The motion of the servos was not looked at: {error}.")
+            diagnosis.warnings.append(f"The motion of the servos was not analysed: {error}.")
 
 
 def _torque_told(controller: Controller, n_joints: int) -> str:
@@ -77,8 +77,8 @@ def _torque_told(controller: Controller, n_joints: int) -> str:
     shown = gains[0] if len(set(gains)) == 1 else ", ".join(gains)
     late = f", {1e3 * controller.delay:.3g} ms late" if controller.delay else ""
     return (
-        f"The torque is that of the servos, gain times error of position{late}: {shown} N m/rad "
-        "(N/m for sliders)."
+        f"The torque is computed from the servos as gain times position error{late}: {shown} N "
+        "m/rad (N/m for sliders)."
     )
 
 

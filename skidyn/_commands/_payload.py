@@ -40,21 +40,24 @@ def add_parser(commands: Any) -> None:
         type=Input,
         required=True,
         metavar="LOG",
-        help="recordings without the payload, if possible of the same motion",
+        help="recordings without the payload, preferably of the same motion",
     )
     parser.add_argument(
-        "--link", help="link that carries it, in whose frame it is stated (default: the last)"
+        "--link",
+        help="link that carries the payload, which is stated in the frame of this link "
+        "(default: the last)",
     )
     parser.add_argument(
         "--com",
         metavar="X,Y,Z",
-        help="centre of mass in the frame of the link in m, where it is known: weighs a payload of "
-        "which the motion shows only the first moment",
+        help="centre of mass in the frame of the link in m, if known: determines the mass where "
+        "the motion shows only the first moment of the payload",
     )
     parser.add_argument(
         "--model",
         default="rigid_body,viscous,coulomb,offset,rotor_inertia",
-        help="what the unloaded robot has, separated by commas (default: %(default)s)",
+        help="components of the model of the unloaded robot, separated by commas (default: "
+        "%(default)s)",
     )
     parser.add_argument(
         "--known-mass",
@@ -77,7 +80,9 @@ def run(options: argparse.Namespace) -> None:
     unloaded = _read(options, robot)
     kinds = [kind.strip() for kind in options.model.split(",") if kind.strip()]
     if "rigid_body" not in kinds:
-        raise SkidynError("--model must contain rigid_body; it may add kinds of the catalogue")
+        raise SkidynError(
+            "--model must contain rigid_body; it may also contain kinds of the catalogue"
+        )
     common: dict[str, Any] = {
         "link": options.link,
         "effects": [kind for kind in kinds if kind != "rigid_body"],

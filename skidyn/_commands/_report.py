@@ -18,8 +18,8 @@ from skidyn._commands._output import (
 )
 
 DESCRIPTION = """\
-Turn a report into one HTML page that needs no network. The log is read anew and the diagnosis run
-again; a warning is given if a file has changed since.
+Turn a report into one HTML page that needs no network. The log is read again and the diagnosis is
+repeated; a warning is issued if a file has changed since.
 
   skidyn report --from report.json --html report.html
 """

@@ -12,24 +12,25 @@ from skidyn._commands._input import read_model_and_log, recorded_options
 from skidyn._commands._output import print_json, run_diagnosis, working
 
 DESCRIPTION = """\
-Where a report says "this data cannot separate it from B", design the motion that would.
+If a report says "this data cannot separate it from B", design a motion that separates the two
+effects.
 
   skidyn separate --from report.json --out motion.csv
 
-The motion keeps the limits of the URDF and of what the log shows; it is simulated with either
-effect as the truth, and the answer says whether both were recognised.
+The motion stays within the limits of the URDF and of the log; it is simulated with each effect as
+the truth, and the output states whether both were recognised.
 """
 
 
 def add_parser(commands: Any) -> None:
     """Add the command to the parser."""
     parser = command(
-        commands, "separate", run, "design the motion that separates two effects", DESCRIPTION
+        commands, "separate", run, "design a motion that separates two effects", DESCRIPTION
     )
     with_report(parser)
     parser.add_argument("--out", type=Motion, required=True, metavar="CSV", help="motion to write")
     parser.add_argument("--effect", dest="finding", help="kind of the finding (default: the first)")
-    parser.add_argument("--rival", help="the other kind (default: its closest rival)")
+    parser.add_argument("--rival", help="the other kind (default: the closest rival)")
     parser.add_argument("--duration", type=float, default=20.0, help="s (default: %(default)s)")
 
 

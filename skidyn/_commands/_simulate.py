@@ -20,15 +20,15 @@ from skidyn._commands._output import print_json, working, write_table
 from skidyn._exceptions import SkidynError
 
 DESCRIPTION = """\
-With --model and --log, run a fitted model along a log and tell how far its motion gets from the
-logged one; the log should not be the one that the model was fitted to.
+With --model and --log, simulate a fitted model along a log and print how far its motion deviates
+from the logged one; the log should not be the one that the model was fitted to.
 
   skidyn simulate --model robot.skops --log run2.csv
   skidyn simulate --model robot.skops --log run2.csv --horizon 0.5 --engine mujoco
   skidyn simulate --model robot.skops --log run2.csv --controller fit
 
-Without them, write a log of a simulated robot that hides an effect, to try the diagnosis on
-something whose answer is known. The answer is printed, and not written into the log.
+Without them, write a log of a simulated robot with a hidden effect, to test the diagnosis on a
+known answer. The answer is printed and not written into the log.
 
   skidyn simulate --robot panda --effect dahl --joints 4 --out log.parquet
   skidyn simulate --robot scara --effect none --noise high --seed 3 --out log.csv
@@ -36,15 +36,21 @@ something whose answer is known. The answer is printed, and not written into the
 
 
 def add_parser(commands: Any) -> None:
-    parser = command(commands, "simulate", run, "write a log that hides an effect", DESCRIPTION)
+    parser = command(
+        commands,
+        "simulate",
+        run,
+        "simulate a model along a log, or write a log with a hidden effect",
+        DESCRIPTION,
+    )
     parser.add_argument("--robot", default="panda", help="embedded robot (default: %(default)s)")
     parser.add_argument("--effect", default="dahl", help="kind, or none (default: %(default)s)")
-    with_joints(parser, "joints that have the effect (default: a suitable choice)")
+    with_joints(parser, "joints with the effect (default: a suitable choice)")
     parser.add_argument(
         "--noise", default="low", choices=("low", "high"), help="of torques (default: %(default)s)"
     )
     parser.add_argument(
-        "--seed", type=int, default=0, help="seed of all that is random (default: 0)"
+        "--seed", type=int, default=0, help="seed of all random numbers (default: 0)"
     )
     parser.add_argument(
         "--out", type=Output, metavar="LOG", help="file.csv or file.parquet to write"
@@ -69,14 +75,14 @@ def add_parser(commands: Any) -> None:
         type=float,
         default=1.0,
         metavar="S",
-        help="seconds until the model is put back on the log; 0 for whole trajectories "
-        "(default: %(default)s)",
+        help="seconds after which the simulation restarts from the logged state; 0 for whole "
+        "trajectories (default: %(default)s)",
     )
     along.add_argument(
         "--engine", default="own", choices=("own", "mujoco"), help="default: %(default)s"
     )
     with_controller(
-        along, "drive the model by the commanded positions of the log, not by its torque"
+        along, "drive the model by the commanded positions of the log instead of its torque"
     )
     along.add_argument("--columns", metavar="JSON", help="which columns hold which signals")
     along.add_argument("--units", metavar="JSON", help="units that are not SI")

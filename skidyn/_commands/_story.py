@@ -106,7 +106,7 @@ def where_lines(failures: Sequence[Any]) -> Iterator[str]:
     """In which part of its motion each joint exceeds its noise, a line each."""
     if failures:
         yield ""
-        yield "Where the error above the noise lies"
+        yield "Location of the error above the noise"
     apart = [failure for failure in failures if failure.places]
     for failure in apart[:TOLD]:
         places = listed(

@@ -158,8 +158,8 @@ def _refitted(
     """Errors that count for a model that is not physics, and what is to be said of its names."""
     assert problem.robot is not None
     remark = (
-        "This model is not a rigid-body model: the names below say how this model errs on this "
-        "log, which need not be what the robot has. "
+        "This model is not a rigid-body model: the effects below describe the error of this "
+        "model on this log, and the robot need not have them. "
     )
     found = result.findings
     steps = [_found_terms(problem, found[:k]) for k in range(len(found) + 1)]
@@ -167,13 +167,14 @@ def _refitted(
     if again is None:
         return (
             errors,
-            remark + "What an effect removes was measured on this model as it is, not refitted.",
+            remark + "The error that an effect removes was measured on this model without "
+            "refitting it.",
         )
     return (
         [[float(e) for e in step] for step in again],
         remark
-        + "What an effect removes was measured on copies of the model that were refitted with it, "
-        "on rows left out.",
+        + "The error that an effect removes was measured on held-out rows, with copies of the "
+        "model that were refitted with the effect.",
     )
 
 
@@ -438,24 +439,23 @@ def _episodic(
     more = f" and {len(episodes) - 4} more" if len(episodes) > 4 else ""
     links = {e.link for e in episodes if e.link is not None}
     push = (
-        f" A force at link {', '.join(sorted(links))} explains the joints together."
-        if links
-        else ""
+        f" A force at link {', '.join(sorted(links))} explains all these joints." if links else ""
     )
     sentence = (
-        f"A torque on {where} comes and goes: {times}{more}. It makes up {np.mean(shares):.0%} of "
-        f"the squared error that is left there, and nothing that was logged predicts it.{push}"
+        f"An intermittent torque acts on {where}: {times}{more}. It accounts for "
+        f"{np.mean(shares):.0%} of the remaining squared error there, and no logged signal "
+        f"predicts it.{push}"
     )
     return Finding(
         UNKNOWN,
-        "A torque that comes and goes in time",
+        "Intermittent torque",
         joints,
         {},
         ("time",),
         float(np.mean(shares)),
         0.0,
         (),
-        "the same motion again: what comes and goes by chance is not there at the same place",
+        "the same motion again, since a random disturbance does not recur at the same place",
         sentence,
         "diagnosis.findings[-1].when",
         (),
@@ -501,5 +501,5 @@ def _fold_notes(problem: Problem) -> list[str]:
     count = "one trajectory" if len(names) == 1 else f"{len(names)} trajectories"
     return [
         f"The log has only {count}: errors are held out by {problem.n_folds} blocks of time with "
-        "a guard between them, not by whole trajectories, and may come out too small."
+        "a guard between them instead of whole trajectories, and may be underestimated."
     ]

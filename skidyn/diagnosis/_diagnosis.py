@@ -263,8 +263,8 @@ def _diagnose(
         kinds, searcher = [], None
         notes.append(
             f"The measurement is in doubt ({'; '.join(doubts)}), so that no physical effect is "
-            "named: what is missing is given as a function of the signals. Settle it, or go on "
-            "regardless with --force (in Python: force=True)."
+            "identified: the missing torque is given as a function of the signals. Resolve the "
+            "doubt, or continue with --force (in Python: force=True)."
         )
     for note in notes:
         warnings.warn(note, LogWarning, stacklevel=4)
@@ -324,8 +324,8 @@ def _check_rows(problem: Problem) -> None:
     empty = [j + 1 for j, n in enumerate(problem.rows.counts) if n < 8]
     if len(empty) == problem.n_joints:
         raise LogError(
-            "no joint slides long enough for a diagnosis: the log is too short, scattered in "
-            "time, or all joints rest"
+            "no joint moves long enough for a diagnosis: the log is too short, scattered in "
+            "time, or all joints are at rest"
         )
 
 

@@ -31,9 +31,7 @@ LEVEL = 0.05
 
 def _refits(search: EffectSearchCV) -> bool:
     if not search.refit:
-        raise AttributeError(
-            "the search was made with refit=False, so that there is no model; set refit=True"
-        )
+        raise AttributeError("the search was run with refit=False and has no model; set refit=True")
     return True
 
 
@@ -189,16 +187,17 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
         opened = open_model(model, X, y)
         if not is_physics(opened.model):
             raise SkidynError(
-                f"{type(self.estimator).__name__} takes no effects; give an RBDRegressor, alone or "
-                "as the last step of a Pipeline. diagnose(model, ...) judges any fitted regressor"
+                f"{type(self.estimator).__name__} has no parameter effects; give an RBDRegressor, "
+                "alone or as the last step of a Pipeline. diagnose(model, ...) accepts any "
+                "fitted regressor"
             )
         name = "".join(f"{pipeline.steps[-1][0]}__" for pipeline in opened.outer) + "effects"
         if name not in model.get_params():
             raise SkidynError(
                 f"{type(self.estimator).__name__} hides the parameter effects of the "
-                f"{type(opened.model).__name__} inside, which this search sets; give that model, "
-                "alone or as the last step of a Pipeline, and put other searches and transformed "
-                "targets around the EffectSearchCV"
+                f"{type(opened.model).__name__} inside, which this search has to set; give that "
+                "model, alone or as the last step of a Pipeline, and put other searches and "
+                "transformed targets around the EffectSearchCV"
             )
         self.diagnosis_: Diagnosis = diagnose(
             model,

@@ -36,7 +36,7 @@ _WHERE = {
     "medium": "at medium speed",
     "fast": "at high speed",
     "loaded": "under high load",
-    "warm": "when it is warm, or late in the recording",
+    "warm": "when it is warm or late in the recording",
 }
 
 
@@ -210,16 +210,16 @@ def find_rest_errors(comparison: Comparison) -> list[RestError]:
         rmse, stiction, beyond = float(np.sqrt(np.mean(residual**2))), None, None
         text = f"{name} (joint {j + 1}): error {rmse:.2g} {unit} at rest"
         if comparison.dry_friction is None:
-            text += "; from this model it is not known how much of it dry friction can hold"
+            text += "; this model does not determine how much of it dry friction can balance"
         else:
             friction = comparison.dry_friction[:, j]
             stiction = float(np.abs(friction).max())
             # what the model says of friction at rest is one of many possible values
             free = residual + friction[here]
             beyond = float(np.sqrt(np.mean(np.maximum(np.abs(free) - stiction, 0.0) ** 2)))
-            text += f"; dry friction can hold up to ±{stiction:.2g} {unit} of it"
+            text += f"; dry friction can balance up to ±{stiction:.2g} {unit} of it"
             if beyond > 0.1 * rmse:
-                text += f", and {beyond:.2g} {unit} exceeds that"
+                text += f", and {beyond:.2g} {unit} exceeds this limit"
         found.append(RestError(j + 1, name, rmse, stiction, beyond, float(here.mean()), text + "."))
     return found
 

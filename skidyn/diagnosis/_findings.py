@@ -179,7 +179,7 @@ def make_finding(
     title = effect.title
     if unknown:
         own = effect.words(term.shape) if isinstance(effect, NamelessEffect) else ""
-        title = own or f"Something that depends on {' and '.join(variables)}"
+        title = own or f"Unknown torque that depends on {' and '.join(variables)}"
     relatives = [k for k in rivals if k != UNKNOWN and get_effect(k).family == effect.family]
     if effect.family and relatives:
         title = f"{effect.family.capitalize()}, best described by {title}"
@@ -200,10 +200,10 @@ def make_finding(
         )
     elsewhere = tuple(tuple(j + 1 for j in pair) for pair in hypothesis.elsewhere)
     if elsewhere:
-        sentence += f" It would explain as much on {pairs_of(elsewhere)}."
+        sentence += f" It would explain the data equally well on {pairs_of(elsewhere)}."
     for u in formulas:
         assert u.proposal is not None
-        sentence += f" A formula that does the same on joint {u.joint}: {u.proposal.text}."
+        sentence += f" An equivalent formula for joint {u.joint}: {u.proposal.text}."
     sentence = " ".join([sentence, *notes(hypothesis.kind, parameters)])
     return Finding(
         hypothesis.kind,
@@ -243,13 +243,15 @@ def notes(kind: str, parameters: Mapping[str, dict[str, Any]]) -> list[str]:
     sentences = [f"Note that {caveat}."] if caveat else []
     mass = parameters.get("mass", {}).get("value", 0.0)
     if isinstance(mass, float) and mass < 0:
-        sentences.append("The mass is negative: the description has a load that the robot lacks.")
+        sentences.append(
+            "The mass is negative: the description includes a load that the robot does not have."
+        )
     return sentences
 
 
 def rival_title(kind: str) -> str:
     """Title of a kind inside a sentence."""
-    return "something without a name" if kind == UNKNOWN else inside(get_effect(kind).title)
+    return "an unknown effect" if kind == UNKNOWN else inside(get_effect(kind).title)
 
 
 def _parameters(
@@ -277,7 +279,7 @@ def _sentence(
     what = next((_value(name, row) for name, row in parameters.items()), "")
     fall = f"Adding it removes {drop:.0%} of the held-out squared error."
     if drop <= 0:
-        fall = "A model refitted with it has no smaller error on data left out."
+        fall = "Refitting the model with it does not reduce the error on held-out data."
     return f"{title} on {where}{what}. {fall}"
 
 

@@ -182,8 +182,8 @@ def _limit(problem: Problem, joint: int, tried: Sequence[tuple[Candidate, float]
     shown = [size for _, size in tried if np.isfinite(size)]
     if not shown:
         sentence = (
-            f"This data cannot separate {inside(effect.title)} of joint {joint + 1} from what the "
-            f"model has; a recording with {effect.separating_motion} would."
+            f"This data cannot separate {inside(effect.title)} of joint {joint + 1} from effects "
+            f"that the model already has; a recording with {effect.separating_motion} would."
         )
         return Limit(effect.kind, joint + 1, None, unit, sentence)
     most = f"{max(shown):.3g}{'' if unit == '1' else ' ' + unit}"
@@ -193,7 +193,7 @@ def _limit(problem: Problem, joint: int, tried: Sequence[tuple[Candidate, float]
     )
     if hidden := _hidden_shapes(tried):
         values = ", ".join(f"{value:.3g}" for value in hidden)
-        sentence += f", but not one with {effect.shapes[0].name} of {values}"
+        sentence += f", except with {effect.shapes[0].name} of {values}"
     return Limit(effect.kind, joint + 1, max(shown), unit, sentence + ".")
 
 
@@ -245,8 +245,9 @@ def without_withdrawn(limits: Sequence[Limit], withdrawn: Sequence[Candidate]) -
         replace(
             limit,
             largest_hidden=None,
-            sentence=f"A trace of {inside(get_effect(limit.kind).title)} on joint {limit.joint} "
-            "shows, but removes too little error to be a finding; no limit is stated for it.",
+            sentence=f"The data shows a trace of {inside(get_effect(limit.kind).title)} on joint "
+            f"{limit.joint}, which removes too little error to be a finding; no limit is stated "
+            "for it.",
         )
         if (limit.kind, limit.joint) in taken
         else limit

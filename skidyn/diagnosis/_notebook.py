@@ -80,7 +80,7 @@ def finding_card(finding: Finding) -> str:
     ]
     if finding.rivals and finding.separating_motion:
         motion = escape(finding.separating_motion)
-        parts.append(f"A recording with {motion} would tell them apart.")
+        parts.append(f"A recording with {motion} would separate them.")
     parts.append(f"<code>{escape(finding.code)}</code>")
     return "".join(f"<p style='margin:.2em 0'>{part}</p>" for part in parts)
 

@@ -193,7 +193,7 @@ def diagnose_parquet(
     refused = [t.kind for t in make_terms(model.effects, robot.n_joints) if t.effect.needs_fit]
     if refused:
         raise SkidynError(
-            f"the columns of {refused[0]!r} need a fit of the model first, so one pass is not "
+            f"the columns of {refused[0]!r} require a fit of the model first, so one pass is not "
             "enough; leave it out, or diagnose data in memory"
         )
     files = parquet_files(paths)
@@ -229,9 +229,9 @@ def _draw(lengths: Sequence[Array], rows: int, seed: int) -> list[frozenset[int]
     n = len(every)
     if n < 2 * FEWEST_TRAJECTORIES:
         raise LogError(
-            f"{n} trajectories are too few to search some and judge by the rest; "
-            f"{2 * FEWEST_TRAJECTORIES} are needed. Number parts of them as trajectories, or read "
-            "them with read_log and use diagnose."
+            f"{n} trajectories are too few to use some for the search and the rest for "
+            f"evaluation; {2 * FEWEST_TRAJECTORIES} are needed. Split them into more "
+            "trajectories, or read them with read_log and use diagnose."
         )
     order = np.random.default_rng(seed).permutation(n)
     wanted = int(np.searchsorted(np.cumsum(every[order]), rows, side="right"))

@@ -39,7 +39,7 @@ from skidyn.simulation import (
 )
 
 #: How the sentence on a finding begins that the model for simulation is without.
-_VETO = "Not in the completed model, because it worsens the simulated motion:"
+_VETO = "Not in the completed model because it worsens the simulated motion:"
 
 #: Findings that every servo may have, beside which its motion may lack another effect.
 _PLAIN = ("offset", "rotor_inertia")
@@ -342,7 +342,9 @@ class Diagnosis:
             )
         controller = self.controller if controller is None else controller
         if controller is None:
-            raise SkidynError("controller is missing: gains of the servos, Controller(...)")
+            raise SkidynError(
+                "controller is missing: give the gains of the servos as Controller(...)"
+            )
         named: set[int] = set()
         known: list[tuple[str, int]] = []
         # A limit that the controller has is simulated, and is no name of what moves the joint.
@@ -426,7 +428,8 @@ class Diagnosis:
         ]
         if not proposals:
             raise EffectError(
-                "no formula was proposed for these joints; diagnosis.unknowns lists what was found"
+                "no formula was proposed for these joints; diagnosis.unknowns lists the torques "
+                "that were found"
             )
         return [t for proposal in proposals for t in proposal.terms]
 

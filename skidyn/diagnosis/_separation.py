@@ -94,13 +94,14 @@ class SeparatingMotion:
             )
         text = (
             f"This motion of {which} ({self.time[-1]:.0f} s) separates {self.kind} from "
-            f"{self.rival}: what the rival cannot explain is {self.gain:.3g} in units of the "
-            f"noise, against {self.gain_of_log:.3g} in as much of the log."
+            f"{self.rival}: the torque that the rival cannot explain is {self.gain:.3g} in units "
+            f"of the noise, against {self.gain_of_log:.3g} in a part of the log of equal length."
         )
         if all(self.confirmed.values()):
-            return text + " In simulated recordings of it both were recognised."
+            return text + " In simulated recordings of this motion both effects were recognised."
         wrong = " and ".join(k for k, right in self.confirmed.items() if not right)
-        return text + f" A simulated recording was still not recognised with {wrong} as the truth."
+        return text + f" In a simulated recording with {wrong} as the truth the effect was still "
+        "not recognised."
 
     def to_frame(self) -> Any:
         """Table of the motion.

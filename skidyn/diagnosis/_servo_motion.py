@@ -58,7 +58,7 @@ def servo_motion_told(
         for found in named
     ]
     return {
-        "heading": "Motion of the servos, each joint simulated along its command",
+        "heading": "Motion of the servos, with each joint simulated along its command",
         "text": _text(named, findings),
         "findings": told,
     }
@@ -66,7 +66,8 @@ def servo_motion_told(
 
 def _text(named: Sequence[ServoFinding], findings: Sequence[Finding]) -> str:
     if not named:
-        return f"It asks for no effect beside friction{' and the findings' if findings else ''}."
+        return "It requires no effect other than "
+        f"friction{' and the findings' if findings else ''}."
     same = [
         f"{inside(finding.title)} on {joints_told(finding.joints)}"
         for finding in findings
@@ -76,4 +77,4 @@ def _text(named: Sequence[ServoFinding], findings: Sequence[Finding]) -> str:
     if not same:
         return f"The torque does not show {'it' if len(named) == 1 else 'them'}."
     takes = "It takes" if len(named) == 1 else "They take"
-    return f"{takes} the place of what the torque could not name: {listed(same)}."
+    return f"{takes} the place of effects that the torque could not identify: {listed(same)}."

@@ -116,13 +116,13 @@ def _sentences(in_turn: InTurn, findings: Sequence[Finding]) -> list[str]:
     told = []
     if in_turn.silent:
         told.append(
-            "The simulated motion is further from the logged one than that of a model without "
-            "forces, so that it says nothing about the findings."
+            "The simulated motion deviates more from the logged one than that of a model without "
+            "forces and therefore gives no evidence about the findings."
         )
     elif any(in_turn.added):
         told.append(together.text)
     elif findings:
-        told.append("No finding is added to the model that is simulated.")
+        told.append("No finding is added to the simulated model.")
     lost = max(together.before.n_lost, together.after.n_lost)
     if lost:
         told.append(
@@ -137,7 +137,7 @@ def _sentences(in_turn: InTurn, findings: Sequence[Finding]) -> list[str]:
             if not added and (verdict is not None) == simulable
         ]
         if out:
-            told.append(f"Left out, because it {why}: {listed(out)}.")
+            told.append(f"Left out because it {why}: {listed(out)}.")
     return told
 
 

@@ -138,8 +138,8 @@ def _verdict(
         named = len(told) - len(nameless)
         mark = "?" if nameless or material else "!"
         text = (
-            "Judged on data that the fit has not seen, adding "
-            f"{'it' if len(lines) == 1 else 'them'} changes the error as shown below."
+            f"The effect of adding {'it' if len(lines) == 1 else 'them'} on the held-out error is "
+            "shown below."
         )
         open_ends = (
             f"; part of the error on {where(material, len(rows))} is not explained"
@@ -150,43 +150,44 @@ def _verdict(
         top = _what_and_where(best)
         if not told:
             joints = sorted({joint for line in lines for joint in line["joints"]})
-            text = f"Something is missing on {joints_told(joints)}; best guess: {top}{open_ends}"
-            return "?", text, "No name is sure; a recording of more or other motion could decide."
+            text = f"An effect is missing on {joints_told(joints)}; most likely: {top}{open_ends}"
+            more = "No effect is certain; a recording with more or different motion could decide."
+            return "?", text, more
         if len(lines) <= SHORT:
-            perhaps = f"; perhaps {listed([*map(_what_and_where, guesses)])}" if guesses else ""
+            perhaps = f"; possibly {listed([*map(_what_and_where, guesses)])}" if guesses else ""
             return (
                 mark,
                 f"Missing: {listed([*map(_what_and_where, told)])}{perhaps}{open_ends}",
                 text,
             )
         if guesses:
-            verb = "is a guess" if len(guesses) == 1 else "are guesses"
+            verb = "is uncertain" if len(guesses) == 1 else "are uncertain"
             open_ends = f"; {len(guesses)} more {verb}{open_ends}"
         what = [f"{named} known effect{'s' if named > 1 else ''}"] if named else []
-        what += ["something without a name"] if nameless else []
+        what += ["an unknown effect"] if nameless else []
         verb = "is" if named + bool(nameless) == 1 else "are"
-        headline = f"{listed(what)} {verb} missing, most of all {top}{open_ends}"
+        headline = f"{listed(what)} {verb} missing, the largest being {top}{open_ends}"
         return mark, headline[:1].upper() + headline[1:], text
     if material:
         return (
             "?",
-            f"Something without a name is missing on {joints_told(material)}",
+            f"An unknown effect is missing on {joints_told(material)}",
             "The error there is much larger than the noise, and no effect of the catalogue "
-            "explains it. What is known about it stands under “What is left”.",
+            "explains it. Details are given under “Remaining error”.",
         )
     if coloured:
         text = (
-            "The error on data that the fit has not seen is about as many times the fast noise on "
-            "every joint: noise of the torque that is correlated in time. An effect would be "
-            "larger on some joints than on others."
+            "The held-out error is about the same multiple of the fast noise on every joint, as "
+            "for torque noise that is correlated in time. An effect would be larger on some "
+            "joints than on others."
         )
     elif any(row["ratios"][1] > FAILS for row in rows):
         text = (
-            "The error on data that the fit has not seen exceeds the noise of the sensors, but is "
-            "small against the torque of the joints; healthy robots leave as much."
+            "The held-out error exceeds the noise of the sensors, but is small relative to the "
+            "torque of the joints, as on healthy robots."
         )
     else:
-        text = "On every joint the error on data that the fit has not seen is like the noise."
+        text = "The held-out error of every joint is at the noise level."
     return SOUND, "Nothing significant is missing", text
 
 
@@ -296,11 +297,11 @@ def sure(finding: Finding) -> str:
     """How sure a finding is, in a few words."""
     share = confidence(finding)
     family = finding.title.partition(", best described by ")
-    named = f"that it is {inside(family[0])}" if family[1] else "of the name"
-    named += " and of its joints" * bool(finding.elsewhere)
-    text = "" if share is None else f"{min(share, 0.99):.0%} sure {named}"
+    named = f" that it is {inside(family[0])}" if family[1] else ""
+    named += " and acts on these joints" * bool(finding.elsewhere)
+    text = "" if share is None else f"confidence {min(share, 0.99):.0%}{named}"
     if finding.elsewhere:
-        pairs = f"on {pairs_of(finding.elsewhere)} it would explain as much"
+        pairs = f"on {pairs_of(finding.elsewhere)} it would explain the data equally well"
         text += f"{'; ' if text else ''}{pairs}"
     if finding.rivals:
         rivals = listed([rival_title(kind) for kind in finding.rivals], "or")
@@ -379,7 +380,7 @@ def _quiet(rows: Sequence[dict[str, Any]]) -> str:
         return ""
     if len(quiet) == len(rows):
         return ""  # the verdict says so
-    return f"On {joints_told(quiet)} the error is like the noise."
+    return f"The error of {joints_told(quiet)} is at the noise level."
 
 
 def _left(diagnosis: Diagnosis, rows: Sequence[dict[str, Any]]) -> str:
@@ -388,7 +389,7 @@ def _left(diagnosis: Diagnosis, rows: Sequence[dict[str, Any]]) -> str:
         (row for row in rows if row["ratios"][1] > FAILS), key=lambda row: -row["ratios"][1]
     )
     if not left:
-        return "What is left is like the noise on every joint."
+        return "The remaining error of every joint is at the noise level."
     parts = [
         f"{digits(row['after'])} {row['unit']} on joint {row['joint']} "
         f"({times(row['ratios'][1])} the noise)"
@@ -396,9 +397,9 @@ def _left(diagnosis: Diagnosis, rows: Sequence[dict[str, Any]]) -> str:
     ]
     others = [row["joint"] for row in left[3:]]
     more = f"; {joints_told(sorted(others))} too" if others else ""
-    text = f"Still above the noise: {listed(parts)}{more}."
+    text = f"Remaining error above the noise: {listed(parts)}{more}."
     if diagnosis.noise_is_coloured:
-        text += " It is alike on every joint, as noise is that is correlated in time."
+        text += " It is similar on every joint, as for noise that is correlated in time."
     elif not any(row["material"] for row in rows):
-        text += " That is small against the torque of the joint; healthy robots leave as much."
+        text += " This is small relative to the torque of the joint, as on healthy robots."
     return text

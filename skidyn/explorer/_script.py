@@ -51,7 +51,7 @@ def script(
         gains = "".join(f", {k}={_plain(v)!r}" for k, v in vars(controller).items())[2:]
         torque = [f"tau = servo_torque(Controller({gains.replace('inf', 'np.inf')}), log)"]
     lines = [
-        '"""What was clicked in skidyn explore; prints the held-out errors that it showed."""',
+        '"""Repeats the steps made in skidyn explore and prints their held-out errors."""',
         "",
         *(["import numpy as np", ""] if "np." in torque[0] else []),
         "from skidyn import save_model",

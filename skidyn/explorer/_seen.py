@@ -56,7 +56,7 @@ class Seen(State):
         Returns
         -------
         list of str
-            Such as ``"90% sure of the name"``: as in a diagnosis, from what the best other effect
+            Such as ``"confidence 90%"``: as in a diagnosis, from what the best other effect
             would have taken instead, and from what is left on its joints now.
         """
         residual, rows = self._steps[-1].residual, self.problem.rows

@@ -100,7 +100,7 @@ class Explorer:
             "progress": self._progress,
         }
         if question not in known:
-            raise SkidynError(f"unknown question {question!r}")
+            raise SkidynError(f"unknown request {question!r}")
         return known[question](**words)
 
     def _state(self) -> dict[str, Any]:
@@ -294,7 +294,7 @@ def make_app(explorer: Explorer, port: int) -> Any:
             async for part in request.stream():
                 body += part
                 if len(body) > LONGEST_BODY:
-                    told = f"a question has at most {LONGEST_BODY} bytes"
+                    told = f"a request has at most {LONGEST_BODY} bytes"
                     return JSONResponse({"error": told}, 413, headers=headers)
             words = json.loads(body or b"{}", parse_constant=_refuse_constant)
             if not isinstance(words, dict):
@@ -307,7 +307,7 @@ def make_app(explorer: Explorer, port: int) -> Any:
             told = str(error).encode("utf-8", "backslashreplace").decode()  # halves of letters
             return JSONResponse({"error": told}, 400, headers=headers)
         except RecursionError:
-            return JSONResponse({"error": "the question is nested too deep"}, 400, headers=headers)
+            return JSONResponse({"error": "the request is nested too deeply"}, 400, headers=headers)
 
     async def saved(request: Request) -> Response:
         """A file that was saved, by one of its fixed names."""

@@ -123,7 +123,7 @@ class Session(Seen):
         away = np.sort(np.abs(rows.time[j][rows.trajectory[j] == trajectory] - time))
         if not len(away):
             raise EffectError(
-                f"joint {joint} does not slide in trajectory {trajectory}: effects cannot be "
+                f"joint {joint} does not move in trajectory {trajectory}, so effects cannot be "
                 "judged there; choose another trajectory"
             )
         half = max(STRETCH / 2, float(away[min(LEAST_ROWS, len(away)) - 1]))

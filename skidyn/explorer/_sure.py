@@ -73,12 +73,12 @@ def sure_told(
     Examples
     --------
     >>> sure_told(Margin(0.8, "Offset"), 1.0, 0.5, True)
-    '98% sure of the name'
+    'confidence 98%'
     >>> sure_told(Margin(-0.3, "Spring"), 1.0, 0.5, True)
-    'not sure of the name: spring takes more of the error'
+    'low confidence: spring removes more of the error'
     """
     if margin.share < 0:
-        return f"not sure of the name: {inside(margin.rival)} takes more of the error"
+        return f"low confidence: {inside(margin.rival)} removes more of the error"
     share = confidence(
         margin.share,
         inflation,
@@ -86,5 +86,5 @@ def sure_told(
         whole_recordings=whole_recordings,
     )
     near = margin.share < NEAR and margin.rival
-    also = f"; {inside(margin.rival)} takes nearly as much of the error" if near else ""
-    return f"{share:.0%} sure of the name{also}"
+    also = f"; {inside(margin.rival)} removes nearly as much of the error" if near else ""
+    return f"confidence {share:.0%}{also}"

@@ -293,7 +293,7 @@ def _headline(report: dict[str, Any]) -> str:
         return f"“{best}” has the smaller error"
     if report["findings"]:
         return "The same effects are missing in both"
-    return "Nothing is missing in either"
+    return "No effect is missing in either"
 
 
 def _brief(rows: Sequence[dict[str, Any]]) -> str:

@@ -7,13 +7,14 @@ MEANINGS = {
     "held-out error": "Root mean square of measured minus modelled torque on judged samples. "
     "Each sample is predicted by a model that was fitted without its trajectory, or without its "
     "block of time where there are few trajectories.",
-    "noise": "What no model could remove: the scatter of the torque and position sensors. A "
-    "joint whose error is like its noise is explained.",
+    "noise": "The part of the error that no model can remove: the scatter of the torque and "
+    "position sensors. A joint whose error is at the noise level is fully explained.",
     "residual": "Measured minus modelled torque.",
-    "judged": "A sample is judged while its joint slides, away from rest and from reversals: "
-    "there dry friction can take any value up to its limit, and no model of sliding can predict "
-    "it. Where hysteresis was found, samples at reversals are judged too.",
-    "reversal": "A change of the joint's direction, and the moments before and after it.",
+    "judged": "A sample is judged while its joint slides, that is, neither at rest nor near a "
+    "reversal, where dry friction can take any value up to its limit and no model of sliding can "
+    "predict it. Where hysteresis was found, samples at reversals are judged too.",
+    "reversal": "A change of the direction of motion of the joint, including the moments before "
+    "and after it.",
     "rest": "The joint does not move: dry friction holds it and can take any value up to its "
     "limit.",
     "slow": "Speeds up to a quarter of the speed that the joint exceeds in 5 % of its motion.",
@@ -22,31 +23,30 @@ MEANINGS = {
     "loaded": "The fifth of the motion with the largest torque.",
     "warm": "The fifth of the motion with the highest temperature, or the last fifth where no "
     "temperature is logged.",
-    "largest hidden": "An effect of this size or more would have been found; a smaller one may "
-    "be there unseen.",
+    "largest hidden": "An effect of this size or larger would have been found; a smaller one may "
+    "be present but undetected.",
     "regime": "A part of the motion: rest, reversal, slow, medium or fast; and, independent of "
     "these, loaded (the fifth of the motion with the largest torque) and warm (the warmest "
     "fifth, or the last one).",
-    "95% interval": "An interval that holds the true value in 95 of 100 recordings. It comes "
-    "from estimates with parts of the log left out.",
-    "rival": "Another effect that explains this recording nearly as well. The motion that is "
-    "named beside it would tell them apart.",
+    "95% interval": "An interval that contains the true value in 95 of 100 recordings. It is "
+    "computed from estimates with parts of the log left out.",
+    "rival": "Another effect that explains this recording nearly as well. The motion stated with "
+    "it would separate the two.",
     "position error": "Root mean square of simulated minus logged position, along recordings that "
     "were left out of the fit of the model.",
-    "without forces": "A model that keeps the velocity with which a piece begins. A model that is "
-    "to be of use in a simulation must be nearer to the log.",
-    "q-value": "Share of false findings that is to be expected among all findings reported at "
-    "this level.",
-    "trajectory": "One piece of motion of the log, with the number that the log gives it, or "
-    "counted from 1. Errors are held out by whole trajectories where there are enough of them.",
+    "without forces": "A model that keeps the initial velocity of a piece. A model that is "
+    "useful for simulation must have a smaller error.",
+    "q-value": "Expected share of false findings among all findings reported at this level.",
+    "trajectory": "One piece of motion of the log, with its number in the log, or counted from "
+    "1. Errors are held out by whole trajectories if there are enough of them.",
 }
 
 #: Words of the page of a fleet alone.
 FLEET_MEANINGS = {
-    "distance": "A robot's coefficient minus that of the others, divided by the scatter between "
-    "the robots.",
-    "scatter": "The standard deviation of a coefficient between normal robots, from the median of "
-    "the fleet, so that few worn robots do not count.",
+    "distance": "The coefficient of a robot minus that of the others, divided by the scatter "
+    "between robots.",
+    "scatter": "The standard deviation of a coefficient between normal robots, estimated by "
+    "medians over the fleet and therefore insensitive to a few worn robots.",
     "q-value": MEANINGS["q-value"],
 }
 

@@ -111,7 +111,7 @@ def change(ratio: float) -> str:
 
 def words(kind: str) -> str:
     """Kind of the vocabulary as words."""
-    return "effect without a name" if kind == "unknown" else kind.replace("_", " ")
+    return "unknown effect" if kind == "unknown" else kind.replace("_", " ")
 
 
 def chance(q_value: float | None) -> str:

@@ -56,7 +56,7 @@ def test_the_command_that_fixes_a_log_keeps_its_options(tmp_path, capsys):
         (["--zero", "q1"], "'q1' is not NAME=VALUE"),
         (["--gain", "tau1=much"], "'much' is not a number"),
         (["--order", "tau=1"], "is not an order of 2 joints"),
-        (["--order", "2,1,tau=2,1"], "'2,1' is of no quantity"),
+        (["--order", "2,1,tau=2,1"], "'2,1' belongs to no quantity"),
         (["--lowpass", "tau=-1"], "expected a signal and the positive time constant"),
     ],
 )

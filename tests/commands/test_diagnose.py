@@ -64,7 +64,7 @@ def test_ctrl_c_leaves_no_half_written_file(tmp_path, arguments):
     _, errors = process.communicate(timeout=120)
     assert (process.returncode, errors.decode().splitlines()[-1]) == (
         cli.STOPPED,
-        "stopped; no file was left half written",
+        "stopped; no file was left incomplete",
     )
     assert list(tmp_path.iterdir()) == []
 
@@ -116,7 +116,7 @@ def test_stamps_that_certainly_jitter_are_replaced_by_even_steps_and_this_is_tol
         assert report["provenance"]["options"]["clock"] == "regular"
         told = report["checks"][0]
         assert (told["check"], told["certainty"]) == ("clock_jitter", "noted")
-        assert "even steps were taken" in told["evidence"]
+        assert "even steps were used" in told["evidence"]
     assert main([*words, "--clock", "recorded"]) == 2
     assert "--clock regular" in capsys.readouterr().err
 
@@ -135,7 +135,7 @@ def test_servos_without_torque_are_diagnosed_by_their_motion(servo_diagnosed, ca
     told = capsys.readouterr().out
     assert "the motion of the servos shows Stribeck friction on joint 2" in told
     assert "Stribeck friction on joint 2: dF = 0.1" in told
-    assert "The torque is that of the servos" in told
+    assert "The torque is computed from the servos" in told
     assert "--effect stribeck --joints 2" in told
 
 
@@ -157,6 +157,6 @@ def test_servos_are_read_by_their_weight_or_by_the_measured_torque(tmp_path, run
         assert code == cli.DONE and report["servo_motion"] is None
         told = " ".join(report["warnings"])
         assert "the log holds 2 piece(s)" in told
-        assert ("The torque is that of the servos" in told) == by_weight
+        assert ("The torque is computed from the servos" in told) == by_weight
     assert main(["diagnose", str(tmp_path / "bare.csv"), *words]) == cli.BAD_INPUT
     assert "--controller fit" in capsys.readouterr().err

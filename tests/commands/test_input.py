@@ -67,7 +67,7 @@ def test_a_report_away_from_its_files_finds_them_here_or_by_urdf(
     monkeypatch.chdir(tmp_path)
     shutil.copy(report.parent / "log.csv", "log.csv")
     assert cli.main([str(word) for word in words]) == cli.BAD_INPUT
-    assert "--urdf names the description" in capsys.readouterr().err
+    assert "--urdf must name the description" in capsys.readouterr().err
     assert run(*words, "--urdf", report.parent / "arm.urdf")[0] == cli.DONE
 
 
@@ -102,13 +102,13 @@ def evil_model(tmp_path):
 def test_a_model_that_names_a_function_is_refused_by_the_commands(work, report, evil_model, capsys):
     words = ["compare", str(work / "log.csv"), "--urdf", str(work / "arm.urdf")]
     assert cli.main([*words, "--model", str(evil_model)]) == cli.BAD_INPUT
-    assert "not trusted: skidyn._writing.write_text" in capsys.readouterr().err
+    assert "untrusted types: skidyn._writing.write_text" in capsys.readouterr().err
     content = json.loads(report.read_text())
     content["provenance"]["options"]["model"] = str(evil_model)
     crafted = report.with_name("evil.json")
     crafted.write_text(json.dumps(content))
     assert cli.main(["add", "--from", str(crafted), "--effect", "dahl"]) == cli.BAD_INPUT
-    assert "not trusted: skidyn._writing.write_text" in capsys.readouterr().err
+    assert "untrusted types: skidyn._writing.write_text" in capsys.readouterr().err
     assert not (evil_model.parent / "harm").exists()
 
 

@@ -10,7 +10,7 @@ import pytest
 from skidyn import cli
 from skidyn.diagnosis import Diagnosis
 
-AGAIN = "asked before"
+AGAIN = "stored result of an earlier identical diagnosis"
 
 
 @pytest.fixture

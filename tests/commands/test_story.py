@@ -25,7 +25,7 @@ def story():
                       "sure": "no other effect explains it as well",
                       "change": "0.63 → 0.16 N m (noise 0.16)"}],
         "joints": [joint(1, 0.1, 0.1, 0.1, False, "quiet"), joint(2, 0.63, 0.16, 0.16)],
-        "quiet": "Joint 1 is at its noise.", "left": "What is left is like the noise.",
+        "quiet": "Joint 1 is at its noise.", "left": "The remaining error is at the noise level.",
     }  # fmt: skip
 
 
@@ -67,7 +67,7 @@ def test_a_screen_holds_several_findings_on_many_joints(story):
     line = {
         "what": "Load-dependent friction", "where": "joints 2 and 3",
         "size": "mu = 0.064 ± 0.0052 (joint 2), mu = 0.072 ± 0.0064 (joint 3)",
-        "sure": "88% sure of the name; this data cannot separate it from LuGre friction",
+        "sure": "confidence 88%; this data cannot separate it from LuGre friction",
         "change": "joint 3: 2.5 → 2.1 N m (noise 1.2)",
     }  # fmt: skip
     place = SimpleNamespace(share_of_excess=0.55, where="at high speed", share_of_time=0.3)

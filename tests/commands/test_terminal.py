@@ -94,7 +94,7 @@ def test_ctrl_c_in_the_search_leaves_no_file_and_no_traceback(short, tmp_path):
 
     assert code == cli.STOPPED
     assert "Traceback" not in shown
-    assert ESCAPE.sub("", shown).splitlines()[-1] == "stopped; no file was left half written"
+    assert ESCAPE.sub("", shown).splitlines()[-1] == "stopped; no file was left incomplete"
     assert shown.rfind("\x1b[?25h") > shown.rfind("\x1b[?25l")  # the cursor is shown again
     assert list(tmp_path.iterdir()) == []
 
@@ -207,4 +207,4 @@ def test_zsh_completes_several_files(capsys):
     script = capsys.readouterr().out
     assert '"*:recordings, one or more files:_files"' in script
     assert '"(*):' not in script
-    assert "diagnose:'learn which effect is missing'" in script
+    assert "diagnose:'identify missing effects'" in script

@@ -29,7 +29,7 @@ def test_two_processes_give_the_same_report_to_the_last_bit(log):
 def test_doubt_keeps_names_back_however_many_processes_work(log, n_jobs, monkeypatch):
     told = [Suspicion("copied_torque", "a torque twice", "in every row", "suspected")]
     monkeypatch.setattr("skidyn.diagnosis._diagnosis.check_measurement", lambda _: told)
-    with pytest.warns(UserWarning, match="no physical effect is named"):
+    with pytest.warns(UserWarning, match="no physical effect is identified"):
         diagnosis = diagnose(RBDRegressor(log.robot), log.X, log.y, n_jobs=n_jobs)
     assert {finding.kind for finding in diagnosis.findings} <= {"unknown"}
 

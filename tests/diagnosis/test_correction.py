@@ -151,7 +151,7 @@ def test_the_search_is_one_of_scikit_learn():
     np.testing.assert_allclose(table[["rmse1", "rmse2"]].mean(axis=1), results["mean_rmse"])
     assert (table[["mean_fit_time", "mean_score_time"]] > 0).all(axis=None)
     assert search.refit_time_ > 0 and not search.multimetric_
-    with pytest.raises(ValueError, match="takes no effects"):
+    with pytest.raises(ValueError, match="has no parameter effects"):
         EffectSearchCV(Ridge()).fit(LOG.X, LOG.y)
 
 

@@ -209,7 +209,7 @@ def test_no_physics_is_named_while_a_unit_is_in_doubt():
     X = log.X.assign(time=1.5 * log.X["time"])  # the clock, or velocities at another scale
 
     told = (
-        r"measurement is in doubt \(.*scale of the clock.*\), so that no physical effect is named"
+        r"measurement is in doubt \(.*scale of the clock.*\), so that no physical effect is identified"
     )
     with pytest.warns(LogWarning, match=told):
         doubted = diagnose(RBDRegressor(arm, effects=["viscous", "coulomb"]), X, log.y)
@@ -255,7 +255,7 @@ def test_a_robot_that_rests_is_refused_by_a_sentence():
     X[moving] = 0.0
     y = 0.3 + 0.01 * np.random.default_rng(2).normal(size=np.shape(log.y))
 
-    with pytest.raises(ValueError, match="no joint slides long enough"):
+    with pytest.raises(ValueError, match="no joint moves long enough"):
         diagnose(RBDRegressor(log.robot), X, y)
 
 

@@ -35,4 +35,4 @@ def test_the_curve_is_that_of_a_spring(missing):
 
 
 def test_a_mass_below_zero_is_explained():
-    assert "description has a load" in notes("payload", {"mass": {"value": -1.0}})[-1]
+    assert "description includes a load" in notes("payload", {"mass": {"value": -1.0}})[-1]

@@ -60,7 +60,7 @@ def test_an_effect_that_the_rest_does_not_show_is_not_confirmed(result, tmp_path
 
 
 def test_what_cannot_be_judged_out_of_core_is_refused(folder, tmp_path):
-    with pytest.raises(SkidynError, match="need a fit of the model first"):
+    with pytest.raises(SkidynError, match="require a fit of the model first"):
         diagnose_parquet(RBDRegressor(ROBOT, ("load_dependent_friction",)), folder)
     make_hidden_effect_log(ROBOT, None, n_trajectories=7, duration=2.0).frame.to_parquet(
         tmp_path / "few.parquet"

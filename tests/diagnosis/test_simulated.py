@@ -68,7 +68,7 @@ def test_what_is_left_out_is_said_with_its_reason(diagnosis, monkeypatch):
         left_out = type(judged)([verdict], [False], none)
         monkeypatch.setattr(diagnosis, "in_turn", left_out)
         motion = diagnosis.story()["simulation"]
-        assert f"Left out, because it {why}: spring on joint 1." in motion["text"]
+        assert f"Left out because it {why}: spring on joint 1." in motion["text"]
         assert not motion["added"]
     assert diagnosis.to_dict()["effects"][0]["simulation"] == {
         "says": "nothing",
@@ -85,6 +85,6 @@ def test_a_motion_that_is_lost_says_nothing(diagnosis, monkeypatch):
     together = type(judged.together)(lost, lost, 0.0, 0.0, 0.0, np.zeros(2))
     monkeypatch.setattr(diagnosis, "in_turn", type(judged)([None], [True], together))
     motion, report = diagnosis.story()["simulation"], diagnosis.to_dict()["simulation"]
-    assert "says nothing about the findings" in motion["text"]
+    assert "gives no evidence about the findings" in motion["text"]
     assert "grows without bound" in motion["text"] and motion["joints"][0]["ratio"] is None
     assert report["says"] == "nothing" and report["before"]["position"] == [None, None]

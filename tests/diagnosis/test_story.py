@@ -27,7 +27,7 @@ def test_numbers_are_those_of_the_diagnosis(missing):
 def test_a_complete_model_has_nothing_to_say(complete):
     story = complete.story()
     assert story["headline"] == "Nothing significant is missing"
-    assert story["findings"] == [] and "like the noise" in story["text"]
+    assert story["findings"] == [] and "at the noise level" in story["text"]
     assert complete.failures == []
 
 
@@ -41,7 +41,7 @@ def test_an_error_above_the_noise_is_said(complete):
 def test_a_material_remainder_is_never_called_complete(complete):
     parts = dataclasses.replace(complete.parts, material=np.array([False, True]))
     story = dataclasses.replace(complete, parts=parts, verdict="unknown").story()
-    assert story["headline"] == "Something without a name is missing on joint 2"
+    assert story["headline"] == "An unknown effect is missing on joint 2"
     assert story["mark"] == "?"
 
 
@@ -74,13 +74,13 @@ def test_when_a_torque_comes_and_goes_is_said(missing):
 def test_confidence_is_said_where_it_is_known(missing):
     finding = dataclasses.replace(missing.findings[0], confidence=0.62)
     line = dataclasses.replace(missing, findings=[finding]).story()["findings"][0]
-    assert "62% sure of the name" in line["sure"] and line["doubtful"]
+    assert "confidence 62%" in line["sure"] and line["doubtful"]
 
 
 def test_a_name_that_is_hardly_sure_is_called_a_guess(missing):
     finding = dataclasses.replace(missing.findings[0], confidence=0.2)
     story = dataclasses.replace(missing, findings=[finding]).story()
-    assert story["headline"] == "Something is missing on joint 2; best guess: spring on joint 2"
+    assert story["headline"] == "An effect is missing on joint 2; most likely: spring on joint 2"
     assert story["mark"] == "?"
 
 
@@ -99,4 +99,4 @@ def test_a_guess_beside_a_sure_name_does_not_lead_the_headline(missing):
     sure = missing.findings[0]
     guess = dataclasses.replace(sure, kind="viscous", title="Viscous friction", confidence=0.1)
     story = dataclasses.replace(missing, findings=[guess, sure]).story()
-    assert story["headline"] == "Missing: spring on joint 2; perhaps viscous friction on joint 2"
+    assert story["headline"] == "Missing: spring on joint 2; possibly viscous friction on joint 2"

@@ -239,7 +239,7 @@ def test_the_loop_click_by_click(explorer, tmp_path):
         assert tab.text_content("#added li span") == "spring on joint 2"
         tab.wait_for_selector("#added small:not(:empty)")
         assert "±" in tab.text_content("#added small.size")
-        assert "sure of the name" in tab.text_content("#added small.sure")
+        assert "confidence" in tab.text_content("#added small.sure")
         assert now == pytest.approx(explorer.session.history[-1]["rmse"][1], rel=0.05)
         # undo, and again
         tab.click("#undo")

@@ -91,7 +91,7 @@ def test_what_cannot_be_done_is_refused(session):
     for ask in (session.curves, session.residuals):
         with pytest.raises(EffectError, match="no trajectory 99"):
             ask(1, 99)
-    with pytest.raises(EffectError, match="joint 1 does not slide in trajectory 99"):
+    with pytest.raises(EffectError, match="joint 1 does not move in trajectory 99"):
         session.stretch(1, 99, 1.0)
     session.add("spring", joint=2)
     with pytest.raises(EffectError, match="spring cannot be added to joint 2"):

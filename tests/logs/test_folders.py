@@ -135,7 +135,7 @@ def test_patterns_name_columns_without_a_robot(tmp_path):
     RUN[["time", *names]].rename(columns=names).to_csv(tmp_path / "log.csv", index=False)
     columns = {"q": "{joint}_angle_x", "tau": "m{i}_load"}
     same(read_log(tmp_path / "log.csv", columns=columns, check=False), RUN)
-    with pytest.raises(LogError, match="no column is like"):
+    with pytest.raises(LogError, match="no column matches"):
         read_log(tmp_path / "log.csv", columns={"q": "{joint}_none", "tau": "m{i}_load"})
 
 

@@ -19,7 +19,7 @@ def test_a_fleet_without_deviation_says_so(fakes):
     fleet.q_value[:] = 1.0
     summary = summarize_fleet(fleet)
     assert summary["headline"] == "None of the 20 robots deviates from the others"
-    assert "Since when" not in render_fleet(summary)
+    assert "Start of the change" not in render_fleet(summary)
 
 
 def test_summary_is_pure_json_and_names_are_escaped(fakes, tmp_path):

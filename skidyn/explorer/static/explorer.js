@@ -31,7 +31,7 @@
         body: JSON.stringify(args),
       });
     } catch {
-      say("no answer: is skidyn explore still running?");
+      say("no response: is skidyn explore still running?");
       throw new Error("no answer");
     }
     const content = await answer.json().catch(() => ({ error: "skidyn explore failed; see its terminal for the reason" }));
@@ -83,7 +83,7 @@
     const { torque, residual } = curves, i = near(torque.time), k = near(residual.time);
     const text = `${time.toFixed(2)} s: measured ${torque.measured[i].toFixed(2)} ${unit()}`;
     const there = residual.given[k] != null && torque.given[i] != null;
-    return text + (there ? `, residual as given ${residual.given[k].toFixed(2)}, now ${residual.now[k].toFixed(2)}` : "; the joint rests or turns");
+    return text + (there ? `, residual as given ${residual.given[k].toFixed(2)}, now ${residual.now[k].toFixed(2)}` : "; the joint is at rest or reverses");
   }
   function read(u) { el("readout").textContent = u.cursor.left < 0 || u.cursor.left == null ? "" : told(u.posToVal(u.cursor.left, "x")); }
   function show() {  // new numbers, same axes of time
@@ -142,7 +142,7 @@
     button.dataset.kind = e.kind;
     button.append(node("span", e.title), node("span", percent(share)));
     const which = e.trajectories.length ? ` in trajector${e.trajectories.length > 1 ? "ies" : "y"} ${e.trajectories.join(", ")}` : "";
-    button.append(node("small", `on ${on(e.joints)}${which}: takes ${percent(e.drop)} of the squared residual of joint ${joint()}`
+    button.append(node("small", `on ${on(e.joints)}${which}: removes ${percent(e.drop)} of the squared residual of joint ${joint()}`
       + (span ? ` in the whole log, ${percent(e.drop_here)} in the chosen time` : "")));
     fill.style.width = 100 * Math.max(0, Math.min(1, share)) + "%";
     bar.append(fill); button.append(bar);
@@ -167,7 +167,7 @@
     el("where").textContent = `(joint ${joint()}, ${place})`;
     el("whole").hidden = el("chosen").hidden = !span;
     el("effects").replaceChildren(...answer.effects.map(effect));
-    if (!answer.effects.length) el("effects").append(node("li", `Nothing more helps joint ${joint()}: no effect of the catalogue lowers its held-out error by 1 % or more.`));
+    if (!answer.effects.length) el("effects").append(node("li", `No further effect of the catalogue reduces the held-out error of joint ${joint()} by 1 % or more.`));
     el("effects").removeAttribute("aria-busy");
     redraw();
     document.body.dataset.ranked = `${joint()} ${span ? "span" : "all"} ${state.history.length}`;
@@ -190,7 +190,7 @@
     } finally { el("effects").removeAttribute("aria-busy"); }
     const spent = (performance.now() - start).toFixed(0);
     document.body.dataset.spent = spent;
-    say(`${words(kind)} added, fitted again in ${spent} ms`);
+    say(`${words(kind)} added and refitted in ${spent} ms`);
     await rank();
     if (state.refinable && (await change("refine"))) {
       await rank();
@@ -205,7 +205,7 @@
       el("added").querySelectorAll(`small.${name}`).forEach((place, k) => { place.textContent = texts[k] || ""; });
   }
   async function remove(step) {
-    if (await change("remove", { step })) { say("removed, the rest fitted again"); await rank(); await sizes(); }
+    if (await change("remove", { step })) { say("removed; the model was refitted"); await rank(); await sizes(); }
   }
   async function undo() {
     if (await change("undo")) { say("taken back"); await rank(); await sizes(); }

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 class Adding(Picture):
     """Held-out errors as given and after every step."""
 
-    place, title = 40, "The error falling"
+    place, title = 40, "Error by step"
 
     def read(self, subject: Diagnosis) -> list[dict[str, float]]:
         """Shares of every joint's squared error by cause."""

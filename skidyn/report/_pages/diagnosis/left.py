@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 class Left(Picture):
     """The remainder of every joint."""
 
-    place, title = 50, "What is left"
+    place, title = 50, "Remaining error"
 
     def read(self, subject: Diagnosis) -> list[dict[str, Any]]:
         """Parts of the error that is left: noise of the torque sensor and of the positions.

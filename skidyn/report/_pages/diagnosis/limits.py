@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What this data could still hide: the largest size of every effect that was not found."""
+"""Largest undetected effects: the largest size of every effect that was not found."""
 
 from __future__ import annotations
 
@@ -9,4 +9,4 @@ from skidyn.report._picture import Picture
 class Limits(Picture):
     """The limits of the report, as a table."""
 
-    place, title = 60, "What could hide"
+    place, title = 60, "Undetected effects"

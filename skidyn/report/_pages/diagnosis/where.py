@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 class Where(Picture):
     """Joints by their error over noise, and a map of the errors."""
 
-    place, title = 10, "Where it fails"
+    place, title = 10, "Where the model fails"
 
     def read(self, subject: Diagnosis) -> dict[str, Any]:
         """Failures in words, the error map, and what dry friction allows at rest."""

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 class Since(Picture):
     """Moving averages that left their bands."""
 
-    place, title = 30, "Since when"
+    place, title = 30, "Start of the change"
 
     def read(self, subject: Fleet) -> list[dict[str, Any]]:
         """Curves of the coefficients that raised an alarm."""

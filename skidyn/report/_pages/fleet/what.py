@@ -9,4 +9,4 @@ from skidyn.report._picture import Picture
 class What(Picture):
     """Coefficient, common value, deviation and how sure it is."""
 
-    place, title = 20, "In which effect"
+    place, title = 20, "Deviating effects"

@@ -31,4 +31,4 @@ def test_the_error_is_taken_apart(diagnosis):
 
 
 def test_without_parts_the_noise_is_all_that_is_said(diagnosis_page):
-    assert "What is left is like the noise on every joint." in diagnosis_page["left"]
+    assert "The remaining error of every joint is at the noise level." in diagnosis_page["left"]

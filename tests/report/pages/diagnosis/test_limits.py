@@ -4,6 +4,6 @@
 
 def test_every_limit_has_its_size_and_words(diagnosis_page):
     shown = diagnosis_page["limits"]
-    assert "2 effects on single joints were tried and not found" in shown
+    assert "2 effects on single joints were tested and not found" in shown
     assert "torque ripple 1 0.12 N m torque ripple on joint 1: below 0.12 N m" in shown
     assert "end stop 2 – N m" in shown

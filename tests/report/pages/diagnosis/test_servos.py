@@ -32,4 +32,4 @@ def test_each_effect_has_its_size_and_a_bar_for_each_model(fakes):
 def test_a_motion_that_names_nothing_says_so(fakes):
     diagnosis = fakes.make_diagnosis("complete")
     diagnosis.servo_motion = []
-    assert "asks for no effect" in section(render_html(summarize(diagnosis)))
+    assert "requires no effect" in section(render_html(summarize(diagnosis)))
