@@ -135,7 +135,7 @@ def _compare_with_log(options: argparse.Namespace) -> None:
     if options.traces:
         from skidyn.export import write_traces
 
-        if len(comparison.measured) < len(frame):  # recordings that are in the log twice count once
+        if len(comparison.measured) < len(frame):  # recordings that occur twice count once
             frame = frame[frame["trajectory"].isin(comparison.signals.trajectory)]
         torques = comparison.measured, comparison.predicted
         write_traces(options.traces, frame, *torques, read_robot(options))

@@ -35,7 +35,7 @@ class DeadBand(Check):
 
     name = "dead_band"
     of_sensor = True
-    suspects = "torque or current that is reported as zero where it is small"
+    suspects = "torque or current that is reported as zero when it is small"
     misnames = True
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
@@ -50,7 +50,7 @@ class DeadBand(Check):
             names = ", ".join(measurement.joint(k) for k in found)
             told_shares = ", ".join(f"{share:.1%}" for share in found.values())
             yield self.suspicion(
-                f"the torque of {names} is zero where it is small",
+                f"the torque of {names} is reported as zero when it is small",
                 f"it is exactly zero in {told_shares} of the rows, in {PASSES} places or more for "
                 f"{RUN} rows or more, although the joint moves, and no other value repeats so",
                 "suspected",
@@ -89,7 +89,7 @@ class TaredTorque(Check):
 
     name = "tared_torque"
     of_sensor = True
-    suspects = "torque that was set to zero at the start of recordings, or whose mean was taken off"
+    suspects = "torque that was set to zero at the start of recordings, or whose mean was removed"
     misnames = True
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
@@ -114,13 +114,13 @@ class TaredTorque(Check):
                 how = (
                     "was set to zero at the start of every recording"
                     if what == "start"
-                    else "has no mean in any recording: it was taken off"
+                    else "has zero mean in every recording: the mean was removed"
                 )
                 yield self.suspicion(
                     f"the torque of {', '.join(measurement.joint(k) for k in joints)} {how}",
-                    "gravity is felt as the joints move, but what it makes "
+                    "the torque varies with gravity as the joints move, but the gravity torque "
                     + ("at the start" if what == "start" else "on average")
-                    + " is missing; record torque as it is measured, or add it again",
+                    + " is missing; record the torque as measured, or add the gravity torque",
                     "suspected",
                     joints,
                 )

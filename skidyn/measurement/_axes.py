@@ -48,7 +48,7 @@ class Axes(Check):
     """A joint that turns, or slides, along another axis than the description says."""
 
     name = "axes"
-    suspects = "the axis of a joint in the description that is not that of the robot"
+    suspects = "the axis of a joint in the description that differs from that of the robot"
     stage = 1
     misnames = True
 
@@ -72,11 +72,12 @@ class Axes(Check):
         measurement.odd = True
         words = " ".join(f"{x:g}" for x in found.direction)
         yield self.suspicion(
-            f"{measurement.joint(found.joint)} turns about another axis than in the description",
-            f'about <axis xyz="{words}"/> of its frame the robot\'s own torque explains the '
-            f"measured one better by {found.gain:.0f} (log-likelihood), that of identified bodies "
-            f"by {found.confirmed:.0f}, and leaves {100 * found.drop:.0f} % less of it; take the "
-            "description of this very robot, or correct the axis there",
+            f"{measurement.joint(found.joint)} turns about a different axis than in the "
+            "description",
+            f'about <axis xyz="{words}"/> of its frame the rigid-body torque explains the '
+            f"measured torque better by {found.gain:.0f} (log-likelihood), or by "
+            f"{found.confirmed:.0f} with identified bodies, and leaves {100 * found.drop:.0f} % "
+            "less residual; use the description of this robot, or correct the axis there",
             "certain",
             [found.joint],
         )

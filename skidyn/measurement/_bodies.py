@@ -39,7 +39,7 @@ UNITS = {1e3: "Nmm", 1e2: "Ncm", 1e-3: "kNm"}
 #: which the stated ones are not those of the robot; share of a torque that bodies are to hold.
 WRONG, TIMES, HEAVY = 0.2, 3.0, 0.3
 #: Error of any bodies, as a share of the spread, and in errors of the mean of a row, from which a
-#: torque has little to do with the motion.
+#: torque is nearly unrelated to the motion.
 UNRELATED, BEYOND = 0.67, 4.0
 #: Share of that which any function of the position must leave, and the places of one.
 LEFT, PLACES = 0.8, 16
@@ -123,7 +123,7 @@ class TorqueScale(Check):
     """Torque in another unit, at the motor, or currents."""
 
     name = "torque_scale"
-    suspects = "currents, motor torque or another unit in the place of joint torque"
+    suspects = "currents, motor torque or another unit instead of joint torque"
     stage = 2
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
@@ -141,10 +141,10 @@ class TorqueScale(Check):
             value = float(f"{rate:.3g}")
             words = f"time={1 / value:.6g},dq={value:g}"
             yield self.suspicion(
-                "the clock runs at another rate, and the velocities were derived with it",
-                f"sampled {value:g} times as fast, torques follow the robot's own by "
-                f"{_rate_gain(fits, rate):.0f} (log-likelihood) better, each at a scale "
-                "that bodies make",
+                "the clock runs at a different rate, and the velocities were derived with it",
+                f"with a sampling rate {value:g} times as high, the rigid-body torque explains "
+                f"the measured torque better by {_rate_gain(fits, rate):.0f} (log-likelihood), "
+                "with a plausible scale on every joint",
                 "suspected",
                 remedy=(f"--gain {words}", f"gain={{'time': {1 / value:.6g}, 'dq': {value:g}}}"),
             )
@@ -160,7 +160,7 @@ class TorqueScale(Check):
         if unit is not None:
             yield self.suspicion(
                 f"torque looks like {unit}",
-                f"it is the robot's own torque times {told}",
+                f"it is the rigid-body torque times {told}",
                 "certain",
                 sorted(gains),
                 (f"--units tau={unit}", f"units={{'tau': '{unit}'}}"),
@@ -168,9 +168,9 @@ class TorqueScale(Check):
             return
         yield self.suspicion(
             "torques look like motor currents, motor torques or another unit",
-            f"they follow the robot's rigid-body torque at another scale ({told}). Better than "
-            "the gains below, which hold the bodies of the description, are the torques per "
-            "ampere of the drives (--drive-gains with i columns)",
+            f"they follow the rigid-body torque at a different scale ({told}). The gains below "
+            "assume the bodies of the description; if known, use the torques per ampere of the "
+            "drives instead (--drive-gains with i columns)",
             "suspected",
             sorted(gains),
             _gain_remedy(_all_factors(fits, gains, typical)),
@@ -195,10 +195,10 @@ class TorqueScale(Check):
                 found[k] = own
             elif wrong and gained > 0:
                 yield self.suspicion(
-                    f"either the torque of {measurement.joint(k)} is at another scale than that of "
-                    "the other joints, or the bodies it moves are not those stated",
-                    f"it is {gain:.3g} times that of the stated bodies; the other joints cannot "
-                    "tell which",
+                    f"either the torque of {measurement.joint(k)} has a different scale than that "
+                    "of the other joints, or the bodies it moves differ from the description",
+                    f"it is {gain:.3g} times that of the stated bodies; the other joints do not "
+                    "determine which",
                     "noted",
                     [k],
                     _gain_remedy({k: float(f"{1 / (_unit_like(gain) or gain):.3g}")}),
@@ -226,8 +226,8 @@ class TorqueScale(Check):
             factors |= refined_scales(fits, units, refined).factors if refined else {}
             joints = sorted(factors)
             yield self.suspicion(
-                f"the torque of {', '.join(measurement.joint(k) for k in joints)} is at "
-                "another scale than that of the other joints",
+                f"the torque of {', '.join(measurement.joint(k) for k in joints)} has a different "
+                "scale than that of the other joints",
                 "; ".join(evidence),
                 "suspected",
                 joints,
@@ -357,7 +357,7 @@ class Bodies(Check):
     """Bodies of the description that are not those of the robot."""
 
     name = "bodies"
-    suspects = "masses or inertias of the description that are not those of the robot"
+    suspects = "masses or inertias of the description that differ from those of the robot"
     stage = 2
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
@@ -380,11 +380,11 @@ class Bodies(Check):
         )
         gains = ", ".join(f"{seen.stated.gain[k]:.2g}" for k in joints)
         yield self.suspicion(
-            "masses or inertias of the robot's description are not those of the robot",
-            f"the error with the stated bodies is that with identified ones times {ratios}, "
-            f"although friction and the scale of each torque ({gains}) were fitted to them. A "
-            "model that keeps the stated bodies (--nominal) would show effects that are not there; "
-            "one that identifies them is not affected",
+            "masses or inertias of the description differ from those of the robot",
+            f"the error with the stated bodies is {ratios} times that with identified ones, "
+            f"although friction and the scale of each torque ({gains}) were fitted with them. A "
+            "model that keeps the stated bodies (--nominal) would show spurious effects; a model "
+            "that identifies them is not affected",
             "noted" if measurement.identified is None else "suspected",
             joints,
         )
@@ -394,7 +394,7 @@ class UnexplainedTorque(Check):
     """A torque that neither the stated bodies nor any others, with friction, explain."""
 
     name = "unexplained"
-    suspects = "torque that has little to do with the motion: another signal, joint or time"
+    suspects = "torque that is unrelated to the motion: another signal, joint or time"
     stage = 2
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
@@ -411,7 +411,7 @@ class UnexplainedTorque(Check):
             names = ", ".join(measurement.joint(k) for k in joints)
             shares = ", ".join(f"{100 * share:.0f} %" for share in least[bad])
             yield self.suspicion(
-                f"the torque of {names} has little to do with the motion",
+                f"the torque of {names} is nearly unrelated to the motion",
                 f"stated or identified bodies with any friction leave {shares} of its spread; it "
                 "may be another signal, of another joint or another time",
                 "suspected",
@@ -437,7 +437,7 @@ class NoFriction(Check):
 
     name = "no_friction"
     of_sensor = True
-    suspects = "torque from which friction was taken off, or that was measured behind the gears"
+    suspects = "torque from which friction was removed, or that was measured behind the gears"
     stage = 2
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
@@ -448,9 +448,10 @@ class NoFriction(Check):
         if len(rubs) > 1 and rubs.max() < FRICTIONLESS and np.median(rubs) < HARDLY:
             measurement.frictionless = True
             yield self.suspicion(
-                "the torque holds no friction",
-                f"viscous and dry friction hold at most {100 * rubs.max():.1f} % of its spread: "
-                "it was taken off, measured behind the gears, or the log was computed",
+                "the torque contains no friction",
+                f"viscous and dry friction account for at most {100 * rubs.max():.1f} % of its "
+                "spread: friction was removed, the torque was measured behind the gears, or the "
+                "log was computed",
                 "noted",
             )
 
@@ -460,7 +461,7 @@ class ComputedTorque(Check):
 
     name = "computed_torque"
     of_sensor = True
-    suspects = "commanded or computed torque in the place of a measured one"
+    suspects = "commanded or computed torque instead of a measured one"
     stage = 2
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
@@ -479,18 +480,18 @@ class ComputedTorque(Check):
         ):
             measurement.computed = True
             yield self.suspicion(
-                "the torque is that of the robot's description: it was commanded or computed, not "
+                "the torque equals that of the description: it was commanded or computed, not "
                 "measured",
                 f"it is {np.median(gain):.4g} times the torque of the stated bodies, friction "
-                f"holds at most {rubs.max():.1g} of its spread, and no other bodies explain it "
-                "better",
+                f"accounts for at most {rubs.max():.1g} of its spread, and no other bodies "
+                "explain it better",
                 "suspected",
             )
         elif identified.max() < 1e-4 and seen.fits.n_rows > 200:
             measurement.computed = True
             yield self.suspicion(
                 "the torque has no noise: it was commanded or computed, not measured",
-                f"a rigid body with friction explains all of it but {identified.max():.1g}",
+                f"a rigid body with friction explains all of it except {identified.max():.1g}",
                 "noted",
             )
 

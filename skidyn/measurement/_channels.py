@@ -38,8 +38,8 @@ class StillJoint(Check):
             if not moves:
                 yield self.suspicion(
                     f"{measurement.joint(k)} hardly moves",
-                    f"from {q[:, k].min():.4g} to {q[:, k].max():.4g} without reversals, so its "
-                    "friction and inertia cannot be identified from this log",
+                    f"it moves from {q[:, k].min():.4g} to {q[:, k].max():.4g} without reversals, "
+                    "so its friction and inertia cannot be identified from this log",
                     "noted",
                     [k],
                 )
@@ -67,8 +67,8 @@ class CoarsePosition(Check):
             largest = max(coarse.values())
             yield self.suspicion(
                 "positions come in coarse steps",
-                f"of up to {largest:.3g} rad, {2 * np.pi / largest:.0f} a turn; accelerations, "
-                "and small effects on them, are less certain",
+                f"the steps are up to {largest:.3g} rad, {2 * np.pi / largest:.0f} per turn; "
+                "accelerations and small effects that depend on them are less certain",
                 "noted",
                 sorted(coarse),
             )
@@ -96,8 +96,8 @@ class ConstantTorque(Check):
         if idle.any():
             yield self.suspicion(
                 "torque was not measured at the ends of recordings",
-                f"in {int(idle.sum())} rows, {idle.mean():.1%}, no torque changes: the drives were "
-                "not enabled, or their values came late",
+                f"in {int(idle.sum())} rows, {idle.mean():.1%}, no torque changes: the drives "
+                "were not enabled, or their values arrived late",
                 "certain",
                 remedy=("--drop-repeated", "drop_repeated=True"),
             )
@@ -155,7 +155,7 @@ class SmoothTorque(Check):
 
     name = "smooth_torque"
     of_sensor = True
-    suspects = "torque that was filtered before it was recorded, so that its noise is not known"
+    suspects = "torque that was filtered before it was recorded, so that its noise is unknown"
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         number, ratios = measurement.signals.trajectory, []
@@ -170,9 +170,9 @@ class SmoothTorque(Check):
         if ratios and max(ratios) < NOISELESS:
             yield self.suspicion(
                 "the torque has no noise",
-                f"from sample to sample it scatters by at most {max(ratios):.1g} of its spread: it "
-                "was filtered before it was recorded, or computed, so that an error says little "
-                "when it is compared with this noise",
+                f"from sample to sample it scatters by at most {max(ratios):.1g} of its spread: "
+                "it was filtered before it was recorded, or computed, and the ratio of the error "
+                "to this noise is not meaningful",
                 "noted",
             )
 
@@ -225,7 +225,7 @@ class BrokenSamples(Check):
     """Single samples that leap away and back."""
 
     name = "broken_samples"
-    suspects = "samples that leap away and back: lost packets, bus errors"
+    suspects = "single outlying samples: lost packets, bus errors"
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         names = tuple(map(str, measurement.joint_names))

@@ -195,9 +195,9 @@ def refuse_certain(found: list[Suspicion]) -> None:
     certain = [s for s in found if s.certainty == "certain"]
     if certain:
         raise MisreadLogError(
-            "the log is not what its names and units say, so that any effect found "
-            "in it would be wrong. "
+            "the log does not agree with its names and units, so that any effect found in it "
+            "would be wrong. "
             + " ".join(map(str, certain))
-            + " To go on all the same: --force (in Python: force=True).",
+            + " To continue anyway: --force (in Python: force=True).",
             certain,
         )

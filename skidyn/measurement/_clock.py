@@ -223,15 +223,15 @@ class ClockJitter(Check):
     """Stamps that jitter although samples were taken at even steps."""
 
     name = "clock_jitter"
-    suspects = "stamps that jitter around samples that were taken at even steps"
+    suspects = "time stamps that jitter although samples were taken at even steps"
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         signals = measurement.whole
         if measurement.same_stamps:
             yield self.suspicion(
                 "the time stamps are too coarse for the samples",
-                f"{measurement.same_stamps} rows have the stamp of the row before although joints "
-                "have moved on",
+                f"{measurement.same_stamps} rows have the time stamp of the previous row although "
+                "joints have moved",
                 "certain",
                 remedy=("--clock regular", "clock='regular'"),
             )
@@ -250,7 +250,7 @@ class ClockJitter(Check):
         )
         if found.margin > TOLD and found.spread > WANDERING * step:
             yield self.suspicion(
-                "the clock wanders",
+                "the clock drifts irregularly",
                 f"its stamps lie {size} around even steps of {1e3 * step:.4g} ms, more than a "
                 "step, so that no regular clock takes its place",
                 "suspected",
@@ -262,8 +262,8 @@ class ClockJitter(Check):
             says = (
                 ""
                 if gained is None
-                else f"; the torque gains {gained:.0f} by them (log-likelihood)"
-                + ("" if harmful else ", so that the stamps do little harm")
+                else f"; the fit of the torque improves by {gained:.0f} with them (log-likelihood)"
+                + ("" if harmful else ", so that the influence of the stamps is small")
             )
             sure = harmful and found.margin > CERTAIN and found.ratio > 1.2
             yield self.suspicion(
@@ -309,7 +309,7 @@ class RepeatedRows(Check):
     """Rows that repeat the one before although joints move."""
 
     name = "repeated_rows"
-    suspects = "rows that repeat the one before: polled faster than the robot reports"
+    suspects = "rows that repeat the previous one: polled faster than the robot reports"
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         count = measurement.repeated
@@ -317,10 +317,10 @@ class RepeatedRows(Check):
             share = count / measurement.n_samples
             measurement.stale = True
             yield self.suspicion(
-                "rows repeat the one before",
+                "rows repeat the previous one",
                 f"in {count} of {measurement.n_samples} rows no position changes although joints "
                 "move: the recorder polled faster than the robot reports, so derivatives are too "
-                "rough",
+                "noisy",
                 "certain" if share > MANY and not _coarse(measurement) else "suspected",
                 remedy=("--drop-repeated", "drop_repeated=True"),
             )
@@ -373,7 +373,7 @@ class InterpolatedRows(Check):
             yield self.suspicion(
                 "torques were interpolated from a slower clock",
                 f"in {100 * on_line / moving:.0f} % of the rows all of them lie on straight lines "
-                "between their neighbours, and positions do not",
+                "between their neighbours, but positions do not",
                 "noted",
             )
 
@@ -405,7 +405,7 @@ class Gaps(Check):
         if len(gaps):
             yield self.suspicion(
                 f"{len(gaps)} gap(s) in time inside trajectories",
-                f"the longest {gaps.max():.3g} s; filters and derivatives do not cross them",
+                f"the longest lasts {gaps.max():.3g} s; filters and derivatives do not cross them",
                 "noted",
             )
 
@@ -414,12 +414,12 @@ class SlowSampling(Check):
     """Too few samples a second for accelerations."""
 
     name = "slow_sampling"
-    suspects = "a rate at which accelerations cannot be told"
+    suspects = "a sampling rate that is too low for accelerations"
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         if 2 <= measurement.rate < 20:
             yield self.suspicion(
                 f"the log is sampled at {measurement.rate:.3g} Hz",
-                "accelerations, and with them inertias, cannot be told from it",
+                "accelerations, and therefore inertias, cannot be determined at this rate",
                 "noted",
             )

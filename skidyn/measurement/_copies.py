@@ -50,7 +50,7 @@ class RepeatedRecordings(Check):
     """Recordings that repeat an earlier one sample by sample."""
 
     name = "repeated_recordings"
-    suspects = "recordings that are in the log twice"
+    suspects = "recordings that occur twice in the log"
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         trajectory = measurement.signals.trajectory
@@ -58,9 +58,9 @@ class RepeatedRecordings(Check):
         if copied.any():
             names = np.unique(trajectory[copied]).tolist()
             yield self.suspicion(
-                "recordings are in the log twice",
+                "recordings occur twice in the log",
                 f"{len(names)} of {len(np.unique(trajectory))} recordings repeat positions and "
-                "torque of an earlier one sample by sample; a diagnosis uses each once",
+                "torque of an earlier one sample by sample; a diagnosis uses each recording once",
                 "suspected",
             )
 
@@ -77,7 +77,7 @@ class CopiedTorque(Check):
         for k, what, j in copied_columns(measurement):
             yield self.suspicion(
                 f"the torque of {measurement.joint(k)} is the {what} of {measurement.joint(j)}",
-                "in every row, to the last digits and a factor",
+                "they agree in every row up to rounding and a constant factor",
                 "certain" if what != "torque" else "suspected",
                 [k] if what != "torque" else [j, k],
             )

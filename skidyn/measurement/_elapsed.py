@@ -99,7 +99,7 @@ class LostRows(Check):
     """Rows that are not in the order of time, or between which others were lost."""
 
     name = "lost_rows"
-    suspects = "rows that are not in the order of time, or between which others are missing"
+    suspects = "rows that are not in the order of time, or between which rows are missing"
     misnames = True
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
@@ -114,9 +114,9 @@ class LostRows(Check):
             measurement.lost = True
             evidence = (
                 f"positions step by {100 * found.size:.0f} % of their spread from row to row, "
-                f"{found.disorder:.2g} times as far as their velocities take them"
+                f"{found.disorder:.2g} times as far as their velocities imply"
                 if anyhow
-                else f"in {100 * share:.0f} % of the moving rows all joints go back along their "
+                else f"in {100 * share:.0f} % of the moving rows all joints move against their "
                 "velocities at once"
             )
             yield self.suspicion(
@@ -140,8 +140,8 @@ class LostRows(Check):
         if share > SKIPPED and usual > 0.5 and share > OTHERS * max(between, none):
             measurement.lost = True
             yield self.suspicion(
-                "rows are missing, and the clock does not say so",
-                f"in {100 * share:.2g} % of the moving rows all joints move two or more times as "
-                "far as their velocities take them in one step",
+                "rows are missing without a gap in the clock",
+                f"in {100 * share:.2g} % of the moving rows all joints move at least twice as far "
+                "in one step as their velocities imply",
                 "certain" if share > SURELY else "suspected",
             )

@@ -55,7 +55,7 @@ class Reading:
     Attributes
     ----------
     flip_motion, flip_torque : frozenset of int
-        Joints, from 0, whose positions and velocities, or torques, have the other sign.
+        Joints, from 0, whose positions and velocities, or torques, have the opposite sign.
     order, torque_order : tuple of int or None
         Column that holds each joint: of all signals, and of the torque beside that.
     summed : tuple of (int, int)

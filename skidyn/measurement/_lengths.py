@@ -68,7 +68,7 @@ class Lengths(Check):
     """Links that are longer or shorter than in the description."""
 
     name = "lengths"
-    suspects = "lengths of links in the description that are not those of the robot"
+    suspects = "lengths of links in the description that differ from those of the robot"
     stage = 2
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
@@ -102,11 +102,11 @@ class Lengths(Check):
             for body, factor, error in zip(found.bodies, found.factors, found.errors, strict=True)
             if abs(factor) > max(ERRORS * error, SHARE)
         }
-        shares = ", ".join(off.values()) or "none of which can be determined alone"
+        shares = ", ".join(off.values()) or "none of which can be determined individually"
         yield self.suspicion(
-            "lengths of links are not those of the robot's description",
+            "lengths of links differ from the description",
             f"other lengths, {shares}, explain the torque better by {found.gain:.0f} "
-            "(log-likelihood); take the description of this very robot, or measure the distances "
+            "(log-likelihood); use the description of this robot, or measure the distances "
             "between its joints",
             "suspected",
             sorted({int(robot.tree.coordinates[body]) for body in off}),

@@ -42,7 +42,7 @@ def suspect_lowpass(
     """
     value = float(f"{constant:.3g}")
     return check.suspicion(
-        f"{what} went through a low pass of about {0.5 / np.pi / constant:.2g} Hz",
+        f"{what} passed a low-pass filter of about {0.5 / np.pi / constant:.2g} Hz",
         evidence,
         "suspected",
         joints,

@@ -38,7 +38,7 @@ LARGER = 3.0
 BETTER = 0.8
 #: Share of its residual that the best effect may leave, and still be what is odd in a recording.
 LEFT = 0.5
-#: Residual from which another zero of a position is tried, and the least that is told, rad.
+#: Residual from which a different zero of a position is tried, and the least that is told, rad.
 SHIFTED, LEAST_ZERO = 3.0, np.deg2rad(4)
 #: Error of identified bodies, as a share of the spread, from which recordings are predicted by the
 #: bodies of the others alone.
@@ -66,8 +66,8 @@ class OddRecording(Check):
 
     name = "odd_recording"
     suspects = (
-        "single recordings in other units, with other signs, with another zero of a joint, or with "
-        "the torque of another"
+        "single recordings with different units, signs or joint zeros, or with the torque of "
+        "another recording"
     )
     stage = 1
 
@@ -80,8 +80,10 @@ class OddRecording(Check):
         sizes = _sizes(measurement)
         for run, size in sizes.items():
             yield self.suspicion(
-                f"in trajectory {run} all torques are in another unit or scale than in the others",
-                f"they spread {size:.3g} times as far; fix that file, or leave it out",
+                f"in trajectory {run} all torques have a different unit or scale than in the "
+                "other trajectories",
+                f"their spread is {size:.3g} times that of the others; fix that file, or leave it "
+                "out",
                 "certain",
             )
         if sizes:
@@ -120,10 +122,10 @@ class OddRecording(Check):
         measurement.odd = bool(scaled or unlike or shifted)
         for run, (joint, angle, gain) in shifted.items():
             yield self.suspicion(
-                f"in trajectory {run} the zero of {measurement.joint(joint)} is off by about "
-                f"{np.rad2deg(angle):.0f} deg against the others",
-                f"with it, the bodies of the others explain the torques of that trajectory better "
-                f"by {gain:.0f} (log-likelihood); fix that file, or leave it out",
+                f"in trajectory {run} the zero of {measurement.joint(joint)} differs by about "
+                f"{np.rad2deg(angle):.0f} deg from that of the others",
+                "with this correction, the bodies of the others explain the torques of that "
+                f"trajectory better by {gain:.0f} (log-likelihood); fix that file, or leave it out",
                 "suspected",
                 [joint],
             )
@@ -132,11 +134,11 @@ class OddRecording(Check):
             names = ", ".join(measurement.joint(one.joint) for one in own)
             multiples = ", ".join(f"{one.multiple:.3g}" for one in own)
             yield self.suspicion(
-                f"in trajectory {run} the torque of {names} has another sign or scale than in the "
-                "others",
-                f"it is {multiples} times what the other trajectories predict, which gains up to "
-                f"{max(one.gain for one in own):.0f} (log-likelihood); fix that file, or leave it "
-                "out",
+                f"in trajectory {run} the torque of {names} has a different sign or scale than in "
+                "the others",
+                f"it is {multiples} times the prediction from the other trajectories, which "
+                f"improves the fit by up to {max(one.gain for one in own):.0f} (log-likelihood); "
+                "fix that file, or leave it out",
                 "suspected",
                 [one.joint for one in own],
             )
@@ -147,10 +149,10 @@ class OddRecording(Check):
             names = ", ".join(measurement.joint(one.joint) for one in own)
             shares = ", ".join(f"{one.larger:.2g}" for one in own)
             yield self.suspicion(
-                f"in trajectory {run} the torque of {names} has little to do with the motion",
-                f"what the other trajectories predict leaves {shares} times as much there as in "
-                "all; it may be the torque of another recording, or its positions have another "
-                "zero",
+                f"in trajectory {run} the torque of {names} is nearly unrelated to the motion",
+                f"the prediction from the other trajectories leaves {shares} times as much "
+                "residual there as in all; it may be the torque of another recording, or its "
+                "positions may have a different zero",
                 "suspected",
                 [one.joint for one in own],
             )

@@ -31,7 +31,9 @@ class OddMotion(Check):
     """A recording in which velocities, positions or the clock are not those of the others."""
 
     name = "odd_motion"
-    suspects = "single recordings whose clock, positions or velocities have another unit or sign"
+    suspects = (
+        "single recordings whose clock, positions or velocities have a different unit or sign"
+    )
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         for run, slopes in measurement.odd_motion.items():
@@ -41,15 +43,19 @@ class OddMotion(Check):
             told = ", ".join(f"{size:.4g}" for size in sizes[known])
             every = len(slopes) == sum(measurement.excited) and len(slopes) > 1
             if every and known.all() and np.ptp(sizes) < SHARED * abs(float(np.median(sizes))):
-                what = "clock, positions or velocities have another unit than in the others"
+                what = "clock, positions or velocities have a different unit than in the others"
             elif known.all() and np.all(np.abs(sizes + 1) < FAR):
-                what = f"the velocity or the position of {names} has the other sign"
+                what = f"the velocity or the position of {names} has the opposite sign"
             else:
-                what = f"the velocity of {names} is not the rate of its position"
-            evidence = "; it is of something else" if not known.all() else ""
+                what = f"the velocity of {names} is not the derivative of its position"
+            evidence = "; it is a different signal" if not known.all() else ""
             yield self.suspicion(
                 f"in trajectory {run} {what}",
-                (f"velocities are {told} times the rates of positions there" if told else "there")
+                (
+                    f"velocities are {told} times the differentiated positions there"
+                    if told
+                    else "there"
+                )
                 + f", in the other trajectories they agree{evidence}; fix that file, or leave it "
                 "out",
                 "certain",

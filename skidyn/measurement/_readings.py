@@ -27,7 +27,7 @@ TIED, ALIKE = 3.0, 0.05
 #: Share of the gain up to which another kind of change of the same joints may be meant as well.
 RIVALS = 0.2
 #: What a change must gain with identified bodies. Negative masses could take the place of torque
-#: with the other sign or of gravity that points up or is absent, so that these gain little.
+#: with the opposite sign or of gravity that points up or is absent, so that these gain little.
 NEEDED = {
     **dict.fromkeys(("motion_sign", "joint_sign", "order", "torque_order", "summed", "zero"), 10.0),
     **dict.fromkeys(("torque_sign", "gravity"), -3.0),
@@ -47,7 +47,7 @@ PARALLEL = 0.999
 #: Offsets of a position that are tried, rad.
 OFFSETS = np.deg2rad([-135, -90, -45, -15, 15, 45, 90, 135, 180])
 #: What a reading may be instead if it gains little over bodies near those of the description.
-OTHER_BODIES = "bodies that are not those stated"
+OTHER_BODIES = "bodies that differ from the description"
 #: Rounds of the fits that only rank, and how many changes are looked at more closely.
 SCREENED, FINALISTS = 1, 12
 #: Rows of these fits at least, and at most over the number of joints.

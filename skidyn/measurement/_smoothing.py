@@ -82,7 +82,9 @@ class SmoothedTorque(Check):
 
     name = "smoothed_torque"
     of_sensor = True
-    suspects = "torque that was smoothed, so that friction seems to turn before and after the joint"
+    suspects = (
+        "torque that was smoothed, so that friction seems to reverse before and after the joint"
+    )
     stage = 2
     misnames = True
 
@@ -108,10 +110,10 @@ class SmoothedTorque(Check):
             return
         yield self.suspicion(
             f"the torque was smoothed over about {1e3 * 2.5 * WIDTHS[common]:.0f} ms",
-            f"friction turns before the joints do and as slowly after, alike on {len(alike)} of "
-            f"{len(found)} joints whose friction shows how it turns, which gains {total:.0f} "
-            "(log-likelihood) over any friction that turns with the joint; record torque as it is "
-            "measured",
+            f"friction reverses gradually before and after the joints do, equally on {len(alike)} "
+            f"of {len(found)} joints whose friction shows its reversals, which improves the fit "
+            f"by {total:.0f} (log-likelihood) over any friction that reverses with the joint; "
+            "record the torque as measured",
             "suspected",
             alike,
         )

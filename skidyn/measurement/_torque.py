@@ -71,9 +71,9 @@ class UnsignedTorque(Check):
             names = ", ".join(measurement.joint(k) for k in cut)
             shares = ", ".join(f"{np.mean(measurement.torque[:, k] == 0):.0%}" for k in cut)
             yield self.suspicion(
-                f"the torque of {names} is cut at zero",
-                f"it has one sign alone, and {shares} of it are zero although the joint moves: "
-                "what has the other sign was lost",
+                f"the torque of {names} is clipped at zero",
+                f"it has only one sign, and {shares} of it are zero although the joint moves: "
+                "values of the opposite sign were lost",
                 "certain",
                 cut,
             )
@@ -89,7 +89,7 @@ class UnsignedTorque(Check):
         )
         if gains:
             evidence += (
-                "; the magnitude of the robot's own torque is more likely by "
+                "; the magnitude of the rigid-body torque explains it better by "
                 f"{max(gains.values()):.0f} (log-likelihood)"
             )
         yield self.suspicion(
@@ -175,7 +175,7 @@ def _magnitude_gain(fits: Fits, k: int) -> float:
     use = fits.moving[:, k]
     columns = fits.average(np.column_stack([own, friction(s, k)]))[use]
     y = fits.average(fits.torque[:, k])[use]
-    # a torque of the other sign is one-sided too where gravity is
+    # a torque of the opposite sign is one-sided too where gravity is
     plain = max(fit_admissible(columns, sign * y).likelihood for sign in (1.0, -1.0))
     best = -np.inf
     size = float(np.abs(columns[:, 0]).mean()) + 1e-12
@@ -198,8 +198,8 @@ class Columns(Check):
 
     name = "reading"
     suspects = (
-        "the sign of single joints, their order, the zero of a position, angles against the base, "
-        "the direction of gravity, or torque from which gravity was taken off"
+        "the sign of single joints, their order, the zero of a position, angles relative to the "
+        "base, the direction of gravity, or torque from which gravity was removed"
     )
     stage = 1
 
@@ -227,8 +227,8 @@ class Columns(Check):
         names = ", ".join(measurement.joint(j) for j in joints)
         best = max(changes, key=lambda change: change.gain)
         evidence = (
-            f"read so, the robot's own torque explains the measured one better by "
-            f"{best.gain:.0f} (log-likelihood), and leaves {100 * best.drop:.0f} % less of it"
+            "with this correction, the rigid-body torque explains the measured torque better by "
+            f"{best.gain:.0f} (log-likelihood) and leaves {100 * best.drop:.0f} % less residual"
         )
         certainty: Certainty = "certain" if _sure(changes) else "suspected"
         if kind == "zero" and min(change.drop for change in changes) < MOSTLY:
@@ -236,24 +236,26 @@ class Columns(Check):
         rivals = {_RIVALS[rival] for change in changes for rival in change.rivals}
         if rivals:
             certainty = "suspected"
-            evidence += f"; {', or '.join(sorted(rivals))} would explain it as well"
+            evidence += f"; {', or '.join(sorted(rivals))} would explain it equally well"
         if kind == "torque_sign":
             columns = [f"tau{j + 1}" for j in joints]
-            what = f"the torque of {names} has the other sign"
+            what = f"the torque of {names} has the opposite sign"
             remedy = (f"--flip {','.join(columns)}", f"flip={columns}")
         elif kind == "motion_sign":
             columns = [f"q{j + 1}" for j in joints]
-            what = f"position and velocity of {names} have the other sign"
+            what = f"position and velocity of {names} have the opposite sign"
             remedy = (f"--flip {','.join(columns)}", f"flip={columns}")
         elif kind == "joint_sign":
             columns = [f"{q}{j + 1}" for j in joints for q in ("q", "tau")]
-            what = f"{names} count the other way round than in the robot's description"
+            what = f"{names} count in the opposite direction to the robot's description"
             remedy = (f"--flip {','.join(columns)}", f"flip={columns}")
         elif kind in ORDERS:
             what, remedy = _ordered(measurement, final)
         elif kind == "summed":
-            what = f"the position of {names} holds that of the joint before: its angle is against "
-            what += "another link than the one it turns on"
+            what = (
+                f"the position of {names} includes that of the previous joint: its angle is "
+                "relative to a link other than its parent"
+            )
             others = {f"q{j + 1}": f"{'-' * (x < 0)}q{j}" for j, x in final.summed if j in joints}
             words = ",".join(f"{name}={other}" for name, other in others.items())
             remedy = (f"--summed {words}", f"summed={others}")
@@ -267,9 +269,12 @@ class Columns(Check):
             gravity = [round(x, 2) + 0.0 for x in (final.gravity or ())]
             words = ",".join(f"{x:g}" for x in gravity)
             if kind == "gravity":
-                what = f"gravity points along ({words}) in the base frame: the robot is mounted so"
+                what = (
+                    f"gravity points along ({words}) in the base frame: the robot is mounted in "
+                    "this orientation"
+                )
             else:
-                what = "the torque holds no gravity: it was taken off"
+                what = "the torque contains no gravity: it was removed"
                 if changes[0].restorable:
                     what += " with the bodies of the description"
                     remedy = ("--restore-gravity", "restore_gravity=True")
@@ -295,7 +300,7 @@ def _ordered(measurement: Measurement, final: Reading) -> tuple[str, tuple[str, 
     names = ", ".join(measurement.joint(k) for k in moved)
     if motion == torque:
         words = ",".join(map(str, motion))
-        what = f"the columns of {names} are in another order than the robot's joints"
+        what = f"the columns of {names} are not in the order of the robot's joints"
         return what, (f"--order {words}", f"order={motion}")
     orders = {q: order for q, order in orders.items() if order != own}
     called = {"motion": "positions and velocities", "tau": "torques"}
@@ -312,14 +317,14 @@ def _torque_order(reading: Reading, every: Iterable[int]) -> list[int]:
 
 #: What another reading of the same joints would mean.
 _RIVALS = {
-    "torque_sign": "the torque with the other sign",
-    "motion_sign": "the position with the other sign",
-    "joint_sign": "position and torque with the other sign",
-    "order": "another order of all columns",
-    "torque_order": "another order of the torques",
-    "summed": "a position against another link",
-    "zero": "another zero of a position",
-    "gravity": "another direction of gravity",
+    "torque_sign": "the torque with the opposite sign",
+    "motion_sign": "the position with the opposite sign",
+    "joint_sign": "position and torque with the opposite sign",
+    "order": "a different order of all columns",
+    "torque_order": "a different order of the torques",
+    "summed": "a position relative to another link",
+    "zero": "a different zero of a position",
+    "gravity": "a different direction of gravity",
     "no_gravity": "no gravity",
 }
 
@@ -332,8 +337,8 @@ def _one_of_two(told: Suspicion, changes: Iterable[Change]) -> Suspicion:
     names = " or ".join(other[:1].lower() + other[1:] for other in others)
     return replace(
         told,
-        suspicion=f"either {told.suspicion}, or it is another cause: {names}",
-        evidence=f"{told.evidence}; the other, on the same joints, explains it as well",
+        suspicion=f"either {told.suspicion}, or there is another cause: {names}",
+        evidence=f"{told.evidence}; the other cause, on the same joints, explains it equally well",
         certainty="noted",
     )
 
@@ -374,7 +379,8 @@ class TorqueDelay(Check):
 
     name = "torque_delay"
     suspects = (
-        "torque that is late or early against the motion, or whose clock runs at another rate"
+        "torque that is late or early relative to the motion, or whose clock runs at a different "
+        "rate"
     )
     stage = 2
 
@@ -387,11 +393,11 @@ class TorqueDelay(Check):
         drift = found.late - found.early
         if abs(drift) > max(SMALLEST, DRIFTING * found.drift_error) and found.gain > LEAST:
             yield self.suspicion(
-                "the clock of the torque runs at another rate than that of the motion",
-                f"torque is late by {1e3 * found.early:.1f} ms in the first half of the recordings "
-                f"and by {1e3 * found.late:.1f} ms in the second (standard error of the difference "
-                f"{1e3 * found.drift_error:.1f} ms); stamp both with one clock, or cut the "
-                "recordings into short ones that are set right each",
+                "the clock of the torque runs at a different rate than that of the motion",
+                f"torque is late by {1e3 * found.early:.1f} ms in the first half of the "
+                f"recordings and by {1e3 * found.late:.1f} ms in the second (standard error of "
+                f"the difference {1e3 * found.drift_error:.1f} ms); stamp both with one clock, or "
+                "cut the recordings into short ones and correct the delay of each",
                 "suspected",
             )
             return
@@ -399,9 +405,10 @@ class TorqueDelay(Check):
         for run, one in odd.items():
             yield self.suspicion(
                 f"in trajectory {run} torque is {'late' if one.lag > 0 else 'early'} by about "
-                f"{abs(1e3 * one.lag):.0f} ms against the others",
-                f"there it is explained better by {one.gain:.0f} (log-likelihood) at that lag, "
-                f"{one.agreeing:.0%} of it on joints that agree; fix that file, or leave it out",
+                f"{abs(1e3 * one.lag):.0f} ms relative to the others",
+                f"at that lag it is explained better by {one.gain:.0f} (log-likelihood), "
+                f"{one.agreeing:.0%} of which is on joints that agree; fix that file, or leave it "
+                "out",
                 "suspected",
             )
         if odd:
@@ -437,10 +444,10 @@ class TorqueDelay(Check):
                 return
             late = float(f"{lag + early:.5f}")
             yield self.suspicion(
-                f"torque is {'late' if ms > 0 else 'early'} against motion by about "
+                f"torque is {'late' if ms > 0 else 'early'} relative to the motion by about "
                 f"{abs(ms):.1f} ms",
-                f"bodies, friction and rotor inertia explain it best at that lag (standard error "
-                f"{1e3 * found.error:.1f} ms, alike in {int(alike.sum())} of "
+                "bodies, friction and rotor inertia explain it best at that lag (standard error "
+                f"{1e3 * found.error:.1f} ms, equal in {int(alike.sum())} of "
                 f"{measurement.n_joints} joints)",
                 "suspected",
                 remedy=(f"--late tau={late:g}", f"late={{'tau': {late:g}}}"),
@@ -457,10 +464,10 @@ class TorqueDelay(Check):
             slow, fast = 1e3 * found.halves[k]
             yield self.suspicion(
                 f"the torque of {measurement.joint(k)} is {'late' if lag > 0 else 'early'} by "
-                f"about {abs(1e3 * lag):.1f} ms, and that of other joints is not"
+                f"about {abs(1e3 * lag):.1f} ms, but that of other joints is not"
                 + ("" if lag > 0 else ", or its position and velocity are late"),
-                f"in its slower rows by {slow:.1f} ms, in its faster ones by {fast:.1f} ms, which "
-                f"gains {found.gains[k]:.0f} (log-likelihood)",
+                f"it is {slow:.1f} ms in its slower rows and {fast:.1f} ms in its faster rows, "
+                f"which improves the fit by {found.gains[k]:.0f} (log-likelihood)",
                 "suspected",
                 [k],
                 (f"--late tau{k + 1}={lag:g}", f"late={{'tau{k + 1}': {lag:g}}}"),
@@ -469,10 +476,10 @@ class TorqueDelay(Check):
     def _late_command(self, lag: float, error: float, n_alike: int) -> Suspicion:
         """A torque of servos that is early: it follows from commands that have not arrived yet."""
         return self.suspicion(
-            f"commands reach the servos later than the controller says, by about {1e3 * lag:.0f} "
-            "ms of delay or more",
+            "commands reach the servos later than the controller states, by about "
+            f"{1e3 * lag:.0f} ms of delay or more",
             "bodies, friction and rotor inertia explain the servos' torque best at that lag "
-            f"(standard error {1e3 * error:.1f} ms, alike in {n_alike} joints)",
+            f"(standard error {1e3 * error:.1f} ms, equal in {n_alike} joints)",
             "suspected",
             remedy=("--controller fit, or its delay", "Controller(delay=...), fit_servo"),
         )
@@ -481,9 +488,9 @@ class TorqueDelay(Check):
         self, what: str, column: str, constant: float, lag: float, joints: Iterable[int] = ()
     ) -> Suspicion:
         evidence = (
-            "bodies, friction and rotor inertia explain it better without a low pass of first "
-            f"order with a time constant of {1e3 * constant:.1f} ms than with a delay, which would "
-            f"be {1e3 * lag:.1f} ms"
+            "bodies, friction and rotor inertia explain it better with a first-order low-pass "
+            f"filter (time constant {1e3 * constant:.1f} ms) undone than with a delay, which "
+            f"would be {1e3 * lag:.1f} ms"
         )
         return suspect_lowpass(self, f"the {what}", column, constant, evidence, joints)
 

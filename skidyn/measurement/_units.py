@@ -53,7 +53,7 @@ class ClockUnit(Check):
     """Time in another unit than seconds, or at another rate."""
 
     name = "clock_unit"
-    suspects = "time in ms, us, ns or minutes, or a clock of another rate"
+    suspects = "time in ms, us, ns or minutes, or a clock with a different rate"
     misnames = True
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
@@ -64,7 +64,7 @@ class ClockUnit(Check):
                 measurement.clock = factor
                 yield self.suspicion(
                     f"time looks like {NAMES.get(unit, unit)}",
-                    f"the integrated velocities are {typical:.4g} times the positions they lead to "
+                    f"the integrated velocities are {typical:.4g} times the changes of position "
                     f"(median over {len(slopes)} joints)",
                     "certain",
                     remedy=unit_remedy({"time": unit}),
@@ -106,11 +106,11 @@ class ClockUnit(Check):
         what = {"time": "the clock", "dq": "velocities", "q": "positions"}
         shared = _round(shared)
         value = float(f"{shared if best == 'q' else 1 / shared:.6g}")
-        doubt = "" if told else "; it may as well be that of velocities or positions"
+        doubt = "" if told else "; the scale of velocities or positions may be off instead"
         return self.suspicion(
             "velocity is not the derivative of the position: the scale of "
             f"{what[best]} is off by a factor of {1 / value:.4g}",
-            f"integrated velocities are {shared:.4g} times the positions they lead to, alike in "
+            f"integrated velocities are {shared:.4g} times the changes of position, equally in "
             f"all joints{doubt}",
             "certain" if told else "suspected",
             remedy=(f"--gain {best}={value:g}", f"gain={{'{best}': {value:g}}}"),
@@ -122,8 +122,8 @@ class PositionUnit(Check):
 
     name = "position_unit"
     suspects = (
-        "positions in degrees, turns, millimetres or counts of an encoder, or of motors before the "
-        "gears"
+        "positions in degrees, turns, millimetres or encoder counts, or motor positions before "
+        "the gears"
     )
     misnames = True
 
@@ -146,10 +146,10 @@ class PositionUnit(Check):
             measurement.odd = True
             largest = np.abs(measurement.signals.q).max()
             yield self.suspicion(
-                f"in trajectory {', '.join(map(str, odd))} positions are in another unit than in "
-                "the others",
-                f"they spread {min(odd.values()):.3g} times as far there, up to {largest:.4g} rad; "
-                "fix that file, or leave it out",
+                f"in trajectory {', '.join(map(str, odd))} positions have a different unit than "
+                "in the others",
+                f"their spread there is {min(odd.values()):.3g} times that of the others, up to "
+                f"{largest:.4g} rad; fix that file, or leave it out",
                 "certain",
             )
             return
@@ -159,9 +159,9 @@ class PositionUnit(Check):
             counts = _round_counts(2 * np.pi / shared)
             shared = 2 * np.pi / counts
             yield self.suspicion(
-                "positions are counts of an encoder, or those of motors",
+                "positions are encoder counts, or motor positions",
                 f"the largest is {np.abs(measurement.signals.q).max():.4g} rad, and they change "
-                f"{1 / shared:.5g} times as fast as the velocities say ({counts:.6g} a turn)",
+                f"{1 / shared:.5g} times as fast as the velocities imply ({counts:.6g} per turn)",
                 "certain",
                 np.flatnonzero(far),
                 (f"--gain q={shared:.9g}", f"gain={{'q': {shared:.9g}}}"),
@@ -221,7 +221,7 @@ class PositionUnit(Check):
         if not outside.any():
             return  # told by their velocities, joint by joint
         k = int(np.argmax(np.where(outside, largest / limits, 0)))
-        where = f"the limit is {limits[k]:.3g} rad" if known[k] else "a turn has 6.28 rad"
+        where = f"the limit is {limits[k]:.3g} rad" if known[k] else "one turn is 6.28 rad"
         seen = f"q{k + 1} ({measurement.joint_names[k]}) reaches {largest[k]:.4g} rad where {where}"
         degrees = bool(np.all(largest[turning] * DEGREE <= 1.1 * limits[turning]))
         usual = float(np.quantile(largest[turning], 0.5, method="lower"))  # of two the smaller
@@ -240,8 +240,8 @@ class PositionUnit(Check):
             moving = dict.fromkeys(both, value)
             words = ",".join(f"{name}={size:g}" for name, size in moving.items())
             yield self.suspicion(
-                "positions and velocities are those of motors, before the gears, or in an unknown "
-                "unit",
+                "positions and velocities are those of the motors before the gears, or have an "
+                "unknown unit",
                 f"{seen}; divided by {ratio:.3g} they explain the torque best",
                 "certain",
                 np.flatnonzero(outside),
@@ -258,7 +258,7 @@ class PositionUnit(Check):
             )
         elif _too_far(measurement, DISTANT).any():
             yield self.suspicion(
-                "positions are in an unknown unit, or those of motors before the gears",
+                "positions have an unknown unit, or are those of the motors before the gears",
                 seen,
                 "certain",
                 np.flatnonzero(outside),
@@ -383,7 +383,7 @@ class WrappedPosition(Check):
     """Positions that leap by a turn at the border of a turn."""
 
     name = "wrapped_position"
-    suspects = "positions that leap by a turn"
+    suspects = "positions that jump by a full turn"
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         signals = measurement.signals
@@ -398,7 +398,7 @@ class WrappedPosition(Check):
                 if count and np.ptp(q) < 1.1 * turn:
                     yield self.suspicion(
                         f"the position of {measurement.joint(int(k))} is wrapped",
-                        f"it leaps by a turn of {turn:.4g} {unit} {count} time(s)",
+                        f"it jumps by a full turn of {turn:.4g} {unit} {count} time(s)",
                         "certain",
                         [int(k)],
                         ("--unwrap", "unwrap=True"),

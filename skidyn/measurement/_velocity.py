@@ -46,8 +46,8 @@ class Velocity(Check):
 
     name = "velocity"
     suspects = (
-        "velocities with the other sign, in degrees or turns, of another joint, or of something "
-        "else than the positions"
+        "velocities with the opposite sign, in degrees or turns, of another joint, or of a "
+        "signal other than the positions"
     )
 
     def look(self, measurement: Measurement) -> Iterable[Suspicion]:
@@ -66,7 +66,7 @@ class Velocity(Check):
             words = ",".join(map(str, numbers))
             told = self.suspicion(
                 f"the velocities of {names} are exchanged",
-                "each is the rate of another joint's position",
+                "each is the derivative of another joint's position",
                 "certain",
                 moved,
                 (f"--order dq={words}", f"order={{'dq': {numbers}}}"),
@@ -76,7 +76,7 @@ class Velocity(Check):
         if constant:
             names = ", ".join(measurement.joint(k) for k in constant)
             told = self.suspicion(
-                f"the velocity of {names} is not that of the position: one of them is constant",
+                f"the velocity of {names} does not belong to the position: one of them is constant",
                 "the other changes in most rows",
                 "certain",
                 constant,
@@ -99,7 +99,7 @@ class Velocity(Check):
     def _held(self, measurement: Measurement, k: int, runs: list[int]) -> Suspicion:
         return self.suspicion(
             f"the position of {measurement.joint(k)} does not change in some trajectories, "
-            "although its velocity says that it moves",
+            "although its velocity is not zero",
             f"in {', '.join(map(str, runs[:8]))}; leave these trajectories out",
             "suspected",
             [k],
@@ -115,14 +115,14 @@ class Velocity(Check):
         if cause == "sign" and _runs_backwards(measurement, joints):
             return self.suspicion(
                 "rows run backwards in time",
-                f"{evidence}, and friction brakes the joints only if time runs the other way; turn "
-                "the rows of every recording round, and leave the clock as it is",
+                f"{evidence}, and friction opposes the motion only if time is reversed; reverse "
+                "the order of the rows of every recording, and keep the clock as it is",
                 "certain",
             )
         if cause == "sign":
             columns = [f"dq{k + 1}" for k in joints]
             return self.suspicion(
-                f"the velocity of {names} has the other sign",
+                f"the velocity of {names} has the opposite sign",
                 evidence,
                 "certain",
                 joints,
@@ -137,7 +137,7 @@ class Velocity(Check):
             words = ",".join(f"{name}={value:g}" for name, value in pairs.items())
             return self.suspicion(
                 what,
-                f"{evidence}; it is at another scale",
+                f"{evidence}; its scale differs",
                 "suspected",
                 joints,
                 (f"--gain {words}", f"gain={pairs}"),
@@ -217,7 +217,9 @@ class VelocityDelay(Check):
     """Velocities that are late or early against the positions, alike in all joints."""
 
     name = "velocity_delay"
-    suspects = "velocities that are late against the positions: filtered, or another clock"
+    suspects = (
+        "velocities that are late relative to the positions: filtered, or stamped by another clock"
+    )
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         if measurement.stale:
@@ -251,9 +253,9 @@ class VelocityDelay(Check):
             yield self._filtered(f"the {late}", early, column, constant)
             return
         yield self.suspicion(
-            f"the {late} is late against the {early} by about {1e3 * value:g} ms",
-            f"at that lag it is the rate of the position, alike in {int(alike.sum())} of "
-            f"{len(told)} joints that move: it was filtered, or has another clock",
+            f"the {late} is late relative to the {early} by about {1e3 * value:g} ms",
+            f"at that lag it is the derivative of the position, equally in {int(alike.sum())} of "
+            f"{len(told)} moving joints: it was filtered, or stamped by another clock",
             "suspected",
             remedy=(f"--late {column}={value:g}", f"late={{'{column}': {value:g}}}"),
         )
@@ -262,8 +264,8 @@ class VelocityDelay(Check):
         self, what: str, other: str, column: str, constant: float, joints: Iterable[int] = ()
     ) -> Suspicion:
         evidence = (
-            f"without one of first order with a time constant of {1e3 * constant:.1f} ms it agrees "
-            f"with the {other}, and far better than at any delay"
+            f"after undoing a first-order filter with a time constant of {1e3 * constant:.1f} ms "
+            f"it agrees with the {other}, far better than at any delay"
         )
         return suspect_lowpass(self, what, column, constant, evidence, joints)
 
@@ -284,9 +286,10 @@ class VelocityDelay(Check):
                 yield self._filtered(what, early, column, constant, [k])
                 continue
             yield self.suspicion(
-                f"the {late} of {measurement.joint(k)} is late against its {early} by about "
-                f"{1e3 * value:g} ms, and that of other joints is not",
-                "at that lag it is the rate of the position: it was filtered, or has another clock",
+                f"the {late} of {measurement.joint(k)} is late relative to its {early} by about "
+                f"{1e3 * value:g} ms, but that of other joints is not",
+                "at that lag it is the derivative of the position: it was filtered, or stamped "
+                "by another clock",
                 "suspected",
                 [k],
                 (f"--late {column}={value:g}", f"late={{'{column}': {value:g}}}"),
@@ -419,7 +422,7 @@ class JoinedRecordings(Check):
     """Positions that leap to another place and go on from there: recordings joined, or cut out."""
 
     name = "joined"
-    suspects = "recordings that were joined, or from which a part was cut, as if they were one"
+    suspects = "recordings that were joined into one, or from which a part was cut out"
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         s = measurement.signals
@@ -429,8 +432,8 @@ class JoinedRecordings(Check):
             joint = int(np.argmax(np.abs(s.q[rows[0]] - s.q[rows[0] - 1])))
             yield self.suspicion(
                 "recordings were joined, or a part was cut out of one",
-                f"positions leap in {len(rows)} place(s) farther than any velocity takes them, and "
-                f"go on from there (rows {shown}; {measurement.joint(joint)} by "
+                f"positions jump in {len(rows)} place(s) farther than any velocity implies, and "
+                f"continue from there (rows {shown}; {measurement.joint(joint)} by "
                 f"{abs(s.q[rows[0], joint] - s.q[rows[0] - 1, joint]):.3g})",
                 "certain",
                 remedy=("--split-leaps", "split_leaps=True"),

@@ -92,4 +92,4 @@ def test_traces_hold_a_recording_that_is_in_the_log_twice_once(here, capsys, tmp
     file = tmp_path / "errors.mcap"
     words = ["compare", str(tmp_path / "twice.csv"), *LOG[1:], "--traces", str(file)]
     assert cli.main(words) == cli.DONE
-    assert "in the log twice" in capsys.readouterr().out and file.exists()
+    assert "occur twice in the log" in capsys.readouterr().out and file.exists()

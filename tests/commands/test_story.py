@@ -55,7 +55,7 @@ def test_the_simulated_motion_is_told_where_it_was_asked_for(story):
 
 
 def test_a_doubt_about_the_log_comes_before_any_name(story):
-    story["doubts"] = ["the torque of joint 2 has the other sign: evidence."]
+    story["doubts"] = ["the torque of joint 2 has the opposite sign: evidence."]
     assert next(iter(story_lines(story))).startswith("Check the log first: the torque of joint 2")
 
 

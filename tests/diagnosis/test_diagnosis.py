@@ -209,7 +209,8 @@ def test_no_physics_is_named_while_a_unit_is_in_doubt():
     X = log.X.assign(time=1.5 * log.X["time"])  # the clock, or velocities at another scale
 
     told = (
-        r"measurement is in doubt \(.*scale of the clock.*\), so that no physical effect is identified"
+        r"measurement is in doubt \(.*scale of the clock.*\), "
+        "so that no physical effect is identified"
     )
     with pytest.warns(LogWarning, match=told):
         doubted = diagnose(RBDRegressor(arm, effects=["viscous", "coulomb"]), X, log.y)

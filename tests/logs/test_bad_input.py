@@ -94,7 +94,7 @@ def test_degrees_are_suspected_with_the_evidence():
         ({"time": 1e9}, "time looks like ns"),
         ({"dq1": 57.29578, "dq2": 57.29578}, "velocities look like deg/s"),
         ({"q1": 57.29578, "q2": 57.29578}, "positions look like degrees"),
-        ({"dq1": -1.0, "dq2": -1.0}, "has the other sign"),
+        ({"dq1": -1.0, "dq2": -1.0}, "has the opposite sign"),
         ({"dq1": 1.6, "dq2": 1.6}, "is not the derivative"),
     ],
 )

@@ -30,7 +30,9 @@ def test_delay_is_measured():
     quality = check_log(late.frame, PANDA)
     delays = [joint.torque_delay for joint in quality.joints]
     assert np.median(delays) == pytest.approx(late.parameters["delay"], abs=0.002)
-    assert any("torque is late against motion by about" in text for text in quality.warnings)
+    assert any(
+        "torque is late relative to the motion by about" in text for text in quality.warnings
+    )
 
 
 def test_report_as_dict_and_text():

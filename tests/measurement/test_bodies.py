@@ -71,7 +71,7 @@ def test_a_rate_that_is_wrong_in_clock_and_velocities(factor, told_of):
     ).frame
     velocities = {f"dq{k}": frame[f"dq{k}"] / factor for k in range(1, 7)}
     told = told_of(frame.assign(time=factor * frame["time"], **velocities), robot)["torque_scale"]
-    assert told.suspicion.startswith("the clock runs at another rate")
+    assert told.suspicion.startswith("the clock runs at a different rate")
     words = dict(pair.split("=") for pair in told.remedy.option.split(" ")[1].split(","))
     assert float(words["time"]) == pytest.approx(1 / factor, rel=0.1)
     assert float(words["dq"]) == pytest.approx(factor, rel=0.1)

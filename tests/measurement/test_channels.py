@@ -64,4 +64,4 @@ def test_a_torque_of_one_sign_before_drives_are_enabled_is_not_cut(recorded, tol
         frame.loc[rows[:40], ["tau1", "tau2"]] = 0.0
     told = told_of(frame)
     assert told["constant_torque"].certainty == "certain"
-    assert "is cut at zero" not in str(told.get("unsigned_torque", ""))
+    assert "is clipped at zero" not in str(told.get("unsigned_torque", ""))

@@ -19,7 +19,7 @@ def test_certain_ones_come_first_and_stop_a_diagnosis(arm, recorded):
     model = RBDRegressor(arm)
     with pytest.raises(LogError, match="--flip dq2.*force=True"):
         diagnose(model, turned, recorded.y)
-    with pytest.warns(UserWarning, match="has the other sign"):
+    with pytest.warns(UserWarning, match="has the opposite sign"):
         forced = diagnose(model, turned, recorded.y, settings=Settings(max_findings=0), force=True)
     assert forced.checks[0].certainty == "certain"
     assert forced.to_dict()["checks"][0]["remedy"] == {

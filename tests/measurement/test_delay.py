@@ -40,7 +40,8 @@ def test_a_delay_of_a_fraction_of_a_sample():
 
 def test_clocks_of_other_rates():
     (told,) = late(lambda since: 0.005 * since)
-    assert told.suspicion == "the clock of the torque runs at another rate than that of the motion"
+    what = "the clock of the torque runs at a different rate than that of the motion"
+    assert told.suspicion == what
     assert told.remedy is None
 
 

@@ -36,12 +36,12 @@ def test_velocities_in_degrees_per_second():
 @pytest.mark.parametrize("joint", [1, 2])
 def test_the_sign_of_a_velocity(joint):
     (told,) = told_of({f"dq{joint}": -FRAME.loc[OWN, f"dq{joint}"]})
-    assert told.joints == (joint,) and "the other sign" in told.suspicion
+    assert told.joints == (joint,) and "the opposite sign" in told.suspicion
 
 
 def test_the_velocity_of_another_joint():
     (told,) = told_of({"dq2": FRAME.loc[OWN, "dq1"]})
-    assert told.joints == (2,) and "is not the rate of its position" in told.suspicion
+    assert told.joints == (2,) and "is not the derivative of its position" in told.suspicion
 
 
 def test_a_clock_in_another_unit():
