@@ -16,8 +16,8 @@ from skidyn.report import (
 def test_story_is_told_in_order(fakes):
     page = render_html(summarize(fakes.make_diagnosis()))
     order = [
-        "Missing: ", "Where it fails", "What is missing", "The error falling", "What is left",
-        "What this data could still hide", "Terms", "Provenance",
+        "Missing: ", "Where the model fails", "What is missing", "Error after each step",
+        "Remaining error", "Largest undetected effects", "Terms", "Provenance",
     ]  # fmt: skip
     places = [page.index(f"<h2>{title}") for title in order]
     assert places == sorted(places)
@@ -27,7 +27,7 @@ def test_story_is_told_in_order(fakes):
 def test_a_complete_model_has_no_findings_to_show(fakes):
     page = render_html(summarize(fakes.make_diagnosis("complete")))
     assert "<h2>Nothing significant is missing" in page
-    assert "<h2>What is missing" not in page and "<h2>The error falling" not in page
+    assert "<h2>What is missing" not in page and "<h2>Error after each" not in page
 
 
 def test_numbers_of_the_page_are_those_of_the_report(fakes):
