@@ -40,7 +40,8 @@ def test_gaps_are_counted():
     quality = check_log(gap)
     assert quality.gaps == 1
     assert any(
-        "1 gap(s) in time inside trajectories: the longest 1.01 s" in w for w in quality.warnings
+        "1 gap(s) in time inside trajectories: the longest lasts 1.01 s" in w
+        for w in quality.warnings
     )
 
 

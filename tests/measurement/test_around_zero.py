@@ -43,7 +43,7 @@ def test_a_drive_that_is_switched_off_has_no_dead_band():
 
 @pytest.mark.parametrize(
     "change, words",
-    [(lambda x: x - x.iloc[:5].mean(), "start of every"), (lambda x: x - x.mean(), "no mean")],
+    [(lambda x: x - x.iloc[:5].mean(), "start of every"), (lambda x: x - x.mean(), "zero mean")],
 )
 def test_torque_that_was_set_to_zero_for_each_recording(change, words):
     told = told_of(in_runs(LOG.frame, change))

@@ -31,5 +31,5 @@ def test_a_channel_that_is_no_torque(channel, name):
     frame = FRAME.assign(tau2=FRAME[channel])
     told = told_of(frame)["copied_torque"]
     assert told.certainty == "certain" and f"is the {name} of joint 2" in told.suspicion
-    with pytest.raises(LogError, match="not what its names and units say"):
+    with pytest.raises(LogError, match="does not agree with its names and units"):
         diagnose(RBDRegressor(ROBOT), frame, frame[["tau1", "tau2"]].to_numpy())

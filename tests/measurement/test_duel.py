@@ -58,7 +58,7 @@ def test_one_of_two_is_a_note(monkeypatch):
     (told,) = [s for s in check_log(flipped(PLAIN), ROBOT).checks if s.check == "reading"]
     assert told.certainty == "noted" and told.remedy.option == "--flip tau3"
     assert told.suspicion.startswith("either the torque of joint 3")
-    assert told.suspicion.endswith("or it is another cause: coupling spring")
+    assert told.suspicion.endswith("or there is another cause: coupling spring")
 
 
 def test_what_an_effect_explains_far_better_is_not_told(monkeypatch):

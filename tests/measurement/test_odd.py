@@ -44,7 +44,7 @@ def test_the_zero_of_a_joint_in_one_recording():
     frame.loc[frame["trajectory"] == RUN, "q2"] += 0.6
     (told,) = [s for s in check_log(frame, ROBOT).checks if s.certainty != "noted"]
     assert told.check == "odd_recording" and told.joints == (2,)
-    assert f"in trajectory {RUN} the zero of joint 2 (joint2) is off by about 3" in told.suspicion
+    assert f"in trajectory {RUN} the zero of joint 2 (joint2) differs by about 3" in told.suspicion
 
 
 def test_a_load_in_half_of_the_recordings_is_no_other_zero():
