@@ -98,7 +98,7 @@ def conclude(
     if not is_physics(model):
         shown, remark = _refitted(problem, result, model, data, shown)
         remarks.append(remark)
-    rivals = {s.added.kind: rivals_of(s) for s in result.steps if s.added is not None}
+    rivals = {h.kind: rivals_of(h) for h in result.findings}
     unknowns = _unknowns(problem, result, terms)
     findings = []
     for i, hypothesis in enumerate(result.findings):

@@ -13,7 +13,7 @@ from skidyn._signals import Array
 from skidyn._text import give_or_take, inside, listed
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._episodes import Episode
-from skidyn.diagnosis._hypothesis import UNKNOWN, Hypothesis, Step
+from skidyn.diagnosis._hypothesis import UNKNOWN, Hypothesis
 from skidyn.diagnosis._unknown import UnknownTorque
 from skidyn.effects import NamelessEffect, Term, get_effect
 from skidyn.evidence import Problem
@@ -128,17 +128,11 @@ class Finding:
         }
 
 
-def rivals_of(step: Step) -> tuple[str, ...]:
+def rivals_of(best: Hypothesis) -> tuple[str, ...]:
     """Kinds that explain nearly as much of the same joints as the one added."""
-    best = step.added
-    assert best is not None
-    own = set(best.joints)
-    kinds = [
-        h.kind
-        for h in step.ranking
-        if h is not best and h.score >= RIVAL_SHARE * best.score and own & set(h.joints)
-    ]
-    return tuple(dict.fromkeys(k for k in kinds if k != best.kind))
+    own, least = set(best.joints), RIVAL_SHARE * best.score
+    near = [h.kind for h in best.others if h.score >= least and own & set(h.joints)]
+    return tuple(dict.fromkeys(near))
 
 
 def make_finding(

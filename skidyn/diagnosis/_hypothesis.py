@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a search works with: hypotheses and what is asked of them, steps, and its result."""
+"""What a search works with: hypotheses and what is asked of them, and its result."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -48,6 +48,8 @@ class Hypothesis:
         Held-out squared error with it; None where it was judged otherwise.
     torque : ndarray of shape (n_samples, n_joints) or None
         Torque to be taken off at the full rate (ripple).
+    others : tuple of Hypothesis
+        Explanations of other kinds that it was ranked with when it was added, best first.
     """
 
     kind: str
@@ -62,6 +64,7 @@ class Hypothesis:
     elsewhere: tuple[tuple[int, ...], ...] = ()
     errors: Array | None = None
     torque: Array | None = None
+    others: tuple[Hypothesis, ...] = ()
 
     @property
     def joints(self) -> tuple[int, ...]:
@@ -80,14 +83,6 @@ class Hypothesis:
 
 
 @dataclass
-class Step:
-    """One step of the search: the ranked explanations and the one that was added."""
-
-    ranking: list[Hypothesis]
-    added: Hypothesis | None
-
-
-@dataclass
 class SearchResult:
     """What the search found.
 
@@ -95,8 +90,6 @@ class SearchResult:
     ----------
     findings : list of Hypothesis
         Added kinds, in order.
-    steps : list of Step
-        Every step with its ranking.
     fit : Fit
         Last fit.
     ripple : ndarray of shape (n_samples, n_joints)
@@ -110,12 +103,16 @@ class SearchResult:
     """
 
     findings: list[Hypothesis]
-    steps: list[Step]
     fit: Fit
     ripple: Array
     inflation: Array
     candidates: list[Candidate] = field(default_factory=list)
     n_tests: int = 1
+
+
+def ranked_with(best: Hypothesis, ranking: Sequence[Hypothesis]) -> Hypothesis:
+    """The explanation that is added, which keeps those of other kinds in its ranking."""
+    return replace(best, others=tuple(h for h in ranking if h.kind != best.kind))
 
 
 def close_shapes(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:

@@ -14,10 +14,10 @@ from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._hypothesis import (
     UNKNOWN,
     Hypothesis,
-    Step,
     close_shapes,
     family_of,
     margin_over,
+    ranked_with,
     rivals_among,
     uses_the_fit,
     within_recordings,
@@ -53,7 +53,8 @@ class ReconsideringSearch(JudgingSearch):
                 rivals = rivals_among(judged, offered)
                 margin, alike = margin_over(judged, rivals), self._alike(judged, rivals)
                 elsewhere = self._elsewhere(judged)
-                return replace(judged, margin=margin, alike=alike, elsewhere=elsewhere)
+                judged = replace(judged, margin=margin, alike=alike, elsewhere=elsewhere)
+                return ranked_with(judged, offered)
         return None
 
     def _first_of_two_names(self, best: Hypothesis, ranking: list[Hypothesis]) -> Hypothesis:
@@ -96,29 +97,26 @@ class ReconsideringSearch(JudgingSearch):
         names = [h for h in names if set(function.joints) <= set(h.joints)]
         return [h for h in names if not self.denied(h, function)][: self.settings.refined]
 
-    def reconsider(self, newest: Hypothesis, steps: list[Step]) -> None:
+    def reconsider(self, newest: Hypothesis) -> None:
         """Let every kind compete again for what earlier findings explain, beside the newest."""
         replaced = False
         for old in [h for h in self.findings if h is not newest and h.torque is None]:
             for _ in range(self.settings.repeated):
-                step = self._competed_again(old)
-                if step is None or step.added is None:
+                winner = self._competed_again(old)
+                if winner is None:
                     if set(old.joints) & set(newest.joints):
-                        self._settled(old, steps)
+                        self._settled(old)
                     break
                 replaced = True
-                steps[:] = [step if s.added is old else s for s in steps]
-                newest, old = self._settled(newest, steps), step.added
+                newest, old = self._settled(newest), winner
                 # What follows the fit had followed a model with the wrong name in it.
                 if not any(map(uses_the_fit, newest.candidates)):
                     break
         if replaced and newest.kind == UNKNOWN and newest.torque is None:
             # What stood beside the wrong name without one may have one beside the right name.
-            step = self._competed_again(newest)
-            if step is not None:
-                steps[:] = [step if s.added is newest else s for s in steps]
+            self._competed_again(newest)
 
-    def _competed_again(self, old: Hypothesis) -> Step | None:
+    def _competed_again(self, old: Hypothesis) -> Hypothesis | None:
         """Put what now wins in the place of an earlier finding: another kind, or a better shape."""
         kept = self._state()
         place = self.findings.index(old)
@@ -145,7 +143,7 @@ class ReconsideringSearch(JudgingSearch):
         self.findings.insert(place, self.findings.pop())
         self.refit()
         self.sigma, self.left = self.weights(), self._left()
-        return Step([best, *(h for h in ranking if h.kind != best.kind)], best)
+        return best
 
     def _name_in_place(
         self, old: Hypothesis, ranking: Sequence[Hypothesis], with_old: Array
@@ -163,11 +161,11 @@ class ReconsideringSearch(JudgingSearch):
             self.add(first)
             self.refit()
             for other in [h for h in self.findings if any(map(uses_the_fit, h.candidates))]:
-                self._settled(other, [])
+                self._settled(other)
             left = self._left()
             self._restore(before)
             if self._good_enough(left, with_old, removed, old.joints):
-                return first
+                return ranked_with(first, ranking)
         return None
 
     def _beside_another_kind(self, shadow: Hypothesis) -> Hypothesis | None:
@@ -205,24 +203,23 @@ class ReconsideringSearch(JudgingSearch):
             self._restore(kept)
         return None
 
-    def name_alike(self, steps: list[Step]) -> None:
+    def name_alike(self) -> None:
         """Give joints the kind of another joint where that explains nearly as much.
 
         Joints of one robot are built alike: what one of them has, another one has rather than
         something else that looks like it there. Where either could be called as the other is, the
         one that explains more names both.
         """
-        for step in steps:
-            old = step.added
-            if old is None or old.kind == UNKNOWN or get_effect(old.kind).is_exact:
+        for old in list(self.findings):
+            if old.kind == UNKNOWN or get_effect(old.kind).is_exact:
                 continue  # a formula that is exact, and explains as much, is right
             for other in list(self.findings):
                 if old is other or not all(map(self._of_own_joints, (old, other))):
                     continue
-                both = self._also(other, old.kind, steps) is not None
+                both = self._also(other, old.kind) is not None
                 if set(old.joints) & set(other.joints) or (both and old.score > other.score):
                     continue
-                same = self._also(old, other.kind, steps)
+                same = self._also(old, other.kind)
                 if same is None or same.kind == old.kind:
                     continue
                 place = self.findings.index(old)
@@ -232,9 +229,9 @@ class ReconsideringSearch(JudgingSearch):
                     self.chosen += old.candidates
                     continue
                 margin = max(0.0, 1 - old.score / same.score)
-                new = replace(judged, margin=margin)
+                new = ranked_with(replace(judged, margin=margin), [old, *old.others])
                 self.chosen += new.candidates
-                self.findings[place] = step.added = new
+                self.findings[place] = new
                 self.refit()
                 self.sigma = self.weights()
                 break
@@ -246,14 +243,12 @@ class ReconsideringSearch(JudgingSearch):
         effect = get_effect(finding.kind)
         return finding.torque is None and effect.scope == "joint" and effect.search == "grid"
 
-    def _also(self, finding: Hypothesis, kind: str, steps: Sequence[Step]) -> Hypothesis | None:
+    def _also(self, finding: Hypothesis, kind: str) -> Hypothesis | None:
         """Another kind on the same joints that explains nearly as much as a finding."""
         least = (1 - self.settings.simpler_share) * finding.score
         near = [
             h
-            for step in steps
-            if step.added is finding
-            for h in step.ranking
+            for h in finding.others
             if h.kind == kind and h.joints == finding.joints and h.score >= least
         ]
         return max(near, key=lambda h: h.score, default=None)
@@ -301,15 +296,13 @@ class ReconsideringSearch(JudgingSearch):
         self.refit()
         return self.findings[place]
 
-    def _settled(self, finding: Hypothesis, steps: list[Step]) -> Hypothesis:
+    def _settled(self, finding: Hypothesis) -> Hypothesis:
         """A finding with its shapes found again; until they stay if its columns follow the fit."""
         follows = any(map(uses_the_fit, finding.candidates))
         for _ in range(self.settings.repeated if follows else 1):
             shapes = [c.term.shape for c in finding.candidates]
-            newer = self._refined_anew(finding)
-            steps[:] = [replace(s, added=newer) if s.added is finding else s for s in steps]
-            finding = newer
-            again = [c.term.shape for c in newer.candidates]
+            finding = self._refined_anew(finding)
+            again = [c.term.shape for c in finding.candidates]
             if all(map(close_shapes, shapes, again)):
                 break
         return finding

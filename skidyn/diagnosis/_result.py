@@ -83,7 +83,7 @@ class Diagnosis:
     problem : Problem
         Averaged rows and folds behind the diagnosis.
     result : SearchResult
-        Every step of the search with its ranking.
+        What the search found and its last fit.
     predictable : ndarray of shape (n_joints,)
         Share of the remaining squared error that a flexible learner predicts.
     unknowns : list of UnknownTorque

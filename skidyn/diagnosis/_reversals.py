@@ -82,11 +82,9 @@ def look_at_reversals(
     if not new & {j for h in second.findings for j in h.joints}:
         return problem, result
     wider = replace(wider, terms=problem.terms, torque=problem.torque)
-    steps = [s for s in result.steps if s.added in others] + second.steps
     return wider, replace(
         second,
         findings=others + second.findings,
-        steps=steps,
         ripple=result.ripple,
         candidates=result.candidates,
     )

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from skidyn.diagnosis._hypothesis import SearchResult, Step
+from skidyn.diagnosis._hypothesis import SearchResult
 from skidyn.diagnosis._reconsideration import ReconsideringSearch
 from skidyn.diagnosis._rule import Settings, variance_inflation
 from skidyn.evidence import Problem
@@ -66,30 +66,24 @@ class _Search(ReconsideringSearch):
 
     def run(self) -> SearchResult:
         """Add one finding after the other."""
-        steps = []
         for _ in range(self.settings.max_findings):
             self.sigma = self.weights()
             self.left = self._left()
             self.start = np.maximum(self.start, self.left)
             if self.findings:
                 self.follow_again()
-            ranking = self.rank()
-            best = self.accepted(ranking)
+            best = self.accepted(self.rank())
             if best is None:
-                steps.append(Step(ranking, None))
                 break
-            steps.append(Step([best, *(h for h in ranking if h.kind != best.kind)], best))
             self.add(best)
             best = self.withdraw(best) or best
-            steps[-1].added = best
             self.refit()
-            best = self._settled(best, steps)
-            self.reconsider(best, steps)
+            self.reconsider(self._settled(best))
         self.sigma = self.weights()
         self.withdraw()
-        self.name_alike(steps)
+        self.name_alike()
         everywhere = range(self.problem.n_joints)
         inflation = variance_inflation(self.problem, self.fit.residual, everywhere)
         return SearchResult(
-            self.findings, steps, self.fit, self.ripple, inflation, self.pool, self.n_tests
+            self.findings, self.fit, self.ripple, inflation, self.pool, self.n_tests
         )

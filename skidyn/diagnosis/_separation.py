@@ -286,21 +286,20 @@ def design_separating_motion(
 def _opponents(
     diagnosis: Diagnosis, kind: str | None, rival: str | None
 ) -> tuple[Hypothesis, Hypothesis]:
-    """The finding and the other explanation of the same step of the search."""
+    """The finding and another explanation that it was ranked with."""
     known = []
     findings = {f.kind: f for f in diagnosis.findings}
-    for step in diagnosis.result.steps:
-        if step.added is None or step.added.kind not in findings:
+    for own in diagnosis.result.findings:
+        if own.kind not in findings:
             continue
-        finding = findings[step.added.kind]
-        others = [h for h in step.ranking if h.kind not in (step.added.kind, "unknown")]
-        known.append(f"{step.added.kind} against {', '.join(h.kind for h in others) or 'nothing'}")
-        if kind not in (None, step.added.kind):
+        others = [h for h in own.others if h.kind != "unknown"]
+        known.append(f"{own.kind} against {', '.join(h.kind for h in others) or 'nothing'}")
+        if kind not in (None, own.kind):
             continue
-        names = [rival] if rival else list(finding.rivals)
+        names = [rival] if rival else list(findings[own.kind].rivals)
         for other in others:
             if other.kind in names:
-                return step.added, other
+                return own, other
     asked = f"finding {kind}" if kind else "finding"
     wanted = f"the rival {rival}" if rival else "a rival"
     raise EffectError(

@@ -104,7 +104,6 @@ def look_at_swift(
     return short, replace(
         moved,
         findings=sorted([*others.findings, *moved.findings], key=lambda h: -h.score),
-        steps=others.steps + moved.steps,
         fit=fit,
         ripple=others.ripple,
         candidates=result.candidates,

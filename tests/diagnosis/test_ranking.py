@@ -3,9 +3,8 @@
 
 
 def test_the_first_of_a_ranking_was_added_and_rivals_score_less(missing):
-    step = missing.result.steps[0]
-    first, *others = step.ranking
-    assert first is step.added and first.kind == "spring"
-    assert all(other.kind != "spring" for other in others)
-    rivals = [h.score for h in others if h.joints == first.joints]
+    first = missing.result.findings[0]
+    assert first.kind == "spring"
+    assert all(other.kind != "spring" for other in first.others)
+    rivals = [h.score for h in first.others if h.joints == first.joints]
     assert not rivals or max(rivals) < first.score
