@@ -195,6 +195,29 @@ class Signals:
         taken: dict[str, Any] = {k: None if v is None else v[rows] for k, v in values.items()}
         return replace(self, **taken)
 
+    def thinned(self, step: int) -> tuple[NDArray[np.int64], Signals]:
+        """The middle one of every few samples in a row, segment by segment.
+
+        Parameters
+        ----------
+        step : int
+            How many samples one stands for, odd.
+
+        Returns
+        -------
+        index : ndarray of shape (n,) of int
+            The samples that are kept.
+        signals : Signals
+            With the segments of these signals, so that no gap is closed.
+        """
+        parts = [np.arange(rows.start + step // 2, rows.stop, step) for rows in self.segments]
+        parts = [part for part in parts if len(part)]
+        index = np.concatenate(parts) if parts else np.zeros(0, dtype=np.int64)
+        few = self.take(index)
+        ends = np.cumsum([0, *map(len, parts)]).tolist()
+        few.__dict__["segments"] = [slice(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+        return index, few
+
 
 def signals_from(
     X: Array, columns: Columns, robot: Robot | None = None, *, to_derive: bool = False

@@ -145,7 +145,8 @@ def catalogue_candidates(
                 continue
             grid = effect.grid(problem.signals, joints)
             if size_share:
-                grid = [effect.bounded(problem.signals, joints, s, size_share) for s in grid]
+                few, _ = problem.sampled(problem.rows.step)
+                grid = [effect.bounded(few, joints, s, size_share) for s in grid]
             terms += [Term.at(kind, joints, shape) for shape in grid]
     # What kinds with the same needs share for a joint is kept for one joint at a time.
     ordered = sorted(terms, key=lambda term: (term.effect.needs, term.places))

@@ -39,6 +39,8 @@ from skidyn.measurement import (
     Suspicion,
     check_measurement,
     copied_rows,
+    keep_checks,
+    known_checks,
     names_in_doubt,
     refuse_certain,
 )
@@ -227,8 +229,10 @@ def _diagnose(
         signals, judged = signals.take(once), torque[once]
         kept_weight = None if weight is None else weight[once]
 
+    known = known_checks(measurement)
+
     def checked() -> list[Suspicion]:
-        checks = check_measurement(measurement)
+        checks = check_measurement(measurement) if known is None else known
         if not force:
             refuse_certain(checks)
         return checks
@@ -251,16 +255,17 @@ def _diagnose(
         try:
             problem = posed()
             _check_rows(problem)
-            # with another core while the checks run, which rarely leave no kind to be named
-            searcher = None if alone() else prepare_search(problem, kinds, settings)
+            # while the checks run on another core: they rarely find what changes the search
+            found = None if alone() else _search(problem, kinds, settings)
         except Exception:
             told()  # what is wrong with the log says more
             raise
         checks = told()
+    keep_checks(measurement, checks)
     notes = [str(check) for check in checks]
     doubts = [] if force else names_in_doubt(checks)
     if doubts:
-        kinds, searcher = [], None
+        kinds, found = [], None
         notes.append(
             f"The measurement is in doubt ({'; '.join(doubts)}), so that no physical effect is "
             "identified: the missing torque is given as a function of the signals. Resolve the "
@@ -268,13 +273,12 @@ def _diagnose(
         )
     for note in notes:
         warnings.warn(note, LogWarning, stacklevel=4)
-    if searcher is None:
-        searcher = prepare_search(problem, kinds, settings)
-    searcher.vibration &= not {check.check for check in checks} & UNSTEADY
-    result = searcher.run()
-    wider, completed = look_at_reversals(problem, result, kinds, settings)
-    if wider is problem:
-        wider, completed = look_at_swift(problem, result, kinds, settings)
+    steady = not {check.check for check in checks} & UNSTEADY
+    if found is None or not steady:
+        if not alone():
+            problem = posed()  # without what the search before has left
+        found = _search(problem, kinds, settings, vibration=steady)
+    result, wider, completed = found
     limits = _limits(problem, result, completed, settings)
     sliding = problem.rows.sliding
     least = settings.least_drop
@@ -282,10 +286,26 @@ def _diagnose(
     diagnosis = conclude(wider, completed, limits, sliding, judged, notes, least, model, data)
     diagnosis.checks = checks
     kept = {c.site for h in diagnosis.result.findings for c in h.candidates}
-    found = [c for h in completed.findings for c in h.candidates]
-    withdrawn = [c for c in found if c.site not in kept]
+    sought = [c for h in completed.findings for c in h.candidates]
+    withdrawn = [c for c in sought if c.site not in kept]
     diagnosis.limits = without_withdrawn(diagnosis.limits, withdrawn)
     return diagnosis
+
+
+def _search(
+    problem: Problem, kinds: list[str], settings: Settings, vibration: bool = True
+) -> tuple[SearchResult, Problem, SearchResult]:
+    """What is missing in long windows, and the rows and findings with a closer look.
+
+    Where the clock is in doubt, no ``vibration`` is looked for: it may be of the logger.
+    """
+    searcher = prepare_search(problem, kinds, settings)
+    searcher.vibration &= vibration
+    result = searcher.run()
+    wider, completed = look_at_reversals(problem, result, kinds, settings)
+    if wider is problem:
+        wider, completed = look_at_swift(problem, result, kinds, settings)
+    return result, wider, completed
 
 
 def _limits(

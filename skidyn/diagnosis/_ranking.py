@@ -291,6 +291,8 @@ class RankingSearch(SearchState):
 
     def _lines(self) -> list[Hypothesis]:
         """Torque ripple and vibration, judged on the residual at the full rate."""
+        if "torque_ripple" not in self.kinds and not self.vibration:
+            return []
         problem = self.problem
         residual = self.residual
         found = []

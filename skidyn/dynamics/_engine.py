@@ -14,9 +14,11 @@ import numpy as np
 
 from skidyn.dynamics._canonical import CanonicalModel, canonicalize
 from skidyn.dynamics._compiled import CompiledProgram
+from skidyn.dynamics._numbers import Numbers
 from skidyn.dynamics._numpy import BoundProgram, chunk_size, clear_vanishing, evaluate_rows
 from skidyn.dynamics._recursion import (
     Program,
+    inverse_dynamics,
     trace_inverse_dynamics,
     trace_jacobian,
     trace_mass_matrix,
@@ -239,6 +241,8 @@ class Engine:
         backend: str = "numpy",
     ) -> np.ndarray:
         """Joint torques; signals that are left out vanish."""
+        if backend == "once":
+            return self._at_once(signals, gravity, parameters)
         options = self.gravity_key(gravity), "dq" in signals, "ddq" in signals
         if backend == "numpy" and parameters is None and self._is_small(signals, dtype):
             return self._scalar("fixed_inverse_dynamics", *options)(signals)
@@ -249,6 +253,25 @@ class Engine:
         if backend == "compiled":
             return self._compiled("inverse_dynamics", *key)(signals, own).T
         return self.evaluate(signals, "inverse_dynamics", *key, parameters=own, dtype=dtype)
+
+    def _at_once(
+        self, signals: dict[str, np.ndarray], gravity: Any, parameters: np.ndarray | None
+    ) -> np.ndarray:
+        """Joint torques without a program, for a robot that is asked once or twice."""
+        numbers = Numbers(signals)
+        own = self.parameters if parameters is None else parameters
+        torques = inverse_dynamics(
+            numbers,
+            self.tree,
+            self.gravity_key(gravity),
+            [[numbers.constant(x) for x in row] for row in np.asarray(own).tolist()],
+            with_velocity="dq" in signals,
+            with_acceleration="ddq" in signals,
+        )
+        result = np.empty((len(torques), len(signals["q"])))
+        for row, torque in zip(result, torques, strict=True):
+            row[:] = torque.value
+        return result.T
 
     def _compiled(self, *key: Any) -> CompiledProgram:
         if key not in self._compiled_programs:

@@ -281,6 +281,44 @@ def trace_inverse_dynamics(
         Values to fold into the program; None leaves them as inputs.
     """
     tape = Tape()
+    if parameters is None:
+        own = [_parameters(tape, body, parameters_used) for body in range(tree.n_bodies)]
+    else:
+        own = [[tape.constant(value) for value in row] for row in parameters]
+    torques = inverse_dynamics(
+        tape, tree, gravity, own, with_velocity=with_velocity, with_acceleration=with_acceleration
+    )
+    return Program(tape, {(i,): t for i, t in enumerate(torques)}, (tree.n_joints,))
+
+
+def inverse_dynamics(
+    tape: Any,
+    tree: KinematicTree,
+    gravity: Sequence[float],
+    parameters: Sequence[Vector],
+    *,
+    with_velocity: bool = True,
+    with_acceleration: bool = True,
+) -> list[Any]:
+    """The recursive Newton-Euler algorithm [1]_ on whatever numbers a tape hands out.
+
+    Parameters
+    ----------
+    tape : Tape or Numbers
+        Where ``input`` and ``constant`` come from.
+    tree : KinematicTree
+    gravity : sequence of 3 floats
+        Gravitational acceleration in the base frame, m/s^2.
+    parameters : sequence of n_bodies sequences of 10 scalars
+        Inertial parameters of every body.
+    with_velocity, with_acceleration : bool, default=True
+        As in :func:`trace_inverse_dynamics`.
+
+    Returns
+    -------
+    list of n_joints scalars
+        Joint torques.
+    """
     joints = _joints(tape, tree)
     zeros = [tape.constant(0.0)] * tree.n_joints
     dq = [tape.input("dq", i) for i in range(tree.n_joints)] if with_velocity else zeros
@@ -291,10 +329,7 @@ def trace_inverse_dynamics(
     torques = list(zeros)
     waiting = np.bincount(tree.parents[tree.parents >= 0], minlength=tree.n_bodies).tolist()
     for body, motion in enumerate(motions):
-        if parameters is None:
-            own = _parameters(tape, body, parameters_used)
-        else:
-            own = [tape.constant(value) for value in parameters[body]]
+        own = parameters[body]
         mass, first_moment, inertia = own[0], own[1:4], own[4:]
         force = _add(_scale(mass, motion.acceleration), _times(motion.B, first_moment))
         moment = _cross(first_moment, motion.acceleration)
@@ -315,7 +350,7 @@ def trace_inverse_dynamics(
                 forces[done] = _add(forces[done], force)
                 moments[done] = _add(moments[done], moment)
                 waiting[done] -= 1
-    return Program(tape, {(i,): t for i, t in enumerate(torques)}, (tree.n_joints,))
+    return torques
 
 
 def trace_torque_regressor(tree: KinematicTree, gravity: Sequence[float]) -> Program:

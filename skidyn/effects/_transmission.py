@@ -75,45 +75,58 @@ _FAST, _FEWEST = 4.0, 20
 _STEP = 1e-6
 
 
-def _torque_slopes(signals: Signals, joint: int) -> tuple[Array, Array, Array]:
-    """Change of all torques per change of a joint's position, velocity and acceleration.
+def _slope(signals: Signals, joint: int, by: str) -> Array:
+    """Change of all torques per change of a joint's position, velocity or acceleration.
 
     Shapes only change how the link moves, so that they share these slopes. They are kept for the
     joint that was asked for last: shapes of one joint follow each other, and all joints together
     would take many times the memory of the log.
 
+    Parameters
+    ----------
+    signals : Signals
+        Motion.
+    joint : int
+        Joint, from 0.
+    by : {"position", "velocity", "acceleration"}
+        What is changed.
+
     Returns
     -------
-    by_position, by_velocity, by_acceleration : ndarray of shape (n_samples, n_joints)
-        N m/rad, N m s/rad, kg m^2, or what takes their place where joints slide.
+    ndarray of shape (n_samples, n_joints)
+        N m/rad, N m s/rad or kg m^2, or what takes their place where joints slide.
     """
-    kept: dict[int, tuple[Array, Array, Array]] = signals.once("torque slopes", dict)
-    if joint not in kept:
-        kept.clear()
-        kept[joint] = _differentiate_torque(signals, joint)
-    return kept[joint]
+    kept: dict[tuple[int, str], Array] = signals.once("torque slopes", dict)
+    if (joint, by) not in kept:
+        for other in [key for key in kept if key[0] != joint]:
+            del kept[other]
+        kept[joint, by] = _differentiate_torque(signals, joint, by)
+    return kept[joint, by]
 
 
-def _differentiate_torque(signals: Signals, joint: int) -> tuple[Array, Array, Array]:
+def _differentiate_torque(signals: Signals, joint: int, by: str) -> Array:
     robot = signals.robot
     assert robot is not None
     inverse_dynamics = partial(robot.inverse_dynamics, parameters=signals.inertial_parameters)
     q, dq, ddq = signals.q, signals.dq, signals.ddq
-    here: Array = signals.once("torque", lambda: inverse_dynamics(q, dq, ddq))
     direction = np.zeros(signals.n_joints)
     direction[joint] = 1.0
+    if by == "acceleration":
+        ones = np.broadcast_to(direction, q.shape)
+        return inverse_dynamics(q, np.zeros_like(dq), ones, gravity=(0.0, 0.0, 0.0))
+    here: Array = signals.once("torque", lambda: inverse_dynamics(q, dq, ddq))
     step = _STEP * signals.unit[joint]
-    by_position = (inverse_dynamics(q + step * direction, dq, ddq) - here) / step
-    by_velocity = (inverse_dynamics(q, dq + step * direction, ddq) - here) / step
-    by_acceleration = inverse_dynamics(
-        q, np.zeros_like(dq), np.broadcast_to(direction, q.shape), gravity=(0.0, 0.0, 0.0)
+    moved = inverse_dynamics(
+        q + step * direction if by == "position" else q,
+        dq + step * direction if by == "velocity" else dq,
+        ddq,
     )
-    return by_position, by_velocity, by_acceleration
+    return np.asarray((moved - here) / step)
 
 
 def _link_inertia(signals: Signals, joint: int) -> Array:
     """Inertia that the free link presents to its own joint, kg m^2 or kg."""
-    inertia = _torque_slopes(signals, joint)[2][:, joint]
+    inertia = _slope(signals, joint, "acceleration")[:, joint]
     # Identified parameters need not be consistent; an inertia that vanishes would fly at once.
     inertia = np.maximum(inertia, 0.05 * np.abs(np.median(inertia)))
     return np.asarray(np.maximum(inertia, np.finfo(float).tiny))
@@ -141,7 +154,7 @@ class _LinkSideEffect(Effect):
     ) -> dict[int, Array]:
         (joint,) = joints
         moves = self.moves(signals, joint, **shape)
-        slopes = _torque_slopes(signals, joint)
+        slopes = [_slope(signals, joint, by) for by in ("position", "velocity", "acceleration")]
         columns = {}
         for j in range(signals.n_joints):
             change = np.zeros(signals.n_samples)
@@ -172,7 +185,7 @@ class AccelerationNoise(NamelessEffect):
     ) -> dict[int, Array]:
         (joint,) = joints
         fast = _fast_part(signals.ddq[:, joint], signals)
-        by_acceleration = _torque_slopes(signals, joint)[2]
+        by_acceleration = _slope(signals, joint, "acceleration")
         return {j: (by_acceleration[:, j] * fast)[:, None] for j in range(signals.n_joints)}
 
 

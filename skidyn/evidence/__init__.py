@@ -67,6 +67,7 @@ from skidyn.evidence._problem import (
 from skidyn.evidence._rows import (
     FEWEST_SAMPLES as FEWEST_SAMPLES,
     REST as REST,
+    column_step as column_step,
     sliding_samples as sliding_samples,
     window_rows as window_rows,
 )

@@ -6,11 +6,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, groupby
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import qr
+from scipy.sparse import csr_matrix
 
 from skidyn._cores import each
 from skidyn._progress import tell
@@ -24,6 +24,8 @@ from skidyn.evidence._rows import (
     WINDOW,
     Rows,
     RowsInTime,
+    averaged,
+    column_step,
     every_sample,
     sliding_samples,
     window_rows,
@@ -116,7 +118,7 @@ class Problem:
     rigid_rows: list[Array] = field(default_factory=list)
     logged: Signals | None = None
     _cache: dict[Term, dict[int, Array]] = field(default_factory=dict, repr=False)
-    _thinned: dict[int, list[Any]] = field(default_factory=dict, repr=False)
+    _thinned: dict[int, list[csr_matrix]] = field(default_factory=dict, repr=False)
 
     @property
     def n_joints(self) -> int:
@@ -131,7 +133,7 @@ class Problem:
     def term_rows(self, term: Term) -> dict[int, Array]:
         """Averaged columns of a term, per joint it reaches."""
         if term not in self._cache:
-            self._cache[term] = self.average(term.torque_columns(self.signals))
+            self._cache[term] = self._averaged(term, self._step(term))
         return self._cache[term]
 
     def screening_rows(self, term: Term) -> dict[int, Array]:
@@ -141,19 +143,33 @@ class Problem:
         mean over every seventh. What jumps, or swings, does not.
         """
         step = self._skipped(term)
-        if step < 2 or term in self._cache:
+        if step <= self._step(term) or term in self._cache:
             return self.term_rows(term)
-        index, few = self.signals.once(("every", step), lambda: self._every(step))
-        if step not in self._thinned:
-            self._thinned[step] = self.rows.thinned(index)
-        columns = term.torque_columns(few)
-        return {j: np.asarray(self._thinned[step][j] @ block) for j, block in columns.items()}
+        return self._averaged(term, step)
+
+    def _step(self, term: Term) -> int:
+        """Samples of which one is enough for a term: fine waves have to be seen at all of them."""
+        return 1 if term.effect.search == "spectrum" else self.rows.step
 
     def _skipped(self, term: Term) -> int:
         """Every how manieth sample tells enough of a term at first."""
         if self.signals.time is None or not term.effect.nameless:
             return 1
         return int(self.motion.rate * WINDOW / ENOUGH_SAMPLES)
+
+    def _averaged(self, term: Term, step: int) -> dict[int, Array]:
+        signals, weights = self.sampled(step)
+        columns = term.torque_columns(signals)
+        return {j: averaged(weights[j], block) for j, block in columns.items()}
+
+    def sampled(self, step: int) -> tuple[Signals, list[csr_matrix]]:
+        """The signals at one of ``step`` samples, and the weights of the rows there, by joint."""
+        if step < 2:
+            return self.signals, self.rows.weights
+        index, few = self.signals.once(("thinned", step), lambda: self.signals.thinned(step))
+        if step not in self._thinned:
+            self._thinned[step] = self.rows.thinned(index)
+        return few, self._thinned[step]
 
     def prepare(
         self, terms: Sequence[Term], screening: bool = False, text: str = ""
@@ -179,17 +195,13 @@ class Problem:
         groups = [list(g) for _, g in groupby(new, key=lambda t: (t.effect.needs, t.places))]
         found = each(lambda group: [of(term) for term in group], groups, text)
         rows = dict(zip(chain(*groups), chain(*found), strict=True))
-        self._cache |= {t: r for t, r in rows.items() if not screening or self._skipped(t) < 2}
+        whole = (t for t in rows if not screening or self._skipped(t) <= self._step(t))
+        self._cache |= {t: rows[t] for t in whole}
         return [rows[t] if t in rows else self._cache[t] for t in terms]
-
-    def _every(self, step: int) -> tuple[NDArray[np.int64], Signals]:
-        parts = [np.arange(rows.start, rows.stop, step) for rows in self.signals.segments]
-        index = np.concatenate(parts)
-        return index, self.signals.take(index)
 
     def average(self, columns: dict[int, Array]) -> dict[int, Array]:
         """Averaged rows of columns given at every sample."""
-        return {j: self.rows.average(block, j) for j, block in columns.items()}
+        return {j: averaged(self.rows.weights[j], block) for j, block in columns.items()}
 
     def design(self, blocks: Sequence[dict[int, Array]]) -> list[Array]:
         """Rigid-body columns and blocks of columns side by side, per joint."""
@@ -315,9 +327,12 @@ class Problem:
         torque = np.zeros_like(self.torque)
         for term, own in fit.terms.slices(len(self.rigid_index)):
             if wanted is None or term in wanted:
-                for j, block in term.torque_columns(self.signals).items():
-                    torque[:, j] += block @ fit.coefficients[own]
+                self._add(torque, term, fit.coefficients[own])
         return torque
+
+    def _add(self, torque: Array, term: Term, coefficients: Array) -> None:
+        for j, block in term.torque_columns(self.signals).items():
+            torque[:, j] += block @ coefficients
 
     def explained(self, fit: Fit) -> Array:
         """Part of :attr:`torque` that a fit explains at every sample, N m or N."""
@@ -333,12 +348,14 @@ class Problem:
         """Hand the load and the model torque of a fit to the effects that need them."""
         load = self.rigid_torque(fit)
         # What a sensor does to the torque acts on the torque before the sensor.
-        before = [t for t in fit.terms if not t.effect.sees_model]
-        smooth = [t for t in before if not t.is_dry]
+        dry, smooth = np.zeros_like(self.torque), np.zeros_like(self.torque)
+        for term, own in fit.terms.slices(len(self.rigid_index)):
+            if not term.effect.sees_model:
+                self._add(dry if term.is_dry else smooth, term, fit.coefficients[own])
         self.signals = self.signals.with_(
             load=load,
-            model_torque=load + self.term_torque(fit, before),
-            smooth_torque=load + self.term_torque(fit, smooth),
+            model_torque=load + dry + smooth,
+            smooth_torque=load + smooth,
             inertial_parameters=self.inertial_parameters(fit),
         )
         self._cache = {t: rows for t, rows in self._cache.items() if not t.effect.follows_fit}
@@ -482,7 +499,9 @@ def motion_rows(motion: SmoothedMotion, reversals: Sequence[int], window: float 
     margin = np.full(signals.n_joints, max(1, round(MARGIN * motion.half_width)))
     margin[list(reversals)] = SHORT_MARGIN
     use = sliding_samples(signals, motion.valid, margin.tolist())
-    return window_rows(signals, use, window)
+    # At reversals friction jumps from one sample to the next.
+    step = 1 if len(reversals) else column_step(motion.rate, window)
+    return window_rows(signals, use, window, step)
 
 
 _RowsAndFolds = tuple[Rows, list[NDArray[np.int64]], int, bool]
@@ -504,16 +523,17 @@ def _rows_and_folds(
 
 def regressor_rows(problem: Problem, index: NDArray[np.int64] | None = None) -> list[Array]:
     """Averaged columns of the torque regressor, chunk by chunk; some of them if told which."""
-    robot, signals = problem.robot, problem.signals
+    robot = problem.robot
     assert robot is not None
     index = np.arange(10 * robot.n_bodies) if index is None else index
     rows = [np.zeros((count, len(index))) for count in problem.rows.counts]
-    in_time = [RowsInTime.of(weights) for weights in problem.rows.weights]
-    for chunk, regressor in robot.iter_torque_regressor(signals.q, signals.dq, signals.ddq):
+    s, weights = problem.sampled(problem.rows.step)
+    in_time = [RowsInTime.of(own) for own in weights]
+    for chunk, regressor in robot.iter_torque_regressor(s.q, s.dq, s.ddq):
         for j, block in enumerate(rows):
-            here, weights = in_time[j].within(chunk)
-            block[here] += weights @ regressor[j][index].T
-        tell("Computing the rigid body", chunk.stop / len(signals.q))
+            here, shares = in_time[j].within(chunk)
+            block[here] += shares @ regressor[j][index].T
+        tell("Computing the rigid body", chunk.stop / len(s.q))
     return rows
 
 
@@ -578,14 +598,7 @@ def _folds(rows: Rows, guard: float) -> tuple[Rows, list[NDArray[np.int64]], int
         index = index[np.argsort(label[index], kind="stable")]
         fold.append(label[index])
         order.append(index)
-    sorted_rows = Rows(
-        [w[i] for w, i in zip(rows.weights, order, strict=True)],
-        [x[i] for x, i in zip(rows.trajectory, order, strict=True)],
-        [x[i] for x, i in zip(rows.time, order, strict=True)],
-        [x[i] for x, i in zip(rows.quarter, order, strict=True)],
-        rows.sliding,
-    )
-    return sorted_rows, fold, n_folds, whole
+    return rows.taken(order), fold, n_folds, whole
 
 
 #: Rows whose middle is nearer than this, or half a window, to the border between two blocks are

@@ -11,7 +11,7 @@ half overlapping the rows are nearly independent, and there are few of them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -25,6 +25,9 @@ WINDOW = 1 / 8
 FEWEST_SAMPLES = 6
 #: A window counts if at least this share of its weight falls on valid samples.
 LEAST_WEIGHT = 0.35
+#: Columns are computed at one of every few samples: at least this many in a window, and at least
+#: one in this time, in s. Motion is smoothed to 27 Hz, so that more would tell the same.
+FEWEST_COLUMNS, LONGEST_STEP = 10, 0.005
 #: Below this velocity (in units of ``Signals.unit`` per s) a joint counts as resting.
 REST = 0.01
 
@@ -45,6 +48,9 @@ class Rows:
         0 to 3: interleaved eighths of each segment, for folds within trajectories.
     sliding : ndarray of shape (n_samples, n_joints) of bool
         Samples that enter.
+    step : int, default=1
+        Samples that one stands for where columns are computed: the middle one of so many, which
+        enter together or not at all.
     """
 
     weights: list[csr_matrix]
@@ -52,6 +58,7 @@ class Rows:
     time: list[Array]
     quarter: list[NDArray[np.int64]]
     sliding: NDArray[np.bool_]
+    step: int = 1
 
     @property
     def n_joints(self) -> int:
@@ -93,9 +100,7 @@ class Rows:
 
     def average(self, values: Array, joint: int) -> Array:
         """Rows of a joint from values at every sample, shape (n_samples,) or (n_samples, k)."""
-        if values.ndim == 2 and values.shape[1] == 1:  # products with one vector are quicker
-            return np.asarray(self.weights[joint] @ values[:, 0])[:, None]
-        return np.asarray(self.weights[joint] @ values)
+        return averaged(self.weights[joint], values)
 
     def thinned(self, index: NDArray[np.int64]) -> list[csr_matrix]:
         """Weights on some samples alone, by joint; those of every row sum up to as much as before.
@@ -137,15 +142,17 @@ class Rows:
         counted = np.concatenate(mean)[np.concatenate(mean) > 0]
         unit = float(counted.mean()) if len(counted) else 1.0
         keep = [np.flatnonzero(m > 0) for m in mean]
-        return Rows(
-            [
-                _scaled(w[k], np.sqrt(m[k] / unit))
-                for w, m, k in zip(self.weights, mean, keep, strict=True)
-            ],
-            [x[k] for x, k in zip(self.trajectory, keep, strict=True)],
-            [x[k] for x, k in zip(self.time, keep, strict=True)],
-            [x[k] for x, k in zip(self.quarter, keep, strict=True)],
-            self.sliding,
+        scaled = [_scaled(w, np.sqrt(m / unit)) for w, m in zip(self.weights, mean, strict=True)]
+        return replace(self, weights=scaled).taken(keep)
+
+    def taken(self, index: Sequence[NDArray[np.intp]]) -> Rows:
+        """Some of the rows of every joint, in the order of their index."""
+        return replace(
+            self,
+            weights=[w[k] for w, k in zip(self.weights, index, strict=True)],
+            trajectory=[x[k] for x, k in zip(self.trajectory, index, strict=True)],
+            time=[x[k] for x, k in zip(self.time, index, strict=True)],
+            quarter=[x[k] for x, k in zip(self.quarter, index, strict=True)],
         )
 
 
@@ -187,6 +194,13 @@ def _scaled(weights: csr_matrix, factor: Array) -> csr_matrix:
     """Weights whose rows are multiplied by a factor each."""
     data = weights.data * np.repeat(factor, np.diff(weights.indptr))
     return csr_matrix((data, weights.indices, weights.indptr), shape=weights.shape)
+
+
+def averaged(weights: csr_matrix, values: Array) -> Array:
+    """Rows from values at every sample, shape (n_samples,) or (n_samples, k)."""
+    if values.ndim == 2 and values.shape[1] == 1:  # products with one vector are quicker
+        return np.asarray(weights @ values[:, 0])[:, None]
+    return np.asarray(weights @ values)
 
 
 def every_sample(signals: Signals) -> Rows:
@@ -239,6 +253,42 @@ def sliding_samples(
     return sliding
 
 
+def column_step(rate: float, window: float) -> int:
+    """Samples of which one is enough where columns are computed; odd.
+
+    Parameters
+    ----------
+    rate : float, Hz
+        Sampling rate.
+    window : float, s
+        Width of the averaging windows.
+    """
+    step = int(rate * min(window / FEWEST_COLUMNS, LONGEST_STEP) * (1 + 1e-6))
+    return max(1, step - 1 + step % 2)
+
+
+def in_groups(use: NDArray[np.bool_], segments: Sequence[slice], step: int) -> NDArray[np.bool_]:
+    """Samples that may enter with all the others that the same column stands for.
+
+    Parameters
+    ----------
+    use : ndarray of shape (n_samples, n_joints) of bool
+        Samples that may enter.
+    segments : sequence of slice
+        Of the signals.
+    step : int
+        Samples of a group; what is left over at the end of a segment does not enter.
+    """
+    if step == 1:
+        return use
+    together = np.zeros_like(use)
+    for rows in segments:
+        whole = (rows.stop - rows.start) // step * step
+        groups = use[rows.start : rows.start + whole].reshape(-1, step, use.shape[1])
+        together[rows.start : rows.start + whole] = np.repeat(groups.all(axis=1), step, axis=0)
+    return together
+
+
 def widened(mask: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
     """A mask along its first axis with so many more samples on each side of all that it holds."""
     total = np.zeros((len(mask) + 1, *mask.shape[1:]), dtype=np.int64)
@@ -248,7 +298,9 @@ def widened(mask: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
     return np.asarray(total[after] > total[before])
 
 
-def window_rows(signals: Signals, use: NDArray[np.bool_], window: float = WINDOW) -> Rows:
+def window_rows(
+    signals: Signals, use: NDArray[np.bool_], window: float = WINDOW, step: int = 1
+) -> Rows:
     """Averaging windows over the samples that may enter.
 
     Parameters
@@ -259,7 +311,10 @@ def window_rows(signals: Signals, use: NDArray[np.bool_], window: float = WINDOW
         Samples that may enter.
     window : float, s, default=1/8
         Width of the window; widened to hold six samples of each trajectory.
+    step : int, default=1
+        As in :class:`Rows`.
     """
+    use = in_groups(use, signals.segments, step)
     spans = [_windows(signals.clock[rows], rows.start, window) for rows in signals.segments]
     weights, trajectory, time, quarter = [], [], [], []
     for joint in range(signals.n_joints):
@@ -274,7 +329,7 @@ def window_rows(signals: Signals, use: NDArray[np.bool_], window: float = WINDOW
         time.append(np.concatenate([s.middle[k] for s, k in zip(spans, keep, strict=True)]))
         eighths = [(np.arange(len(k)) * 8 // max(1, len(k)) % 4)[k] for k in keep]
         quarter.append(np.concatenate(eighths))
-    return Rows(weights, trajectory, time, quarter, use)
+    return Rows(weights, trajectory, time, quarter, use, step)
 
 
 @dataclass(frozen=True)

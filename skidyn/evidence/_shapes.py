@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from scipy.optimize import minimize
 
 from skidyn._signals import Array
 from skidyn.effects import Shape, Term, get_effect
@@ -140,6 +139,8 @@ def _by_simplex(
             v * (1 + step) ** x if shape.spacing == "log" else v + x * step
             for shape, (_, _, step), v, x in moved
         ]
+
+    from scipy.optimize import minimize  # not paid for by who only checks a log
 
     first = np.vstack([np.zeros(len(shapes)), np.eye(len(shapes)) / SHRINK])
     found = minimize(

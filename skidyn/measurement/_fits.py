@@ -40,8 +40,6 @@ MOST_ALIKE = 0.875
 OWN = 4
 #: Fewest rows of a joint for a fit.
 FEWEST = 25
-#: Samples of a robot of one joint whose regressor is held at a time.
-CHUNK = 12288
 #: Motions of which columns are kept.
 KEPT = 2
 #: What of a reading does not concern the motion.
@@ -138,6 +136,8 @@ class Fits:
         Torque at the full rate, for rows at other times.
     left_out : frozenset of int
         Columns of the torque, from 0, that are of no use.
+    backend : {"numpy", "once"}, default="numpy"
+        How torques are computed; no program is worth writing for a robot that is only tried.
     """
 
     robot: Robot
@@ -146,6 +146,7 @@ class Fits:
     moving: NDArray[np.bool_]
     recorded: Recorded
     left_out: frozenset[int] = frozenset()
+    backend: str = "numpy"
     _known: dict[Reading, Outcome] = field(default_factory=dict, repr=False)
     _moved: dict[Reading, Array] = field(default_factory=dict, repr=False)
     _parts: dict[Reading, tuple[Array, Array]] = field(default_factory=dict, repr=False)
@@ -167,8 +168,10 @@ class Fits:
         return Fits(self.robot, self.signals, self.torque, self.moving, self.recorded, left_out)
 
     def of(self, robot: Robot) -> Fits:
-        """The same rows, for another robot with the same joints."""
-        return Fits(robot, self.signals, self.torque, self.moving, self.recorded, self.left_out)
+        """The same rows, for another robot with the same joints that is only tried."""
+        return Fits(
+            robot, self.signals, self.torque, self.moving, self.recorded, self.left_out, "once"
+        )
 
     def thinned(self, count: int) -> Fits:
         """Some of the rows, evenly over the log: enough to see what may be wrong."""
@@ -306,7 +309,8 @@ class Fits:
     def _own_torque(self, motion: Reading, s: Signals) -> Array:
         """Mean torque of the robot as described, in rows."""
         if motion.gravity is None:
-            return self.average(self.robot.inverse_dynamics(s.q, s.dq, s.ddq))
+            torque = self.robot.inverse_dynamics(s.q, s.dq, s.ddq, backend=self.backend)
+            return self.average(torque)
         still, pulls = self.gravity_parts(motion)
         return np.asarray(still + np.tensordot(motion.gravity, pulls, 1))
 
@@ -452,14 +456,12 @@ class Fits:
 
     def mean_regressor(self, robot: Robot, s: Signals, index: NDArray[np.int64]) -> Array:
         """Some columns of the mean regressor, (n_rows, n_joints, len(index)), chunk by chunk."""
-        step = SAMPLES * max(1, CHUNK // (SAMPLES * robot.n_joints))
-        parts = [slice(start, start + step) for start in range(0, s.n_samples, step)]
-        return np.concatenate(
-            [
-                self.average(robot.torque_regressor(s.q[p], s.dq[p], s.ddq[p])[:, :, index])
-                for p in parts
-            ]
-        )
+        total = np.zeros((robot.n_joints, len(index), self.n_rows))
+        for k in range(SAMPLES):  # the first samples of all rows, then the second ones
+            q, dq, ddq = (x[k::SAMPLES] for x in (s.q, s.dq, s.ddq))
+            for rows, regressor in robot.iter_torque_regressor(q, dq, ddq):
+                total[:, :, rows] += regressor[:, index]
+        return np.moveaxis(total / SAMPLES, 2, 0)
 
     def _spread(self, columns: Sequence[int], fits: Sequence[RobustFit]) -> Outcome:
         n = self.n_joints
@@ -508,7 +510,7 @@ def make_fits(signals: Signals, torque: Array, robot: Robot) -> Fits | None:
     motion = smooth_motion(signals)
     rate, smooth = motion.rate, motion.signals
     every = max(1, round(rate * WIDTH / SAMPLES))
-    mean = _running_mean(torque, every | 1)  # an even number would be half a sample late
+    mean = running_mean(torque, every | 1)  # an even number would be half a sample late
     parts = []
     for rows in signals.segments:
         edge = max(2, motion.half_width // 2) + every
@@ -534,7 +536,7 @@ def _stretches(n: int) -> NDArray[np.int64]:
     return np.unique(starts[:, None] + np.arange(length))
 
 
-def _running_mean(values: Array, width: int) -> Array:
+def running_mean(values: Array, width: int) -> Array:
     """Mean around every sample; ends are not used."""
     if width < 2:
         return values
@@ -648,9 +650,10 @@ def fit_together(
         gram = 1e-9 * np.eye(len(size)) * sum(float(w.sum()) for w in weights)
         cross = np.zeros(len(size))
         for d, place, y, s, w in zip(scaled, places, targets, scales, weights, strict=True):
-            weighted = d * (w / s**2)[:, None]
-            gram[np.ix_(place, place)] += weighted.T @ d
-            cross[place] += weighted.T @ y
+            root = np.sqrt(w) / s
+            weighted = d * root[:, None]
+            gram[np.ix_(place, place)] += weighted.T @ weighted  # symmetric: half the work
+            cross[place] += weighted.T @ (root * y)
         diagonal = np.sqrt(np.diag(gram))
         gram = gram / diagonal[:, None] / diagonal + 1e-10 * np.eye(len(size))
         coefficients = cho_solve(cho_factor(gram), cross / diagonal) / diagonal

@@ -185,7 +185,8 @@ def _slopes(robot: Robot, bodies: list[int], factors: Array, near: NearBodies) -
 
     def torque(factors: Array) -> Array:
         own = stretched(robot, bodies, factors)
-        return near.fits.average(own.inverse_dynamics(s.q, s.dq, s.ddq, parameters=parameters))
+        torque = own.inverse_dynamics(s.q, s.dq, s.ddq, parameters=parameters, backend="once")
+        return near.fits.average(torque)
 
     here, steps = torque(factors), SLOPE * np.eye(len(bodies))
     slopes = np.stack([(torque(factors + step) - here) / SLOPE for step in steps], axis=2)

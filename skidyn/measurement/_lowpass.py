@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.signal import lfilter
 
 from skidyn._signals import Array
 from skidyn.measurement._check import Check
@@ -114,6 +113,8 @@ def lowpass_of_torque(fits: Fits, lag: float, late: Sequence[int]) -> tuple[floa
     steps = np.diff(clock)
     step = float(np.median(steps))
     parts = np.split(np.arange(len(clock)), np.flatnonzero(np.abs(steps / step - 1) > 0.5) + 1)
+
+    from scipy.signal import lfilter  # half a second of imports that few logs need
 
     def filtered(constant: float) -> float:
         torque = np.empty_like(source.torque)

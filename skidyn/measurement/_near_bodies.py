@@ -139,9 +139,10 @@ class NearBodies:
                 w / (s**2 * i) for w, s, i in zip(trust, scales, self.inflation, strict=True)
             ]
             for d, place, y, w in zip(designs, places, self.targets, weights, strict=True):
-                weighted = d * w[:, None]
-                gram[np.ix_(place, place)] += weighted.T @ d
-                right[place] += weighted.T @ y
+                root = np.sqrt(w)
+                weighted = d * root[:, None]
+                gram[np.ix_(place, place)] += weighted.T @ weighted  # symmetric: half the work
+                right[place] += weighted.T @ (root * y)
             found = solved(gram, right, positive)
             residuals = [
                 y - d @ found[p] for d, p, y in zip(designs, places, self.targets, strict=True)

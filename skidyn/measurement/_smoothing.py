@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array, Signals
 from skidyn.effects import get_effect
-from skidyn.evidence import smooth_motion
+from skidyn.evidence import column_step, smooth_motion
 from skidyn.measurement._check import Check
-from skidyn.measurement._fits import student
+from skidyn.measurement._fits import running_mean, student
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import measured_delay
@@ -95,9 +95,12 @@ class SmoothedTorque(Check):
         if delay is not None and delay.common > LATE:
             return  # a filter that makes late is told as such
         found = {}
-        motion = smooth_motion(measurement.signals).signals  # noise would blur when a joint turns
+        motion = smooth_motion(measurement.signals)  # noise would blur when a joint turns
+        step = column_step(motion.rate, AROUND)
+        index, few = motion.signals.thinned(step)
+        torque = running_mean(measurement.torque, step)[index]
         for k in np.flatnonzero(measurement.excited).tolist():
-            turns = at_turns(motion, measurement.torque[:, k], k)
+            turns = at_turns(few, torque[:, k], k)
             if turns is not None and max(turns.smoothed.max(), turns.other) > turns.step:
                 found[k] = turns
         widths = [turns.width for turns in found.values() if turns.gain > WORD]

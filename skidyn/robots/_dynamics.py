@@ -65,9 +65,12 @@ class RigidBodyDynamics:
             Gravitational acceleration in the base frame in place of the robot's, m/s^2.
         dtype : {numpy.float64, numpy.float32}, default=numpy.float64
             float32 is about twice as fast; its error stays below 2e-6 of the largest torque.
-        backend : {"numpy", "compiled"}, default="numpy"
-            ``"compiled"`` writes C text for this robot, compiles it once with the system's C
-            compiler (about a second) and is then several times as fast; float64 only.
+        backend : {"numpy", "once", "compiled"}, default="numpy"
+            ``"numpy"`` writes a program for this robot and keeps it. ``"once"`` writes none, which
+            is several times as fast for a robot that is evaluated only once on a few thousand
+            samples. ``"compiled"`` writes C text for this robot, compiles it once with the system's
+            C compiler (about a second) and is then several times as fast. The last two work in
+            float64 only.
 
         Returns
         -------
@@ -85,7 +88,7 @@ class RigidBodyDynamics:
         >>> load_scara().inverse_dynamics([[0, 0, 0, 0]], [[0, 0, 0, 0]], [[0, 0, 1, 0]]).round(2)
         array([[ 0.  ,  0.  , 16.22,  0.  ]])
         """
-        _check_backend(backend, dtype)
+        _check_backend(backend, dtype, "once")
         signals = self._signals(q=q, dq=dq, ddq=ddq)
         return self._engine.inverse_dynamics(
             signals,
@@ -334,8 +337,10 @@ class RigidBodyDynamics:
         return body % self.n_bodies, None
 
 
-def _check_backend(backend: str, dtype: Any) -> None:
-    if backend not in ("numpy", "compiled"):
-        raise SkidynError(f"backend is {backend!r}; expected 'numpy' or 'compiled'.")
-    if backend == "compiled" and np.dtype(dtype) != np.float64:
-        raise SkidynError("backend='compiled' works in float64 only.")
+def _check_backend(backend: str, dtype: Any, *others: str) -> None:
+    known = ("numpy", *others, "compiled")
+    if backend not in known:
+        names = ", ".join(map(repr, known[:-1]))
+        raise SkidynError(f"backend is {backend!r}; expected {names} or 'compiled'.")
+    if backend != "numpy" and np.dtype(dtype) != np.float64:
+        raise SkidynError(f"backend={backend!r} works in float64 only.")

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from skidyn.effects import Signals
-from skidyn.evidence import sliding_samples, window_rows
+from skidyn.evidence import column_step, sliding_samples, window_rows
 from skidyn.evidence._rows import every_sample
 
 
@@ -52,3 +52,26 @@ def test_no_rows_can_be_weighted():
     short = Signals(*np.zeros((3, 4, 1)), np.arange(4), time=np.arange(4.0))
     rows = window_rows(short, np.ones((4, 1), dtype=bool))
     assert rows.counts.tolist() == rows.weighted(np.ones(4)).counts.tolist() == [0]
+
+
+def test_columns_at_one_of_several_samples_give_the_rows_of_all_samples():
+    """A log at 1 kHz: columns are computed at 200 Hz, and the torque is averaged at 1 kHz."""
+    t = np.arange(20_000) * 0.001
+    q = np.sin(2 * np.pi * 1.3 * t)[:, None] + 0.2 * np.sin(2 * np.pi * 4.1 * t)[:, None]
+    dq, ddq = np.gradient(q[:, 0], t)[:, None], np.zeros((20_000, 1))
+    signals = Signals(q, dq, ddq, np.repeat([0, 1], 10_000), time=t)
+    step = column_step(1000.0, 1 / 8)
+    assert step == 5
+    use = sliding_samples(signals, np.ones((20_000, 1), dtype=bool), margin=11)
+    rows = window_rows(signals, use, step=step)
+    index, few = signals.thinned(step)
+    assert few.segments == [slice(0, 2000), slice(2000, 4000)]
+    (thin,) = rows.thinned(index)
+    for values in (q, dq, np.tanh(dq / 0.003), q**3):
+        whole = rows.average(values, 0)
+        np.testing.assert_allclose(thin @ values[index], whole, atol=2e-3 * np.abs(whole).max())
+
+
+def test_logs_of_ordinary_rates_have_columns_at_every_sample():
+    assert {column_step(rate, 1 / 8) for rate in (1.0, 50.0, 100.0, 250.0, 500.0)} == {1}
+    assert column_step(1000.0, 1 / 32) == 3
