@@ -46,10 +46,11 @@ def run(options: argparse.Namespace) -> None:
     joints = joint_numbers(options.on)
     spec = options.effect if joints is None else (options.effect, joints)
     terms = make_terms([spec], robot.n_joints)
-    before = run_diagnosis(model, frame, tau, options, kinds=()).rmse_before
+    given = run_diagnosis(model, frame, tau, options, kinds=())
+    before = given.rmse_before
     fitted = model.with_effects(terms).fit(frame, tau)
     better = model.with_effects(fitted.effect_terms_[-len(terms) :])
-    after = run_diagnosis(better, frame, tau, options, kinds=()).rmse_before
+    after = run_diagnosis(better, frame, tau, options, kinds=(), checks=given.checks).rmse_before
     if options.out:
         write_json(options.out, parameters(fitted))
     if options.json:

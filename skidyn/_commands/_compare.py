@@ -111,7 +111,7 @@ def _compare(options: argparse.Namespace) -> None:
     if options.html:
         writable(Path(options.html).with_suffix(".json"))
     names = options.names.split(",") if options.names else _names(options, pair)
-    diagnoses = [_diagnosed(side) for side in pair]
+    diagnoses = _diagnosed(*pair)
     sources = [provenance(side) for side in pair]
     summary = summarize_comparison(*diagnoses, names=names, provenance=sources)
     files = write_comparison(options.html, summary) if options.html else ()
@@ -182,9 +182,23 @@ def _names(options: argparse.Namespace, pair: list[argparse.Namespace]) -> list[
     return names if names[0] != names[1] else ["first", "second"]
 
 
-def _diagnosed(options: argparse.Namespace) -> Diagnosis:
-    model, frame, tau = read_model_and_log(options, check=False)  # a diagnosis checks it
-    return run_diagnosis(model, frame, tau, options)
+def _diagnosed(one: argparse.Namespace, other: argparse.Namespace) -> list[Diagnosis]:
+    """Diagnoses of both sides; what they have in common is computed once."""
+    found: list[Diagnosis] = []
+    for side in (one, other):
+        same_log = bool(found) and _but_for(side, "model") == _but_for(one, "model")
+        if same_log and side.model == one.model:
+            return [*found, *found]
+        model, frame, tau = read_model_and_log(side, check=False)  # a diagnosis checks it
+        checks = found[0].checks if same_log else None
+        found.append(run_diagnosis(model, frame, tau, side, checks=checks))
+    return found
+
+
+def _but_for(options: argparse.Namespace, *names: str) -> dict[str, Any]:
+    """What was asked for, but for some of it."""
+    left_out = {*names, "report", "against", "against_model", "told"}
+    return {name: value for name, value in vars(options).items() if name not in left_out}
 
 
 def _print_pair(summary: dict[str, Any]) -> None:

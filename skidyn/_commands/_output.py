@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from skidyn.diagnosis import Comparison, Diagnosis
     from skidyn.identification import RBDRegressor
+    from skidyn.measurement import Suspicion
     from skidyn.simulation import Controller
 
 
@@ -31,6 +32,7 @@ def run_diagnosis(
     options: argparse.Namespace,
     kinds: Any = None,
     controller: Controller | None = None,
+    checks: Sequence[Suspicion] | None = None,
 ) -> Diagnosis:
     from skidyn.diagnosis import Settings, diagnose
 
@@ -53,6 +55,7 @@ def run_diagnosis(
             force=force,
             n_jobs=getattr(options, "jobs", -1),
             controller=controller,
+            checks=checks,
         )
 
 

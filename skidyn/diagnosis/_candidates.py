@@ -127,6 +127,7 @@ def catalogue_candidates(
         Least size of a coefficient, as a share of what its shape says.
     """
     present = {(term.kind, term.places) for term in problem.terms}
+    few = problem.few
     terms: list[Term] = []
     for kind in kinds:
         effect = get_effect(kind)
@@ -138,14 +139,13 @@ def catalogue_candidates(
             continue
         if "load" in effect.needs and problem.robot is None:
             continue
-        for joints in effect.sites(problem.signals):
-            hidden = [effect.not_shown(problem.signals, j) for j in joints]
+        for joints in effect.sites(few):
+            hidden = [effect.not_shown(few, j) for j in joints]
             # An effect of the whole robot shows as soon as one joint shows it.
             if (kind, joints) in present or all(hidden) or (len(joints) < 3 and any(hidden)):
                 continue
-            grid = effect.grid(problem.signals, joints)
+            grid = effect.grid(few, joints)
             if size_share:
-                few, _ = problem.sampled(problem.rows.step)
                 grid = [effect.bounded(few, joints, s, size_share) for s in grid]
             terms += [Term.at(kind, joints, shape) for shape in grid]
     # What kinds with the same needs share for a joint is kept for one joint at a time.

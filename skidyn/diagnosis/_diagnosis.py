@@ -39,8 +39,6 @@ from skidyn.measurement import (
     Suspicion,
     check_measurement,
     copied_rows,
-    keep_checks,
-    known_checks,
     names_in_doubt,
     refuse_certain,
 )
@@ -67,6 +65,7 @@ def diagnose(
     force: bool = False,
     sample_weight: Any = None,
     n_jobs: int | None = None,
+    checks: Sequence[Suspicion] | None = None,
 ) -> Diagnosis:
     """Compare a model with measurements and learn which physical effects it lacks.
 
@@ -109,6 +108,9 @@ def diagnose(
         Processes, as joblib counts them: None is 1 unless a ``joblib.parallel_config`` says
         otherwise, -1 all cores. The result is the same to the last bit. On systems other than
         Linux there is one process.
+    checks : sequence of Suspicion, optional
+        What is known to be wrong with this very log: the ``checks`` of an earlier diagnosis of it.
+        It is checked otherwise, which takes a third of the time.
 
     Returns
     -------
@@ -162,6 +164,7 @@ def diagnose(
             force,
             sample_weight,
             controller if of_servos else None,
+            checks,
         )
         diagnosis.controller = controller
         if opened.outer:
@@ -184,6 +187,7 @@ def _diagnose(
     force: bool,
     sample_weight: Any,
     servos: Controller | None,
+    known: Sequence[Suspicion] | None,
 ) -> Diagnosis:
     if isinstance(effects, str):
         raise EffectError(f"effects={effects!r} is one word; write a list, effects=[{effects!r}]")
@@ -229,10 +233,8 @@ def _diagnose(
         signals, judged = signals.take(once), torque[once]
         kept_weight = None if weight is None else weight[once]
 
-    known = known_checks(measurement)
-
     def checked() -> list[Suspicion]:
-        checks = check_measurement(measurement) if known is None else known
+        checks = check_measurement(measurement) if known is None else list(known)
         if not force:
             refuse_certain(checks)
         return checks
@@ -261,7 +263,6 @@ def _diagnose(
             told()  # what is wrong with the log says more
             raise
         checks = told()
-    keep_checks(measurement, checks)
     notes = [str(check) for check in checks]
     doubts = [] if force else names_in_doubt(checks)
     if doubts:
@@ -302,6 +303,7 @@ def _search(
     searcher = prepare_search(problem, kinds, settings)
     searcher.vibration &= vibration
     result = searcher.run()
+    del searcher  # and with it the columns of all that was tried
     wider, completed = look_at_reversals(problem, result, kinds, settings)
     if wider is problem:
         wider, completed = look_at_swift(problem, result, kinds, settings)

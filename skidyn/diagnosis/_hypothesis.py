@@ -97,7 +97,7 @@ class SearchResult:
     inflation : ndarray of shape (n_joints,)
         Variance inflation by the residual's autocorrelation.
     candidates : list of Candidate
-        What was not found.
+        Named effects that were not found.
     n_tests : int
         Everything that was tried.
     """

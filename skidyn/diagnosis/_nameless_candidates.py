@@ -63,24 +63,25 @@ def nameless_candidates(
 
     found = each(follow, looked_at)
     followed = dict(zip(looked_at, found, strict=True))
+    few = problem.few
     made: list[tuple[Term, tuple[str, ...]]] = []
     for kind in nameless_kinds():
         effect = get_effect(kind)
         assert isinstance(effect, NamelessEffect)
-        for joints in effect.sites(problem.signals):
+        for joints in effect.sites(few):
             joint = joints[0]
-            if effect.search == "spectrum" or effect.not_shown(problem.signals, joint):
+            if effect.search == "spectrum" or effect.not_shown(few, joint):
                 continue
             if effect.drawn_against == "ddq" and joint in coarse:
                 continue
             if followed_on is not None and (effect.search != "screened" or joint not in followed):
                 continue
-            shapes = effect.grid(problem.signals, joints)
+            shapes = effect.grid(few, joints)
             if isinstance(effect, FunctionOfSignals):
                 sets = [names for names in followed[joint].sets if len(names) == effect.n_signals]
-                shapes = [effect.shape_of(problem.signals, names) for names in sets]
+                shapes = [effect.shape_of(few, names) for names in sets]
             if isinstance(effect, FunctionOfSum):
-                shapes = [effect.shape_of(problem.signals, *of) for of in followed[joint].sums]
+                shapes = [effect.shape_of(few, *of) for of in followed[joint].sums]
             if effect.search == "clock":
                 line = clock_line(
                     problem.signals,

@@ -59,8 +59,8 @@ def recording_candidates(problem: Problem, kinds: Iterable[str]) -> list[Candida
         effect = get_effect(kind)
         if not effect.by_recording:
             continue
-        for joints in effect.sites(problem.signals):
-            if effect.not_shown(problem.signals, joints[0]):
+        for joints in effect.sites(problem.few):
+            if effect.not_shown(problem.few, joints[0]):
                 continue
             if not all(_mostly_both_ways(problem, j) for j in joints):
                 continue

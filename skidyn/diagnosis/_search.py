@@ -84,6 +84,8 @@ class _Search(ReconsideringSearch):
         self.name_alike()
         everywhere = range(self.problem.n_joints)
         inflation = variance_inflation(self.problem, self.fit.residual, everywhere)
-        return SearchResult(
-            self.findings, self.fit, self.ripple, inflation, self.pool, self.n_tests
-        )
+        # Functions without a name have no limits, and their columns take much memory.
+        named = [c for c in self.pool if not c.term.effect.nameless]
+        found = [c.term for h in self.findings for c in h.candidates]
+        self.problem.keep([*self.problem.terms, *found, *(c.term for c in named)])
+        return SearchResult(self.findings, self.fit, self.ripple, inflation, named, self.n_tests)

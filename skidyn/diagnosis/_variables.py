@@ -102,7 +102,7 @@ def averaged_signals(problem: Problem, joint: int) -> dict[str, Array]:
     dict of str to ndarray of shape (n_rows,)
         Positions, velocities and accelerations of all joints, and the joint's own temperature.
     """
-    s = problem.signals
+    s, weights = problem.sampled(problem.rows.step)
     columns = {
         f"{kind}{k + 1}": table[:, k]
         for k in range(problem.n_joints)
@@ -110,8 +110,10 @@ def averaged_signals(problem: Problem, joint: int) -> dict[str, Array]:
     }
     if s.temperature is not None:
         columns[f"temp{joint + 1}"] = s.temperature[:, joint]
-    averages = average_at_rows(problem, joint, np.column_stack(list(columns.values())))
-    return dict(zip(columns, averages.T, strict=True))
+    own = weights[joint]
+    total = own @ np.ones(s.n_samples)
+    averages = own @ np.column_stack(list(columns.values()))
+    return dict(zip(columns, averages.T / total, strict=True))
 
 
 def row_weights(problem: Problem, joint: int) -> Array:

@@ -27,6 +27,7 @@ from skidyn.evidence._rows import (
     averaged,
     column_step,
     every_sample,
+    interpolation,
     sliding_samples,
     window_rows,
 )
@@ -147,6 +148,11 @@ class Problem:
             return self.term_rows(term)
         return self._averaged(term, step)
 
+    def keep(self, terms: Iterable[Term]) -> None:
+        """Forget the averaged columns of all terms but some."""
+        wanted = set(terms)
+        self._cache = {term: rows for term, rows in self._cache.items() if term in wanted}
+
     def _step(self, term: Term) -> int:
         """Samples of which one is enough for a term: fine waves have to be seen at all of them."""
         return 1 if term.effect.search == "spectrum" else self.rows.step
@@ -162,13 +168,19 @@ class Problem:
         columns = term.torque_columns(signals)
         return {j: averaged(weights[j], block) for j, block in columns.items()}
 
+    @property
+    def few(self) -> Signals:
+        """The signals at the samples at which columns are computed."""
+        return self.sampled(self.rows.step)[0]
+
     def sampled(self, step: int) -> tuple[Signals, list[csr_matrix]]:
         """The signals at one of ``step`` samples, and the weights of the rows there, by joint."""
         if step < 2:
             return self.signals, self.rows.weights
-        index, few = self.signals.once(("thinned", step), lambda: self.signals.thinned(step))
+        _, few = self.signals.once(("thinned", step), lambda: self.signals.thinned(step))
         if step not in self._thinned:
-            self._thinned[step] = self.rows.thinned(index)
+            between = interpolation(self.signals.segments, few.segments, step)
+            self._thinned[step] = self.rows.thinned(between)
         return few, self._thinned[step]
 
     def prepare(
@@ -499,8 +511,7 @@ def motion_rows(motion: SmoothedMotion, reversals: Sequence[int], window: float 
     margin = np.full(signals.n_joints, max(1, round(MARGIN * motion.half_width)))
     margin[list(reversals)] = SHORT_MARGIN
     use = sliding_samples(signals, motion.valid, margin.tolist())
-    # At reversals friction jumps from one sample to the next.
-    step = 1 if len(reversals) else column_step(motion.rate, window)
+    step = column_step(motion.rate, window, int(margin.min()))
     return window_rows(signals, use, window, step)
 
 

@@ -25,9 +25,10 @@ WINDOW = 1 / 8
 FEWEST_SAMPLES = 6
 #: A window counts if at least this share of its weight falls on valid samples.
 LEAST_WEIGHT = 0.35
-#: Columns are computed at one of every few samples: at least this many in a window, and at least
-#: one in this time, in s. Motion is smoothed to 27 Hz, so that more would tell the same.
-FEWEST_COLUMNS, LONGEST_STEP = 10, 0.005
+#: Columns of a log that is faster than this, in Hz, are computed at one of every few samples: as
+#: many in a window as of a slow log, and at least one in this time, in s. Motion is smoothed to
+#: 27 Hz, so that more would tell the same.
+FAST, LONGEST_STEP = 600.0, 0.01
 #: Below this velocity (in units of ``Signals.unit`` per s) a joint counts as resting.
 REST = 0.01
 
@@ -49,8 +50,7 @@ class Rows:
     sliding : ndarray of shape (n_samples, n_joints) of bool
         Samples that enter.
     step : int, default=1
-        Samples that one stands for where columns are computed: the middle one of so many, which
-        enter together or not at all.
+        Columns are computed at one of so many samples, and interpolated between these.
     """
 
     weights: list[csr_matrix]
@@ -102,27 +102,20 @@ class Rows:
         """Rows of a joint from values at every sample, shape (n_samples,) or (n_samples, k)."""
         return averaged(self.weights[joint], values)
 
-    def thinned(self, index: NDArray[np.int64]) -> list[csr_matrix]:
-        """Weights on some samples alone, by joint; those of every row sum up to as much as before.
+    def thinned(self, between: csr_matrix) -> list[csr_matrix]:
+        """Weights of the samples at which columns are computed, by joint.
 
         Parameters
         ----------
-        index : ndarray of shape (n,) of int
-            Samples that are kept.
+        between : csr_matrix of shape (n_samples, n)
+            What gives values at every sample from those at some of them, of
+            :func:`interpolation`.
 
         Returns
         -------
         list of csr_matrix of shape (n_rows_j, n)
         """
-        thin = [w[:, index].sorted_indices() for w in self.weights]
-        sums = [
-            (np.asarray(w.sum(1)).ravel(), np.asarray(t.sum(1)).ravel())
-            for w, t in zip(self.weights, thin, strict=True)
-        ]
-        return [
-            _scaled(t, all_ / np.where(some > 0, some, 1.0))
-            for (all_, some), t in zip(sums, thin, strict=True)
-        ]
+        return [csr_matrix(w @ between).sorted_indices() for w in self.weights]
 
     def weighted(self, weight: Array) -> Rows:
         """The same rows, each multiplied by the root of the mean weight of its samples.
@@ -253,7 +246,7 @@ def sliding_samples(
     return sliding
 
 
-def column_step(rate: float, window: float) -> int:
+def column_step(rate: float, window: float, margin: int) -> int:
     """Samples of which one is enough where columns are computed; odd.
 
     Parameters
@@ -262,31 +255,57 @@ def column_step(rate: float, window: float) -> int:
         Sampling rate.
     window : float, s
         Width of the averaging windows.
+    margin : int
+        Samples that are left out beside a reversal: nothing is interpolated over one.
     """
-    step = int(rate * min(window / FEWEST_COLUMNS, LONGEST_STEP) * (1 + 1e-6))
+    if rate < FAST:
+        return 1
+    step = int(rate * min(window / FEWEST_SAMPLES, LONGEST_STEP) * (1 + 1e-6))
+    step = min(step, margin // 2)
     return max(1, step - 1 + step % 2)
 
 
-def in_groups(use: NDArray[np.bool_], segments: Sequence[slice], step: int) -> NDArray[np.bool_]:
-    """Samples that may enter with all the others that the same column stands for.
+def interpolation(segments: Sequence[slice], few: Sequence[slice], step: int) -> csr_matrix:
+    """Cubic interpolation (Lagrange) from the middle one of every few samples to all of them.
 
     Parameters
     ----------
-    use : ndarray of shape (n_samples, n_joints) of bool
-        Samples that may enter.
     segments : sequence of slice
-        Of the signals.
+        Of all samples.
+    few : sequence of slice
+        Of the samples that are kept, for each of these segments that keeps some.
     step : int
-        Samples of a group; what is left over at the end of a segment does not enter.
+        How many samples one stands for.
+
+    Returns
+    -------
+    csr_matrix of shape (n_samples, n)
+        Each sample from the four kept ones of its segment that are nearest, or from the nearest
+        one where a segment keeps fewer.
     """
-    if step == 1:
-        return use
-    together = np.zeros_like(use)
-    for rows in segments:
-        whole = (rows.stop - rows.start) // step * step
-        groups = use[rows.start : rows.start + whole].reshape(-1, step, use.shape[1])
-        together[rows.start : rows.start + whole] = np.repeat(groups.all(axis=1), step, axis=0)
-    return together
+    kept = [rows for rows in segments if rows.stop - rows.start > step // 2]
+    values, columns, n_samples = [], [], segments[-1].stop if segments else 0
+    counts = np.zeros(n_samples, dtype=np.int64)
+    for rows, own in zip(kept, few, strict=True):
+        place = (np.arange(rows.stop - rows.start) - step // 2) / step
+        count = own.stop - own.start
+        if count < 4:
+            nearest = np.clip(np.round(place), 0, count - 1).astype(np.int64)
+            columns.append(own.start + nearest)
+            values.append(np.ones(len(place)))
+            counts[rows] = 1
+            continue
+        first = np.clip(np.floor(place).astype(np.int64) - 1, 0, count - 4)
+        x = place - first
+        a, b, c = x - 1, x - 2, x - 3
+        weights = [-a * b * c / 6, x * b * c / 2, -x * a * c / 2, x * a * b / 6]
+        columns.append((own.start + first[:, None] + np.arange(4)).ravel())
+        values.append(np.column_stack(weights).ravel())
+        counts[rows] = 4
+    starts = np.concatenate([[0], np.cumsum(counts)])
+    found = np.concatenate([np.zeros(0), *values]), np.concatenate([np.zeros(0, int), *columns])
+    n = few[-1].stop if few else 0
+    return csr_matrix((*found, starts), shape=(n_samples, n))
 
 
 def widened(mask: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
@@ -314,7 +333,6 @@ def window_rows(
     step : int, default=1
         As in :class:`Rows`.
     """
-    use = in_groups(use, signals.segments, step)
     spans = [_windows(signals.clock[rows], rows.start, window) for rows in signals.segments]
     weights, trajectory, time, quarter = [], [], [], []
     for joint in range(signals.n_joints):

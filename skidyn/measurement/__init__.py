@@ -19,11 +19,7 @@ __all__ = [
 ]
 
 # For other packages of skidyn; no part of the public interface.
-from skidyn.measurement._checks import (
-    keep_checks as keep_checks,
-    known_checks as known_checks,
-    names_in_doubt as names_in_doubt,
-)
+from skidyn.measurement._checks import names_in_doubt as names_in_doubt
 from skidyn.measurement._clock import count_same_stamps as count_same_stamps
 from skidyn.measurement._copies import copied_rows as copied_rows
 from skidyn.measurement._lowpass import without_lowpass as without_lowpass

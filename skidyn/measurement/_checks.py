@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from skidyn._exceptions import MisreadLogError
 from skidyn.measurement._around_zero import DeadBand, TaredTorque
 from skidyn.measurement._axes import Axes
@@ -43,9 +41,6 @@ from skidyn.measurement._suspicion import CERTAINTIES, Suspicion
 from skidyn.measurement._torque import Columns, TorqueDelay, UnsignedTorque
 from skidyn.measurement._units import ClockUnit, PositionUnit, WrappedPosition
 from skidyn.measurement._velocity import JoinedRecordings, Velocity, VelocityDelay
-
-if TYPE_CHECKING:
-    from skidyn.robots import Robot
 
 TARED, UNSIGNED = TaredTorque(), UnsignedTorque()
 #: Nothing else in skidyn keeps a list of checks.
@@ -155,43 +150,6 @@ def check_measurement(measurement: Measurement) -> list[Suspicion]:
     measurement.readable = misread > 1
     return sorted(found, key=lambda s: CERTAINTIES.index(s.certainty))
 
-
-def known_checks(measurement: Measurement) -> list[Suspicion] | None:
-    """What the checks found when the same measurement was checked last.
-
-    Models are compared on one log, before and after something was added to them, and the checks
-    know nothing of a model.
-
-    Parameters
-    ----------
-    measurement : Measurement
-        What was recorded and the robot.
-
-    Returns
-    -------
-    list of Suspicion or None
-        None where something else was checked last.
-    """
-    kept = _LAST.get("kept")
-    if kept is None or kept[0] is not measurement.robot or kept[1] != measurement.content:
-        return None
-    return list(kept[2])
-
-
-def keep_checks(measurement: Measurement, found: list[Suspicion]) -> None:
-    """Remember what the checks found, for :func:`known_checks`.
-
-    Parameters
-    ----------
-    measurement : Measurement
-        What was checked.
-    found : list of Suspicion
-        From :func:`check_measurement`.
-    """
-    _LAST["kept"] = measurement.robot, measurement.content, list(found)
-
-
-_LAST: dict[str, tuple[Robot | None, bytes, list[Suspicion]]] = {}
 
 #: Checks whose certain suspicions make every fit of the robot meaningless, and those of which
 #: mere suspicions do.

@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from hashlib import blake2b
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -100,16 +99,6 @@ class Measurement:
     millimetres: set[int] = field(default_factory=set, repr=False)
     #: Rows to which positions leap; trajectories are taken to end there.
     leaps: Array = field(init=False, repr=False)
-
-    @cached_property
-    def content(self) -> bytes:
-        """Digest of all that the checks look at, but for the robot."""
-        digest = blake2b(repr((self.joint_names, self.identified, self.of_servos)).encode())
-        digest.update(str(self.same_stamps).encode())
-        s = self.signals
-        for values in (s.q, s.dq, s.ddq, s.trajectory, s.time, s.temperature, self.torque):
-            digest.update(b"-" if values is None else np.ascontiguousarray(values).tobytes())
-        return digest.digest()
 
     def __post_init__(self) -> None:
         s = self.signals
