@@ -99,7 +99,7 @@ def test_a_coupling_that_bodies_make_the_same_on_another_pair_of_joints_names_bo
 
     assert {finding.joints, *finding.elsewhere} == {(1, 4), (2, 4)}
     assert finding.confidence < 0.5
-    assert "as much on joints" in finding.sentence
+    assert "equally well on joints 2 and 4" in finding.sentence
 
 
 def test_a_narrow_bump_is_one_function_of_the_position_and_not_a_spring_and_a_stop(arm_log):
