@@ -36,8 +36,9 @@ export MPLBACKEND ?= Agg
 demo: $(VENV)/.demo
 	$(BIN)/python -m skidyn demo
 
+# worksteal: tests of a file stay together, so that what they share is made once
 test: $(VENV)/.test
-	$(BIN)/python -m pytest -n 2 $(PYTEST_ARGS)
+	$(BIN)/python -m pytest -n 2 --dist worksteal $(PYTEST_ARGS)
 
 lint: $(VENV)/.lint docs
 	$(BIN)/ruff check .
@@ -60,7 +61,7 @@ wheel: $(VENV)/.torch
 # pytest by its own name: "python -m pytest" would test the folder, and not what is installed
 compatibility: $(OLDEST)/.installed
 	$(OLDEST)/bin/python -c "import skidyn; skidyn.show_versions()"
-	$(OLDEST)/bin/pytest -n 2 -p no:cacheprovider -W default::DeprecationWarning $(CORE_TESTS)
+	$(OLDEST)/bin/pytest -n 2 --dist worksteal -p no:cacheprovider -W default::DeprecationWarning $(CORE_TESTS)
 
 clean:
 	rm -rf $(VENV) $(OLDEST) build dist docs/_build docs/gallery docs/api

@@ -5,9 +5,11 @@ import os
 from pathlib import Path
 from types import SimpleNamespace
 
-# One thread per worker: pytest-xdist already uses the cores, and results must not depend on how
-# many there are. Set before NumPy and torch read them.
-for _variable in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+# One thread and one process per worker: pytest-xdist already uses the cores, and results must not
+# depend on how many there are. The last is what joblib, and with it skidyn, takes for all cores;
+# tests of several processes ask for their number. Set before NumPy and torch read them.
+_ONE = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "LOKY_MAX_CPU_COUNT")
+for _variable in _ONE:
     os.environ.setdefault(_variable, "1")
 os.environ.setdefault("MPLBACKEND", "Agg")
 

@@ -20,9 +20,8 @@ def work(tmp_path_factory):
     folder = tmp_path_factory.mktemp("commands")
     urdf = files("skidyn.datasets").joinpath("robots", "planar_arm.urdf").read_text("utf-8")
     (folder / "arm.urdf").write_text(urdf, encoding="utf-8")
-    log = make_hidden_effect_log(
-        load_planar_arm(), "maxwell_slip", joints=[2], noise="high", duration=6.0, random_state=5
-    )
+    options = {"joints": [2], "noise": "high", "n_trajectories": 6, "duration": 6.0}
+    log = make_hidden_effect_log(load_planar_arm(), "maxwell_slip", random_state=5, **options)
     log.frame.to_csv(folder / "log.csv", index=False)
     return folder
 

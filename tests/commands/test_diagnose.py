@@ -54,7 +54,7 @@ def test_diagnose_writes_report_and_page(diagnosed):
 def test_ctrl_c_leaves_no_half_written_file(tmp_path, arguments):
     """A real signal to a real process, while it works."""
     out, page = tmp_path / "report.json", tmp_path / "report.html"
-    words = ["diagnose", *arguments, "--out", str(out), "--html", str(page)]
+    words = ["diagnose", *arguments, "--jobs", "2", "--out", str(out), "--html", str(page)]
     process = subprocess.Popen(
         [sys.executable, "-c", STOPPABLE, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )

@@ -8,16 +8,20 @@ import shutil
 import pytest
 
 from skidyn import cli
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import Diagnosis
 
 AGAIN = "stored result of an earlier identical diagnosis"
+#: Short, because every test searches it twice at least.
+LOG = {"joints": [2], "n_trajectories": 3, "duration": 3.0}
 
 
 @pytest.fixture
-def ask(diagnosed, tmp_path, capsys, monkeypatch):
+def ask(work, tmp_path, capsys, monkeypatch):
     """Diagnose a log of one's own; what is printed, the page, and how often a search was made."""
-    for name in ("log.csv", "arm.urdf"):
-        shutil.copy(diagnosed / name, tmp_path)
+    shutil.copy(work / "arm.urdf", tmp_path)
+    log = make_hidden_effect_log(load_planar_arm(), "stribeck", **LOG)
+    log.frame.to_csv(tmp_path / "log.csv", index=False)
     told = []
     given = Diagnosis.story
     monkeypatch.setattr(Diagnosis, "story", lambda self: told.append(1) or given(self))

@@ -29,7 +29,9 @@ ESCAPE = re.compile(r"\x1b\[[0-9;?]*[a-zA-Z]")
 def short(work, tmp_path_factory):
     """Words that name a short log and its robot."""
     folder = tmp_path_factory.mktemp("terminal")
-    log = make_hidden_effect_log(load_planar_arm(), "stribeck", joints=[2], n_trajectories=3)
+    log = make_hidden_effect_log(
+        load_planar_arm(), "stribeck", joints=[2], n_trajectories=3, duration=5.0
+    )
     log.frame.to_csv(folder / "log.csv", index=False)
     return [str(folder / "log.csv"), "--urdf", str(work / "arm.urdf")]
 
@@ -89,7 +91,7 @@ _search._Search.pick = lambda *_: time.sleep(3600)
 def test_ctrl_c_in_the_search_leaves_no_file_and_no_traceback(short, tmp_path):
     out, page = tmp_path / "report.json", tmp_path / "report.html"
 
-    words = ["diagnose", *short, "--out", out, "--html", page]
+    words = ["diagnose", *short, "--jobs", "2", "--out", out, "--html", page]
     code, shown = in_terminal(*words, stop_at="Round 1", before=ENDLESS_SEARCH)
 
     assert code == cli.STOPPED
