@@ -6,7 +6,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from skidyn._signals import find_segments
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import Settings, diagnose
 from skidyn.diagnosis._reversals import look_at_reversals
@@ -22,7 +21,8 @@ def log():
 
 @pytest.fixture(scope="module")
 def diagnosis(log):
-    rows = find_segments(log.X["trajectory"].to_numpy(), log.X["time"].to_numpy())
+    runs = log.X.groupby("trajectory").indices.values()
+    rows = [slice(run[0], run[-1] + 1) for run in runs]
     state = dahl_state(log.X["q1"].to_numpy(), rows, presliding=0.004)
     torque = np.array(log.y)
     torque[:, 0] += 2.0 * state

@@ -3,8 +3,7 @@
 
 import numpy as np
 
-from skidyn._signals import Signals
-from skidyn.effects import Term, get_effect
+from skidyn.effects import Signals, Term, get_effect
 
 
 def test_springs(signals, columns_of):

@@ -8,8 +8,7 @@ from sklearn.linear_model import LinearRegression
 from sklearn.model_selection import ShuffleSplit
 from sklearn.neighbors import KNeighborsRegressor
 
-from skidyn.hybrid import HybridRegressor
-from skidyn.hybrid._gate import learned_weights
+from skidyn.hybrid import HybridRegressor, learned_weights
 from skidyn.model_selection import PhaseKFold
 
 FEATURES = ["q1", "q2", "dq1", "dq2"]  # what learners without key columns see

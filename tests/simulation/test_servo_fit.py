@@ -6,9 +6,9 @@ import pytest
 
 from skidyn.forward import read_task
 from skidyn.identification import RBDRegressor
-from skidyn.simulation import servo_torque
+from skidyn.simulation import LAWS, servo_torque
 from skidyn.simulation._servo_fit import fit_all
-from skidyn.simulation._servo_laws import FRICTION, LAWS
+from skidyn.simulation._servo_laws import FRICTION
 from skidyn.simulation._servo_motion import PIECE, _Arm
 
 

@@ -5,15 +5,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from skidyn.simulation._servo_laws import (
-    FRICTION,
-    LAWS,
-    SERVO_EFFECTS,
-    rivals_of,
-    sizes_told,
-    title_of,
-    units_told,
-)
+from skidyn.simulation import LAWS, SERVO_EFFECTS, title_of
+from skidyn.simulation._servo_laws import FRICTION, rivals_of, sizes_told, units_told
 
 
 def kinds(known=(), **words):
