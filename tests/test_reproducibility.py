@@ -26,7 +26,7 @@ from skidyn.neural_network import BLLRegressor, LSTMRegressor, NDLRegressor, SDL
 from skidyn.identification import RBDRegressor
 
 log = make_hidden_effect_log(load_planar_arm(), "stribeck", joints=[2], n_trajectories=5,
-                             duration=6.0, rate=100.0)
+                             duration=4.0, rate=100.0)
 X, y, robot = log.X, log.y, log.robot
 physics = RBDRegressor(robot).fit(X, y)
 found = diagnose(RBDRegressor(robot), X, y, effects=["stribeck", "spring", "dahl"])

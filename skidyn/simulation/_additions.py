@@ -80,7 +80,9 @@ def judge_additions(
     >>> from skidyn.datasets import load_planar_arm, make_hidden_effect_log
     >>> from skidyn.identification import RBDRegressor
     >>> from skidyn.simulation import judge_additions
-    >>> log = make_hidden_effect_log(load_planar_arm(), "spring", joints=[1], random_state=0)
+    >>> log = make_hidden_effect_log(
+    ...     load_planar_arm(), "spring", joints=[1], n_trajectories=4, duration=4.0
+    ... )
     >>> model = RBDRegressor(log.robot, ("viscous", "coulomb"))
     >>> verdicts = judge_additions(model, [[("spring", [1])]], log.X, log.y)
     >>> verdicts[0].improves

@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+import json
+import sys
 import warnings
+from functools import cache
 
 import numpy as np
 import pandas as pd
@@ -14,6 +17,7 @@ from skidyn.diagnosis import diagnose
 from skidyn.exceptions import LogError, LogWarning
 from skidyn.explorer import Session
 from skidyn.identification import RBDRegressor
+from skidyn.measurement import Suspicion
 
 ROBOTS = {"ur5": load_ur5, "planar arm": load_planar_arm}
 #: Parameter of the truth whose interval is checked.
@@ -36,6 +40,8 @@ SIZE = {
 #: Kinds that act on all joints, or on the tool: the joints are not chosen.
 WHOLE = ("payload", "time_delay")
 HYSTERESIS = {"dahl", "lugre", "maxwell_slip"}
+#: Six joints take most of the time; where there is little noise, a shorter log shows as much.
+LENGTH = {("ur5", "low"): {"n_trajectories": 6, "duration": 6.0}}
 
 
 def hidden_log(kind, robot, noise):
@@ -43,10 +49,17 @@ def hidden_log(kind, robot, noise):
     # The inertia of the rotor of a UR's second joint is part of its link's: take one that shows.
     joint = 4 if kind == "rotor_inertia" and robot == "ur5" else 2
     joints = None if kind in (None, *WHOLE) else [joint]
-    log = make_hidden_effect_log(
-        ROBOTS[robot](), kind, joints=joints, noise=noise, base=base, random_state=11
-    )
+    options = {"joints": joints, "noise": noise, "base": base}
+    options |= LENGTH.get((robot, noise), {})
+    log = make_hidden_effect_log(ROBOTS[robot](), kind, random_state=11, **options)
     return log, RBDRegressor(log.robot, base)
+
+
+@cache
+def healthy(robot, noise):
+    """The diagnosis of a log that hides nothing."""
+    log, model = hidden_log(None, robot, noise)
+    return diagnose(model, log.X, log.y)
 
 
 @pytest.mark.parametrize("noise", ["low", "high"])
@@ -73,7 +86,7 @@ def test_hidden_effect_is_named_and_sized_and_the_error_falls(kind, robot, noise
         spare = 0.25 if kind == "temperature_friction" else 0.01
         _assert_inside(finding.parameters[SIZE[kind]], log.parameters[SIZE[kind]], spare)
     # Noise of the simulated sensors, or what the model without an effect leaves: whichever is more.
-    floor = _error_without_effect(robot, noise)
+    floor = healthy(robot, noise).rmse_before
     reached = diagnosis.rmse_after / np.maximum(floor, log.noise_std)
     limit = 2.0 if kind == "time_delay" else 1.5
     assert np.all(reached < limit), reached
@@ -83,9 +96,7 @@ def test_hidden_effect_is_named_and_sized_and_the_error_falls(kind, robot, noise
 @pytest.mark.parametrize("noise", ["low", "high"])
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_nothing_is_found_where_nothing_is_hidden(robot, noise):
-    log, model = hidden_log(None, robot, noise)
-
-    diagnosis = diagnose(model, log.X, log.y)
+    diagnosis = healthy(robot, noise)
 
     assert diagnosis.verdict == "complete"
     assert diagnosis.findings == []
@@ -100,7 +111,10 @@ def test_backlash_and_elasticity_are_told_apart():
 
 
 def test_unknown_effect_is_reported_with_its_variables():
-    log = make_hidden_effect_log(load_ur5(), "unknown_cable", joints=[2, 3], random_state=2)
+    length = LENGTH["ur5", "low"]
+    log = make_hidden_effect_log(
+        load_ur5(), "unknown_cable", joints=[2, 3], random_state=2, **length
+    )
 
     diagnosis = diagnose(RBDRegressor(log.robot), log.X, log.y)
 
@@ -117,16 +131,6 @@ def _assert_inside(parameter, truth, spare):
     margin = 0.5 * (high - low) + spare * abs(truth)
     assert low - margin <= truth <= high + margin, (low, truth, high)
     assert abs(value - truth) < (0.15 + spare) * abs(truth)
-
-
-_FLOORS: dict[tuple[str, str], np.ndarray] = {}
-
-
-def _error_without_effect(robot, noise):
-    if (robot, noise) not in _FLOORS:
-        log, model = hidden_log(None, robot, noise)
-        _FLOORS[robot, noise] = diagnose(model, log.X, log.y).rmse_before
-    return _FLOORS[robot, noise]
 
 
 @pytest.fixture(scope="module")
@@ -265,7 +269,7 @@ def test_a_robot_that_rests_is_refused_by_a_sentence():
 )
 def test_a_completed_model_is_complete(load, kind):
     """Also where the effect's columns need the load or the torque of the model itself."""
-    log = make_hidden_effect_log(load(), kind, joints=[2])
+    log = make_hidden_effect_log(load(), kind, joints=[2], n_trajectories=6, duration=6.0)
     model = RBDRegressor(log.robot, ("viscous", "coulomb"))
     first = diagnose(model, log.X, log.y)
     assert [(f.kind, f.joints) for f in first.findings] == [(kind, (2,))]
@@ -274,3 +278,42 @@ def test_a_completed_model_is_complete(load, kind):
     assert second.verdict == "complete"
     assert second.rmse_before == pytest.approx(first.rmse_after, rel=0.1)
     assert Session(completed, log.X, log.y).history[0]["rmse"] is not None
+
+
+@pytest.fixture(scope="module")
+def sticking():
+    return make_hidden_effect_log(
+        load_planar_arm(), "stribeck", joints=[2], n_trajectories=8, duration=4.0
+    )
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are forked on Linux only")
+def test_two_processes_give_the_same_report_to_the_last_bit(sticking):
+    one, two = (
+        diagnose(RBDRegressor(sticking.robot), sticking.X, sticking.y, n_jobs=n).to_dict()
+        for n in (1, 2)
+    )
+    assert json.dumps(one, default=str) == json.dumps(two, default=str)
+    assert [e["kind"] for e in one["effects"]] == ["stribeck"]
+
+
+@pytest.mark.parametrize("n_jobs", [1, 2])
+def test_doubt_keeps_names_back_however_many_processes_work(sticking, n_jobs, monkeypatch):
+    told = [Suspicion("copied_torque", "a torque twice", "in every row", "suspected")]
+    monkeypatch.setattr("skidyn.diagnosis._diagnosis.check_measurement", lambda _: told)
+    with pytest.warns(UserWarning, match="no physical effect is identified"):
+        diagnosis = diagnose(RBDRegressor(sticking.robot), sticking.X, sticking.y, n_jobs=n_jobs)
+    assert {finding.kind for finding in diagnosis.findings} <= {"unknown"}
+
+
+@pytest.mark.parametrize("n_jobs", [1, 2])
+def test_a_log_that_is_certainly_wrong_is_refused(sticking, n_jobs):
+    mirrored = sticking.frame.assign(dq2=-sticking.frame["dq2"])
+    torque = [f"tau{j + 1}" for j in range(sticking.robot.n_joints)]
+    with pytest.raises(ValueError, match="dq2|velocity of joint 2"):
+        diagnose(
+            RBDRegressor(sticking.robot),
+            mirrored.drop(columns=torque),
+            mirrored[torque],
+            n_jobs=n_jobs,
+        )

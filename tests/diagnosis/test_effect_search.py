@@ -56,10 +56,14 @@ def test_scikit_learn_contract(estimator, check):
     check(estimator)
 
 
-def test_finds_adds_and_predicts_better():
-    log = make_hidden_effect_log(
-        load_planar_arm(), "spring", joints=[2], n_trajectories=6, duration=6.0
+@pytest.fixture(scope="module")
+def log():
+    return make_hidden_effect_log(
+        load_planar_arm(), "spring", joints=[2], n_trajectories=6, duration=3.0
     )
+
+
+def test_finds_adds_and_predicts_better(log):
     start = RBDRegressor(log.robot)
     search = clone(EffectSearchCV(start, effects=("spring", "dahl"))).fit(log.X, log.y)
     assert [(t.kind, t.joints) for t in search.best_effects_] == [("spring", (2,))]
@@ -69,10 +73,7 @@ def test_finds_adds_and_predicts_better():
     assert not hasattr(search.estimator, "coef_")
 
 
-def test_keeps_findings_only_as_far_as_they_raise_the_score():
-    log = make_hidden_effect_log(
-        load_planar_arm(), "spring", joints=[2], n_trajectories=6, duration=6.0
-    )
+def test_keeps_findings_only_as_far_as_they_raise_the_score(log):
     search = EffectSearchCV(RBDRegressor(log.robot), effects=("spring",), cv=3)
 
     def against(estimator, X, y):
@@ -91,10 +92,7 @@ def test_keeps_findings_only_as_far_as_they_raise_the_score():
     np.testing.assert_allclose(search.predict(log.X), alone.predict(log.X), rtol=1e-12)
 
 
-def test_the_gain_of_a_single_fold_keeps_nothing():
-    log = make_hidden_effect_log(
-        load_planar_arm(), "spring", joints=[2], n_trajectories=6, duration=6.0
-    )
+def test_the_gain_of_a_single_fold_keeps_nothing(log):
     folds = list(GroupKFold(5).split(log.X, groups=log.X["trajectory"]))
 
     def in_folds(*gains):
@@ -127,7 +125,6 @@ def test_the_gain_of_a_single_fold_keeps_nothing():
         ({"settings": "x"}, r"expected Settings\(\.\.\.\)"),
     ],
 )
-def test_parameters_of_another_kind_are_refused(wrong, message):
-    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=2, duration=2.0)
+def test_parameters_of_another_kind_are_refused(wrong, message, log):
     with pytest.raises(ValueError, match=message):
         EffectSearchCV(RBDRegressor(log.robot), **wrong).fit(log.X, log.y)

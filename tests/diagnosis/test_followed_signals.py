@@ -32,6 +32,8 @@ FORMS = {
     "bump": (2, 4.0, lambda x: np.exp(-((x["q2"] / 0.15) ** 2)), {"q2"}, None),
 }
 
+LENGTH = {"n_trajectories": 6, "duration": 6.0}
+
 
 def _since_reversal(x, name):
     """A hump along the way since the joint turned back, alike in both directions."""
@@ -73,7 +75,7 @@ def _relaxed(x, name, time_constant):
 @pytest.mark.parametrize("form", FORMS)
 def test_a_form_in_no_catalogue_is_unknown_and_its_signals_are_named(form):
     joint, size, torque, signals, formula = FORMS[form]
-    log = make_hidden_effect_log(load_ur5(), None, noise="low", random_state=11)
+    log = make_hidden_effect_log(load_ur5(), None, random_state=11, **LENGTH)
     y = np.array(log.y, dtype=float)
     y[:, joint - 1] += size * torque(log.X)
 
@@ -106,7 +108,7 @@ def test_a_joint_that_rests_in_some_trajectories_is_diagnosed_all_the_same():
 
 
 def test_a_product_of_signals_that_do_nothing_alone_is_followed():
-    log = make_hidden_effect_log(load_ur5(), None, noise="low", random_state=3)
+    log = make_hidden_effect_log(load_ur5(), None, random_state=3, **LENGTH)
     y = np.array(log.y, dtype=float)
     y[:, 5] += 0.05 * np.sign(log.X["dq4"]) * log.X["dq5"] + 0.05 * log.X["dq4"]
 
@@ -118,7 +120,7 @@ def test_a_product_of_signals_that_do_nothing_alone_is_followed():
 
 
 def test_what_lies_between_two_joints_is_one_finding_on_both():
-    log = make_hidden_effect_log(load_ur5(), None, noise="low", random_state=11)
+    log = make_hidden_effect_log(load_ur5(), None, random_state=11, **LENGTH)
     x = log.X["q3"] + 0.6 * log.X["q4"]
     tight = 8 * np.maximum(0.0, x - np.quantile(x, 0.7))
     y = np.array(log.y, dtype=float)
@@ -134,7 +136,7 @@ def test_what_lies_between_two_joints_is_one_finding_on_both():
 
 
 def test_a_bath_that_the_tool_dips_into_drags_on_all_joints():
-    log = make_hidden_effect_log(load_ur5(), None, noise="low", random_state=11)
+    log = make_hidden_effect_log(load_ur5(), None, random_state=11, **LENGTH)
     q, dq = (log.X[[f"{s}{j}" for j in range(1, 7)]].to_numpy() for s in ("q", "dq"))
     place = log.robot.forward_kinematics(q)[0]
     jacobian = log.robot.jacobian(q)[:, :3]

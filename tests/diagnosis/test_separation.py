@@ -13,7 +13,8 @@ from skidyn.identification import RBDRegressor
 
 
 def diagnosis_of(kind):
-    log = make_hidden_effect_log(load_planar_arm(), kind, joints=[2], noise="high", random_state=5)
+    options = {"joints": [2], "noise": "high", "n_trajectories": 6, "duration": 6.0}
+    log = make_hidden_effect_log(load_planar_arm(), kind, random_state=5, **options)
     return diagnose(RBDRegressor(log.robot), log.X, log.y)
 
 

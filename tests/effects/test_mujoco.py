@@ -34,6 +34,7 @@ class Native:
     force: tuple[float, ...] = ()
     load: Callable = load_planar_arm
     base: tuple[str, ...] = ("viscous", "coulomb")
+    trajectories: int = 8
 
 
 def more(name, index, value):
@@ -63,10 +64,12 @@ NATIVE = {
     "spring": Native((2,), "k", 2.5, edit=more("jnt_stiffness", 1, 2.5)),
     "coupling_spring": Native((1, 2), "k", 2.0, tendon='stiffness="2" springlength="0"'),
     "coupled_friction": Native((1, 2), "Fc", 0.6, tendon='frictionloss="0.6"'),
-    "coupled_inertia": Native((5, 6), "Ia", 0.2, tendon='armature="0.2"', load=load_ur5),
+    "coupled_inertia": Native(
+        (5, 6), "Ia", 0.2, tendon='armature="0.2"', load=load_ur5, trajectories=4
+    ),
     "payload": Native((2,), "mass", 0.8, loaded=more("body_mass", -1, 0.8)),
     "external_wrench": Native((1, 2), "force_x", 3.0, force=(3.0, 0.0, -4.0)),
-    "base_tilt": Native((), "tilt_deg", 3.0, edit=tilt, load=load_srs_arm),
+    "base_tilt": Native((), "tilt_deg", 3.0, edit=tilt, load=load_srs_arm, trajectories=4),
     "end_stop": Native((2,), "q_lim", 0.6, edit=stiff_limits),
 }
 
@@ -90,7 +93,7 @@ def torque_of(force, model, data):
     return torque
 
 
-def simulate(native, path, trajectories=8):
+def simulate(native, path):
     """Motion and torque of a log that MuJoCo made."""
     robot = native.load()
     n = robot.n_joints
@@ -108,8 +111,8 @@ def simulate(native, path, trajectories=8):
     data = mujoco.MjData(model)
     rng = np.random.default_rng(4)
     tables, torques = [], []
-    for trajectory in range(trajectories):
-        if trajectory == trajectories // 2:
+    for trajectory in range(native.trajectories):
+        if trajectory == native.trajectories // 2:
             native.loaded(model)
         t, q, dq, ddq = motion(rng, n)
         tau = np.zeros_like(q)
@@ -117,7 +120,7 @@ def simulate(native, path, trajectories=8):
             data.qpos[:], data.qvel[:], data.qacc[:] = q[i], dq[i], ddq[i]
             mujoco.mj_inverse(model, data)
             tau[i] = data.qfrc_inverse
-            if native.force and trajectory >= trajectories // 2:
+            if native.force and trajectory >= native.trajectories // 2:
                 tau[i] -= torque_of(native.force, model, data)
         columns = {"time": t, "trajectory": trajectory}
         for j in range(n):
