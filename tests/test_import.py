@@ -60,6 +60,12 @@ def test_every_package_is_reached_from_the_top():
         assert skidyn.__getattr__(name).__name__ == f"skidyn.{name}"
 
 
+def test_every_module_can_be_imported():
+    for module in pkgutil.walk_packages(skidyn.__path__, "skidyn."):
+        if not module.name.endswith("__main__"):
+            importlib.import_module(module.name)
+
+
 def test_what_is_imported_without_an_extra_is_declared():
     """Top-level imports of third parties and pandas, which the README's loop needs."""
     with open(Path(skidyn.__file__).parents[1] / "pyproject.toml", "rb") as file:
