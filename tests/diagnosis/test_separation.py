@@ -32,7 +32,7 @@ def test_hysteresis_is_told_apart_by_a_motion_that_the_log_lacked(diagnosis, mot
     assert {"dahl", "maxwell_slip"} <= {diagnosis.findings[0].kind, *diagnosis.findings[0].rivals}
     assert motion.gain > 3 * motion.gain_of_log
     assert motion.confirmed == {"maxwell_slip": True, "dahl": True}
-    assert "both were recognised" in motion.sentence
+    assert "both effects were recognised" in motion.sentence
 
 
 def test_the_motion_keeps_the_limits_and_starts_and_ends_at_rest(diagnosis, motion):
