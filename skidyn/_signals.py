@@ -87,6 +87,13 @@ class Signals:
         The model's torque without dry friction, which jumps at reversals (N m or N).
     inertial_parameters : ndarray of shape (n_bodies, 10) or None
         Parameters of the rigid body where effects need them; the robot's own if None.
+    valid : ndarray of shape (n_samples, n_joints) of bool or None
+        False where a sample of a joint is not to be used: broken, or near the end of a segment,
+        where what was smoothed is one-sided. None for samples that are all as good.
+    half_width : int
+        Half the width of the window in which the motion was smoothed, in samples; 0 as logged.
+    cutoff : float
+        Cut-off of that smoother, Hz; infinite as logged.
     """
 
     q: Array
@@ -101,6 +108,9 @@ class Signals:
     model_torque: Array | None = None
     smooth_torque: Array | None = None
     inertial_parameters: Array | None = None
+    valid: NDArray[np.bool_] | None = None
+    half_width: int = 0
+    cutoff: float = np.inf
 
     def __post_init__(self) -> None:
         if len(self.prismatic) == 0:
@@ -135,6 +145,18 @@ class Signals:
     def clock(self) -> Array:
         """Time in s; the sample number where no time is logged."""
         return np.arange(self.n_samples, dtype=float) if self.time is None else self.time
+
+    @cached_property
+    def rate(self) -> float:
+        """Median sampling rate, Hz; 1 where no time is logged."""
+        steps = np.diff(self.clock)[np.diff(self.trajectory) == 0]
+        steps = steps[steps > 0]
+        return 1.0 / float(np.median(steps)) if len(steps) else 1.0
+
+    @property
+    def usable(self) -> NDArray[np.bool_]:
+        """Samples of every joint that may be used, (n_samples, n_joints)."""
+        return np.ones(self.q.shape, dtype=bool) if self.valid is None else self.valid
 
     @cached_property
     def steps(self) -> list[float]:
@@ -189,7 +211,7 @@ class Signals:
         """The same signals on some rows."""
         per_sample = (
             *("q", "dq", "ddq", "trajectory", "time", "temperature"),
-            *("load", "model_torque", "smooth_torque"),
+            *("load", "model_torque", "smooth_torque", "valid"),
         )
         values = {name: getattr(self, name) for name in per_sample}
         taken: dict[str, Any] = {k: None if v is None else v[rows] for k, v in values.items()}

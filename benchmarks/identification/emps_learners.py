@@ -44,7 +44,7 @@ def motion_of(frame):
     q = frame["q1"].to_numpy()[:, None]
     dq, time = frame["dq1"].to_numpy()[:, None], frame["time"].to_numpy()
     signals = Signals(q, dq, 0 * q, np.zeros(len(q), int), time)
-    smooth = smooth_motion(signals).signals
+    smooth = smooth_motion(signals)
     return smooth.q[:, 0], smooth.dq[:, 0], smooth.ddq[:, 0]
 
 

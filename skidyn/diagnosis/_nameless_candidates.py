@@ -87,7 +87,7 @@ def nameless_candidates(
                     problem.signals,
                     residual[:, joint],
                     problem.rows.sliding[:, joint],
-                    problem.motion.rate,
+                    problem.signals.rate,
                     (LOWEST, SLOWEST),
                 )
                 shapes = [] if line is None else [{"frequency": line.frequency}]

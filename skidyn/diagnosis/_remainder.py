@@ -27,7 +27,7 @@ from skidyn.diagnosis._rule import (
     REMAINDER_TIMES_NOISE,
     variance_inflation,
 )
-from skidyn.evidence import Fit, Problem, SmoothedMotion, smooth_motion
+from skidyn.evidence import Fit, Problem, smooth_motion
 from skidyn.measurement import position_step
 
 #: Quantiles between which the range of the torque lies.
@@ -174,24 +174,24 @@ def position_noise(problem: Problem, fit: Fit | None = None) -> Array:
     encoder counts in visible steps, the smoothed positions are counted in them instead: of slow
     motion such noise is slow, too, and passes the smoother.
     """
-    signals, motion, robot = problem.logged, problem.motion, problem.robot
+    signals, motion, robot = problem.logged, problem.signals, problem.robot
     quiet = np.zeros(problem.n_joints)
     if robot is None or signals is None or motion.half_width == 0:
         return quiet
     shaken, again = signals.once(
         ("shaken motion", motion.half_width), lambda: _shaken(signals, motion)
     )
-    use = shaken.valid & again.valid
+    use = shaken.usable & again.usable
     change = np.where(use, _torque(problem, fit, shaken) - _torque(problem, fit, again), 0.0)
     counts = np.maximum(use.sum(0), 1)
     return np.asarray(np.sqrt(np.sum(change**2, axis=0) / counts))
 
 
-def _shaken(logged: Signals, motion: SmoothedMotion) -> tuple[SmoothedMotion, SmoothedMotion]:
+def _shaken(logged: Signals, motion: Signals) -> tuple[Signals, Signals]:
     """The smoothed motion with the noise of positions, and without, both smoothed again."""
-    taken = np.median(np.abs(logged.q - motion.signals.q), axis=0) / MEDIAN
+    taken = np.median(np.abs(logged.q - motion.q), axis=0) / MEDIAN
     part = slice(0, min(logged.n_samples, MOST_SAMPLES))
-    smooth = motion.signals.take(part)
+    smooth = motion.take(part)
     rng = np.random.default_rng(0)
     noise = rng.normal(size=smooth.q.shape) * taken
     for k, step in enumerate(map(position_step, logged.q.T)):
@@ -201,9 +201,9 @@ def _shaken(logged: Signals, motion: SmoothedMotion) -> tuple[SmoothedMotion, Sm
     return smooth_motion(smooth.with_(q=smooth.q + noise)), smooth_motion(smooth)
 
 
-def _torque(problem: Problem, fit: Fit | None, motion: SmoothedMotion) -> Array:
+def _torque(problem: Problem, fit: Fit | None, motion: Signals) -> Array:
     """Torque of the bodies and of the effects that follow a motion smoothly, N m or N."""
-    s, robot = motion.signals, problem.robot
+    s, robot = motion, problem.robot
     assert robot is not None
     own = None if fit is None else problem.inertial_parameters(fit)
     torque = robot.inverse_dynamics(s.q, s.dq, s.ddq, parameters=own)

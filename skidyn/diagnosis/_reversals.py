@@ -105,9 +105,9 @@ def failing_joints(problem: Problem, result: SearchResult) -> list[int]:
     list of int
         Joints, from 0.
     """
-    motion, n = problem.motion, problem.signals.n_samples
-    close = sliding_samples(motion.signals, motion.valid, SHORT_MARGIN)
-    rows = window_rows(motion.signals, close)
+    motion, n = problem.signals, problem.signals.n_samples
+    close = sliding_samples(motion, motion.usable, SHORT_MARGIN)
+    rows = window_rows(motion, close)
     residual = problem.torque - result.ripple - problem.explained(result.fit)
     dry = [t for t in result.fit.terms if t.is_dry or _is_hysteresis(t.kind)]
     friction = problem.term_torque(result.fit, dry)

@@ -335,7 +335,7 @@ def _duel(diagnosis: Diagnosis, first: Hypothesis, second: Hypothesis, duration:
         # Rows have unit noise gain: their noise is that of a sample.
         sigma,
         _position_noise(diagnosis),
-        min(problem.motion.rate, 200.0),
+        min(problem.signals.rate, 200.0),
         duration,
     )
 
@@ -394,7 +394,8 @@ def _position_noise(diagnosis: Diagnosis) -> Array:
         robot,
         trajectory=getattr(model, "trajectory", "auto"),
         time=getattr(model, "time", "auto"),
-        rate=diagnosis.problem.motion.rate,
+        rate=diagnosis.problem.signals.rate,
     )
-    rough = (raw.q - diagnosis.problem.signals.q)[diagnosis.problem.motion.valid.all(1)]
+    smooth = diagnosis.problem.signals
+    rough = (raw.q - smooth.q)[smooth.usable.all(1)]
     return np.asarray(np.std(rough, axis=0))

@@ -123,7 +123,7 @@ def find_vibrations(
     fold = problem.sample_folds(int(np.argmax(problem.rows.counts)))
     for joint in range(problem.n_joints):
         use, r = problem.rows.sliding[:, joint], residual[:, joint]
-        found = clock_line(signals, r, use, problem.motion.rate, (SLOWEST, np.inf))
+        found = clock_line(signals, r, use, problem.signals.rate, (SLOWEST, np.inf))
         if found is not None and significant(found.chance):
             term = Term.at("vibration", (joint,), {"frequency": found.frequency})
             line = _test_line(problem, term, found.chance, 1.0, use, r, fold)

@@ -53,7 +53,7 @@ def look_at_swift(
     """
     family = [k for k in kinds if get_effect(k).moves_link]
     clocked = problem.signals.time is not None and problem.robot is not None
-    if not family or not clocked or problem.motion.rate * SHORT_WINDOW < FEWEST_SAMPLES:
+    if not family or not clocked or problem.signals.rate * SHORT_WINDOW < FEWEST_SAMPLES:
         return problem, result
     residual = problem.torque - problem.explained(result.fit)
     sensor = np.nan_to_num(sensor_noise(problem.signals, residual))
@@ -85,7 +85,7 @@ def look_at_swift(
             c.term.effect.fastest(c.term.shape) for h in moved.findings for c in h.candidates
         ]
         # Smoothing weakens what is faster, as if a link swung there.
-        if max(fastest, default=0.0) > problem.motion.cutoff:
+        if max(fastest, default=0.0) > problem.signals.cutoff:
             return problem, result
         # A link that swings in the long windows, too, does not fly.
         if not now or not before.items() <= now.items():

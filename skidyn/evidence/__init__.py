@@ -39,12 +39,7 @@ from skidyn.evidence._from_motion import (
     renumbered as renumbered,
     sample_blocks as sample_blocks,
 )
-from skidyn.evidence._kinematics import (
-    SmoothedMotion as SmoothedMotion,
-    as_given as as_given,
-    sampling_rate as sampling_rate,
-    smooth_motion as smooth_motion,
-)
+from skidyn.evidence._kinematics import smooth_motion as smooth_motion
 from skidyn.evidence._parquet import (
     ColumnMap as ColumnMap,
     read_trajectories as read_trajectories,

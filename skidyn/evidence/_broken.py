@@ -8,14 +8,11 @@ reversal does not raise, and are left out of the rows with a word to the user.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from skidyn._signals import Array, Signals
-from skidyn.evidence._kinematics import SmoothedMotion
 from skidyn.evidence._rows import widened
 
 #: Samples of the running median; up to three of them may be broken.
@@ -107,12 +104,12 @@ def reversals(signals: Signals) -> NDArray[np.bool_]:
     return widened(turns, WIDTH // 2)
 
 
-def without_broken(motion: SmoothedMotion, logged: Signals, torque: Array) -> SmoothedMotion:
+def without_broken(motion: Signals, logged: Signals, torque: Array) -> Signals:
     """Trust no sample whose torque is broken, nor those that a broken position reaches.
 
     Parameters
     ----------
-    motion : SmoothedMotion
+    motion : Signals
         Smoothed motion.
     logged : Signals
         Motion before smoothing.
@@ -124,8 +121,7 @@ def without_broken(motion: SmoothedMotion, logged: Signals, torque: Array) -> Sm
     position = np.asarray(broken.any(1))
     if position.any():
         position = widened(position, max(1, motion.half_width))
-    valid = motion.valid & ~wrong & ~position[:, None]
-    return replace(motion, valid=valid)
+    return motion.with_(valid=motion.usable & ~wrong & ~position[:, None])
 
 
 def _broken(signals: Signals, torque: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:

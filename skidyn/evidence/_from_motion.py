@@ -226,9 +226,9 @@ def _checked(
     if np.any(np.diff(number) < 0):
         order = np.argsort(number, kind="stable")
         number, arrays = number[order], {name: a[order] for name, a in arrays.items()}
-    torque = arrays.pop("torque")
+    q, dq, ddq, torque = arrays.values()
     prismatic = np.array([kind == "prismatic" for kind in robot.joint_types])
-    return Signals(**arrays, trajectory=number, prismatic=prismatic, robot=robot), torque
+    return Signals(q, dq, ddq, number, prismatic=prismatic, robot=robot), torque
 
 
 def _counts(

@@ -3,10 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-from numpy.typing import NDArray
 
 from skidyn._local_polynomial import local_polynomial
 from skidyn._signals import Array, Signals
@@ -20,45 +17,7 @@ HIGHEST_CUTOFF, CUTOFF_SHARE = 27.0, 0.24
 EVEN_STEPS = 1e-3
 
 
-@dataclass(frozen=True)
-class SmoothedMotion:
-    """Smoothed motion and where it can be trusted.
-
-    Attributes
-    ----------
-    signals : Signals
-        With smoothed q, dq and ddq.
-    valid : ndarray of shape (n_samples, n_joints) of bool
-        False near the ends of a segment, where the polynomial is one-sided, and where a sample is
-        broken.
-    half_width : int
-        Half the width of the smoothing window, in samples at the median rate.
-    cutoff : float
-        Cut-off of the smoother in Hz.
-    rate : float
-        Median sampling rate in Hz.
-    """
-
-    signals: Signals
-    valid: NDArray[np.bool_]
-    half_width: int
-    cutoff: float
-    rate: float
-
-
-def sampling_rate(signals: Signals) -> float:
-    """Median sampling rate in Hz (1 where no time is logged)."""
-    steps = np.diff(signals.clock)[np.diff(signals.trajectory) == 0]
-    steps = steps[steps > 0]
-    return 1.0 / float(np.median(steps)) if len(steps) else 1.0
-
-
-def as_given(signals: Signals) -> SmoothedMotion:
-    """Motion without a clock, taken as it is."""
-    return SmoothedMotion(signals, np.ones(signals.q.shape, dtype=bool), 0, np.inf, 1.0)
-
-
-def smooth_motion(signals: Signals, cutoff: float | None = None) -> SmoothedMotion:
+def smooth_motion(signals: Signals, cutoff: float | None = None) -> Signals:
     """Replace q, dq and ddq by a zero-phase local polynomial fit to the positions.
 
     Parameters
@@ -67,13 +26,18 @@ def smooth_motion(signals: Signals, cutoff: float | None = None) -> SmoothedMoti
         Logged motion; dq and ddq are not used.
     cutoff : float, Hz, optional
         Cut-off; by default 24 % of the sampling rate, at most 27 Hz.
+
+    Returns
+    -------
+    Signals
+        Samples near the ends of a segment are not valid.
     """
-    rate = sampling_rate(signals)
+    rate = signals.rate
     half, used = _half_width(rate, cutoff)
     q, dq, ddq = (np.array(x, dtype=float) for x in (signals.q, signals.dq, signals.ddq))
     valid = np.ones(signals.q.shape, dtype=bool)
     for rows in signals.segments:
-        own = sampling_rate(signals.take(rows))
+        own = signals.take(rows).rate
         own = own if abs(own - rate) > EVEN_STEPS * rate else rate  # recordings of several rates
         width, _ = _half_width(own, cutoff)
         # Scattered samples are many for their median step, or few for the time they span.
@@ -87,8 +51,7 @@ def smooth_motion(signals: Signals, cutoff: float | None = None) -> SmoothedMoti
         edge = max(2, width // 2)
         valid[rows.start : rows.start + edge] = False
         valid[rows.stop - edge : rows.stop] = False
-    smoothed = signals.with_(q=q, dq=dq, ddq=ddq)
-    return SmoothedMotion(smoothed, valid, half, used, rate)
+    return signals.with_(q=q, dq=dq, ddq=ddq, valid=valid, half_width=half, cutoff=used)
 
 
 def _half_width(rate: float, cutoff: float | None) -> tuple[int, float]:

@@ -18,7 +18,7 @@ from skidyn._signals import Array, Signals
 from skidyn.effects import Term, TermSum
 from skidyn.evidence._broken import without_broken
 from skidyn.evidence._folds import RIDGE, Normal, nearest_folds
-from skidyn.evidence._kinematics import SmoothedMotion, as_given, smooth_motion
+from skidyn.evidence._kinematics import smooth_motion
 from skidyn.evidence._rows import (
     FEWEST_SAMPLES,
     WINDOW,
@@ -81,10 +81,8 @@ class Problem:
     ----------
     robot : Robot or None
         Its rigid body is part of the model when ``rigid_body`` is True.
-    motion : SmoothedMotion
-        Smoothed motion.
     signals : Signals
-        Motion with the load and model torque of the current fit.
+        Smoothed motion with the load and model torque of the current fit.
     torque : ndarray of shape (n_samples, n_joints)
         Measured torque less what is not fitted: the rigid body with the parameters of the URDF, or
         the prediction of a given regressor. Identified parameters are corrections to the URDF's,
@@ -106,7 +104,6 @@ class Problem:
     """
 
     robot: Robot | None
-    motion: SmoothedMotion
     signals: Signals
     torque: Array
     terms: TermSum
@@ -161,7 +158,7 @@ class Problem:
         """Every how manieth sample tells enough of a term at first."""
         if self.signals.time is None or not term.effect.nameless:
             return 1
-        return int(self.motion.rate * WINDOW / ENOUGH_SAMPLES)
+        return int(self.signals.rate * WINDOW / ENOUGH_SAMPLES)
 
     def _averaged(self, term: Term, step: int) -> dict[int, Array]:
         signals, weights = self.sampled(step)
@@ -422,12 +419,11 @@ def make_problem(
     """
     motion = read_motion(signals, smooth, torque)
     if weight is not None:
-        motion = replace(motion, valid=motion.valid & (weight > 0)[:, None])
+        motion = motion.with_(valid=motion.usable & (weight > 0)[:, None])
     rows, fold, n_folds, whole = _rows_and_folds(motion, reversals, weight)
     problem = Problem(
         robot,
-        motion,
-        motion.signals.with_(robot=robot),
+        motion.with_(robot=robot),
         torque,
         TermSum(terms),
         rows,
@@ -458,7 +454,7 @@ def with_reversals(problem: Problem, terms: Iterable[Term], joints: Sequence[int
     joints : sequence of int
         Joints, from 0, whose rows reach up to the reversals.
     """
-    return _with_rows(problem, terms, _rows_and_folds(problem.motion, joints))
+    return _with_rows(problem, terms, _rows_and_folds(problem.signals, joints))
 
 
 def with_short_windows(problem: Problem, terms: Iterable[Term], window: float) -> Problem:
@@ -473,7 +469,7 @@ def with_short_windows(problem: Problem, terms: Iterable[Term], window: float) -
     window : float, s
         Width of the windows.
     """
-    return _with_rows(problem, terms, _rows_and_folds(problem.motion, (), window=window))
+    return _with_rows(problem, terms, _rows_and_folds(problem.signals, (), window=window))
 
 
 def _with_rows(problem: Problem, terms: Iterable[Term], rows_and_folds: _RowsAndFolds) -> Problem:
@@ -495,23 +491,22 @@ def _with_rows(problem: Problem, terms: Iterable[Term], rows_and_folds: _RowsAnd
     return other
 
 
-def read_motion(signals: Signals, smooth: bool, torque: Array) -> SmoothedMotion:
+def read_motion(signals: Signals, smooth: bool, torque: Array) -> Signals:
     """Motion as the rows see it, smoothed or as logged, without broken samples."""
     if signals.time is None:
-        return as_given(signals)
+        return signals
     motion = without_broken(smooth_motion(signals), signals, torque)
-    return motion if smooth else replace(motion, signals=signals)
+    return motion if smooth else motion.with_(q=signals.q, dq=signals.dq, ddq=signals.ddq)
 
 
-def motion_rows(motion: SmoothedMotion, reversals: Sequence[int], window: float = WINDOW) -> Rows:
+def motion_rows(signals: Signals, reversals: Sequence[int], window: float = WINDOW) -> Rows:
     """Averaging windows over the samples that count."""
-    signals = motion.signals
     if signals.time is None:
         return every_sample(signals)
-    margin = np.full(signals.n_joints, max(1, round(MARGIN * motion.half_width)))
+    margin = np.full(signals.n_joints, max(1, round(MARGIN * signals.half_width)))
     margin[list(reversals)] = SHORT_MARGIN
-    use = sliding_samples(signals, motion.valid, margin.tolist())
-    step = column_step(motion.rate, window, int(margin.min()))
+    use = sliding_samples(signals, signals.usable, margin.tolist())
+    step = column_step(signals.rate, window, int(margin.min()))
     return window_rows(signals, use, window, step)
 
 
@@ -519,16 +514,16 @@ _RowsAndFolds = tuple[Rows, list[NDArray[np.int64]], int, bool]
 
 
 def _rows_and_folds(
-    motion: SmoothedMotion,
+    signals: Signals,
     reversals: Sequence[int],
     weight: Array | None = None,
     window: float = WINDOW,
 ) -> _RowsAndFolds:
     """Averaging windows and the folds they fall into."""
     # A slow log has wider windows, which reach further over a border; samples reach over none.
-    clock = motion.signals.time is not None
-    guard = max(WINDOW_GUARD, _half_window(motion.rate)) if clock else 0.0
-    rows = motion_rows(motion, reversals, window)
+    clock = signals.time is not None
+    guard = max(WINDOW_GUARD, _half_window(signals.rate)) if clock else 0.0
+    rows = motion_rows(signals, reversals, window)
     return _folds(rows if weight is None else rows.weighted(weight), guard)
 
 

@@ -198,12 +198,10 @@ def evidence_of_signals(
     terms = tuple(terms)
     motion = read_motion(signals, smooth, torque)
     rows = motion_rows(motion, hysteresis_joints(terms))
-    s = motion.signals
     problem = Problem(
         robot=robot,
-        motion=motion,
-        signals=s.with_(robot=robot),
-        torque=torque - robot.inverse_dynamics(s.q, s.dq, s.ddq),
+        signals=motion.with_(robot=robot),
+        torque=torque - robot.inverse_dynamics(motion.q, motion.dq, motion.ddq),
         terms=TermSum(terms),
         rows=rows,
         fold=[np.zeros(n, dtype=np.int64) for n in rows.counts],

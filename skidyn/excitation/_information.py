@@ -14,7 +14,7 @@ from skidyn._exceptions import SkidynError
 from skidyn._signals import Array, signals_from
 from skidyn.dynamics import BoundProgram, Program, Scalar, Tape, chunk_size, evaluate_rows
 from skidyn.effects import Term, TermSum, make_terms
-from skidyn.evidence import as_given, sampling_rate, smooth_motion
+from skidyn.evidence import smooth_motion
 from skidyn.excitation._excitation import Excitation
 from skidyn.export import check_model, static_model
 from skidyn.identification import RBDRegressor
@@ -164,8 +164,8 @@ def _information_of_log(model: Model, frame: Any) -> Array:
     table = np.full((len(frame), len(names)), np.nan)
     table[:, columns.used()] = np.asarray(frame.iloc[:, columns.used()], dtype=float)
     signals = signals_from(table, columns, model.robot, to_derive=True)
-    motion = smooth_motion(signals) if smooths else as_given(signals)
-    s = motion.signals.take(np.asarray(motion.valid.all(axis=1)))
+    motion = smooth_motion(signals) if smooths else signals
+    s = motion.take(np.asarray(motion.usable.all(axis=1)))
     if s.n_samples == 0:
         raise SkidynError("a recording is too short to derive accelerations from it")
-    return model.information(s.q, s.dq, s.ddq, s.n_samples / sampling_rate(signals))
+    return model.information(s.q, s.dq, s.ddq, s.n_samples / signals.rate)

@@ -138,5 +138,5 @@ def _motion(robot: Robot, X: Any) -> tuple[Any, Any, Any]:
         raise SkidynError("the log has no column 'time' (s)")
     table = np.asarray(X, dtype=float)
     plain = replace(columns, ddq=columns.ddq or columns.dq, temperature=None)
-    signals = smooth_motion(signals_from(table, plain, robot)).signals
+    signals = smooth_motion(signals_from(table, plain, robot))
     return signals.q, signals.dq, signals.ddq

@@ -105,7 +105,7 @@ def motion_of(model: Any, X: Any) -> Signals:
     for values, what in ((signals.q, "positions"), (signals.dq, "velocities")):
         _refuse_gaps(values, what)
     if model._smooths() or not given:
-        signals = smooth_motion(signals).signals
+        signals = smooth_motion(signals)
     return signals.with_(robot=robot)
 
 

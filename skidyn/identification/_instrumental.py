@@ -83,7 +83,7 @@ def instrument_rows(problem: Problem, fit: Fit, signals: Signals, smooth: bool) 
     ValueError
         The motion has not the rows of the log.
     """
-    own = problem.motion.signals
+    own = problem.signals
     same = signals.n_samples == own.n_samples
     if not (same and np.array_equal(signals.trajectory, own.trajectory)):
         raise ValueError(
@@ -91,8 +91,8 @@ def instrument_rows(problem: Problem, fit: Fit, signals: Signals, smooth: bool) 
             f"{signals.n_samples} rows for {own.n_samples}"
         )
     motion = read_motion(signals, smooth, problem.torque)
-    moved = motion.signals.with_(robot=problem.robot)
-    other = replace(problem, motion=motion, signals=moved, _cache={})
+    moved = motion.with_(robot=problem.robot)
+    other = replace(problem, signals=moved, _cache={})
     other.set_fit(fit)
     other.rigid_rows = regressor_rows(other, problem.rigid_index)
     return other.design([other.term_rows(t) for t in fit.terms])

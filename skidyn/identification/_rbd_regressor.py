@@ -370,7 +370,7 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
             "for noise, rest and reversals. Use a longer log of motion."
         )
         if self._smooths():
-            signals = smooth_motion(signals).signals
+            signals = smooth_motion(signals)
         return made(signals.with_(time=None), False)
 
     def _solve(

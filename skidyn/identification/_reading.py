@@ -111,7 +111,7 @@ class Reading:
         if named_recordings(self.effect_terms_):
             signals = recognise(signals, self.recordings_)
         if self._smooths():
-            signals = smooth_motion(signals).signals
+            signals = smooth_motion(signals)
         return signals.with_(robot=self.robot_), np.argsort(order)
 
     def _order(self, X: Array) -> NDArray[np.intp]:

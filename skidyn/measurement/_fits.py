@@ -508,8 +508,7 @@ def make_fits(signals: Signals, torque: Array, robot: Robot) -> Fits | None:
         As described.
     """
     motion = smooth_motion(signals)
-    rate, smooth = motion.rate, motion.signals
-    every = max(1, round(rate * WIDTH / SAMPLES))
+    every = max(1, round(motion.rate * WIDTH / SAMPLES))
     mean = running_mean(torque, every | 1)  # an even number would be half a sample late
     parts = []
     for rows in signals.segments:
@@ -522,7 +521,7 @@ def make_fits(signals: Signals, torque: Array, robot: Robot) -> Fits | None:
     if len(blocks) > MOST_ROWS:  # stretches of rows from everywhere in the log
         blocks = blocks[_stretches(len(blocks))]
     rows_used = blocks.ravel()
-    taken = smooth.take(rows_used).with_(robot=None)
+    taken = motion.take(rows_used).with_(robot=None)
     slow = REST * taken.unit
     moving = np.abs(taken.dq).reshape(-1, SAMPLES, robot.n_joints).mean(axis=1) > slow
     recorded = Recorded(signals.clock, mean, signals.segments, rows_used)

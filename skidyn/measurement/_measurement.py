@@ -141,11 +141,10 @@ class Measurement:
         time, number = self.signals.clock, self.signals.trajectory
         return np.asarray(np.diff(time)[number[1:] == number[:-1]])
 
-    @cached_property
+    @property
     def rate(self) -> float:
         """Median sampling rate, Hz."""
-        steps = self.steps[self.steps > 0]
-        return 1 / float(np.median(steps)) if len(steps) else 1.0
+        return self.signals.rate
 
     @cached_property
     def jitter(self) -> float:

@@ -97,7 +97,7 @@ class SmoothedTorque(Check):
         found = {}
         motion = smooth_motion(measurement.signals)  # noise would blur when a joint turns
         step = column_step(motion.rate, AROUND, motion.half_width)
-        index, few = motion.signals.thinned(step)
+        index, few = motion.thinned(step)
         torque = running_mean(measurement.torque, step)[index]
         for k in np.flatnonzero(measurement.excited).tolist():
             turns = at_turns(few, torque[:, k], k)

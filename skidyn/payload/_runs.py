@@ -213,7 +213,7 @@ def _read(robot: Robot, frame: Any) -> tuple[Signals, Array, bool]:
 
 def _joined(parts: Sequence[Signals], robot: Robot) -> Signals:
     names = ("q", "dq", "ddq", "trajectory", "time")
-    whole = {name: np.concatenate([getattr(p, name) for p in parts]) for name in names}
+    whole: dict[str, Any] = {n: np.concatenate([getattr(p, n) for p in parts]) for n in names}
     return Signals(**whole, prismatic=parts[0].prismatic, robot=robot)
 
 

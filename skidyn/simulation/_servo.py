@@ -268,7 +268,7 @@ def _read(log: Any, robot: Robot | None) -> tuple[Signals, Array]:
     signals = signals_from(table, plain, robot)
     signals = signals.with_(trajectory=trajectory_numbers(table, plain))
     if robot is not None:
-        signals = smooth_motion(signals).signals
+        signals = smooth_motion(signals)
     return signals, np.column_stack([np.asarray(log[name], dtype=float) for name in wanted])
 
 

@@ -4,7 +4,7 @@
 import numpy as np
 
 from skidyn.effects import Signals
-from skidyn.evidence import as_given, sampling_rate, smooth_motion
+from skidyn.evidence import smooth_motion
 
 TIME = np.arange(0, 10, 0.01)
 
@@ -17,24 +17,23 @@ def motion(time=TIME, noise=0.0):
 
 def test_velocity_and_acceleration_of_a_sine():
     smoothed = smooth_motion(motion())
-    use = smoothed.valid[:, 0]
+    use = smoothed.usable[:, 0]
     assert use.mean() > 0.9 and not use[0] and not use[-1]
-    np.testing.assert_allclose(smoothed.signals.dq[use, 0], 3 * np.cos(3 * TIME[use]), atol=1e-6)
-    np.testing.assert_allclose(smoothed.signals.ddq[use, 0], -9 * np.sin(3 * TIME[use]), atol=1e-3)
+    np.testing.assert_allclose(smoothed.dq[use, 0], 3 * np.cos(3 * TIME[use]), atol=1e-6)
+    np.testing.assert_allclose(smoothed.ddq[use, 0], -9 * np.sin(3 * TIME[use]), atol=1e-3)
 
 
 def test_uneven_steps_are_as_good():
     steps = np.random.default_rng(1).uniform(0.008, 0.012, 1000)
     time = np.cumsum(steps)
     smoothed = smooth_motion(motion(time))
-    use = smoothed.valid[:, 0]
-    np.testing.assert_allclose(smoothed.signals.dq[use, 0], 3 * np.cos(3 * time[use]), atol=1e-4)
+    use = smoothed.usable[:, 0]
+    np.testing.assert_allclose(smoothed.dq[use, 0], 3 * np.cos(3 * time[use]), atol=1e-4)
 
 
 def test_noise_is_lowered_and_rates_are_medians():
     noisy = motion(noise=1e-3)
-    use = smooth_motion(noisy).valid[:, 0]
-    left = smooth_motion(noisy).signals.q[use, 0] - np.sin(3 * TIME[use])
+    use = smooth_motion(noisy).usable[:, 0]
+    left = smooth_motion(noisy).q[use, 0] - np.sin(3 * TIME[use])
     assert left.std() < 0.8e-3
-    assert np.isclose(sampling_rate(noisy), 100.0)
-    assert as_given(noisy).signals is noisy
+    assert np.isclose(noisy.rate, 100.0) and noisy.usable.all()
