@@ -11,7 +11,13 @@ from numpy.typing import NDArray
 
 from skidyn._columns import ColumnSpec, _key_column
 from skidyn._compat import Interval, StrOptions
-from skidyn.preprocessing._signals import SignalTransformer, _sampling_rate, refuse_columns_there
+from skidyn.preprocessing._signals import (
+    SignalTransformer,
+    _sampling_rate,
+    refuse_columns_there,
+    refuse_cutoff,
+    segment_times,
+)
 from skidyn.preprocessing._smoothers import SMOOTHERS, Smoothed
 
 Array = NDArray[np.float64]
@@ -135,11 +141,8 @@ class SmoothDerivatives(SignalTransformer):
         self.derivatives_ = self.derivatives or (1 if of_velocities else 2)
         refuse_columns_there(names, self.columns_, self.derivatives_)
         self.rate_ = _sampling_rate(X, keys, self._segments(X), self.rate)
-        if self.cutoff is not None and not self.cutoff < self.rate_ / 2:
-            raise ValueError(
-                f"cutoff={self.cutoff} Hz is not below half the sampling rate "
-                f"({self.rate_ / 2:.4g} Hz)."
-            )
+        if self.cutoff is not None:
+            refuse_cutoff(self.cutoff, self.rate_)
         self._choose(X)
 
     def _choose(self, X: Array) -> None:
@@ -184,18 +187,7 @@ class SmoothDerivatives(SignalTransformer):
         return parts
 
     def _times(self, X: Array, rows: slice) -> Array:
-        """Times in s within a segment; an error where they do not advance."""
-        keys = self._keys()
-        if keys.time is None:
-            return np.arange(rows.stop - rows.start) / self.rate_
-        times = X[rows, keys.time]
-        still = np.flatnonzero(np.diff(times) <= 0)
-        if len(still):
-            raise ValueError(
-                f"time does not advance at row {rows.start + still[0] + 1}; remove repeated rows "
-                "first."
-            )
-        return times
+        return segment_times(X, self._keys(), rows, self.rate_)
 
     def _changed(self, X: Array) -> Array:
         smoothed = X.copy()

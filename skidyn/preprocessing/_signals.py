@@ -59,12 +59,30 @@ def _sampling_rate(X: Array, keys: Keys, segments: list[slice], rate: float | No
     return float(1.0 / np.median(steps))
 
 
-def _low_pass(values: Array, cutoff: float, order: int, rate: float) -> Array:
-    """Zero-phase Butterworth low-pass of the columns of one segment."""
+def segment_times(X: Array, keys: Keys, rows: slice, rate: float) -> Array:
+    """Times in s within a segment; an error where they do not advance."""
+    if keys.time is None:
+        return np.arange(rows.stop - rows.start) / rate
+    times: Array = X[rows, keys.time]
+    still = np.flatnonzero(np.diff(times) <= 0)
+    if len(still):
+        raise ValueError(
+            f"time does not advance at row {rows.start + still[0] + 1}; remove repeated rows first."
+        )
+    return times
+
+
+def refuse_cutoff(cutoff: float, rate: float) -> None:
+    """Refuse a cut-off that the sampling cannot show."""
     if not cutoff < rate / 2:
         raise ValueError(
             f"cutoff={cutoff} Hz is not below half the sampling rate ({rate / 2:.4g} Hz)."
         )
+
+
+def _low_pass(values: Array, cutoff: float, order: int, rate: float) -> Array:
+    """Zero-phase Butterworth low-pass of the columns of one segment."""
+    refuse_cutoff(cutoff, rate)
     sections = signal.butter(order, cutoff, fs=rate, output="sos")
     longest = 3 * (2 * len(sections) + 1)
     padding = min(longest, len(values) - 1)
@@ -230,16 +248,7 @@ class TimeDerivative(SignalTransformer):
                 )
             if self.cutoff is not None:
                 values = _low_pass(values, self.cutoff, 4, self.rate_)
-            if keys.time is None:
-                times = np.arange(len(values)) / self.rate_
-            else:
-                times = X[segment, keys.time]
-                still = np.flatnonzero(np.diff(times) <= 0)
-                if len(still):
-                    raise ValueError(
-                        f"time does not advance at row {segment.start + still[0] + 1}; remove "
-                        "repeated rows first."
-                    )
+            times = segment_times(X, keys, segment, self.rate_)
             derivative[segment] = np.gradient(
                 values, times, axis=0, edge_order=2 if len(values) > 2 else 1
             )
