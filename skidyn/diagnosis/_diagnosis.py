@@ -29,8 +29,9 @@ from skidyn.diagnosis._rule import (
     Settings,
     correlation_time,
     time_blocks,
+    variance_inflation,
 )
-from skidyn.diagnosis._search import prepare_search, search
+from skidyn.diagnosis._search import search
 from skidyn.diagnosis._swift import look_at_swift
 from skidyn.effects import Term, list_effects, make_terms
 from skidyn.evidence import Fit, Problem, make_problem
@@ -300,10 +301,7 @@ def _search(
 
     Where the clock is in doubt, no ``vibration`` is looked for: it may be of the logger.
     """
-    searcher = prepare_search(problem, kinds, settings)
-    searcher.vibration &= vibration
-    result = searcher.run()
-    del searcher  # and with it the columns of all that was tried
+    result = search(problem, kinds, settings, vibration=vibration)
     wider, completed = look_at_reversals(problem, result, kinds, settings)
     if wider is problem:
         wider, completed = look_at_swift(problem, result, kinds, settings)
@@ -325,7 +323,8 @@ def _limits(
     share = np.expm1(np.maximum(np.asarray(gain, dtype=float), 0.0) / np.maximum(counts, 1))
     earlier = np.asarray(counts * share, dtype=np.float64)
     gates = Gates(settings, result.n_tests, n_blocks - 1, counts, _whiteness(problem, fit), earlier)
-    return find_limits(problem, result.candidates, blocks, fit.noise, result.inflation, gates)
+    inflation = variance_inflation(problem, fit.residual, everywhere)
+    return find_limits(problem, result.candidates, blocks, fit.noise, inflation, gates)
 
 
 def _whiteness(problem: Problem, fit: Fit) -> Array:

@@ -94,8 +94,6 @@ class SearchResult:
         Last fit.
     ripple : ndarray of shape (n_samples, n_joints)
         Torque of the ripple found, N m.
-    inflation : ndarray of shape (n_joints,)
-        Variance inflation by the residual's autocorrelation.
     candidates : list of Candidate
         Named effects that were not found.
     n_tests : int
@@ -105,7 +103,6 @@ class SearchResult:
     findings: list[Hypothesis]
     fit: Fit
     ripple: Array
-    inflation: Array
     candidates: list[Candidate] = field(default_factory=list)
     n_tests: int = 1
 

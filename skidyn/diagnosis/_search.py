@@ -9,19 +9,20 @@ import numpy as np
 
 from skidyn.diagnosis._hypothesis import SearchResult
 from skidyn.diagnosis._reconsideration import ReconsideringSearch
-from skidyn.diagnosis._rule import Settings, variance_inflation
+from skidyn.diagnosis._rule import Settings
 from skidyn.evidence import Problem
 
 
-def prepare_search(
+def search(
     problem: Problem,
     kinds: Sequence[str],
     settings: Settings,
     *,
     nameless: bool = True,
+    vibration: bool = True,
     joints: Sequence[int] | None = None,
-) -> _Search:
-    """Fit the model, and compute the columns of all that may be missing.
+) -> SearchResult:
+    """Fit the model, and find the missing effects.
 
     Parameters
     ----------
@@ -33,32 +34,17 @@ def prepare_search(
         Thresholds.
     nameless : bool, default=True
         Whether nameless functions of the signals compete.
+    vibration : bool, default=True
+        Whether a wave in time is one of them.
     joints : sequence of int, optional
         Joints, from 0, on which effects are tried; all by default.
     """
     searcher = _Search(problem, kinds, settings, nameless)
+    searcher.vibration &= vibration
     if joints is not None:
         searcher.pool = [c for c in searcher.pool if set(c.joints) <= set(joints)]
         searcher.nameless = False
-    return searcher
-
-
-def search(
-    problem: Problem,
-    kinds: Sequence[str],
-    settings: Settings,
-    *,
-    nameless: bool = True,
-    joints: Sequence[int] | None = None,
-) -> SearchResult:
-    """Find the missing effects.
-
-    Parameters
-    ----------
-    problem, kinds, settings, nameless, joints
-        As in :func:`prepare_search`.
-    """
-    return prepare_search(problem, kinds, settings, nameless=nameless, joints=joints).run()
+    return searcher.run()
 
 
 class _Search(ReconsideringSearch):
@@ -82,10 +68,8 @@ class _Search(ReconsideringSearch):
         self.sigma = self.weights()
         self.withdraw()
         self.name_alike()
-        everywhere = range(self.problem.n_joints)
-        inflation = variance_inflation(self.problem, self.fit.residual, everywhere)
         # Functions without a name have no limits, and their columns take much memory.
         named = [c for c in self.pool if not c.term.effect.nameless]
         found = [c.term for h in self.findings for c in h.candidates]
         self.problem.keep([*self.problem.terms, *found, *(c.term for c in named)])
-        return SearchResult(self.findings, self.fit, self.ripple, inflation, named, self.n_tests)
+        return SearchResult(self.findings, self.fit, self.ripple, named, self.n_tests)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
@@ -172,37 +172,29 @@ class FunctionOfLaggingPosition(NamelessEffect):
     coefficients = unnamed_coefficients(_LAGGING)
     depends_on = ("q_own",)
     softness = 2e-3
+    #: What lags, and its plays as shares of its range.
+    signal: ClassVar[str] = "q"
+    plays: ClassVar[tuple[float, ...]] = _PLAYS
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        low, high = supported_range(signals, signals.q[:, joints[0]])
-        return [{"play": share * (high - low), "low": low, "high": high} for share in _PLAYS]
+        low, high = supported_range(signals, getattr(signals, self.signal)[:, joints[0]])
+        return [{"play": share * (high - low), "low": low, "high": high} for share in self.plays]
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        q, play = signals.q[:, joint], shape["play"]
-        lagging = q - play * stop_state(q, signals.segments, play)
+        x, play = getattr(signals, self.signal)[:, joint], shape["play"]
+        lagging = x - play * stop_state(x, signals.segments, play)
         return splines(lagging, shape["low"], shape["high"], _LAGGING)
 
 
-class FunctionOfLaggingVelocity(NamelessEffect):
+class FunctionOfLaggingVelocity(FunctionOfLaggingPosition):
     """A torque that switches at one speed on the way up and at another one on the way down."""
 
     kind = "function_of_lagging_velocity"
     drawn_against = "dq"
     title = "Function of the velocity with play"
     formula = r"f(\mathcal{P}_r[\dot q])"
-    coefficients = unnamed_coefficients(_LAGGING)
     depends_on = ("dq_own",)
-    softness = 2e-3
-    is_of_one_number = True
-
-    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        low, high = supported_range(signals, signals.dq[:, joints[0]])
-        return [{"play": share * (high - low), "low": low, "high": high} for share in _PLAYS[2:5]]
-
-    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        dq, play = signals.dq[:, joint], shape["play"]
-        lagging = dq - play * stop_state(dq, signals.segments, play)
-        return splines(lagging, shape["low"], shape["high"], _LAGGING)
+    signal, plays = "dq", _PLAYS[2:5]
 
 
 class RelaxingSpring(NamelessEffect):
@@ -245,7 +237,23 @@ def _followed(x: Array, signals: Signals, time_constant: float) -> Array:
     return y
 
 
-class DragOnTool(NamelessEffect):
+class _AtTool(NamelessEffect):
+    scope = "robot"
+    needs = ("robot",)
+    follows: ClassVar[tuple[str, ...]] = ("tool position",)
+
+    def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
+        return self.follows
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        return [] if signals.robot is None else self.tried(signals, tool_position(signals))
+
+    def tried(self, signals: Signals, position: Array) -> list[dict[str, Any]]:
+        """Shapes for a motion whose tool was at these places, (n_samples, 3)."""
+        raise NotImplementedError
+
+
+class DragOnTool(_AtTool):
     """A drag of the tool that depends on its height: a bath that it dips into, air, brushes."""
 
     kind = "drag_on_tool"
@@ -254,16 +262,10 @@ class DragOnTool(NamelessEffect):
     formula = r"J_n(q)^\top c(z(q))\,v"
     coefficients = unnamed_coefficients(10)
     softness = 2e-3
-    scope = "robot"
-    needs = ("robot",)
+    follows = ("tool position", "tool velocity")
 
-    def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
-        return ("tool position", "tool velocity")
-
-    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        if signals.robot is None:
-            return []
-        low, high = supported_range(signals, tool_position(signals)[:, 2])
+    def tried(self, signals: Signals, position: Array) -> list[dict[str, Any]]:
+        low, high = supported_range(signals, position[:, 2])
         return [{"low": low, "high": high}] if high > low else []
 
     def torque_columns(
@@ -276,23 +278,15 @@ class DragOnTool(NamelessEffect):
         return {j: np.sum(jacobian[:, :, j] * velocity, axis=1)[:, None] * field for j in joints}
 
 
-class ForceOverToolPosition(NamelessEffect):
+class ForceOverToolPosition(_AtTool):
     """A force on the tool that depends on where the tool is: a field, a hose, a cloth."""
 
     kind = "force_over_tool_position"
     title = "Force that depends on the position of the tool"
     formula = r"-J_n(q)^\top f(p(q))"
     coefficients = unnamed_coefficients(30)
-    scope = "robot"
-    needs = ("robot",)
 
-    def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
-        return ("tool position",)
-
-    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        if signals.robot is None:
-            return []
-        position = tool_position(signals)
+    def tried(self, signals: Signals, position: Array) -> list[dict[str, Any]]:
         low, high = np.quantile(position, [0.005, 0.995], axis=0)
         return [{"low": tuple(map(float, low)), "high": tuple(map(float, high))}]
 
@@ -306,7 +300,7 @@ class ForceOverToolPosition(NamelessEffect):
         }
 
 
-class ForceNearPoint(NamelessEffect):
+class ForceNearPoint(_AtTool):
     """A force on the tool near one place: an edge, a magnet, a curtain."""
 
     kind = "force_near_point"
@@ -317,18 +311,10 @@ class ForceNearPoint(NamelessEffect):
         *(Shape(axis, "m", (), -np.inf, np.inf, spacing="linear", scales=False) for axis in "xyz"),
         Shape("width", "m", (), 1e-3, 1e2, scales=False),
     )
-    scope = "robot"
-    needs = ("robot",)
 
-    def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
-        return ("tool position",)
-
-    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        if signals.robot is None:
-            return []
-        position = tool_position(signals)
+    def tried(self, signals: Signals, position: Array) -> list[dict[str, Any]]:
         places = _spread_out(position, _PLACES)
-        reach = self.travel(signals, joints, {})
+        reach = self.travel(signals, (), {})
         return [
             dict(zip("xyz", map(float, place), strict=True)) | {"width": share * reach}
             for place in places

@@ -106,6 +106,22 @@ def described(model: RBDRegressor | Robot, kinds: tuple[str, ...]) -> Descriptio
     return Description(robot, parameters, joints, left)
 
 
+#: Effects that a joint of MuJoCo has.
+MUJOCO = ("viscous", "coulomb", "rotor_inertia", "spring")
+
+
+def mujoco_attributes(own: Description) -> dict[str, np.ndarray]:
+    """Attributes of MuJoCo's joints, (n_joints,) each, from the effects in :data:`MUJOCO`."""
+    stiffness, torque = own.joints["spring"].T
+    return {
+        "damping": own.joints["viscous"][:, 0],
+        "frictionloss": own.joints["coulomb"][:, 0],
+        "armature": own.joints["rotor_inertia"][:, 0],
+        "stiffness": stiffness,
+        "springref": -torque / np.where(stiffness > 0.0, stiffness, np.inf),
+    }
+
+
 def numbers(values: Any) -> str:
     """Numbers as text that reads back to the same doubles."""
     return " ".join(repr(float(value) + 0.0) for value in np.ravel(values))

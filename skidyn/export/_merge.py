@@ -14,7 +14,15 @@ from scipy.spatial.transform import Rotation
 from skidyn._exceptions import SkidynError
 from skidyn._optional import import_optional
 from skidyn.dynamics import transform_inertial
-from skidyn.export._bodies import CentralInertia, about_origin, central_inertia, described, numbers
+from skidyn.export._bodies import (
+    MUJOCO,
+    CentralInertia,
+    about_origin,
+    central_inertia,
+    described,
+    mujoco_attributes,
+    numbers,
+)
 from skidyn.export._edits import Edits, Element
 from skidyn.export._files import PathLike, write_files
 from skidyn.identification import RBDRegressor
@@ -187,7 +195,7 @@ def merge_mjcf(
     ()
     """
     mujoco = import_optional("mujoco", extra="mujoco")
-    own = described(model, ("viscous", "coulomb", "rotor_inertia", "spring"))
+    own = described(model, MUJOCO)
     robot, edits = own.robot, Edits(source)
     compiler = edits.root.find("compiler")
     settings = {} if compiler is None else compiler.attributes
@@ -206,14 +214,7 @@ def merge_mjcf(
             f"has {', '.join(needed)}"
         )
     frames = _frames(mujoco, world, robot, edits.path)
-    stiffness, torque = own.joints["spring"].T
-    wanted = {
-        "damping": own.joints["viscous"][:, 0],
-        "frictionloss": own.joints["coulomb"][:, 0],
-        "armature": own.joints["rotor_inertia"][:, 0],
-        "stiffness": stiffness,
-        "springref": -torque / np.where(stiffness > 0.0, stiffness, np.inf),
-    }
+    wanted = mujoco_attributes(own)
     degrees = settings.get("angle", "degree") == "degree"
     for j, name in enumerate(robot.joint_names):
         index = mujoco.mj_name2id(world, mujoco.mjtObj.mjOBJ_JOINT, name)
@@ -223,7 +224,7 @@ def merge_mjcf(
             "frictionloss": world.dof_frictionloss[dof],
             "armature": world.dof_armature[dof],
             "stiffness": np.ravel(world.jnt_stiffness[index])[0],
-            "springref": world.qpos_spring[place] if stiffness[j] > 0 else 0.0,
+            "springref": world.qpos_spring[place] if wanted["stiffness"][j] > 0 else 0.0,
         }
         new = {}
         for key, values in wanted.items():

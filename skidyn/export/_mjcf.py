@@ -9,7 +9,13 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from skidyn._exceptions import SkidynError
-from skidyn.export._bodies import central_inertia, described, numbers
+from skidyn.export._bodies import (
+    MUJOCO,
+    central_inertia,
+    described,
+    mujoco_attributes,
+    numbers,
+)
 from skidyn.export._files import PathLike, write_files
 from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
@@ -54,16 +60,9 @@ def write_mjcf(model: RBDRegressor | Robot, path: PathLike) -> tuple[str, ...]:
     ...     write_mjcf(load_planar_arm(), pathlib.Path(folder) / "arm.xml")
     ()
     """
-    own = described(model, ("viscous", "coulomb", "rotor_inertia", "spring"))
+    own = described(model, MUJOCO)
     robot, values = own.robot, own.parameters
-    stiffness, torque = own.joints["spring"].T
-    dynamics = {
-        "damping": own.joints["viscous"][:, 0],
-        "frictionloss": own.joints["coulomb"][:, 0],
-        "armature": own.joints["rotor_inertia"][:, 0],
-        "stiffness": stiffness,
-        "springref": -torque / np.where(stiffness > 0.0, stiffness, np.inf),
-    }
+    dynamics = mujoco_attributes(own)
     root = ElementTree.Element("mujoco", model=robot.name)
     # Angles as they are, inertias as they are: nothing is to be derived from shapes or rounded.
     ElementTree.SubElement(root, "compiler", angle="radian", inertiafromgeom="false")
