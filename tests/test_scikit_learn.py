@@ -160,7 +160,7 @@ def grid(request, model):
 def remarks():
     """Two trajectories are few for a hybrid, and some of these tools shuffle rows."""
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "the learned part is left off")
+        warnings.filterwarnings("ignore", "the learned part is left out")
         warnings.simplefilter("ignore", LeakageWarning)
         yield
 

@@ -105,7 +105,7 @@ class SwingingLoad(NamelessEffect):
 
     kind = "swinging_load"
     drawn_against = "ddq"
-    title = "Something that swings with the link"
+    title = "Oscillating load on the link"
     formula = r"c_1\,\omega^2 z + c_2\,\omega\dot z,"
     formula += r"\quad \ddot z + 2\zeta\omega\dot z + \omega^2 z = -\ddot q_j"
     coefficients = unnamed_coefficients(2)

@@ -72,7 +72,7 @@ class FunctionOfTime(NamelessEffect):
 
     def not_shown(self, signals: Signals, joint: int) -> str | None:
         if len(signals.segments) < _DRIFTING:
-            return "too few recordings to tell a drift from what differs between them"
+            return "too few recordings to separate a drift from differences between them"
         return super().not_shown(signals, joint)
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
@@ -86,11 +86,11 @@ class FunctionOfTime(NamelessEffect):
 
 
 class SuddenOffset(NamelessEffect):
-    """A torque that sets in at some moment and stays, as after a collision or a slip."""
+    """Torque with an onset at some moment and stays, as after a collision or a slip."""
 
     kind = "sudden_offset"
     drawn_against = "time"
-    title = "Torque that sets in at some moment"
+    title = "Torque with an onset in time"
     formula = r"\tau_0\,[t \geq t_0]"
     coefficients = unnamed_coefficients(1)
     shapes = (Shape("moment", "s", (), -np.inf, np.inf, spacing="linear", scales=False),)
@@ -108,7 +108,7 @@ class SuddenOffset(NamelessEffect):
         return least < since < 1 - least
 
     def words(self, shape: Mapping[str, Any]) -> str:
-        return f"A torque that sets in at {shape['moment']:.6g} s"
+        return f"Torque with an onset at {shape['moment']:.6g} s"
 
     def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
         # a recording's length: moments between recordings are all alike
@@ -123,7 +123,7 @@ class FrictionSinceReversal(NamelessEffect):
 
     is_of_one_number = True
     kind = "friction_since_reversal"
-    title = "Friction that depends on the way since the last reversal"
+    title = "Friction that depends on the distance since the last reversal"
     formula = r"f(|q - q_\mathrm{turn}|)\,\mathrm{sign}\,\dot q"
     coefficients = unnamed_coefficients(len(_WAYS))
     depends_on = ("q_own", "dq_own")
@@ -141,7 +141,7 @@ class FunctionOfWaySinceReversal(NamelessEffect):
 
     is_of_one_number = True
     kind = "function_of_way_since_reversal"
-    title = "Function of the way since the last reversal"
+    title = "Function of the distance since the last reversal"
     formula = r"f(|q - q_\mathrm{turn}|)"
     coefficients = unnamed_coefficients(2 * len(_WAYS))
     depends_on = ("q_own", "dq_own")

@@ -93,7 +93,7 @@ class Saturation(Effect):
     needs = ("model_torque",)
     simplicity = 15
     rivals = ("torque_gain",)
-    separating_motion = "motion at lower torque, which the limit leaves alone"
+    separating_motion = "motion at lower torque, below the limit"
     reference = "Swevers, Verdonck, De Schutter (2007), IEEE Control Systems 27(5), 58-71."
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:

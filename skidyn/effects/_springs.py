@@ -29,7 +29,7 @@ class Offset(Effect):
     is_exact = True
     simplicity = 0
     rivals = ("asymmetric_friction", "spring", "temperature_offset")
-    separating_motion = "poses in which gravity acts with both signs; the sensor zeroed anew"
+    separating_motion = "poses in which gravity acts with both signs; zeroing the sensor again"
     reference = "Gautier, Khalil (1988), ICRA."
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:

@@ -159,5 +159,5 @@ class FrictionDrift(Effect):
 
     def not_shown(self, signals: Signals, joint: int) -> str | None:
         if signals.temperature is not None:
-            return "a temperature is logged, which says more about friction than time does"
+            return "a temperature is logged, which predicts friction better than time"
         return super().not_shown(signals, joint)

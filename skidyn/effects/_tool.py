@@ -53,7 +53,7 @@ class _ToolEffect(Effect):
 
     def not_shown(self, signals: Signals, joint: int) -> str | None:
         if len(np.unique(signals.trajectory)) < 2:
-            return "only one trajectory: nothing to compare it with"
+            return "there is only one trajectory, which cannot be compared with others"
         return None
 
 

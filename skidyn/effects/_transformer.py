@@ -136,9 +136,10 @@ def _with_further_columns(keys: Keys) -> Columns:
     n = max(1, len(own) // 3)
     ddq = own[2 * n : 3 * n] or None
     warnings.warn(
-        f"X has {len(own)} columns without names, which is not a multiple of 3: they are taken for "
-        f"q, dq{'' if ddq is None else ', ddq'} of {n} joint(s), and {max(0, len(own) - 3 * n)} "
-        "further column(s) handed on. Name the columns q1.., dq1.., ddq1.., or give n_joints.",
+        f"X has {len(own)} columns without names, which is not a multiple of 3: they are "
+        f"interpreted as q, dq{'' if ddq is None else ', ddq'} of {n} joint(s), and "
+        f"{max(0, len(own) - 3 * n)} further column(s) are passed on. Name the columns q1.., "
+        "dq1.., ddq1.., or give n_joints.",
         UserWarning,
         stacklevel=6,
     )
@@ -152,14 +153,14 @@ def _refuse(term: Term, columns: Columns) -> None:
     if effect.scope != "joint" or beyond:
         what = ", ".join(beyond) or f"scope {effect.scope!r}"
         raise EffectError(
-            f"{term.kind} does not follow from the motion of one joint alone ({what}); "
-            "use RBDRegressor, which holds the robot and its torque"
+            f"{term.kind} does not depend on the motion of one joint alone ({what}); use "
+            "RBDRegressor, which has the robot and its torque"
         )
     if term.is_open:
         example = ", ".join(f"{s.name!r}: .." for s in effect.shapes) or ".."
         raise EffectError(
             f"{term.kind} needs shape parameters; pass Term({term.kind!r}, ({term.joints[0]},), "
-            f"{{{example}}}) or use RBDRegressor, which finds them"
+            f"{{{example}}}) or use RBDRegressor, which estimates them"
         )
     for need in effect.needs:
         if getattr(columns, need) is None:

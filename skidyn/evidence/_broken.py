@@ -189,7 +189,7 @@ def broken_notes(signals: Signals, torque: Array, joint_names: tuple[str, ...]) 
             near = np.median(values[max(0, first - WIDTH) : first + WIDTH, j])
             count = f"{len(rows)} samples" if len(rows) > 1 else "1 sample"
             notes.append(
-                f"The {what} of joint {j + 1} ({joint_names[j]}) leaps away and back in {count} "
-                f"(the first in row {first}: {values[first, j]:.4g} among {near:.4g}): left out."
+                f"The {what} of joint {j + 1} ({joint_names[j]}) has outliers in {count} (the "
+                f"first in row {first}: {values[first, j]:.4g} among {near:.4g}): left out."
             )
     return notes

@@ -165,7 +165,7 @@ def _layout(names: Sequence[str], robot: Robot, columns: ColumnMap | None, path:
     if lost:
         raise LogError(
             f"{path}: lacks {', '.join(lost)}; it has {', '.join(names)}. If they have other "
-            "names, say which with columns={'q': [...], 'tau': [...]}."
+            "names, give them with columns={'q': [...], 'tau': [...]}."
         )
     if "time" not in found and not set(of["ddq"]) <= set(found):
         raise LogError(f"{path}: has neither time nor {of['ddq'][0]}..; one is needed")

@@ -226,14 +226,14 @@ def linear_terms(effects: Iterable[Any], n_joints: int) -> list[Term]:
     for term in terms:
         if term.effect.needs_fit:
             raise SkidynError(
-                f"the columns of {term.kind!r} need a fit of the model first, so one pass is not "
-                "enough; leave it out, or fit an RBDRegressor on data in memory"
+                f"the columns of {term.kind!r} require a fit of the model first, so one pass is "
+                "not enough; leave it out, or fit an RBDRegressor on data in memory"
             )
         if term.is_open:
             names = ", ".join(shape.name for shape in term.effect.shapes) or "found from the log"
             raise SkidynError(
-                f"{term.kind!r} has open shape parameters ({names}); give them with Term(...), for "
-                "example those found on a part of the data"
+                f"{term.kind!r} has unspecified shape parameters ({names}); give them with "
+                "Term(...), for example as found on a part of the data"
             )
     return terms
 

@@ -135,9 +135,7 @@ def design_excitation(
     if motion == "fourier":
         basis = FourierBasis(duration, base_frequency, harmonics, blend)
         if duration <= 2 * blend:
-            raise SkidynError(
-                f"a motion of {duration} s leaves no time beside blending for {blend} s"
-            )
+            raise SkidynError(f"a motion of {duration} s is too short for blending of {blend} s")
     known = make_model(model, effects)
     bounds = (limits or MotionLimits()).resolved(known.robot)
     before = recorded_information(known, recorded)
@@ -394,8 +392,8 @@ def _best_within(
         if trial:
             return trial
     raise SkidynError(
-        f"no motion was found that keeps the limits of {' and '.join(broken)}; widen them, or "
-        "narrow the position limits to poses that are allowed"
+        f"no motion was found within the limits of {' and '.join(broken)}; widen them, or "
+        "restrict the position limits to admissible poses"
     )
 
 

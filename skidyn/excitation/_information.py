@@ -159,7 +159,7 @@ def _information_of_log(model: Model, frame: Any) -> Array:
         names, len(names), model.robot.joint_names, require_acceleration=False
     )
     if columns.time is None:
-        raise SkidynError("a recording has no column 'time'; its length is needed")
+        raise SkidynError("a recording has no column 'time', which is needed for its duration")
     smooths = columns.ddq is None
     table = np.full((len(frame), len(names)), np.nan)
     table[:, columns.used()] = np.asarray(frame.iloc[:, columns.used()], dtype=float)

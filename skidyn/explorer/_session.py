@@ -227,7 +227,7 @@ class Session(Seen):
         if not pool:
             raise EffectError(
                 f"{kind} cannot be added to joint {joint}: this log does not show it there, its "
-                "fit is not physical, or it is in the model already"
+                "fit is not physical, or it is already in the model"
             )
         candidate = max(pool, key=lambda item: item[0])[1]
         self._push(candidate, joint, margin(kind, self.ranked(joint)))

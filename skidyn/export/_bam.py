@@ -146,7 +146,7 @@ def checked_actuator(actuator: str | None) -> str:
     """The servo, which has to be named: BAM's law of control depends on it."""
     if not isinstance(actuator, str):
         given = "missing" if actuator is None else repr(actuator)
-        raise SkidynError(f"actuator is {given}: the servo as BAM calls it, such as 'xl330'")
+        raise SkidynError(f"actuator is {given}: the name of the servo in BAM, such as 'xl330'")
     return actuator
 
 
@@ -281,7 +281,7 @@ def write_bam(
     left: tuple[str, ...] = ()
     if isinstance(model, BamModel):
         if joint is not None or actuator is not None or motor is not None:
-            raise SkidynError("joint, actuator and motor go with a fitted model, not a BamModel")
+            raise SkidynError("joint, actuator and motor are for a fitted model, not a BamModel")
     else:
         model, left = _of_joint(model, joint, checked_actuator(actuator), motor_constants(motor))
     write_json(path, {**model.parameters, "model": model.name, "actuator": model.actuator})
@@ -299,7 +299,7 @@ def joint_place(robot: Any, joint: str | int | None) -> int:
             f"joint is {joint!r}; expected one of {', '.join(names)}, or its number from 1"
         )
     if robot.joint_types[number - 1] == "prismatic":
-        raise SkidynError(f"{names[number - 1]} slides; BAM's servos turn")
+        raise SkidynError(f"{names[number - 1]} is prismatic; BAM's servos are revolute")
     return number - 1
 
 

@@ -49,9 +49,9 @@ def central_inertia(parameters: np.ndarray, body: str) -> CentralInertia | None:
     if moments[0] < -1e-9 * max(abs(moments[-1]), 1e-9):
         raise SkidynError(
             f"Body {body!r} has the principal moments {', '.join(f'{m:.3g}' for m in moments)} kg "
-            "m^2 about its center of mass; no real body has a negative one. Identify physically "
-            "consistent parameters: RBDRegressor(..., consistent=True), on the command line "
-            "--consistent."
+            "m^2 about its center of mass; physical bodies have none that is negative. Identify "
+            "physically consistent parameters: RBDRegressor(..., consistent=True), on the "
+            "command line --consistent."
         )
     return CentralInertia(mass, center, (central + central.T) / 2)
 

@@ -84,7 +84,7 @@ def merge_urdf(
         given.inertial_parameters, robot.inertial_parameters, rtol=1e-9, atol=1e-12
     ):
         raise SkidynError(
-            f"{edits.path} is not the URDF from which the model's robot was read: joints or "
+            f"{edits.path} is not the URDF from which the robot of the model was read: joints or "
             "inertial parameters differ"
         )
     links = {e.attributes.get("name"): e for e in edits.root.children if e.tag == "link"}
@@ -310,9 +310,10 @@ def _frames(
         )
         if apart > _ALIKE:
             raise SkidynError(
-                f"{path}: joint {robot.body_joints[body]!r} does not move its body as that of the "
-                f"robot moves {name!r} (apart by {apart:.2g} rad or m). Axis, zero position, and "
-                "the frame of the body below the first joint have to be those of the URDF's base"
+                f"{path}: joint {robot.body_joints[body]!r} does not move its body in the same "
+                f"way as the robot moves {name!r} (apart by {apart:.2g} rad or m). Axis, zero "
+                "position, and the frame of the body below the first joint have to agree with "
+                "the base of the URDF"
             )
     return found[0]
 
@@ -340,7 +341,7 @@ def _mjcf_text(parameters: np.ndarray, name: str) -> str:
     central = central_inertia(parameters, name)
     if central is None:
         raise SkidynError(
-            f"Body {name!r} would have no mass; MuJoCo refuses moving bodies without."
+            f"Body {name!r} would have no mass; MuJoCo refuses moving bodies without mass."
         )
     I = central.inertia
     full = numbers([I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]])
@@ -359,6 +360,6 @@ def _check_loads(mujoco: Any, data: bytes, source: Path) -> None:
             mujoco.MjModel.from_xml_path(trial.name)
         except ValueError as error:
             raise SkidynError(
-                f"MuJoCo refuses {source} with the identified numbers: {error}. Identify "
+                f"MuJoCo refuses {source} with the identified parameters: {error}. Identify "
                 "physically consistent parameters: RBDRegressor(..., consistent=True)"
             ) from None

@@ -92,14 +92,14 @@ def _add_body(
     element = ElementTree.SubElement(carrier, "body", {"name": name, **pose})
     central = central_inertia(parameters, name)
     if central is None:
-        raise SkidynError(f"Body {name!r} has no mass; MuJoCo refuses moving bodies without.")
+        raise SkidynError(f"Body {name!r} has no mass; MuJoCo refuses moving bodies without mass.")
     moments = np.linalg.eigvalsh(central.inertia)
     if moments[0] < _SMALLEST or moments[0] + moments[1] < moments[2] * (1 - 1e-9):
         raise SkidynError(
             f"Body {name!r} has the principal moments {', '.join(f'{m:.3g}' for m in moments)} kg "
-            "m^2, which break the triangle inequality or vanish; MuJoCo refuses them. Identify "
-            "physically consistent parameters, RBDRegressor(..., consistent=True), on the command "
-            "line --consistent."
+            "m^2, which violate the triangle inequality or vanish; MuJoCo refuses them. Identify "
+            "physically consistent parameters, RBDRegressor(..., consistent=True), on the "
+            "command line --consistent."
         )
     I = central.inertia
     ElementTree.SubElement(

@@ -69,7 +69,7 @@ def merge_usd(
     own = described(model, ("viscous", "coulomb", "rotor_inertia"))
     robot, file = own.robot, Path(path)
     if file.suffix != ".usda":
-        raise SkidynError(f"{path}: a layer of text has to end in .usda")
+        raise SkidynError(f"{path}: the name of a text layer has to end in .usda")
     if not Path(source).exists():
         raise SkidynError(f"{source}: no such file")
     stage = pxr.Usd.Stage.Open(os.fspath(source))
@@ -182,7 +182,7 @@ def _checked_carrier(robot: Robot, body: int, joint: Any, unit: _Units, stage: A
         raise SkidynError(f"joint {name!r} has no physics:body1, the body that it moves")
     carrier = stage.GetPrimAtPath(ends[1][0])
     if not carrier or carrier.IsInstanceProxy():
-        raise SkidynError(f"the body of joint {name!r} is not there, or is part of an instance")
+        raise SkidynError(f"the body of joint {name!r} does not exist, or is part of an instance")
     base, moved = (_frame(joint, k, unit.metre) for k in (0, 1))
     token = str(joint.GetAttribute("physics:axis").Get() or "X")
     axis = moved[0][:, "XYZ".index(token)]
@@ -206,8 +206,8 @@ def _checked_carrier(robot: Robot, body: int, joint: Any, unit: _Units, stage: A
         )
         if off > _ALIKE:
             raise SkidynError(
-                f"the frame of {carrier.GetName()!r} behind joint {name!r} is not that of the "
-                f"robot's description: it differs by {off:.3g} m or rad"
+                f"the frame of {carrier.GetName()!r} behind joint {name!r} differs from that of "
+                f"the robot's description by {off:.3g} m or rad"
             )
     return carrier
 

@@ -136,13 +136,13 @@ def compare_fleet(
     """
     if len(evidence) < FEWEST_ROBOTS:
         raise SkidynError(
-            f"{len(evidence)} robots are too few to see how robots of a type differ; "
+            f"{len(evidence)} robots are too few to estimate how robots of a type differ; "
             f"{FEWEST_ROBOTS} are needed"
         )
     parts = list(evidence.values())
     if any(part.columns != parts[0].columns for part in parts):
         odd = next(n for n, part in evidence.items() if part.columns != parts[0].columns)
-        raise SkidynError(f"the evidence of robot {odd!r} has other columns than the first one")
+        raise SkidynError(f"the evidence of robot {odd!r} has different columns than the first one")
     for name, part in evidence.items():
         if not all(np.isfinite(factor).all() for factor in part.factors.values()):
             raise SkidynError(

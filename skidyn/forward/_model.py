@@ -142,8 +142,9 @@ class ForwardModel:
         if unknown:
             names = ", ".join(map(str, unknown))
             raise SkidynError(
-                f"{names}: depends on past samples in a way that does not say how it goes on, and "
-                "cannot be simulated; fit a model without it, or derive its class from PathMemory"
+                f"{names}: depends on past samples in a way that cannot be continued step by "
+                "step, and cannot be simulated; fit a model without it, or derive its class from "
+                "PathMemory"
             )
         self.inside = inside
         self._program = self._traced(inside)

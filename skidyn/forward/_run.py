@@ -258,6 +258,6 @@ def _check_inertia(stepper: Stepper, state: State) -> None:
         row = int(np.argmin(least))
         raise SkidynError(
             f"the inertia matrix of the model has the eigenvalue {least[row]:.3g} at the start of "
-            f"piece {row}: such bodies cannot move. Fit with consistent=True, or give the links an "
-            "<inertial>."
+            f"piece {row}: such bodies cannot be simulated. Fit with consistent=True, or give the "
+            "links an <inertial>."
         )

@@ -77,7 +77,7 @@ def make_windows(signals: Signals, horizon: float | None) -> Windows:
                 pieces.append((rows.start + start, rows.start + end + 1))
             start, first = end, False
     if not pieces:
-        raise SkidynError("no stretch of the log holds two samples of one trajectory")
+        raise SkidynError("no part of the log has two samples of one trajectory")
     longest = max(b - a for a, b in pieces)
     index = np.empty((len(pieces), longest), dtype=np.int64)
     valid = np.zeros((len(pieces), longest), dtype=bool)

@@ -39,9 +39,9 @@ from skidyn.preprocessing import without_keys_inside
 Array = NDArray[np.float64]
 
 NOT_TESTED = (
-    "the learned part is left off: with fewer than three trajectories its gain cannot be told from "
-    "chance. Record more, cut a long recording of a motion that does not repeat into trajectories, "
-    "or set alpha=1 to keep whatever helps on held-out parts."
+    "the learned part is left out: with fewer than three trajectories its gain cannot be "
+    "distinguished from chance. Record more, split a long recording of a motion that does not "
+    "repeat into trajectories, or set alpha=1 to keep any part that helps on held-out data."
 )
 
 
@@ -342,7 +342,9 @@ def _fit_weighted(estimator: Any, X: Any, y: Array, weight: Array | None) -> Any
     if weight is None:
         return estimator.fit(X, y)
     if not has_fit_parameter(estimator, "sample_weight"):
-        raise ValueError(f"{type(estimator).__name__} takes no sample_weight; fit without it.")
+        raise ValueError(
+            f"{type(estimator).__name__} does not accept sample_weight; fit without it."
+        )
     return estimator.fit(X, y, sample_weight=weight)
 
 

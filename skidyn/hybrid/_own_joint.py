@@ -135,7 +135,9 @@ class OwnJointRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, Ba
         weights = {}
         if sample_weight is not None:
             if not has_fit_parameter(base, "sample_weight"):
-                raise ValueError(f"{type(base).__name__} takes no sample_weight; fit without it.")
+                raise ValueError(
+                    f"{type(base).__name__} does not accept sample_weight; fit without it."
+                )
             weights["sample_weight"] = _check_sample_weight(sample_weight, X, dtype=np.float64)
         self.estimators_ = Parallel(n_jobs=self.n_jobs)(
             delayed(clone(base).fit)(own, targets[:, j], **weights)

@@ -185,7 +185,7 @@ def _inside_box(
         k = "xyz".index(axis)
         if not (box_low[k] < 0 < box_high[k] or box_low[k] == 0 == box_high[k]):
             raise ValueError(
-                f"{name!r} is its own mirror image at {axis} = 0, and so is its centre of mass; "
+                f"{name!r} is symmetric about {axis} = 0, and so is its centre of mass; "
                 f"centre_of_mass requires it to be between {box_low[k]} and {box_high[k]} m"
             )
         centre[k] = 0.0
@@ -218,8 +218,8 @@ def _masses(known: BodyConstraints, names: Sequence[str], nominal: Array) -> Arr
         if np.isclose(scaled(1.0).sum(), known.total_mass):
             return scaled(1.0)
         raise ValueError(
-            f"total_mass={known.total_mass} kg does not go with the masses of the bodies, which "
-            f"together lie between {low.sum():.6g} and {high.sum():.6g} kg"
+            f"total_mass={known.total_mass} kg is inconsistent with the masses of the bodies, "
+            f"whose sum lies between {low.sum():.6g} and {high.sum():.6g} kg"
         )
     for _ in range(200):
         middle = float(np.sqrt(factors[0] * factors[1]))

@@ -81,7 +81,7 @@ def regressor_from_evidence(
     terms = linear_terms(effects, robot.n_joints)
     base = find_base_parameters(robot)
     if evidence.columns != column_names(robot, base.index, terms):
-        raise SkidynError("the evidence has other columns than the robot and its effects")
+        raise SkidynError("the evidence has different columns than the robot and its effects")
     coefficients, noise = weighted_solution(evidence)
     signal_names = [f"{s}{j + 1}" for s in ("q", "dq") for j in range(robot.n_joints)]
     names = ["time", "trajectory", *signal_names] if feature_names is None else list(feature_names)

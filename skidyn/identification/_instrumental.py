@@ -44,8 +44,8 @@ def instrumental(regression: Regression, prior_std: float | None = None) -> Solu
     """Instrumental-variable estimate, with the test whether it was needed."""
     if regression.instruments is None:
         raise ValueError(
-            "estimator='instrumental' needs fit(X, y, instruments=...): a table like X of a motion "
-            "whose errors have nothing to do with those of X, such as the reference positions"
+            "estimator='instrumental' needs fit(X, y, instruments=...): a table like X of a "
+            "motion whose errors are independent of those of X, such as the reference positions"
         )
     noise = regression.own_noise()
     for _ in range(PASSES):

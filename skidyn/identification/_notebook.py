@@ -54,7 +54,7 @@ def model_table(
             f"<td>{digits(float(noise[j]))} {'N' if slides else 'N m'}</td></tr>"
         )
     return (
-        "<table><thead><tr><th style='text-align:left'>Joint</th><th style='text-align:left'>"
-        "Effects, with 95 % intervals</th><th>Left by the fit</th></tr></thead>"
-        f"<tbody>{''.join(rows)}</tbody></table>"
+        "<table><thead><tr><th style='text-align:left'>Joint</th><th "
+        "style='text-align:left'>Effects, with 95 % "
+        f"intervals</th><th>Residual</th></tr></thead><tbody>{''.join(rows)}</tbody></table>"
     )

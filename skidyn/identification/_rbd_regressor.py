@@ -56,7 +56,7 @@ def _keeps_no_rows(model: RBDRegressor) -> bool:
     """Whether evidence is enough for the estimator of a model."""
     if getattr(ESTIMATORS.get(model.estimator), "rows", False):
         raise AttributeError(
-            f"estimator={model.estimator!r} looks at single rows, which partial_fit does not keep; "
+            f"estimator={model.estimator!r} needs single rows, which partial_fit does not keep; "
             "use fit, or another estimator"
         )
     return True
@@ -277,11 +277,11 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
             )
         if controller is not None and not method.simulates:
             raise ValueError(
-                f"estimator={self.estimator!r} takes no controller; 'output_error' does"
+                f"estimator={self.estimator!r} does not accept a controller; 'output_error' does"
             )
         if instruments is not None and self.estimator != "instrumental":
             raise ValueError(
-                f"estimator={self.estimator!r} takes no instruments; 'instrumental' does"
+                f"estimator={self.estimator!r} does not accept instruments; 'instrumental' does"
             )
         self.__dict__.pop("recordings_", None)
         signals, torque, order = self._begin(X, y, first=True)
@@ -364,10 +364,10 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
         if signals.time is None or problem.rows.counts.sum() >= max(unknowns, 1):
             return problem
         warn_about_log(
-            f"{signals.n_samples} samples make {int(problem.rows.counts.sum())} rows when they are "
-            "averaged over short windows of motion, too few to fit a model: the log is short, "
-            "scattered in time, or at rest. Every sample is taken as a row instead, without care "
-            "for noise, rest and reversals. Use a longer log of motion."
+            f"{signals.n_samples} samples make {int(problem.rows.counts.sum())} rows when they "
+            "are averaged over short windows of motion, too few to fit a model: the log is "
+            "short, scattered in time, or at rest. Every sample is used as a row instead, "
+            "without treatment of noise, rest and reversals. Use a longer log of motion."
         )
         if self._smooths():
             signals = smooth_motion(signals)

@@ -73,15 +73,15 @@ class Reading:
             holds = "numbers that are not whole" if fractions else "another number in every row"
             warn_about_log(
                 f"the column {which} of X, which is declared as that of the trajectories, holds "
-                f"{holds}. Rows follow each other only within a trajectory, so that hardly any "
-                "row has a neighbour and nothing is averaged. Give the column that numbers the "
-                "recordings (0, 1, ..), or trajectory=None; a clock goes to time="
+                f"{holds}. Rows are consecutive only within a trajectory, so that hardly any row "
+                "has a neighbour and no rows are averaged. Give the column that numbers the "
+                "recordings (0, 1, ..), or trajectory=None; give a clock as time="
             )
 
     def _without_clock(self, signals: Signals) -> Signals:
         if self._smooths():
             raise ColumnError(
-                "rows of X at the same time belong to several recordings, so that accelerations "
+                "rows of X with equal time belong to several recordings, so that accelerations "
                 "cannot be derived from them; number the recordings in a column 'trajectory', or "
                 "give ddq1.. and smooth=False"
             )
@@ -158,8 +158,8 @@ def _warn_of_leakage() -> None:
     warnings.warn(
         "the rows of X are not in the order of time, as after train_test_split or "
         "KFold(shuffle=True). They are sorted by trajectory and time and the fit is valid, but a "
-        "score on the rows between them is too good. Hold out whole "
-        "trajectories: TrajectoryKFold, GroupKFold, or GroupShuffleSplit",
+        "score on the rows between them is optimistic. Hold out whole trajectories: "
+        "TrajectoryKFold, GroupKFold, or GroupShuffleSplit",
         LeakageWarning,
         stacklevel=4,
     )

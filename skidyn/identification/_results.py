@@ -161,7 +161,7 @@ class Results:
         """
         check_is_fitted(self)
         if self.estimator != "instrumental":
-            raise SkidynError("the test compares with estimator='instrumental': fit with it first")
+            raise SkidynError("the test requires a fit with estimator='instrumental'")
         columns = (self.hausman_[key] for key in ("difference", "std", "p_value"))
         return [
             {"name": n, "difference": float(d), "std": float(s), "p_value": float(p)}

@@ -253,8 +253,8 @@ def find_bands(model: Prediction) -> PredictionBands:
     """
     if not hasattr(model, "bands_"):
         raise SkidynError(
-            "this model holds no errors of single samples: it was made from evidence or in parts. "
-            "Use fit for bands around predictions"
+            "this model has no errors of single samples because it was made from evidence or in "
+            "parts. Use fit for bands around predictions"
         )
     return model.bands_
 

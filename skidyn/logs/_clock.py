@@ -141,8 +141,8 @@ def align_channels(
         restarts = np.flatnonzero(np.diff(table["time"].to_numpy()) < 0)
         if len(restarts):
             raise LogError(
-                f"the clock of {name} goes back in row {restarts[0] + 1}: which rows of the other "
-                "channels belong to it cannot be told. Store every run in a file of its own."
+                f"the clock of {name} goes back in row {restarts[0] + 1}: the corresponding rows "
+                "of the other channels cannot be determined. Store every run in a separate file."
             )
     begin = max(table["time"].min() for table in tables)
     end = min(table["time"].max() for table in tables)
@@ -199,8 +199,8 @@ def _resampled(table: pd.DataFrame, rate: float, notes: list[str]) -> pd.DataFra
         clock = first + np.arange(int((last - first) * rate + 1e-6) + 1) / rate
         parts.append(_interpolate(part, np.minimum(clock, last)).assign(time=clock))
     if not parts:
-        raise LogError("no two samples of the log belong together, so it cannot be resampled.")
-    alone = f"; {lonely} row(s) that stand alone left out" if lonely else ""
+        raise LogError("the log has no two consecutive samples, so it cannot be resampled.")
+    alone = f"; {lonely} isolated row(s) left out" if lonely else ""
     how = "averaged" if _slower(1 / rate, time) else "interpolated"
     notes.append(f"{how} to {rate:g} Hz within {len(parts)} run(s) without a gap{alone}")
     regular: pd.DataFrame = pandas.concat(parts, ignore_index=True)
@@ -410,7 +410,7 @@ def derive_velocity(position: np.ndarray, time: np.ndarray, trajectory: np.ndarr
     for rows in find_segments(trajectory, time):
         if rows.stop - rows.start < 2:
             raise LogError(
-                f"row {rows.start} stands alone between gaps, so no velocity can be derived for "
+                f"row {rows.start} is isolated between gaps, so no velocity can be derived for "
                 "it; remove it or supply dq."
             )
         velocity[rows] = np.gradient(position[rows], time[rows], axis=0)

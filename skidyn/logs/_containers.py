@@ -85,8 +85,8 @@ def _refuse_other_files(path: Path, datasets: Sequence[Any]) -> None:
         if item.is_virtual or item.external:
             other = item.virtual_sources()[0].file_name if item.is_virtual else item.external[0][0]
             raise LogError(
-                f"{path}: the numbers of {item.name} lie in another file, {other}; files that a "
-                "log names are not opened. Copy them into the log."
+                f"{path}: the numbers of {item.name} are stored in another file, {other}; files "
+                "referenced by a log are not opened. Copy them into the log."
             )
 
 
@@ -243,7 +243,8 @@ def _runs(channels: list[Channel], path: Path) -> list[Channel]:
     ordered = sorted(channels, key=lambda c: [int(n) for n in re.findall(r"\d+", c.name)])
     tables = [c.table.assign(trajectory=k) for k, c in enumerate(ordered, 1)]
     warn_about_log(
-        f"{path}: {', '.join(c.name for c in ordered)} hold the same columns; each is a trajectory"
+        f"{path}: {', '.join(c.name for c in ordered)} have the same columns; each becomes a "
+        "trajectory"
     )
     table = pd.concat(tables, ignore_index=True)
     return [Channel(path.name, table, ordered[0].attributes)]

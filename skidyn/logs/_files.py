@@ -114,8 +114,8 @@ def _shape_of_rows(path: Path, separator: str | None, skip: int, max_bytes: int)
     for number, width, last in _rows_of_text(path, separator, skip):
         if shape.n_rows and width != shape.width:
             raise LogError(
-                f"{path}: line {number} has {width} fields, the lines before {shape.width}. "
-                "Was the recording cut off, or does a field hold the separator? Fix or remove "
+                f"{path}: line {number} has {width} fields, the lines before {shape.width}. The "
+                "recording may be truncated, or a field may contain the separator. Fix or remove "
                 "the line."
             )
         shape.width = width
@@ -164,8 +164,8 @@ def _names_of_fields(path: Path, cells: Sequence[str], headless: bool, shape: _S
         return [*cells, _NOTHING]
     if shape.width == len(cells) + 1:
         warn_about_log(
-            f"{path}: rows have one field more than the header. The first is taken for the names "
-            "of rows, as R writes them, and left out."
+            f"{path}: rows have one field more than the header. The first field is interpreted as "
+            "row names, as written by R, and left out."
         )
         return [_ROW_NAMES, *cells]
     raise LogError(
@@ -250,12 +250,12 @@ def of_one_length(arrays: Mapping[str, np.ndarray], source: str) -> dict[str, np
         if 2 * length > n and quantity_of(name) is not None:
             like = next(name for name, a in numeric.items() if len(a) == n)
             raise LogError(
-                f"{source}: {name} has {length} rows, {like} has {n}. Which rows belong together "
-                "cannot be known; store signals of one length."
+                f"{source}: {name} has {length} rows, {like} has {n}. Corresponding rows cannot "
+                "be determined; store signals of equal length."
             )
     if left := [f"{name} ({length})" for name, length in others.items() if length > 1]:
         names = ", ".join(left)
-        warn_about_log(f"{source}: of another length than {n} rows, and so left out: {names}")
+        warn_about_log(f"{source}: left out because their length is not {n} rows: {names}")
     return {name: a for name, a in numeric.items() if len(a) == n}
 
 
@@ -302,7 +302,7 @@ def _check_npy_header(archive: zipfile.ZipFile, member: zipfile.ZipInfo, path: P
         and int(np.prod(shape, dtype=object)) * dtype.itemsize > member.file_size
     ):
         raise LogError(
-            f"{path}: {member.filename} promises an array of shape {shape} but is short."
+            f"{path}: {member.filename} declares an array of shape {shape} but is truncated."
         )
 
 

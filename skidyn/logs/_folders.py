@@ -191,8 +191,8 @@ def _side_by_side(channels: Sequence[Channel]) -> list[Channel]:
         if partner is None:
             raise LogError(
                 f"{channel.name} has no time column and {len(channel.table)} rows, other than "
-                f"{', '.join(f'{c.name} ({len(c.table)})' for c in clocked)}: which rows belong "
-                "together cannot be told."
+                f"{', '.join(f'{c.name} ({len(c.table)})' for c in clocked)}: corresponding rows "
+                "cannot be determined."
             )
         joined[id(partner)].append(channel.table.reset_index(drop=True))
     return [

@@ -110,7 +110,9 @@ def decode(path: Path, topics: Sequence[str] | None, max_bytes: int) -> list[Cha
         raise
     except Exception as error:  # decoders raise whatever the bytes lead them to
         what = f"{type(error).__name__}: {error}"
-        raise LogError(f"{path}: damaged, or not what its suffix says ({what}).") from error
+        raise LogError(
+            f"{path}: damaged, or its suffix does not match its content ({what})."
+        ) from error
 
 
 def _decode(path: Path, topics: Sequence[str] | None, max_bytes: int) -> list[Channel]:
@@ -121,11 +123,13 @@ def _decode(path: Path, topics: Sequence[str] | None, max_bytes: int) -> list[Ch
         with path.open("rb") as file:
             if file.read(len(POINTER)) == POINTER:
                 raise LogError(
-                    f"{path}: a pointer of Git LFS, not the file itself. Fetch it with: git lfs "
-                    f"pull --include={path.name}"
+                    f"{path}: a Git LFS pointer instead of the file itself. Fetch it with: git "
+                    f"lfs pull --include={path.name}"
                 )
         if path.suffix.lower() == ".gz" and suffix not in TEXT:
-            raise LogError(f"{path}: only text is read compressed; unpack it with gunzip first.")
+            raise LogError(
+                f"{path}: only compressed text is read; unpack the file with gunzip first."
+            )
         if suffix in _READERS:
             return _READERS[suffix](path, max_bytes, topics)
     if (path / "metadata.yaml").exists():

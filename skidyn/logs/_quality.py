@@ -251,7 +251,7 @@ def check_log(frame: pd.DataFrame, robot: Robot | None = None) -> LogQuality:
     if same_stamps:
         time = regular_clock(time, trajectory)  # what else is wrong shows with the remedy alone
     elif not unique.all():
-        messages.append(f"{int((~unique).sum())} row(s) repeat the time of the row before.")
+        messages.append(f"{int((~unique).sum())} row(s) repeat the time of the previous row.")
         time, q, dq, tau, trajectory = (a[unique] for a in (time, q, dq, tau, trajectory))
     names = list(frame.attrs.get("joint_names", ())) if robot is None else list(robot.joint_names)
     if len(names) != n:
@@ -262,7 +262,7 @@ def check_log(frame: pd.DataFrame, robot: Robot | None = None) -> LogQuality:
     motion = Signals(q, dq, np.zeros_like(q), trajectory, time, prismatic=prismatic)
     measurement = Measurement(motion, tau, robot, names, same_stamps=same_stamps)
     if len(measurement.steps) == 0:
-        raise LogError("every trajectory of the log has a single row; nothing moves in it.")
+        raise LogError("every trajectory of the log has a single row and therefore no motion.")
     n_trajectories = len(np.unique(trajectory))
     checks = tuple(check_measurement(measurement))
     return LogQuality(
@@ -316,8 +316,8 @@ def _joints(measurement: Measurement) -> list[JointQuality]:
 
 
 _SINGLE = (
-    "there is a single trajectory: held-out trajectories cannot be judged, only held-out "
-    "stretches of it (split_gaps, split_dwells or several files give more)."
+    "there is a single trajectory: errors can only be evaluated on held-out parts of it "
+    "(split_gaps, split_dwells or several files give more trajectories)."
 )
 _MOTION_HEAD = "  position range  coverage     step   speed reversals"
 _TORQUE_HEAD = "      torque range  at limit  at rest     dq/q'  delay ms"

@@ -296,7 +296,7 @@ def _refuse_other_columns(
     if list(joints) != list(first_joints):
         raise LogError(
             f"{file}: its joints ({', '.join(joints)}) are not those of the first file "
-            f"({', '.join(first_joints)}). Pass robot= or columns= to say which belong together."
+            f"({', '.join(first_joints)}). Pass robot= or columns= to specify how they correspond."
         )
     differing = sorted(set(map(str, table.columns)) ^ set(map(str, first.columns)))
     if differing:

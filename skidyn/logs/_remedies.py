@@ -98,20 +98,20 @@ def mend_columns(
         notes.append(f"flip: the sign of {', '.join(columns)} was changed in {_all(table)} rows")
     for name, value in _each(remedies.gain, table, "gain"):
         if not np.isfinite(value) or value == 0:
-            raise LogError(f"gain: {name} is to be multiplied by {value}; expected a number.")
+            raise LogError(f"gain: {name} cannot be multiplied by {value}; expected a number.")
         table[name] = value * table[name]
         notes.append(f"gain: {name} was multiplied by {value:g} in {_all(table)} rows")
     if remedies.summed:
         _take_apart(table, n, remedies.summed, notes)
     for name, value in _each(remedies.zero, table, "zero"):
         if not np.isfinite(value):
-            raise LogError(f"zero: {name} is to read {value} at zero; expected a number.")
+            raise LogError(f"zero: {name} has the value {value} at zero; expected a number.")
         if not re.fullmatch(r"q\d+", name):
             raise LogError(f"zero: {name} is not a position; expected q1 .. q{n}.")
         for column in (name, name.replace("q", "cmd")):
             if column in table.columns:
                 table[column] = table[column] - value
-        notes.append(f"zero: {value:g} was taken off {name} in {_all(table)} rows")
+        notes.append(f"zero: {value:g} was subtracted from {name} in {_all(table)} rows")
     return table
 
 
@@ -138,11 +138,11 @@ def restore_gravity(table: pd.DataFrame, robot: Robot | None, notes: list[str]) 
     pull = robot.gravity_torque(table[[f"q{k + 1}" for k in range(n)]].to_numpy(dtype=float))
     if not np.any(pull):
         raise LogError(
-            "restore_gravity has nothing to add: no joint of the robot carries weight, or its "
-            "gravity is zero."
+            "restore_gravity has no effect: no joint of the robot carries weight, or its gravity "
+            "is zero."
         )
     names = [f"tau{k + 1}" for k in range(n)]
-    notes.append(f"restore_gravity: torque of gravity was added in {_all(table)} rows")
+    notes.append(f"restore_gravity: the gravity torque was added in {_all(table)} rows")
     restored = table[names].to_numpy() + pull
     return table.assign(**dict(zip(names, restored.T, strict=True)))
 
@@ -193,17 +193,17 @@ def mend_rows(table: pd.DataFrame, n: int, remedies: Remedies, notes: list[str])
         before = len(table)
         for name, delay in _each(remedies.late, table, "late"):
             if not np.isfinite(delay):
-                raise LogError(f"late: {name} is late by {delay:g}; expected seconds.")
+                raise LogError(f"late: the delay of {name} is {delay:g}; expected seconds.")
         table = advance_channels(table, dict(remedies.late))
         if table.empty:
             raise LogError(
-                f"late: no recording is as long as the delays {dict(remedies.late)} in s take, so "
+                f"late: no recording is longer than the delays {dict(remedies.late)} in s, so "
                 "that no row is left."
             )
         told = ", ".join(f"{name} by {1e3 * v:g} ms" for name, v in remedies.late.items())
         notes.append(
-            f"late: {told} taken out; {before - len(table)} of {before} rows, at the ends of "
-            "stretches, left out"
+            f"late: {told} removed; {before - len(table)} of {before} rows at the ends of "
+            "continuous parts left out"
         )
     return table
 
@@ -261,8 +261,9 @@ def _take_apart(table: pd.DataFrame, n: int, summed: Mapping[str, str], notes: l
         own, held = re.fullmatch(r"q(\d+)", name), re.fullmatch(r"(-?)q(\d+)", str(other))
         if own is None or held is None or own[1] == held[2]:
             raise LogError(
-                f"summed: {name}={other} is not a position and that of another joint which it "
-                "holds; expected such as q3=q2, or q3=-q2 where the other is taken off it."
+                f"summed: {name}={other} does not name a position and the position of another "
+                "joint that it includes; expected for example q3=q2, or q3=-q2 if the other is "
+                "subtracted from it."
             )
         joint, sign, before = own[1], -1.0 if held[1] else 1.0, held[2]
         if max(int(joint), int(before)) > n or min(int(joint), int(before)) < 1:
@@ -271,7 +272,7 @@ def _take_apart(table: pd.DataFrame, n: int, summed: Mapping[str, str], notes: l
             columns = f"{quantity}{joint}", f"{quantity}{before}"
             if set(columns) <= set(table.columns):
                 table[columns[0]] = recorded[columns[0]] - sign * recorded[columns[1]]
-        notes.append(f"summed: {other} was taken off {name} in {_all(table)} rows")
+        notes.append(f"summed: {other} was subtracted from {name} in {_all(table)} rows")
 
 
 def _flipped(item: str | int, table: pd.DataFrame, joints: Sequence[str]) -> list[str]:
@@ -341,7 +342,7 @@ def _unwrapped(table: pd.DataFrame, names: Sequence[str], notes: list[str]) -> p
         if not np.array_equal(q, table[name]):
             changed[name] = q
     told = ", ".join(changed) or "no position"
-    notes.append(f"unwrap: leaps by a turn were taken out of {told}")
+    notes.append(f"unwrap: jumps by a full turn were removed from {told}")
     return table.assign(**changed)
 
 
@@ -354,7 +355,7 @@ def _split_at_leaps(table: pd.DataFrame, names: Sequence[str], notes: list[str])
     cut[1:] = number[1:] != number[:-1]
     cut[rows] = 1
     notes.append(
-        f"split_leaps: {len(rows)} of {len(table)} rows, to which positions leap, begin a "
+        f"split_leaps: {len(rows)} of {len(table)} rows after a jump of positions begin a new "
         "trajectory"
     )
     return table.assign(trajectory=np.cumsum(cut) + 1)
@@ -371,16 +372,20 @@ def _without_lowpass(
     for name, constant in _each(constants, table, "lowpass"):
         if name in ("time", "trajectory") or not np.isfinite(constant) or constant <= 0:
             raise LogError(
-                f"lowpass: {name} is to be without a low pass of {constant:g} s; expected a signal "
-                "and the positive time constant of its low pass, such as tau=0.04."
+                f"lowpass: got {name} and {constant:g} s; expected a signal and the positive time "
+                "constant of its low-pass filter, such as tau=0.04."
             )
         values = table[name].to_numpy(dtype=float).copy()
         for rows in find_segments(number, time):
             if np.any(np.diff(time[rows]) <= 0):
-                raise LogError("lowpass: the clock does not rise; mend it first (clock='regular').")
+                raise LogError(
+                    "lowpass: time does not increase; fix the clock first (clock='regular')."
+                )
             values[rows] = without_lowpass(time[rows], values[rows], constant)
         changed[name] = values
-        notes.append(f"lowpass: one of {1e3 * constant:g} ms was undone in {_all(table)} of {name}")
+        notes.append(
+            f"lowpass: a filter of {1e3 * constant:g} ms was undone in {_all(table)} of {name}"
+        )
     return table.assign(**changed)
 
 

@@ -72,7 +72,7 @@ class _JsonDecoders:
 
 def _read_json(data: bytes) -> Any:
     if len(data) > LARGEST_MESSAGE:
-        raise LogError(f"a message in JSON has {len(data)} bytes; no state of joints is so long")
+        raise LogError(f"a JSON message has {len(data)} bytes, which is too long for a joint state")
     return json.loads(data, object_hook=lambda fields: SimpleNamespace(**fields))
 
 

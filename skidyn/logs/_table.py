@@ -210,8 +210,8 @@ def _clean(
             raise LogError(f"{source}: the trajectory column must hold whole numbers.")
         if len(number) and np.abs(number).max() > LARGEST_NUMBER:
             raise LogError(
-                f"{source}: the trajectory column holds {number[np.abs(number).argmax()]:g}; "
-                f"numbers up to {LARGEST_NUMBER} can be told apart. Number the trajectories from 1."
+                f"{source}: the trajectory column holds {number[np.abs(number).argmax()]:g}; only "
+                f"numbers up to {LARGEST_NUMBER} are distinct. Number the trajectories from 1."
             )
         number = number.astype(np.int64)
     else:
@@ -225,15 +225,15 @@ def _clean(
             )
         if restarts:
             match.notes.append(
-                f"{source}: the clock starts anew {restarts} time(s); each is a trajectory"
+                f"{source}: the clock restarts {restarts} time(s); each run becomes a trajectory"
             )
     table["trajectory"] = number
     keep = check_time_order(time, number, source)
     if not keep.all() and not _same_stamps(table, n, number, source, options):
         first = int(np.argmin(keep))
         warn_about_log(
-            f"{source}: {int((~keep).sum())} of {len(keep)} rows repeat the time of the row before "
-            f"(first in row {first}); the first of each is kept."
+            f"{source}: {int((~keep).sum())} of {len(keep)} rows repeat the time of the previous "
+            f"row (first in row {first}); the first of each is kept."
         )
         table = table[keep].reset_index(drop=True)
     _split(table, n, own_trajectories, match, source, options)
@@ -260,8 +260,8 @@ def _same_stamps(
     same = count_same_stamps(table["time"].to_numpy(), q, number)
     if same and options.remedies.clock != "regular":
         raise LogError(
-            f"{source}: {same} of {len(table)} rows have the time of the row before although "
-            "joints have moved on: the time stamps are too coarse for the samples. If samples were "
+            f"{source}: {same} of {len(table)} rows have the time of the previous row although "
+            "joints have moved: the time stamps are too coarse for the samples. If samples were "
             "taken at even steps: --clock regular (in Python: clock='regular')."
         )
     return same

@@ -230,7 +230,5 @@ class BrokenSamples(Check):
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         names = tuple(map(str, measurement.joint_names))
         for note in broken_notes(measurement.signals, measurement.torque, names):
-            what, _, rest = note.rstrip(".").partition(" leaps away and back in ")
-            yield self.suspicion(
-                f"{what[0].lower()}{what[1:]} leaps away and back", f"in {rest}", "noted"
-            )
+            what, _, rest = note.rstrip(".").partition(" has outliers in ")
+            yield self.suspicion(f"{what[0].lower()}{what[1:]} has outliers", f"in {rest}", "noted")

@@ -143,8 +143,8 @@ def _rms(left: Array, use: NDArray[np.bool_]) -> Array:
     if not use.any(axis=0).all():
         j = int(np.flatnonzero(~use.any(axis=0))[0])
         raise SkidynError(
-            f"joint {j + 1} never moves in one of the recordings, so its error says nothing of "
-            "wear; give recordings in which every joint moves"
+            f"joint {j + 1} never moves in one of the recordings, so its error gives no "
+            "information about wear; give recordings in which every joint moves"
         )
     square = np.where(use, left**2, 0.0).sum(axis=0) / use.sum(axis=0)
     return np.asarray(np.sqrt(square))

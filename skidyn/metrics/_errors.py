@@ -84,7 +84,8 @@ def rmse_over_range(
     still = np.flatnonzero(~(np.asarray(span) > 0))
     if len(still):
         raise ValueError(
-            f"the torque of joint {still[0] + 1} has no range; give torque_range, or use the RMSE."
+            f"the torque of joint {still[0] + 1} is constant and has no range; give torque_range, "
+            "or use the RMSE."
         )
     return _reduced(np.sqrt(((true - pred) ** 2).mean(axis=0)) / span, multioutput)
 
@@ -161,7 +162,9 @@ def percent_improvement(before: ArrayLike, after: ArrayLike) -> Any:
     """
     old, new = np.asarray(before, dtype=np.float64), np.asarray(after, dtype=np.float64)
     if (old <= 0).any():
-        raise ValueError("an error before the compensation is not positive; there is no ratio.")
+        raise ValueError(
+            "an error before the compensation is not positive, so that the ratio is undefined."
+        )
     improvement = 100.0 * (1.0 - new / old)
     return float(improvement) if improvement.ndim == 0 else improvement
 

@@ -144,7 +144,7 @@ def _message(found: Bunch) -> str:
         )
     if found.repeated_share > REPEATED_SHARE:
         parts.append(
-            f"{found.repeated_share:.0%} of the test rows of a fold repeat a motion of its "
+            f"{found.repeated_share:.0%} of the test rows of a fold repeat a motion in its "
             "training rows; hold out whole motions (TrajectoryKFold, PhaseKFold)"
         )
     return "The folds leak: " + "; ".join(parts) + "." if parts else ""

@@ -19,10 +19,10 @@ def order_of_log(estimator: Any, X: NDArray[Any], keys: Keys) -> NDArray[np.intp
     order = time_order(X, keys)
     if order is not None:
         warnings.warn(
-            f"{type(estimator).__name__} predicts a row from the rows before it, but the rows of X "
-            "are not in the order of time, as after train_test_split or KFold(shuffle=True). They "
-            "are sorted by trajectory and time; rows whose predecessors are missing are predicted "
-            "without them. Hold out whole trajectories: TrajectoryKFold, GroupKFold or "
+            f"{type(estimator).__name__} predicts a row from the rows before it, but the rows of "
+            "X are not in the order of time, as after train_test_split or KFold(shuffle=True). "
+            "They are sorted by trajectory and time; rows with missing predecessors are "
+            "predicted without them. Hold out whole trajectories: TrajectoryKFold, GroupKFold or "
             "GroupShuffleSplit, and resource='max_epochs' in HalvingGridSearchCV",
             LeakageWarning,
             stacklevel=4,

@@ -431,7 +431,7 @@ def _held_out_rows(
     last = np.arange(n_rows) >= n_rows - max(1, int(fraction * n_rows))
     if not (weight[~last] > 0).any() or not (weight[last] > 0).any():
         raise ValueError(
-            "a callback watches rows that are held out from the training; X has too few rows "
+            "a callback monitors rows that are held out from the training; X has too few rows "
             f"({n_rows}). Give more trajectories, or leave out such callbacks."
         )
     return last

@@ -433,7 +433,7 @@ def _fit(estimator: Any, X: Any, y: Any, sample_weight: Array | None) -> Any:
         return estimator.fit(X, y)
     inner = estimator.estimator if isinstance(estimator, MultiOutputRegressor) else estimator
     if not has_fit_parameter(inner, "sample_weight"):
-        raise ValueError(f"{type(inner).__name__} takes no sample_weight; fit without it.")
+        raise ValueError(f"{type(inner).__name__} does not accept sample_weight; fit without it.")
     return estimator.fit(X, y, sample_weight=sample_weight)
 
 

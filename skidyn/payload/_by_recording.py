@@ -104,8 +104,8 @@ def differing(shares: Shares, joint_names: Sequence[str]) -> list[str]:
     r, j = divmod(int(np.argmax(np.where(told, away / shares.std, 0.0))), told.shape[1])
     return [
         f"In {shares.names[r]}, {joint_names[j]} measures {100 * shares.values[r, j]:.1f} ± "
-        f"{100 * shares.std[r, j]:.1f} % of what the other recordings let expect: its drive gain "
-        "or its friction was not the same there."
+        f"{100 * shares.std[r, j]:.1f} % of the torque expected from the other recordings: its "
+        "drive gain or its friction was different there."
     ]
 
 

@@ -80,11 +80,11 @@ class DriveGainEstimate:
         ]
         if not np.allclose(self.factors, self.gains, equal_nan=True):
             shown = ", ".join(f"{factor:.3f}" for factor in self.factors)
-            lines.append(f"over the gains by which the runs were read: {shown}")
+            lines.append(f"relative to the gains with which the runs were read: {shown}")
         for name, own in zip(self.by_recording.names, self.by_recording.values, strict=True):
             if np.isfinite(own).any():
                 shown = ", ".join(f"{gain:.4g}" for gain in own)
-                lines.append(f"by {name} alone: {shown}")
+                lines.append(f"from {name} alone: {shown}")
         return "\n".join([*lines, *self.notes])
 
     def __str__(self) -> str:
@@ -232,15 +232,16 @@ def _estimate(runs: Runs, robot: Robot, known: Array, nominal: Array) -> DriveGa
     gains, std = np.where(is_open, np.nan, gains), np.where(is_open, np.nan, std)
     half = interval_factor(len(factors)) * std[:, None] * [-1.0, 1.0]
     notes = [
-        f"All gains rest on the mass of {known[0]:g} kg: if it is 1 % too large, so are they. "
-        "Friction and every inertial parameter scale with them."
+        f"All gains are proportional to the mass of {known[0]:g} kg: if it is 1 % too large, so "
+        "are they. Friction and all inertial parameters scale with them."
     ]
     hardly = is_open | (np.abs(half[:, 1]) >= np.abs(gains))
     if hardly.any():
         names = ", ".join(np.array(robot.joint_names)[hardly])
         notes.append(
-            f"These runs say little about the gain of {names}, whose current hardly depends on the "
-            "load. Record motion in which that joint turns the load out of balance."
+            f"These runs contain little information about the gain of {names}, whose current "
+            "hardly depends on the load. Record motion in which that joint turns the load out of "
+            "balance."
         )
 
     def expected(left_out: NDArray[np.int64]) -> list[Array]:

@@ -144,9 +144,9 @@ class PayloadEstimate:
                 if np.isfinite(value)
             )
             return [
-                f"payload at {self.link}: its mass does not show in this motion, its first moment "
-                f"does, in kg m (95 %):  {shown}",
-                "give its centre of mass (com), and its mass follows from this",
+                f"payload at {self.link}: this motion determines its first moment but not its "
+                f"mass; first moment in kg m (95 %):  {shown}",
+                "if its centre of mass (com) is given, its mass follows from the first moment",
             ]
         low, high = self.mass_interval
         return [
@@ -282,8 +282,8 @@ def identify_payload(
         torque = torque - _prediction(model, loaded)
         terms = []
         notes.append(
-            "Without unloaded runs the model is taken as exact: its errors are part of the payload "
-            "and not of the intervals."
+            "Without unloaded runs the model is assumed to be exact: its errors are included in "
+            "the payload but not in the intervals."
         )
     runs = make_runs(
         signals,
@@ -311,8 +311,8 @@ def _prediction(model: Robot | RBDRegressor, loaded: Any) -> Array:
     """Torque of a fitted model on the loaded runs, in their order."""
     if isinstance(model, Robot):
         raise SkidynError(
-            "without unloaded runs a fitted RBDRegressor is needed: it says what the robot's own "
-            "torque is"
+            "without unloaded runs a fitted RBDRegressor is needed, which predicts the torque of "
+            "the robot itself"
         )
     check_is_fitted(model)
     frames = [loaded] if hasattr(loaded, "columns") else list(loaded)
@@ -342,9 +342,9 @@ def _estimate(runs: Runs, link: str, notes: list[str], com: Array | None = None)
     is_open: NDArray[np.bool_] = np.any(np.abs(free[:, hidden]) > 0, axis=1)
     if is_open[:4].all():
         raise SkidynError(
-            f"this motion shows neither mass nor first moment of a payload at {link}: the torque "
-            "of no joint depends on them, or on them apart from the robot's own. Turn it about a "
-            "joint whose axis is not vertical, with and without the load."
+            f"this motion shows neither mass nor first moment of a payload at {link}: no torque "
+            "depends on them, or they cannot be separated from those of the robot. Turn the "
+            "payload about a joint whose axis is not vertical, with and without the load."
         )
     left = np.array([_solve(rows) for rows in without_each(factors)])[:, :width] @ free.T
     std = jackknife(left)
@@ -392,9 +392,11 @@ def _estimate(runs: Runs, link: str, notes: list[str], com: Array | None = None)
         )
     if is_open.any():
         names = ", ".join(np.array(SYMBOLS)[is_open])
-        notes.append(f"This motion does not determine {names}; they are those of a small sphere.")
+        notes.append(
+            f"This motion does not determine {names}; the values are those of a small sphere."
+        )
     if com is not None:
-        notes.append("The centre of mass is the one that was given; the mass rests on it.")
+        notes.append("The centre of mass is the given one; the mass depends on it.")
         parameters = _sphere(body[0], com) if is_open[4:].any() else body
     else:
         parameters = _consistent(whole, solution[:10], is_open)
@@ -403,7 +405,7 @@ def _estimate(runs: Runs, link: str, notes: list[str], com: Array | None = None)
     least = wide * float(np.max(std[[4, 7, 9]]))  # of Ixx, Iyy, Izz; NaN where one is open
     if np.trace(about) < least:
         notes.append(
-            "The inertia about the centre of mass is smaller than this motion can tell "
+            "The inertia about the centre of mass is smaller than this motion can resolve "
             f"({least:.2g} kg m^2 about each axis)."
         )
     com_std = jackknife(left[:, 1:4] / left[:, :1])
@@ -459,7 +461,8 @@ def _disagreement(shares: Array, errors: Array) -> list[str]:
     j = felt[worst]
     return [
         f"Joint {j + 1} alone gives {100 * shares[j]:.0f} % of this mass, {distance[worst]:.1f} "
-        "standard errors from all joints together: check its drive gain before the mass is used."
+        "standard errors from the estimate of all joints: check its drive gain before using the "
+        "mass."
     ]
 
 

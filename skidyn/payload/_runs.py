@@ -132,7 +132,7 @@ def in_body(robot: Robot, link: str | None) -> tuple[int, Array]:
         raise SkidynError(f"the robot {robot.name!r} has no link {link!r}")
     placement = robot.links[link]
     if placement.body < 0:
-        raise SkidynError(f"link {link!r} does not move: no torque depends on what it carries")
+        raise SkidynError(f"link {link!r} does not move: no torque depends on its load")
     frame = np.eye(4)
     frame[:3, :3], frame[:3, 3] = placement.rotation, placement.translation
     units = pseudo_inertia(np.eye(10))
@@ -200,7 +200,7 @@ def _read(robot: Robot, frame: Any) -> tuple[Signals, Array, bool]:
     columns = resolve_columns(names, len(names), robot.joint_names, require_acceleration=False)
     given = columns.ddq is not None
     if columns.time is None:
-        raise SkidynError("a run has no column time, by which it is smoothed and averaged")
+        raise SkidynError("a run has no column time, which is needed for smoothing and averaging")
     columns = replace(columns, temperature=None)
     table = np.zeros((len(frame), len(names)))
     for k in columns.used():

@@ -106,7 +106,9 @@ def estimate_delay(
     """
     a, b = np.asarray(reference, dtype=float), np.asarray(channel, dtype=float)
     if a.ndim != 1 or a.shape != b.shape:
-        raise ValueError(f"reference and channel must be columns alike; got {a.shape}, {b.shape}.")
+        raise ValueError(
+            f"reference and channel must be columns of equal shape; got {a.shape}, {b.shape}."
+        )
     clock, step = _clock(len(a), time, rate)
     runs = np.zeros(len(a), dtype=int) if trajectory is None else np.asarray(trajectory)
     reach = int(np.ceil(largest / step)) + 1
@@ -119,7 +121,8 @@ def estimate_delay(
         products += _block_products(x, y, reach)
     if not products:
         raise ValueError(
-            f"no stretch of the log is long enough for delays up to {largest} s; lower largest."
+            f"no continuous part of the log is long enough for delays up to {largest} s; lower "
+            "largest."
         )
     table = np.array(products)  # (blocks, 3, shifts): products and both energies
     total = table.sum(axis=0)
@@ -128,8 +131,8 @@ def estimate_delay(
     best, correlation = _peak(total)
     if abs(best) >= reach - 1:
         raise ValueError(
-            f"the correlation is largest at the edge of {largest} s: raise largest, or the two "
-            "signals do not follow the same quantity."
+            f"the correlation is largest at the edge of {largest} s: raise largest, or check "
+            "whether both signals measure the same quantity."
         )
     groups = [table[k::BLOCKS].sum(axis=0) for k in range(min(BLOCKS, len(table)))]
     left = np.array([_peak(total - group)[0] for group in groups]) if len(groups) > 1 else None

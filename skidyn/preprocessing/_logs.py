@@ -78,7 +78,7 @@ def _average_periods(frame: pd.DataFrame, period: float) -> pd.DataFrame:
     start, span = time[0], time[-1] - time[0]
     n_periods = int(np.floor(span / period))
     if n_periods < 2:
-        raise ValueError(f"the recording of {span:.4g} s holds no two periods of {period} s.")
+        raise ValueError(f"the recording of {span:.4g} s has fewer than two periods of {period} s.")
     if span / period - n_periods > 0.5:
         raise ValueError(
             f"the last {span - n_periods * period:.4g} s are not a whole period; cut them."

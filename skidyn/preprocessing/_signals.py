@@ -343,6 +343,6 @@ def refuse_columns_there(names: list[str] | None, columns: Array, derivatives: i
     there = sorted({name for name in made if name in given})
     if there:
         raise ColumnError(
-            f"X has {', '.join(there)} already, which would be appended again. Leave them out of X "
-            "to derive them anew, or the transformer to keep them"
+            f"X has {', '.join(there)} already, which would be appended again. Leave them out of "
+            "X to derive them again, or omit the transformer to keep them"
         )

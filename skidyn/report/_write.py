@@ -153,7 +153,7 @@ def write_comparison(path: PathLike, summary: dict[str, Any]) -> tuple[Path, Pat
     """
     beside = Path(path).with_suffix(".json")
     if beside == Path(path):
-        raise SkidynError(f"{path}: the page needs another ending, such as .html")
+        raise SkidynError(f"{path}: the name of the page needs another suffix, such as .html")
     writable(beside)  # neither without the other
     page = write_text(path, render_comparison(summary))
     return page, write_json(beside, summary["report"])

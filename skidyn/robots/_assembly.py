@@ -231,7 +231,7 @@ def _moving_joints(
         if name not in independent:
             reason = "is fixed" if name not in following else f"mimics {following[name].leader!r}"
             raise RobotDescriptionError(
-                f"joints names {name!r}, which {reason} and has no own torque."
+                f"joints names {name!r}, which {reason} and has no torque of its own."
             )
     if len(set(selected)) < len(selected):
         raise RobotDescriptionError(f"joints names a joint twice: {_listed(list(selected))}.")

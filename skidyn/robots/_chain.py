@@ -132,9 +132,9 @@ def describe_chain(
     for name in links:
         if name not in found and np.any(links[name].parameters):
             raise RobotDescriptionError(
-                f"The link {name!r} has a mass and the chain has no such frame"
-                f"{suggest(name, names)}. Build the chain of the whole robot and lock joints by "
-                "joints=, or give the inertia of its links as a mapping."
+                f"The link {name!r} has a mass, but the chain has no such "
+                f"frame{suggest(name, names)}. Build the chain of the whole robot and lock joints "
+                "by joints=, or give the inertia of its links as a mapping."
             )
     return Description("chain", {n: replace(links.get(n, found[n]), name=n) for n in found}, moved)
 

@@ -153,7 +153,7 @@ def link_of(
         parameters = transform_inertial(central, rotation, center)
     if not np.isfinite(parameters).all():
         raise RobotDescriptionError(
-            f"The mass or inertia of {what} is too large to be a number; check its size and units."
+            f"The mass or inertia of {what} is too large; check its size and units."
         )
     return Link(name, parameters, _fault(inertia, what))
 
@@ -213,7 +213,7 @@ def _fault(matrix: np.ndarray, what: str) -> str:
         )
     if moments[0] + moments[1] < moments[2] - _MOMENT_TOLERANCE * abs(moments[-1]):
         warnings.warn(
-            f"The principal moments {listed} kg m^2 of {what} break the triangle inequality: no "
+            f"The principal moments {listed} kg m^2 of {what} violate the triangle inequality: no "
             "distribution of positive mass has them. They are used as given.",
             RobotDescriptionWarning,
             stacklevel=3,

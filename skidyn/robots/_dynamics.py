@@ -187,7 +187,8 @@ class RigidBodyDynamics:
             )
         except np.linalg.LinAlgError as error:
             raise SkidynError(
-                "The mass matrix is singular: a joint moves no mass. Give the links an <inertial>."
+                "The mass matrix is singular because a joint moves no mass. Give the links an "
+                "<inertial>."
             ) from error
         return solved[..., 0]
 

@@ -110,7 +110,7 @@ def _joint(
     if not slide and kind != mujoco.mjtJoint.mjJNT_HINGE:
         raise RobotDescriptionError(
             f"The joint {name!r} is a ball or a free joint; supported are hinge and slide. Remove "
-            "the free joint of the base: the robot stands on its base."
+            "the free joint of the base: the base of the robot is fixed."
         )
     for what, value in (
         ("armature", model.dof_armature[dof]),
@@ -118,8 +118,8 @@ def _joint(
     ):
         if value:
             warnings.warn(
-                f"The {what} of joint {name!r} is not part of the rigid body and is left out; the "
-                f"effect {'rotor_inertia' if what == 'armature' else 'spring'!r} stands for it.",
+                f"The {what} of joint {name!r} is not part of the rigid body and is left out; use "
+                f"the effect {'rotor_inertia' if what == 'armature' else 'spring'!r} instead.",
                 RobotDescriptionWarning,
                 stacklevel=2,
             )
@@ -157,8 +157,8 @@ def _followers(mujoco: Any, model: Any) -> dict[int, Mimic]:
         linear = model.eq_type[e] == mujoco.mjtEq.mjEQ_JOINT and not np.any(factors[2:])
         if not linear or leader < 0 or not model.eq_active0[e]:
             warnings.warn(
-                f"The equality constraint {e} of the model is left out: only active ones that tie "
-                "a joint to another by a constant ratio are understood.",
+                f"The equality constraint {e} of the model is left out: only active ones that "
+                "couple two joints by a constant ratio are supported.",
                 RobotDescriptionWarning,
                 stacklevel=2,
             )

@@ -145,7 +145,8 @@ class _Reader:
         inertial = only(element, "inertial", what)
         if inertial is None:
             warnings.warn(
-                f"The {what} has no <inertial>: it has 1 kg and 1 kg m^2, as the standard says.",
+                f"The {what} has no <inertial>: it is assigned 1 kg and 1 kg m^2, as specified by "
+                "the standard.",
                 RobotDescriptionWarning,
                 stacklevel=2,
             )

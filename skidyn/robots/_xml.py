@@ -86,8 +86,8 @@ def parse_robot_element(data: bytes, path: str = "robot.urdf.xacro") -> ElementT
         expanded = Path(path).name.removesuffix(".xacro").removesuffix(".urdf") + ".urdf"
         expanded = expanded if expanded != Path(path).name else f"expanded_{expanded}"
         raise RobotDescriptionError(
-            f"The description holds xacro macros; expand them first: xacro {shlex.quote(path)} > "
-            f"{shlex.quote(expanded)} (pip install xacro brings it without ROS)."
+            f"The description contains xacro macros; expand them first: xacro {shlex.quote(path)} "
+            f"> {shlex.quote(expanded)} (pip install xacro installs it without ROS)."
         )
     for element in list(root):
         if element.tag == "link":
@@ -219,8 +219,8 @@ def _refuse_declarations(data: bytes) -> None:
 
     def refuse(*_: object) -> int:
         raise RobotDescriptionError(
-            "The description declares a document type or entities, which could expand without end "
-            "or read other files; a URDF needs none. Remove the <!DOCTYPE ...> part."
+            "The description declares a document type or entities, which could expand without "
+            "bound or read other files; a URDF needs none. Remove the <!DOCTYPE ...> part."
         )
 
     parser = expat.ParserCreate()

@@ -96,7 +96,7 @@ def simulate_bam_servo(
     bench = _read(robot, log, gain, volts, step)
     lost = [key for key in ("kt", "R", "armature") if key not in servo.parameters]
     if lost:
-        raise SkidynError(f"the servo lacks {', '.join(lost)}, which its motion depends on")
+        raise SkidynError(f"the servo lacks {', '.join(lost)}, on which its motion depends")
     values = {"q_offset": 0.0, **servo.parameters}
     q, dq = _run(bench, servo.name, {k: np.array([[v]]) for k, v in values.items()})
     columns = {"q1": bench.on_rows(q[0])}
@@ -228,7 +228,9 @@ class _Bench:
 
 def _read(robot: Robot, log: Any, gain: Any, volts: Any, step: float) -> _Bench:
     if robot.n_joints != 1 or robot.joint_types[0] == "prismatic":
-        raise SkidynError("a servo is fitted on a robot of one joint that turns, as on BAM's bench")
+        raise SkidynError(
+            "a servo is fitted on a robot with one revolute joint, as on BAM's test bench"
+        )
     names = column_names(log)
     lost = [name for name in ("time", "q1", "q_ref1") if name not in (names or [])]
     if lost:

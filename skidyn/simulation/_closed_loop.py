@@ -103,8 +103,8 @@ def simulate_closed_loop(
     if static.left:
         left = ", ".join(name_term(static.robot, term) for term in static.left)
         raise SkidynError(
-            f"{left}: depends on more than the present q, dq and ddq and cannot be simulated here;"
-            " fit a model without it first"
+            f"{left}: depends on more than the current q, dq and ddq and cannot be simulated "
+            "here; fit a model without it first"
         )
     n = static.robot.n_joints
     gains = [_gain(x, n, name) for x, name in ((stiffness, "stiffness"), (damping, "damping"))]
@@ -166,8 +166,8 @@ def _check_inertia(torque: ScalarFunction, q: Array) -> None:
         if not least > 0.0:
             raise SkidynError(
                 f"the inertia matrix of the model has the eigenvalue {least:.3g} in row {row} of "
-                "the reference: such bodies cannot move. Fit with consistent=True, or give the "
-                "links an <inertial>."
+                "the reference: such bodies cannot be simulated. Fit with consistent=True, or "
+                "give the links an <inertial>."
             )
 
 
@@ -222,8 +222,8 @@ def _follow(
     if solution.status != 0:
         raise SkidynError(
             f"trajectory {trajectory}: the model left its reference by more than {_LOST:g} rad "
-            f"(m), or the solver gave up ({solution.message}). Are stiffness and damping those of "
-            "the controller, and is no friction of the model negative?"
+            f"(m), or the solver failed ({solution.message}). Check that stiffness and damping "
+            "are those of the controller, and that no friction of the model is negative."
         )
     q, dq = solution.y[:n].T, solution.y[n:].T
     ddq = [acceleration(*row) for row in zip(q, dq, wanted(time), velocity(time), strict=True)]

@@ -327,7 +327,7 @@ class SimulationVerdict:
         low, high = (f"{100 * np.expm1(x):+.0f} %" for x in (self.low, self.high))
         lost = self.after.n_lost - self.before.n_lost
         more = f" With the change {lost} piece(s) grow without bound." if lost > 0 else ""
-        said = "changes by an amount that may be chance"
+        said = "does not change significantly"
         if self.worsens or self.improves:
             said = "grows" if self.worsens else "falls"
         return (
@@ -399,8 +399,8 @@ def judge_by_simulation(
         task = read_task(model, X, y, controller, horizon)
         if len(task.windows.rows) < 2:
             raise SkidynError(
-                "one piece is not enough to tell a change from chance; give a longer log or a "
-                "shorter horizon"
+                "one piece is not enough to distinguish a change from chance; give a longer log "
+                "or a shorter horizon"
             )
         errors.append(errors_of(model, task, *run(ForwardModel(model), task, step), horizon))
     return compare_errors(*errors)

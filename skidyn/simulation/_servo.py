@@ -150,14 +150,14 @@ def fit_servo(robot: Robot, log: Any, *, shared: bool = False) -> Controller:
     if len(hidden):
         names = ", ".join(robot.joint_names[j] for j in hidden)
         remedy = (
-            "Give a Controller with the gain that you know"
+            "Give a Controller with the known gain"
             if shared
             else "Give --controller fit-shared (in Python: shared=True) if all joints have the "
-            "same servo, or a Controller with the gain that you know"
+            "same servo, or a Controller with the known gain"
         )
         raise SkidynError(
-            f"this log does not show the servo gain of {names}: the error of position does not "
-            f"follow the robot's weight there. {remedy}"
+            f"this log does not determine the servo gain of {names}: the position error there is "
+            f"not related to the weight of the robot. {remedy}"
         )
     wanted, _ = _late(signals, reference, delay)
     _warn_of_other_gains(
@@ -204,10 +204,10 @@ def _warn_of_other_gains(
     if told:
         all_ = ", ".join(f"{1 / v:.3g}" for v in (whole[0, :1] if shared else whole[0]))
         warnings.warn(
-            f"the servo gain that follows the robot's weight differs between recordings: "
-            f"{listed(told)}, {all_} in all of them. Its gain was changed, or its torque "
-            "or speed is at a limit in some; take the recordings with the same "
-            "settings that ask for no more than the servo can give",
+            "the servo gain estimated from the weight of the robot differs between recordings: "
+            f"{listed(told)}, {all_} in all of them. The gain was changed, or the torque or speed "
+            "of the servo is at a limit in some; use recordings with the same settings that stay "
+            "within the limits of the servo",
             LogWarning,
             stacklevel=3,
         )

@@ -117,9 +117,9 @@ class ServoFinding:
         before, after, beside = (
             f"{1e3 * error:.3g}" for error in (self.before, self.after, self.beside)
         )
-        said = f"the simulated motion errs by {after} in place of {before} m{self.unit}"
+        said = f"the error of the simulated motion is {after} instead of {before} m{self.unit}"
         if self.beside >= self.before:
-            return f"{said}; no other effect lowers that"
+            return f"{said}; no other effect reduces it"
         return f"{said}; with {inside(title_of(self.rival))} it would be {beside}"
 
     def to_dict(self) -> dict[str, Any]:
@@ -203,8 +203,8 @@ def explain_servo_motion(
     pieces = len(task.windows.rows)
     if pieces < FEWEST_PIECES:
         raise LogError(
-            f"the log holds {pieces} piece(s) of {PIECE:g} s; effects are judged on pieces left "
-            f"out, which takes {FEWEST_PIECES}"
+            f"the log holds {pieces} piece(s) of {PIECE:g} s; effects are judged on held-out "
+            f"pieces, which requires {FEWEST_PIECES}"
         )
     least = STANDS_OUT * np.maximum(_encoder_noise(model.robot_, X, task.signals.q), SMALLEST)
     arm = _Arm(model, task, known, {j - 1 for j in wanted})

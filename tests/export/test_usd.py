@@ -162,7 +162,7 @@ def test_wrong_stages_are_refused(model, own):
     cases = {
         "joints with the name 'elbow'": ('"elbow"', '"knee"'),
         "turns about": ('physics:axis = "Y"', 'physics:axis = "Z"'),
-        "is not that of the robot": ("(40, 0, 0)", "(50, 0, 0)"),
+        "differs from that of the robot": ("(40, 0, 0)", "(50, 0, 0)"),
         "no physics:body1": ("rel physics:body1 = </arm/lower>", ""),
     }
     for message, (old, new) in cases.items():

@@ -130,7 +130,7 @@ def test_parameters_without_meaning_are_refused():
     ):
         with pytest.raises(ValueError, match=message):
             RBDRegressor(ROBOT, **wrong).fit(X, y)
-    with pytest.raises(ValueError, match="takes no instruments"):
+    with pytest.raises(ValueError, match="does not accept instruments"):
         RBDRegressor(ROBOT).fit(X, y, instruments=X)
     with pytest.raises(AttributeError):
         RBDRegressor(ROBOT, estimator="robust").partial_fit(X, y)

@@ -23,7 +23,7 @@ def test_every_coefficient_stands_in_the_table_with_its_error(model):
 
 
 def test_a_test_of_instruments_needs_instruments(model):
-    with pytest.raises(SkidynError, match="fit with it first"):
+    with pytest.raises(SkidynError, match="requires a fit"):
         model.durbin_wu_hausman()
 
 

@@ -77,7 +77,7 @@ def test_no_bands_without_samples(log):
     evidence = evidence_from_motion(robot, *states, robot.inverse_dynamics(*states), FRICTION)
     names = [f"{s}{j}" for s in ("q", "dq", "ddq") for j in (1, 2)]
     from_evidence = regressor_from_evidence(robot, evidence, FRICTION, feature_names=names)
-    with pytest.raises(SkidynError, match="holds no errors of single samples"):
+    with pytest.raises(SkidynError, match="has no errors of single samples"):
         from_evidence.predict_interval(np.hstack(list(states)))
 
 

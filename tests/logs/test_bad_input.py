@@ -147,7 +147,7 @@ def test_archives_that_unpack_to_too_much_are_refused(tmp_path):
     np.lib.format.write_array_header_1_0(header, shape)
     with zipfile.ZipFile(tmp_path / "lie.npz", "w") as archive:
         archive.writestr("t.npy", header.getvalue() + b"\0" * 80)
-    with pytest.raises(LogError, match="promises an array of shape"):
+    with pytest.raises(LogError, match="declares an array of shape"):
         read_log(tmp_path / "lie.npz")
     (tmp_path / "no.npz").write_bytes(b"no archive")
     with pytest.raises(LogError, match="not a NumPy archive"):

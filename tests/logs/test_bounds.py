@@ -282,5 +282,5 @@ def test_a_message_of_json_without_end_is_refused(tmp_path):
         channel = out.register_channel("/joint_states", "json", schema)
         out.add_message(channel, 0, b'{"name": [' + b"{}," * MIB + b"0]}", 0)
         out.finish()
-    with pytest.raises(LogError, match="no state of joints is so long"):
+    with pytest.raises(LogError, match="too long for a joint state"):
         read_log(tmp_path / "log.mcap", check=False)

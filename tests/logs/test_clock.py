@@ -62,7 +62,7 @@ def test_resampling_does_not_fill_a_gap():
     table = align_channels([pd.DataFrame({"time": t, "q1": t})], ["a"], 20.0, notes)
     np.testing.assert_allclose(table["q1"], table["time"])
     assert not ((table["time"] > 0.991) & (table["time"] < 2.99)).any()
-    assert notes[0].endswith("1 row(s) that stand alone left out")
+    assert notes[0].endswith("1 isolated row(s) left out")
 
 
 def test_a_slower_clock_averages_vibration_away():
@@ -99,7 +99,7 @@ def test_a_mean_reaches_into_no_gap_and_over_no_missing_value():
 def test_channels_whose_clock_starts_anew_cannot_be_brought_together():
     fast = pd.DataFrame({"time": np.tile(np.arange(5) / 10, 2), "q1": 0.0})
     slow = pd.DataFrame({"time": np.arange(3) / 5, "tau1": 0.0})
-    with pytest.raises(LogError, match="the clock of a goes back in row 5.*file of its own"):
+    with pytest.raises(LogError, match="the clock of a goes back in row 5.*separate file"):
         align_channels([fast, slow], ["a", "b"], None, [])
     unread = fast.assign(time=np.r_[np.nan, np.arange(9)])
     with pytest.raises(LogError, match="the clock of a is not a number in row 0"):
@@ -132,5 +132,5 @@ def test_velocity_does_not_cross_trajectories():
     q = np.r_[5 * t[:4], 100 - t[4:]][:, None]
     dq = derive_velocity(q, t, np.repeat([0, 1], 4))
     np.testing.assert_allclose(dq[:, 0], [5] * 4 + [-1] * 4)
-    with pytest.raises(LogError, match="row 4 stands alone"):
+    with pytest.raises(LogError, match="row 4 is isolated"):
         derive_velocity(q[:5], t[:5], np.array([0, 0, 0, 0, 1]))

@@ -78,7 +78,7 @@ def test_groups_with_the_same_columns_are_trajectories(tmp_path):
         for k in (2, 10):
             fill(file.create_group(f"run_{k}"))
             file[f"run_{k}"]["q"][...] += k
-    with pytest.warns(LogWarning, match="run_2, run_10 hold the same columns; each is a traj"):
+    with pytest.warns(LogWarning, match="run_2, run_10 have the same columns; each becomes a traj"):
         frame = read_log(tmp_path / "log.h5", check=False)
     assert frame["trajectory"].nunique() == 2
     assert frame["q1"][0] == pytest.approx(2) and frame["q1"][N] == pytest.approx(10)

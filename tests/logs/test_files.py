@@ -20,14 +20,14 @@ def read(path, text):
 
 def test_row_names_of_r_shift_no_column(tmp_path):
     rows = "".join(f"{k},{row}\n" for k, row in enumerate(ROWS.split(), 1))
-    with pytest.warns(LogWarning, match="names of rows, as R writes them"):
+    with pytest.warns(LogWarning, match="row names, as written by R"):
         frame = read(tmp_path / "log.csv", HEADER + rows)
     np.testing.assert_array_equal(frame[["time", "q1", "tau1"]].iloc[1], [2, 0.2, 0.3])
 
 
 def test_quoted_row_names_of_r_separated_by_blanks(tmp_path):
     rows = "".join(f'"{k}" {row}\n' for k, row in enumerate(ROWS.replace(",", " ").splitlines()))
-    with pytest.warns(LogWarning, match="as R writes them"):
+    with pytest.warns(LogWarning, match="as written by R"):
         frame = read(tmp_path / "log.txt", '"time" "q1" "tau1"\n' + rows)
     np.testing.assert_array_equal(frame["q1"], [0.1, 0.2, 0.3])
 

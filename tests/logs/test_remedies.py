@@ -111,7 +111,7 @@ def test_a_low_pass_is_undone_within_recordings(read):
         filtered.loc[rows, "tau1"] = values
     mended = read(filtered, lowpass={"tau1": 0.03})
     np.testing.assert_allclose(mended["tau1"], LOG["tau1"], atol=1e-9)
-    assert any(note.startswith("lowpass: one of 30 ms") for note in mended.attrs["notes"])
+    assert any(note.startswith("lowpass: a filter of 30 ms") for note in mended.attrs["notes"])
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
@@ -129,16 +129,16 @@ def test_sign_from_the_command(read):
         ({"order": [1, 1]}, r"order: \[1, 1\] is not an order of 2 joints"),
         ({"order": {"volts": [2, 1]}}, "order: 'volts' is none of"),
         ({"order": {"temp": [2, 1]}}, "order: the log has no temp1"),
-        ({"gain": {"tau1": 0.0}}, "gain: tau1 is to be multiplied by 0.0"),
+        ({"gain": {"tau1": 0.0}}, "gain: tau1 cannot be multiplied by 0.0"),
         ({"gain": {"volts": 2.0}}, "gain: the log has no volts"),
         ({"zero": {"tau1": 2.0}}, "zero: tau1 is not a position"),
-        ({"zero": {"q1": float("nan")}}, "zero: q1 is to read nan"),
+        ({"zero": {"q1": float("nan")}}, "zero: q1 has the value nan"),
         ({"late": {"volts": 0.1}}, "late: the log has no volts"),
-        ({"late": {"tau": 100.0}}, "late: no recording is as long as"),
-        ({"late": {"tau": float("nan")}}, "late: tau1 is late by nan"),
+        ({"late": {"tau": 100.0}}, "late: no recording is longer than"),
+        ({"late": {"tau": float("nan")}}, "late: the delay of tau1 is nan"),
         ({"lowpass": {"volts": 0.1}}, "lowpass: the log has no volts"),
-        ({"lowpass": {"tau": 0.0}}, "lowpass: tau1 is to be without a low pass of 0 s"),
-        ({"lowpass": {"time": 0.1}}, "lowpass: time is to be without"),
+        ({"lowpass": {"tau": 0.0}}, "lowpass: got tau1 and 0 s"),
+        ({"lowpass": {"time": 0.1}}, "lowpass: got time and"),
         ({"clock": "even"}, "clock is 'even'"),
         ({"torque_sign": "guess"}, "torque_sign is 'guess'"),
         ({"torque_sign": "command"}, "the log has no cmd1, cmd2"),
@@ -208,9 +208,9 @@ def test_positions_that_hold_those_before_them(read):
     "summed, message",
     [
         ({"q3": "q2"}, "the log has q1 .. q2"),
-        ({"q2": "q2"}, "expected such as q3=q2"),
-        ({"q2": "elbow"}, "expected such as q3=q2"),
-        ({"tau2": "q1"}, "expected such as q3=q2"),
+        ({"q2": "q2"}, "expected for example q3=q2"),
+        ({"q2": "elbow"}, "expected for example q3=q2"),
+        ({"tau2": "q1"}, "expected for example q3=q2"),
     ],
 )
 def test_sums_that_cannot_be_taken_apart(read, summed, message):

@@ -96,7 +96,7 @@ def test_paper_head_and_weights(log):
         found = bll.fit(X, y).predict(X)
         np.testing.assert_array_equal(clone(bll).fit(X, y).predict(X), found)  # seeds the head too
     assert found.shape == y.shape
-    with pytest.raises(ValueError, match="takes no sample_weight"):
+    with pytest.raises(ValueError, match="does not accept sample_weight"):
         bll.fit(X, y, sample_weight=np.ones(len(X)))
 
 

@@ -43,7 +43,7 @@ def found(currents):
 def test_gains_and_load(currents, found):
     np.testing.assert_allclose(found.gains[:5], GAINS[:5], rtol=0.03)
     np.testing.assert_allclose(found.com, currents[0].parameters["com"], atol=0.005)
-    assert "rest on the mass" in found.text and "N m/A" in found.text
+    assert "proportional to the mass" in found.text and "N m/A" in found.text
     assert json.loads(json.dumps(found.to_dict()))["gains"] == list(found.gains)
 
 
@@ -65,7 +65,7 @@ def test_corrects_gains_that_were_used_for_reading(currents, found):
     )
     np.testing.assert_allclose(other.gains, found.gains, rtol=1e-4)
     np.testing.assert_allclose(other.factors * wrong, other.gains)
-    assert "by which the runs were read" in other.text
+    assert "with which the runs were read" in other.text
 
 
 def test_gain_of_one_recording_that_differs(currents, found):

@@ -75,7 +75,7 @@ def test_a_fitted_model_stands_for_unloaded_runs(runs, found):
     )
     other = identify_payload(model, loaded)
     assert other.mass == pytest.approx(found.mass, rel=0.02)
-    assert any("taken as exact" in note for note in other.notes)
+    assert any("assumed to be exact" in note for note in other.notes)
     with pytest.raises(SkidynError, match="a fitted RBDRegressor is needed"):
         identify_payload(log.robot, loaded)
 

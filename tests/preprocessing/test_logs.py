@@ -29,7 +29,7 @@ def test_periods_of_one_recording():
     average = average_repetitions(log, period=2.5)
     assert average["time"].max() < 2.5
     np.testing.assert_allclose(average["q1"], np.sin(2 * np.pi * average["time"] / 2.5), atol=1e-3)
-    with pytest.raises(ValueError, match="no two periods"):
+    with pytest.raises(ValueError, match="fewer than two periods"):
         average_repetitions(log, period=9.0)
     with pytest.raises(ValueError, match="not a whole period"):
         average_repetitions(log, period=6.0 / 1.0 - 0.5 - 1.5)

@@ -38,7 +38,7 @@ def test_point_mass_is_accepted_and_impossible_inertia_warned_about():
         warnings.simplefilter("error")
         Robot.from_urdf(robot(link("a"), point, joint("j", "a", "b")))
     odd = link("b", 1, GOOD_INERTIA.replace('izz="1"', 'izz="3"'))
-    with pytest.warns(UserWarning, match="link 'b' break the triangle inequality"):
+    with pytest.warns(UserWarning, match="link 'b' violate the triangle inequality"):
         Robot.from_urdf(robot(link("a"), odd, joint("j", "a", "b")))
 
 
