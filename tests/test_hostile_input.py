@@ -118,7 +118,8 @@ def test_numbers_of_an_hdf5_log_do_not_lie_in_other_files(world):
         layout[:] = h5py.VirtualSource("../secret/other.h5", "q1", shape=(10,))
         file.create_virtual_dataset("q1", layout)
     for name in ("external.h5", "virtual.h5"):
-        with pytest.raises(LogError, match=f"{name}: the numbers of /q1 are stored"):
+        told = f"{name}: the numbers of /q1 are stored in another file"
+        with pytest.raises(LogError, match=told):
             read_log(name)
     with h5py.File("link.h5", "w") as file:
         file["time"], file["q1"], file["tau1"] = time, time, time
