@@ -20,7 +20,7 @@ SLOW, FAST = 0.25, 0.7
 
 @dataclass(frozen=True)
 class Comparison:
-    """Measured against predicted torque; the prediction never saw the sample's trajectory.
+    """Measured and predicted torque; each sample is predicted without its trajectory.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class Comparison:
         Samples on which effects are judged: the sliding ones by default, and those at reversals
         where hysteresis was found.
     dry_friction : ndarray of shape (n_samples, n_joints), optional
-        Dry friction in the prediction, N m or N; None where the model does not tell.
+        Dry friction in the prediction, N m or N; None if the model does not provide it.
 
     Examples
     --------

@@ -60,7 +60,7 @@ def confidence(
     whole_recordings : bool, default=True
         Whether it was judged on whole recordings left out.
     alike : bool, default=False
-        Whether a kind that acts on other joints explains as much.
+        Whether a kind that acts on other joints explains the data equally well.
     rivalled : bool, default=False
         Whether the data cannot separate it from another explanation of its joints.
     few : bool, default=False

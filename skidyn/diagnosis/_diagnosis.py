@@ -68,25 +68,24 @@ def diagnose(
     n_jobs: int | None = None,
     checks: Sequence[Suspicion] | None = None,
 ) -> Diagnosis:
-    """Compare a model with measurements and learn which physical effects it lacks.
+    """Compare a model with measurements and find the physical effects that it lacks.
 
     Parameters
     ----------
     model : RBDRegressor or fitted regressor
         The model to be judged. An :class:`~skidyn.identification.RBDRegressor` is refitted together
-        with every candidate effect, fold by fold; any other fitted regressor is taken as it is and
-        its residual is diagnosed. A model of the first kind is taken out of a search or a
-        ``TransformedTargetRegressor``, and out of a ``Pipeline``. The better model of a
-        ``Pipeline`` is a ``Pipeline``.
+        with every candidate effect, fold by fold; for any other fitted regressor the residual is
+        diagnosed without refitting. A model of the first kind is extracted from a search, a
+        ``TransformedTargetRegressor``, or a ``Pipeline``. For a ``Pipeline`` the completed model is
+        a ``Pipeline``.
     X : DataFrame or array of shape (n_samples, n_features)
         Motion, following the X contract, with ``time`` and ``trajectory`` where they are known.
     tau : array-like of shape (n_samples, n_joints), optional
         Measured torque, N m (N for sliders); may be left out with a controller.
     controller : Controller, optional
         Position servos from whose commands in X (``q_ref1..`` or ``cmd1..``) the torque is computed
-        where ``tau`` is None (:func:`skidyn.simulation.servo_torque`). There is no sensor then that
-        could be wrong, so that checks of it are left out, and a limit that all servos are known to
-        have is no effect.
+        where ``tau`` is None (:func:`skidyn.simulation.servo_torque`). In this case checks of the
+        torque sensor are omitted, and a known limit of all servos is not an effect.
     robot : Robot, optional
         Needed for regressors that have none of their own.
     effects : iterable of str, optional
@@ -101,7 +100,7 @@ def diagnose(
     settings : Settings, optional
         Thresholds of the search.
     force : bool, default=False
-        Continue although a check is certain that the log is wrong
+        Continue although a check is certain of an error in the log
         (:func:`skidyn.measurement.check_measurement`).
     sample_weight : array-like of shape (n_samples,), optional
         Weight of every sample in all fits; those of weight 0 are left out.
@@ -128,7 +127,7 @@ def diagnose(
     EffectError
         The catalogue has no such effect.
     ValueError
-        ``settings``, ``smooth`` or ``n_jobs`` has no meaning, or neither torque nor controller is
+        ``settings``, ``smooth`` or ``n_jobs`` is invalid, or neither torque nor controller is
         given.
 
     Examples

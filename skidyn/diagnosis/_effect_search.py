@@ -36,15 +36,15 @@ def _refits(search: EffectSearchCV) -> bool:
 
 
 class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEstimator):
-    """Find the effects a rigid-body model lacks, add them, and predict with the best model.
+    """Find the effects that a rigid-body model lacks, add them, and predict with the best model.
 
     The diagnosis adds one finding after the other. Models with the first k of them are scored on
-    held-out folds, and findings are kept as far as they raise the score in most folds: what stands
-    out where effects are judged may bring nothing in a score that counts every sample.
+    held-out folds, and findings are kept as long as they raise the score in most folds: an effect
+    that is significant on the judged samples may not improve a score over all samples.
     ``diagnosis_`` has all findings.
 
-    What was added fades out beyond the motion of the log: a function of the position that was
-    fitted to a part of the travel is no law of the rest.
+    Added effects fade out beyond the motion of the log, since a function of the position that was
+    fitted to a part of the travel is not valid elsewhere.
 
     Parameters
     ----------
@@ -57,20 +57,20 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
     smooth : bool, default=True
         Derive velocity and acceleration from the positions in the search; False takes those of X.
     scoring : str, callable or None, default=None
-        By what the models of ``cv_results_`` are scored on held-out folds; R2 if None. The effects
-        themselves are judged by :func:`diagnose`, whatever the scoring.
+        Score of the models of ``cv_results_`` on held-out folds; R2 if None. The effects themselves
+        are judged by :func:`diagnose`, independent of the scoring.
     cv : int, cross-validator or iterable, default=5
-        Folds of these scores: by trajectory where it is a number.
+        Folds of these scores; by trajectory if it is a number.
     refit : bool, default=True
         Fit the best model to all rows.
     n_jobs : int or None, default=None
         Processes for the scores.
     fade_out : bool, default=True
-        Let what was added fade out, in the scores as well, where the best model is less sure than
-        anywhere in the log. How sure it is tells the standard deviation of its prediction
+        Let added effects fade out, also in the scores, where the uncertainty of the best model
+        exceeds that in the log. The uncertainty is the standard deviation of its prediction
         (:meth:`~skidyn.identification.RBDRegressor.predict`) relative to that of the given model.
-        What was added counts in full up to the largest ratio in the log, or 1, and not at all at
-        twice that ratio. False predicts by ``best_estimator_`` alone.
+        Added effects have full weight up to the largest ratio in the log, or 1, and zero weight at
+        twice that ratio. False predicts with ``best_estimator_`` only.
 
     Attributes
     ----------
@@ -79,28 +79,27 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
     best_estimator_ : estimator
         The given model with ``best_effects_`` added, fitted to all data; with ``refit=True``.
     fading_ : FadingCorrection
-        The given model and the best one, both fitted to all data; where something was added that
-        fades out.
+        The given model and the best one, both fitted to all data; only if added effects fade out.
     best_params_ : dict
         The parameter ``effects`` of the best model, by its name in ``estimator``.
     best_effects_ : list of Term
-        What was added: the findings up to the last that raised the score.
+        Added effects: the findings up to the last one that raised the score.
     best_index_ : int
         Row of ``cv_results_`` of the best model: the last that scores higher than the best before
         it, in the mean and by the signed ranks of the differences over the folds [1]_, at the level
-        of 5 % (one-sided): in all folds where there are five or fewer. A single fold can carry the
-        mean of its differences and their standard error alike, not their ranks.
+        of 5 % (one-sided): in all folds where there are five or fewer. A single fold can dominate
+        the mean of the differences and their standard error, but not their ranks.
     best_score_ : float
         Its mean score on held-out folds.
     cv_results_ : dict of str to ndarray
         One entry per step, as scikit-learn's searches have them: ``params`` (list of dict),
         ``param_<name>``, ``split<k>_test_score``, ``mean_test_score``, ``std_test_score``,
-        ``rank_test_score`` and the times to fit and score, s. Beside these ``added``, ``rmse1`` ..
+        ``rank_test_score`` and the times to fit and score, s. In addition ``added``, ``rmse1`` ..
         of every joint (N m or N, held out, on the samples judged) and ``mean_rmse``.
     n_splits_ : int
         Number of folds.
     scorer_ : callable
-        What scores.
+        The scorer.
     multimetric_ : bool
         False: there is one score.
     refit_time_ : float

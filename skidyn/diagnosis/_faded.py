@@ -134,7 +134,7 @@ def step_scores(
     fold : (array of int, array of int)
         Training and test rows.
     scorer : callable
-        What scores.
+        The scorer.
     weights : dict of str to ndarray
         Weights of all rows, by their keyword of ``fit``.
     fade_out : bool

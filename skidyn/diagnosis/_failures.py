@@ -42,7 +42,7 @@ _WHERE = {
 
 @dataclass(frozen=True)
 class Place:
-    """A part of the motion that holds more of a joint's excess error than its share of time.
+    """A part of the motion in which the share of the excess error exceeds the share of time.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class Place:
     where : str
         The place in words, such as ``"at low speed"``.
     share_of_excess : float
-        Share of what the joint's squared error has above the noise.
+        Share of the squared error of the joint above the noise.
     share_of_time : float
         Share of the judged samples.
     regime : str, default=""
@@ -96,8 +96,8 @@ class Failure:
     ratio : float
         Error over noise.
     places : tuple of Place
-        Regimes, range of position, trajectories and stretch of time in which the excess lies;
-        empty where it is spread evenly.
+        Regimes, range of position, trajectories and interval of time in which the excess occurs;
+        empty if it is spread evenly.
     sentence : str
         The same in words.
 
@@ -119,7 +119,7 @@ class Failure:
 
 @dataclass(frozen=True)
 class RestError:
-    """Error of a joint at rest, where dry friction may hold any torque up to its limit.
+    """Error of a joint at rest, where dry friction can balance any torque up to its limit.
 
     Parameters
     ----------
@@ -130,9 +130,9 @@ class RestError:
     rmse : float
         Root mean square error at rest, N m or N.
     stiction : float or None
-        Dry friction that the model holds possible, N m or N; None where it does not tell.
+        Limit of dry friction in the model, N m or N; None if it is unknown.
     beyond : float or None
-        Root mean square of what exceeds it, N m or N.
+        Root mean square of the error that exceeds it, N m or N.
     share_of_time : float
         Share of the samples at rest.
     sentence : str

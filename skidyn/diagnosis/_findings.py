@@ -31,9 +31,9 @@ class Finding:
     Parameters
     ----------
     kind : str
-        Kind of the vocabulary, ``"unknown"`` for something no name describes.
+        Kind of the catalogue, or ``"unknown"`` for an effect that is not in the catalogue.
     title : str
-        Name for people.
+        Title of the effect.
     joints : tuple of int
         Joints, counted from 1: one, a pair, or all that a tool reaches.
     parameters : dict
@@ -43,32 +43,33 @@ class Finding:
     error_drop : float
         Share of the held-out squared error on these joints that adding it removes.
     q_value : float
-        False-discovery rate at which it was accepted: its chance times the number of candidates.
+        False-discovery rate at which it was accepted: its p-value times the number of candidates.
     rivals : tuple of str
-        Kinds this data cannot separate it from.
+        Kinds from which this data cannot separate it.
     separating_motion : str
-        Motion that would.
+        Motion that would separate them.
     sentence : str
-        All of it in words.
+        The finding as a sentence.
     code : str
         Line of Python that adds it.
     terms : tuple of Term
         Terms to add to a model.
     margin : float
-        Share of its gain that the best other explanation of the same joints falls short of;
-        negative where a simpler name was preferred.
+        Margin over the best other explanation of the same joints, as a share of its gain; negative
+        if a simpler effect was preferred.
     confidence : float or None
-        Probability that the name is right.
+        Probability that the effect is identified correctly.
     trajectories : tuple of int or None
-        Recordings that have it; None where all do.
+        Recordings with the effect; None if all have it.
     when : list of Episode
-        Times at which it was there, for a torque that comes and goes.
+        Intervals of time of an intermittent torque.
     curves : list of dict
         Effect and partial residual against its main signal, for each joint.
     alike : bool
-        Whether a kind that acts on other joints explains as much.
+        Whether a kind that acts on other joints explains the data equally well.
     elsewhere : tuple of tuple of int
-        Other pairs of joints, counted from 1, on which the same effect explains as much.
+        Other pairs of joints, counted from 1, on which the same effect explains the data equally
+        well.
 
     Examples
     --------

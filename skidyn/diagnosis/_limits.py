@@ -35,7 +35,7 @@ NEW_SHARE = 1e-4
 
 @dataclass(frozen=True)
 class Limit:
-    """Largest magnitude of an effect that this data could hide.
+    """Largest magnitude of an effect that could be present without being detected.
 
     Parameters
     ----------

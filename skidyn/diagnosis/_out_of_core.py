@@ -42,23 +42,24 @@ LEVEL = 0.01
 
 @dataclass(frozen=True)
 class Confirmation:
-    """What a finding of the sample removes on all trajectories that the search did not see.
+    """Error that a finding removes on all trajectories that were not used in the search.
 
     Parameters
     ----------
     finding : Finding
         The finding.
     rmse_without, rmse_with : dict of int to float
-        Held-out error of averaged rows by joint (from 1), of the model with all other findings,
-        and with this one too; N m or N.
+        Held-out error of averaged rows by joint (from 1), for the model with all other findings,
+        and with this one in addition; N m or N.
     error_drop : float
         Share of the held-out squared error on the joints of the finding that it removes.
     p_value : float
         Probability of such a drop by chance, from the spread of its logarithm over groups of
         trajectories.
     confirmed : bool or None
-        Whether it is less than 1 %; None, with a drop of 0, for effects whose columns need a fit of
-        the model first, such as friction that grows with the load: these rest on the sample alone.
+        Whether the p-value is less than 1 %; None, with a drop of 0, for effects whose columns
+        require a fit of the model first, such as load-dependent friction: these are based on the
+        sample only.
 
     Examples
     --------
@@ -122,12 +123,12 @@ def diagnose_parquet(
     n_jobs: int | None = None,
     client: Any = None,
 ) -> ParquetDiagnosis:
-    """Learn what a model lacks from Parquet files that need not fit into memory.
+    """Diagnose a model with Parquet files that may be larger than memory.
 
     The search for effects needs the rows again and again, so it is done on trajectories drawn at
-    random. What it finds is then put to all other trajectories, in one pass over the files: is the
-    error of each group of them, predicted by a model fitted to the others, smaller with the
-    effect? Memory is that of the sample and the longest trajectory, time is linear in the rows.
+    random. Its findings are then tested on all other trajectories in one pass over the files: the
+    error of each group, predicted by a model fitted to the others, is compared with and without the
+    effect. Memory is that of the sample and the longest trajectory, time is linear in the rows.
 
     Parameters
     ----------
@@ -136,10 +137,10 @@ def diagnose_parquet(
     paths : path or iterable of path
         Files or a folder, see :func:`skidyn.evidence.evidence_from_parquet`. They need ``time``.
     columns : mapping, optional
-        Which column holds which signal, where the names do not tell.
+        Column of each signal, for columns without the usual names.
     sample_rows : int, default=100_000
-        Rows that are searched: as many trajectories as they hold, four at least, and half of all
-        at most.
+        Number of rows used in the search, rounded to whole trajectories: at least four, and at most
+        half of all.
     effects : iterable of str, optional
         Kinds to try; by default the whole catalogue.
     settings : Settings, optional
@@ -149,9 +150,9 @@ def diagnose_parquet(
     random_state : int, default=0
         Draws the sample.
     n_jobs : int, optional
-        Processes that make the evidence, see :func:`skidyn.evidence.evidence_from_parquet`.
+        Processes that compute the evidence, see :func:`skidyn.evidence.evidence_from_parquet`.
     client : distributed.Client, optional
-        Cluster that makes it.
+        Cluster that computes it.
 
     Returns
     -------

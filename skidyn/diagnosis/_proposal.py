@@ -29,7 +29,7 @@ _ABSORBED = 1e-4
 
 @dataclass(frozen=True)
 class Proposal:
-    """A formula that explains what a nameless function does.
+    """A formula that explains the torque of a nameless function.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class Proposal:
     coefficients : tuple of float
         Their coefficients, N m or N.
     share : float
-        Squared error it removes on held-out folds over what the nameless function removes.
+        Squared error that it removes on held-out folds, relative to that of the nameless function.
     terms : tuple of Term
         To be added to a model.
 

@@ -49,15 +49,15 @@ Verdict = Literal["complete", "missing", "unknown"]
 
 @dataclass(repr=False)
 class Diagnosis:
-    """What a model lacks, where it shows, and what adding it does.
+    """Result of a diagnosis: missing effects, errors, and the completed model.
 
     Made by :func:`skidyn.diagnosis.diagnose`.
 
     Parameters
     ----------
     verdict : {"complete", "missing", "unknown"}
-        Nothing significant is missing; a named effect is missing; something is missing that no
-        named effect explains.
+        Nothing significant is missing; a known effect is missing; an effect is missing that no
+        known effect explains.
     joint_names : tuple of str
         Names of the joints.
     findings : list of Finding
@@ -71,15 +71,16 @@ class Diagnosis:
     noise_floor : ndarray of shape (n_joints,)
         Noise of torque and position sensors together in the error of samples, N m or N.
     unexplained : dict or None
-        Joints, variables and share of what stays predictable without a name.
+        Joints, variables and share of the error that is predictable but not explained by known
+        effects.
     limits : list of Limit
         Largest magnitude of every effect that was not found.
     warnings : list of str
-        What about the data or the folds the reader should know.
+        Warnings about the data or the folds.
     base_model : regressor
         The model as given.
     data : tuple
-        X and the torque it was diagnosed on.
+        X and the torque of the diagnosis.
     problem : Problem
         Averaged rows and folds behind the diagnosis.
     result : SearchResult
@@ -89,20 +90,20 @@ class Diagnosis:
     unknowns : list of UnknownTorque
         Tested variables, shape and formula of every nameless torque that was found.
     checks : list of Suspicion
-        What the checks suspect about the measurement, with evidence and remedy.
+        Suspicions of the checks of the measurement, with evidence and remedy.
     parts : Remainder
-        What the completed model leaves, by what it is made of.
+        Remaining error of the completed model, by component.
     opened : Opened or None
-        What the model was taken out of (a pipeline, a search), if anything.
+        Pipeline or search from which the model was extracted, if any.
     vetoed : list of Finding
         Findings that worsen the simulated motion, which :attr:`model` leaves out; empty before
         :meth:`judge_by_simulation`.
     in_turn : InTurn or None
-        What :meth:`judge_by_simulation` found for every finding and for all together.
+        Results of :meth:`judge_by_simulation` for every finding and for all together.
     servo_motion : list of ServoFinding or None
-        What :meth:`explain_servo_motion` named; None before.
+        Effects found by :meth:`explain_servo_motion`; None before it is called.
     controller : Controller or None
-        Position servos that :func:`diagnose` was told of.
+        Controller given to :func:`diagnose`.
 
     Examples
     --------
@@ -178,17 +179,17 @@ class Diagnosis:
 
     @property
     def remainder(self) -> Array:
-        """What is neither noise nor predictable from the signals, (n_joints,), N m or N."""
+        """Part of the error that is neither noise nor predictable from the signals, (n_joints,), N m or N."""
         return np.zeros(len(self.joint_names)) if self.parts is None else self.parts.left
 
     @property
     def remainder_inflation(self) -> Array:
-        """How slow what is left is: 1 if it is white, up to 2 as coloured noise; (n_joints,)."""
+        """Autocorrelation of the remainder: 1 if it is white, up to 2 for coloured noise; (n_joints,)."""
         return np.ones(len(self.joint_names)) if self.parts is None else self.parts.inflation
 
     @property
     def noise_is_coloured(self) -> bool:
-        """Whether the error exceeds fast noise on all joints alike, as correlated noise does."""
+        """Whether the error exceeds the fast noise equally on all joints, as for correlated noise."""
         return self.parts is not None and self.parts.coloured
 
     @property
@@ -197,17 +198,17 @@ class Diagnosis:
         return REGIMES
 
     def story(self) -> dict[str, Any]:
-        """The first screen in words and numbers: verdict, joints, findings, what is left.
+        """Content of the first screen of the report: verdict, joints, findings, remaining error.
 
         Returns
         -------
         dict
             ``verdict``, ``mark``, ``headline``, ``text``; ``findings`` in a line each (``what``,
             ``where``, ``size``, ``sure``, ``change``); ``joints`` with ``before``, ``after`` and
-            ``noise`` (N m or N) and ``speaks`` where there is something to say; ``quiet``,
-            ``left``, ``doubts`` about the log and other ``warnings``; ``simulation`` with errors
-            of the simulated motion, after :meth:`judge_by_simulation`; ``servo_motion`` with what
-            :meth:`explain_servo_motion` named.
+            ``noise`` (N m or N) and ``speaks`` for joints that are shown; ``quiet``, ``left``,
+            ``doubts`` about the log and other ``warnings``; ``simulation`` with errors of the
+            simulated motion, after :meth:`judge_by_simulation`; ``servo_motion`` with the effects
+            found by :meth:`explain_servo_motion`.
         """
         return {**story(self), "simulation": simulated(self.in_turn, self.findings)}
 
@@ -255,30 +256,32 @@ class Diagnosis:
     def judge_by_simulation(
         self, horizon: float | None = HORIZON, *, controller: Controller | None = None
     ) -> list[SimulationVerdict | None]:
-        """Judge every finding by the motion of the model along recordings left out of its fit.
+        """Judge every finding by the simulated motion along recordings left out of the fit.
 
-        The errors of the motion without and with the findings stand in :attr:`simulation`, on the
-        page and in the report. An effect that lowers the error of the torque may worsen the motion.
-        One that does so beyond chance goes to :attr:`vetoed`, a sentence on it to :attr:`warnings`,
-        and :attr:`model` comes without it; :meth:`add` adds it all the same.
+        The errors of the motion without and with the findings are stored in :attr:`simulation` and
+        shown on the page and in the report. An effect that reduces the error of the torque may
+        worsen the motion. An effect that worsens it significantly is added to :attr:`vetoed`, with
+        a sentence in :attr:`warnings`, and is not part of :attr:`model`; :meth:`add` adds it
+        nevertheless.
 
         Parameters
         ----------
         horizon : float, s, or None, default=1.0
-            Time after which the simulated model is put back on the log; None for whole recordings.
+            Time after which the simulation restarts from the logged state; None for whole
+            recordings.
         controller : Controller, optional
-            Drives the model by the commands of X (``q_ref1..`` or ``cmd1..``) in place of the
-            torque: for logs of position servos.
+            Drives the model by the commands of X (``q_ref1..`` or ``cmd1..``) instead of the
+            torque, for logs of position servos.
 
         Returns
         -------
         list of SimulationVerdict or None
-            For every finding; None where simulation says nothing.
+            For every finding; None if simulation gives no evidence.
 
         Raises
         ------
         SkidynError
-            The model is no RBDRegressor, it cannot be simulated, or the log has no time.
+            The model is not an RBDRegressor, it cannot be simulated, or the log has no time.
 
         See Also
         --------
@@ -306,16 +309,15 @@ class Diagnosis:
         return verdicts
 
     def explain_servo_motion(self, controller: Controller | None = None) -> list[ServoFinding]:
-        """Name what the motion of position servos lacks where the torque does not say it.
+        """Find effects by the motion of position servos that the torque does not show.
 
-        A torque that was made from a servo's error hides what lasts hundredths of a second. Joints
-        are simulated in their loops (:func:`skidyn.simulation.explain_servo_motion`) with the
-        findings that such a simulation has, and without nameless functions, hysteresis, offsets
-        and a torque that the controller limits; joints with other findings are left out. What is
-        named there takes the place of nameless functions and hysteresis
-        on its joint; :attr:`findings` stay as they are. It is kept in :attr:`servo_motion`, stands
-        in the report and on the page, and a diagnosis without any other finding is no longer
-        ``"complete"``.
+        A torque computed from the position error of a servo hides effects that last hundredths of a
+        second. Joints are simulated in their loops (:func:`skidyn.simulation.explain_servo_motion`)
+        with the findings that the simulation supports, and without nameless functions, hysteresis,
+        offsets and saturation by the controller; joints with other findings are left out. The
+        effects found replace nameless functions and hysteresis on their joints; :attr:`findings`
+        are not changed. They are stored in :attr:`servo_motion` and shown in the report and on the
+        page, and a diagnosis without any other finding is no longer ``"complete"``.
 
         Parameters
         ----------
@@ -326,12 +328,12 @@ class Diagnosis:
         Returns
         -------
         list of ServoFinding
-            In the order in which they were taken.
+            In the order of selection.
 
         Raises
         ------
         SkidynError
-            The model is no RBDRegressor, no controller is known, or the log has no commands.
+            The model is not an RBDRegressor, no controller is given, or the log has no commands.
         LogError
             The log is too short.
         """
@@ -377,7 +379,7 @@ class Diagnosis:
     def simulation(self) -> SimulationVerdict | None:
         """Simulated motion of the model as given, and with the findings; None before it is judged.
 
-        The second model has no finding that worsens the motion or that cannot be simulated.
+        The second model excludes findings that worsen the motion or that cannot be simulated.
         """
         return None if self.in_turn is None else self.in_turn.together
 

@@ -122,82 +122,85 @@ SHORT_WINDOW = 1 / 32
 
 @dataclass(frozen=True)
 class Settings:
-    """Thresholds of the search; the defaults are what is shipped, for every robot and effect.
+    """Thresholds of the search, with the same defaults for every robot and effect.
 
     Parameters
     ----------
     level : float
-        Chance of a false finding over everything that is tried.
+        Probability of a false finding over all tested candidates.
     least_gain : float
-        Twice the log-likelihood, held out, less the price of its parameters, that a finding must
-        gain: smoothing and coarse positions leave torques that are no chance, but small. A nameless
-        function must gain so much more than a name, and a further form more than the plain one.
+        Twice the gain in held-out log-likelihood, minus the penalty for its parameters, that a
+        finding needs: smoothing and coarse positions leave torques that are significant but small.
+        A nameless function needs this gain relative to a known effect, and a further form relative
+        to the plain one.
     least_share : float
-        Share of the squared error of averaged rows that a finding must remove on its joints, held
-        out.
+        Share of the held-out squared error of averaged rows that a finding must remove on its
+        joints.
     least_drop : float
-        Share of the squared error of single samples that it must remove, held out.
+        Share of the held-out squared error of single samples that it must remove.
     form_tolerance : float
-        Share of the squared error that an effect removes which its imperfect formula may leave, a
-        tenth of its size. A nameless function that does better by no more than this does not take
-        the place of a name, and a later finding that removes no more on the same joints is the
-        shadow of the earlier ones.
+        Share of the squared error removed by an effect that its imperfect formula may leave, a
+        tenth of its size. A nameless function that is better by no more than this does not replace
+        a known effect, and a later finding that removes no more on the same joints is attributed to
+        the earlier ones.
     further_tolerance : float
         The same where a further form of a known effect is compared with a nameless function: it
         was chosen among several.
     exact_tolerance : float
         The same where every formula is exact (:attr:`Effect.is_exact`).
     nameless_tolerance : float
-        The same for what a nameless function leaves: its form is only near the true one; and for
-        what an effect that moves the link leaves to a nameless function.
+        The same for the residual of a nameless function, whose form only approximates the true one,
+        and for the residual that an effect that moves the link leaves to a nameless function.
     alike : float
-        Two effects on different joints whose scores differ by less than this share are not told
-        apart by the data.
+        Two effects on different joints whose scores differ by less than this share cannot be
+        separated by the data.
     simpler_share : float
-        A simpler kind is named if it falls behind by less than this share.
+        A simpler kind is preferred if its score is lower by less than this share.
     family_share : float
-        Within a family of effects (hysteresis), the simplest one with this share of the best
-        one's score is named.
+        Within a family of effects (hysteresis), the simplest one with this share of the best score
+        is preferred.
     ripple_share : float
-        Torque ripple must do this share of what a function of the signals does on averaged rows.
+        Torque ripple must reach this share of the score of a function of the signals on averaged
+        rows.
     resolved : float
-        Times the lower end of the range of a shape parameter that its refined value must reach;
-        below, the effect is the simpler kind that it becomes there.
+        Multiple of the lower end of the range of a shape parameter that its refined value must
+        reach; below, the effect is equivalent to a simpler kind.
     far_end : float
-        Share of the upper end of the range of its first shape parameter from which on an effect is
-        not named: a refined value that ends there belongs to something else.
+        Share of the upper end of the range of its first shape parameter above which an effect is
+        rejected: such a refined value indicates another effect.
     member : float
-        Chance at which one of several recordings differs, once all together are more than chance.
+        Level at which one of several recordings differs, if all together are significant.
     most_recordings : int
-        Recordings of a joint that may have an effect of a size of their own under its name.
+        Maximum number of recordings of a joint that may have an effect with individual sizes.
     recordings_share : float
-        What differs between more recordings than these comes last if something that is alike in
-        all of them does more than this share of it.
+        Effects that differ between more recordings than these have the lowest priority if an effect
+        that is equal in all of them explains more than this share.
     white : float
-        Inflation of the variance by autocorrelation up to which what remains is white.
+        Inflation of the variance by autocorrelation up to which the remainder is considered white.
     nameless_price : int
-        Coefficients that a nameless function is charged for at most: its held-out error has paid
-        for them once already.
+        Maximum number of coefficients for which a nameless function is penalised, since its
+        held-out error already includes them.
     nameless_tried : int
-        Functions of the signals among which a nameless candidate was chosen, for each that is
-        tried; and formulas among which a further form of a known effect was.
+        Number of functions of the signals from which each tested nameless candidate was selected,
+        and of formulas for a further form of a known effect.
     shapes_tested : int
-        Candidates of a kind, joints and shapes, that are tested before the kind is given up.
+        Number of candidates (joints and shapes) of a kind that are tested before the kind is
+        rejected.
     max_findings : int
-        Kinds added at most.
+        Maximum number of added kinds.
     finalists : int
         Kinds compared with noise re-estimated.
     refined : int
-        So many of them with their shape parameters refined.
+        Number of them with refined shape parameters.
     size_share : float
-        Least size of a coefficient, as a share of what its shape says (:meth:`Effect.bounded`):
-        noise may have the form of an effect, but not its size. Joints that swing together have a
-        third of the size that each would have by itself, or less.
+        Least size of a coefficient, as a share of the size implied by its shape
+        (:meth:`Effect.bounded`): noise may have the form of an effect, but not its size. For joints
+        that oscillate together the size is a third of that for each joint separately, or less.
     size_share_short : float
-        The same in short windows, which more noise passes. With less than half of its size, the
-        torque is explained better without the effect than with all of it.
+        The same in short windows, which have more noise. With less than half of the size, the
+        torque is explained better without the effect than with its full size.
     repeated : int
-        Times a fit is repeated at most whose columns follow it, as that of a saturation.
+        Maximum number of repetitions of a fit whose columns depend on it, as for a saturation.
 
     Examples
     --------

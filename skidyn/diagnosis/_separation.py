@@ -45,7 +45,7 @@ TRAJECTORIES, ROUNDS, POPULATION = 4, 12, 6
 
 @dataclass(frozen=True)
 class SeparatingMotion:
-    """A motion that tells two explanations apart.
+    """A motion that separates two explanations.
 
     Parameters
     ----------
@@ -58,12 +58,12 @@ class SeparatingMotion:
     q, dq, ddq : ndarray of shape (n_samples, n_joints)
         Motion of all joints, SI units.
     gain : float
-        Squared torque, in units of the noise, that the rival leaves over on this motion.
+        Squared torque, in units of the noise, that the rival cannot explain on this motion.
     gain_of_log : float
-        The same for a stretch as long of the log that was diagnosed.
+        The same for a part of equal length of the diagnosed log.
     confirmed : dict of str to bool
-        For each of the two as the truth: whether a simulated recording of this motion is diagnosed
-        as it.
+        For each effect as the truth: whether the diagnosis of a simulated recording of this motion
+        finds it.
 
     Examples
     --------
@@ -84,7 +84,7 @@ class SeparatingMotion:
 
     @property
     def sentence(self) -> str:
-        """What the motion does, in words."""
+        """Description of the motion."""
         joints = "joint" if len(self.joints) == 1 else "joints"
         which = f"{joints} {', '.join(map(str, self.joints))}"
         if self.gain < LEAST_GAIN:
@@ -100,8 +100,10 @@ class SeparatingMotion:
         if all(self.confirmed.values()):
             return text + " In simulated recordings of this motion both effects were recognised."
         wrong = " and ".join(k for k, right in self.confirmed.items() if not right)
-        return text + f" In a simulated recording with {wrong} as the truth the effect was still "
-        "not recognised."
+        return (
+            f"{text} In a simulated recording with {wrong} as the truth the effect was still not "
+            "recognised."
+        )
 
     def to_frame(self) -> Any:
         """Table of the motion.
@@ -214,7 +216,7 @@ def design_separating_motion(
     duration: float = 20.0,
     random_state: int = 0,
 ) -> SeparatingMotion:
-    """Motion that tells a finding from a rival.
+    """Design a motion that separates a finding from a rival.
 
     Parameters
     ----------
@@ -232,12 +234,12 @@ def design_separating_motion(
     Returns
     -------
     SeparatingMotion
-        Within the limits of the URDF and of what the log shows the robot to do.
+        Motion within the limits of the URDF and of the log.
 
     Raises
     ------
     EffectError
-        No such finding, or the search has not weighed such a rival against it.
+        No such finding, or the search has not compared it with this rival.
 
     Examples
     --------

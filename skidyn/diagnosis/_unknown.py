@@ -36,7 +36,7 @@ class UnknownTorque:
         ``variables`` (one or two), ``edges`` of the bins of each (SI units), and ``value``,
         ``low``, ``high``: torque in every bin with its 95 % band, N m or N; NaN where no sample is.
     proposal : Proposal or None
-        A short formula that does the same.
+        A short formula for it.
 
     Examples
     --------

@@ -40,9 +40,9 @@ class VariableTest:
     variable : str
         Signal, joints counted from 1: ``"q1"``, ``"dq3"``, ``"ddq2"``, ``"temp1"``.
     share : float
-        Share of the predictable squared error that is lost without it, or won with it.
+        Share of the predictable squared error that is lost without it, or gained with it.
     p_value : float
-        Chance of that if the torque did not depend on it.
+        Probability of this share if the torque did not depend on the signal.
     needed : bool
         Whether the torque depends on it.
 

@@ -36,7 +36,7 @@ ABOVE_ZERO = 1e-3
 
 
 def is_consistent(parameters: Array) -> bool:
-    """Whether every body has a mass distribution that can exist.
+    """Whether every body is physically consistent.
 
     Parameters
     ----------
@@ -69,16 +69,16 @@ def make_consistent(
     known: BodyConstraints | None = None,
     body_names: Sequence[str] | None = None,
 ) -> tuple[Array, Array]:
-    """Least squares under physical consistency.
+    """Solve least squares with physical consistency.
 
     Minimises ``|factor @ [parameters, coefficients] - target|^2`` over bodies whose pseudo-inertia
-    is positive definite, coefficients of the right sign and whatever else is known. In directions
-    that the data leaves open the bodies stay as near to the nominal ones as they can.
+    is positive definite, coefficients of the right sign and further constraints. In directions that
+    the data does not determine the bodies remain as close as possible to the nominal ones.
 
     Parameters
     ----------
     nominal : ndarray of shape (n_bodies, 10)
-        Parameters to start from; bodies that cannot exist are replaced by small spheres.
+        Initial parameters; inconsistent bodies are replaced by small spheres.
     factor : ndarray of shape (k, 10 * n_bodies + n_coefficients)
         Triangular factor of the weighted columns.
     target : ndarray of shape (k,)
@@ -86,23 +86,23 @@ def make_consistent(
     signs : ndarray of shape (n_coefficients,)
         1 for coefficients that must not be negative.
     start : ndarray of shape (n_coefficients,)
-        Coefficients to start from.
+        Initial coefficients.
     known : BodyConstraints, optional
-        What is known about the bodies.
+        Constraints on the bodies.
     body_names : sequence of str, optional
-        Names by which ``known`` calls the bodies; ``"0"``, ``"1"``, ... by default.
+        Names of the bodies in ``known``; ``"0"``, ``"1"``, ... by default.
 
     Returns
     -------
     parameters : ndarray of shape (n_bodies, 10)
-        Of bodies that can exist.
+        Parameters of physically consistent bodies.
     coefficients : ndarray of shape (n_coefficients,)
-        Of the right sign.
+        Coefficients with the required sign.
 
     Raises
     ------
     ValueError
-        What is known contradicts itself.
+        The constraints are contradictory.
 
     Notes
     -----

@@ -25,7 +25,7 @@ INSIDE = 0.05
 
 @dataclass(frozen=True)
 class BodyConstraints:
-    """Knowledge about bodies that a consistent identification keeps.
+    """Constraints on bodies for a consistent identification.
 
     Parameters
     ----------
@@ -34,8 +34,8 @@ class BodyConstraints:
     centre_of_mass : mapping of str to (sequence of 3 floats, sequence of 3 floats)
         Lowest and highest coordinates of the centre of mass in the frame of the body, m.
     symmetry : mapping of str to str
-        Mirror planes through the origin of the body's frame, by the axis that is normal to them:
-        ``"y"`` for a body that is its own mirror image at y = 0, ``"xy"`` for two planes.
+        Mirror planes through the origin of the body's frame, given by their normal axes: ``"y"``
+        for a body that is symmetric about y = 0, ``"xy"`` for two planes.
     total_mass : float, optional
         Mass of all moving bodies together, kg.
 
@@ -45,8 +45,8 @@ class BodyConstraints:
 
     Notes
     -----
-    A body is a link with everything that is fixed to it; the names are those of
-    ``Robot.body_names``. Fixed or locked links at the base do not move and have no place here.
+    A body is a link with all links fixed to it; the names are those of ``Robot.body_names``. Fixed
+    or locked links at the base do not move and cannot be constrained.
 
     References
     ----------

@@ -41,8 +41,8 @@ def regressor_from_evidence(
     effects : iterable of str, (str, joints) or Term, default=("viscous", "coulomb")
         Effects of the evidence.
     consistent : bool or BodyConstraints, default=False
-        Demand bodies that can exist (positive definite pseudo-inertia), coefficients without
-        forbidden signs, and what else is known about the bodies.
+        Require physically consistent bodies (positive definite pseudo-inertia), coefficients with
+        admissible signs, and further constraints on the bodies.
     feature_names : sequence of str, optional
         Columns of the tables that will be predicted; by default
         ``time, trajectory, q1..qn, dq1..dqn``. Accelerations that are not among them are derived

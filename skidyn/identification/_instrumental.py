@@ -129,8 +129,8 @@ def durbin_wu_hausman(difference: Array, left_out: Array) -> dict[str, Array]:
 def repetition_instruments(X: Any, trajectory: str = "trajectory") -> Any:
     """Instruments from a motion that was run several times.
 
-    The errors of the sensors differ from run to run, the motion does not: the mean of the other
-    runs is an instrument for each.
+    Sensor errors differ between runs, but the motion does not: the mean of the other runs is an
+    instrument for each run.
 
     Parameters
     ----------
@@ -156,8 +156,8 @@ def repetition_instruments(X: Any, trajectory: str = "trajectory") -> Any:
 
     Notes
     -----
-    A controller repeats a motion, and its own noise, only so far; what differs between runs beside
-    the noise of the sensors makes the instruments weaker, not wrong.
+    A controller repeats a motion only approximately; differences between runs other than sensor
+    noise make the instruments weaker, but not invalid.
 
     References
     ----------

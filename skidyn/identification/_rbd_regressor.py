@@ -63,37 +63,37 @@ def _keeps_no_rows(model: RBDRegressor) -> bool:
 
 
 class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEstimator):
-    """Inverse dynamics of a robot: rigid body plus effects, identified together.
+    """Inverse dynamics of a robot: rigid body and effects, identified together.
 
     Parameters
     ----------
     robot : Robot, str or path
         Robot, or its URDF.
     effects : sequence of str, (str, joints) or Term, default=("viscous", "coulomb")
-        Effects beside the rigid body: ``"viscous"`` on all joints, ``("dahl", [1, 4])`` on some
-        (counted from 1), or a :class:`~skidyn.effects.Term` with its shape parameters. Shape
+        Effects in addition to the rigid body: ``"viscous"`` on all joints, ``("dahl", [1, 4])`` on
+        some (counted from 1), or a :class:`~skidyn.effects.Term` with its shape parameters. Shape
         parameters that are not given are searched.
     parameters : {"identified", "nominal"}, default="identified"
-        Whether inertial parameters are identified, or those of the URDF kept.
+        Whether inertial parameters are identified or kept as in the URDF.
     estimator : str, default="weighted"
-        How coefficients are found: ``"weighted"`` (least squares, joints weighted by their noise,
-        iterated), ``"ordinary"`` (all rows alike), ``"robust"`` (rows that the majority
-        contradicts lose their weight), ``"ridge"`` and ``"entropic"`` (pulled toward the bodies
-        of the URDF), ``"instrumental"`` (for noisy motion; fit needs instruments),
-        ``"output_error"`` (for simulation: refined until the simulated motion is that of the log).
+        Estimator of the coefficients: ``"weighted"`` (least squares, joints weighted by their
+        noise, iterated), ``"ordinary"`` (equal weights for all rows), ``"robust"`` (outlying rows
+        have reduced weight), ``"ridge"`` and ``"entropic"`` (regularised toward the bodies of the
+        URDF), ``"instrumental"`` (for noisy motion; fit needs instruments), ``"output_error"`` (for
+        simulation: minimises the error of the simulated motion).
     prior_std : float or None, default=None
-        How far the true bodies may be from those of the URDF, relative, for ``"ridge"`` and
-        ``"entropic"``: 0.3 is 30 %. None takes what predicts left-out folds best. The others weigh
-        what the log hardly shows against the URDF; ``numpy.inf`` takes the data's word for all that
-        it shows, as plain least squares does.
+        Relative uncertainty of the bodies of the URDF for ``"ridge"`` and ``"entropic"``: 0.3 is 30
+        %. None selects the value that best predicts left-out folds. The other estimators combine
+        directions that the log hardly determines with the URDF; ``numpy.inf`` uses the data only,
+        as in plain least squares.
     consistent : bool or BodyConstraints, default=False
-        Demand bodies that can exist (positive definite pseudo-inertia), coefficients without
-        forbidden signs, and what else is known about the bodies.
+        Require physically consistent bodies (positive definite pseudo-inertia), coefficients with
+        admissible signs, and further constraints on the bodies.
     horizon : float or None, default=1.0
         Seconds that ``"output_error"`` simulates from each measured state; None for whole
         trajectories, which only a log without drift allows.
     forgetting : float, default=1.0
-        Weight of all earlier rows at each call of ``partial_fit``; 1 forgets nothing.
+        Weight of all earlier rows at each call of ``partial_fit``; 1 keeps their weight.
     smooth : bool or None, default=None
         Derive velocity and acceleration from the positions by a zero-phase smoother. None does so
         where X has no accelerations. Needs time.
@@ -108,12 +108,13 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
         Their names.
     coef_std_ : ndarray of shape (n_coefficients,)
         Standard errors by the jackknife over trajectories (or blocks of time), which are valid
-        under autocorrelation within a trajectory; where the data says nothing, how far the URDF may
-        be off.
+        under autocorrelation within a trajectory; for directions that the data does not determine,
+        the uncertainty of the URDF.
     base_parameters_ : dict of str to float
-        Base parameters by the combination of inertial parameters they stand for.
+        Base parameters by the combination of inertial parameters that they represent.
     inertial_parameters_ : ndarray of shape (n_bodies, 10)
-        Parameters that give the same torque; what the data leaves open is as in the URDF.
+        Parameters that give the same torque; directions that the data does not determine are as in
+        the URDF.
     effect_terms_ : list of Term
         Effects with their shape parameters.
     effect_coefficients_ : dict of Term to ndarray
@@ -126,21 +127,20 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
     row_weights_ : list of ndarray of shape (n_rows_j,)
         Weight of every averaged row by joint, 1.25 at most; the robust estimator only.
     bands_ : PredictionBands
-        Errors of left-out folds, from which :meth:`predict_interval` makes its bands.
+        Errors of left-out folds, from which :meth:`predict_interval` computes its bands.
     condition_number_ : float
-        Condition number of the weighted columns that the data shows at all, scaled to equal length:
-        how well the motion excites the model. Below 100 is good, beyond 1,000 a part of the
-        coefficients is chance.
+        Condition number of the weighted columns excited by the data, scaled to equal length. Below
+        100 the excitation is good, beyond 1,000 some coefficients are determined by noise.
     noise_std_ : ndarray of shape (n_joints,)
         Standard deviation of one residual row, N m or N.
     rows_ : {"averaged", "samples"}
         Whether the rows of the fit are averages over short windows of motion, or all samples.
     recordings_ : list of (int, ndarray of uint64)
-        By what the recordings are known again to which effects of single recordings belong.
+        Fingerprints of the recordings, by which effects of single recordings are assigned.
     robot_ : Robot
         The robot.
     columns_ : Columns
-        Which column of X means what.
+        Meaning of the columns of X.
     n_features_in_ : int
         Number of columns of X.
     feature_names_in_ : ndarray of str
@@ -154,10 +154,10 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
     -----
     :doc:`/user_guide/identification` explains when to use which estimator.
 
-    Directions of the inertial parameters that the data hardly shows stay as in the URDF; those that
-    it knows ten times better than the URDF change by less than one part in a million. How far the
-    URDF is trusted is found from the data (empirical Bayes). Estimators with a prior have their own
-    way.
+    Directions of the inertial parameters that the data hardly determines are kept as in the URDF;
+    those that it determines ten times better than the URDF change by less than one part in a
+    million. The uncertainty of the URDF is estimated from the data (empirical Bayes). Estimators
+    with a prior use it instead.
 
     With a time column, torque and all regressor columns are averaged over the same short windows
     (parallel filtering), without samples at rest and around reversals. Where X holds accelerations
@@ -250,12 +250,12 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
             Weight of every sample. An averaged row has the mean weight of its samples; those of
             weight 0 are left out.
         instruments : DataFrame or array of shape (n_samples, n_features), optional
-            The columns of X along a motion whose errors have nothing to do with those of X, such
-            as the reference of the controller; for ``estimator="instrumental"`` only.
+            The columns of X along a motion whose errors are independent of those of X, such as the
+            reference of the controller; for ``estimator="instrumental"`` only.
         controller : Controller, optional
             Drives the simulated model by the commands of X (``q_ref1..`` or ``cmd1..``, rad or m)
-            in place of y; for ``estimator="output_error"`` only. For a log of a position servo y is
-            then :func:`skidyn.simulation.servo_torque`, from which the fit starts.
+            instead of y; for ``estimator="output_error"`` only. For a log of a position servo, y is
+            :func:`skidyn.simulation.servo_torque`, which gives the initial fit.
 
         Returns
         -------
@@ -267,8 +267,8 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
         ColumnError
             X does not follow the contract, or y has the wrong number of joints; X lacks commands.
         ValueError
-            A parameter has no meaning; instruments are missing, not wanted or of other rows; a
-            controller is not wanted, or is none.
+            A parameter is invalid; instruments are missing, not accepted or have different rows; a
+            controller is not accepted or invalid.
         """
         method = self._method()
         if controller is not None and not isinstance(controller, Controller):
@@ -476,7 +476,7 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
         return self
 
     def with_effects(self, effects: Iterable[Any]) -> RBDRegressor:
-        """An unfitted copy with more effects; those it has already are not added twice.
+        """Unfitted copy with additional effects; existing effects are not added twice.
 
         Parameters
         ----------

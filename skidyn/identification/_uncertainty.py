@@ -39,8 +39,9 @@ def bootstrap_coefficients(
 ) -> Array:
     """Coefficients of a model fitted to trajectories drawn with replacement.
 
-    Whole trajectories are drawn [1]_, so that nothing has to be assumed on the noise within one.
-    The data is not needed again: every draw is a sum of the Gram matrices of trajectories.
+    Whole trajectories are drawn [1]_, which requires no assumption on the noise within a
+    trajectory. The data is not needed again: every draw is a sum of the Gram matrices of
+    trajectories.
 
     Parameters
     ----------
