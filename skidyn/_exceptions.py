@@ -71,14 +71,14 @@ class LogError(SkidynError):
 
 
 class MisreadLogError(LogError):
-    """A log is certainly not what its names and units say.
+    """A log certainly does not agree with its names and units.
 
     Parameters
     ----------
     message : str
-        What is wrong, and the options that fix it.
+        Description of the error, and the options that fix it.
     suspicions : sequence of Suspicion
-        What is certain.
+        The certain suspicions.
 
     Examples
     --------

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def load_demo_log() -> Bunch:
     """Log of a Panda arm whose fourth joint has pre-sliding friction and whose second has a spring.
 
-    It is simulated when it is asked for and always the same; nothing is stored or downloaded.
+    It is simulated on request and always the same; nothing is stored or downloaded.
 
     Returns
     -------

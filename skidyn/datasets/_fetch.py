@@ -81,7 +81,7 @@ def fetch_emps(
     """Download the EMPS benchmark: one prismatic axis with a ball screw, 25 s at 1 kHz.
 
     The recording is that of [1]_ as kept in the repository forgi86/sysid-neural-continuous, whose
-    licence is Apache-2.0. Nothing of it comes with skidyn.
+    licence is Apache-2.0. It is not part of skidyn.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def fetch_emps(
     Raises
     ------
     LogError
-        The checksum is another one.
+        The checksum differs.
     ImportError
         pooch is not installed (``pip install skidyn[fetch]``).
 
@@ -129,8 +129,7 @@ def fetch_panda_exciting(
     """Download an excitation of a Franka Emika Panda: 7 joints, 24 s at 30 Hz.
 
     The recording is a ROS 2 bag of the repository unisa-acg/inverse-dynamics-solver, whose licence
-    is BSD-3-Clause. Nothing of it comes with skidyn. It is too slow for accelerations above a few
-    hertz.
+    is BSD-3-Clause. It is not part of skidyn. It is too slow for accelerations above a few hertz.
 
     Parameters
     ----------
@@ -151,7 +150,7 @@ def fetch_panda_exciting(
     Raises
     ------
     LogError
-        The checksum is another one.
+        The checksum differs.
     ImportError
         pooch is not installed (``pip install skidyn[fetch]``).
 
@@ -170,8 +169,8 @@ def fetch_double_pendulum(
     """Download identification runs of a double pendulum: two backdrivable joints, 200 to 690 Hz.
 
     The recordings are those of design C.0 of 14 September 2022 in the repository
-    dfki-ric-underactuated-lab/double_pendulum [1]_, whose licence is BSD-3-Clause. Nothing of them
-    comes with skidyn.
+    dfki-ric-underactuated-lab/double_pendulum [1]_, whose licence is BSD-3-Clause. They are not
+    part of skidyn.
 
     Parameters
     ----------
@@ -226,7 +225,7 @@ def fetch_xl330(
     """Download a servo that swings 0.49 kg at 0.1 m: 16 runs of a Dynamixel XL330 at about 200 Hz.
 
     The recordings are those of [1]_ in the history of the repository Rhoban/bam, whose licence is
-    Apache-2.0. Nothing of them comes with skidyn.
+    Apache-2.0. They are not part of skidyn.
 
     Parameters
     ----------
@@ -277,7 +276,7 @@ def fetch_panda_gaz(*, data_home: str | os.PathLike[str] | None = None, url: str
     """Download an excitation of a Franka Emika Panda without a hand: 7 joints, 28 s at 1 kHz.
 
     The recording is that of [1]_ in the repository marcocognetti/FrankaEmikaPandaDynModel, whose
-    licence is GPL-3.0. Nothing of it comes with skidyn.
+    licence is GPL-3.0. It is not part of skidyn.
 
     Parameters
     ----------
@@ -339,8 +338,7 @@ def fetch_screw_drive(
     """Download a worm drive at constant speeds and in start-stop runs, seen from its motor.
 
     The recordings are those of drive 3 (worm 60:1, a hanging weight of 0.096 kg) of [1]_ in the
-    repository RViMLab/TRO2021-Dynamic-Modelling, whose licence is MIT. Nothing of them comes with
-    skidyn.
+    repository RViMLab/TRO2021-Dynamic-Modelling, whose licence is MIT. They are not part of skidyn.
 
     Parameters
     ----------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Diagnosis of models: where a model fails, missing physical effects, and the benefit of adding them."""
+"""Diagnosis: where a model fails, missing physical effects, and the benefit of adding them."""
 
 from skidyn.diagnosis._comparison import Comparison
 from skidyn.diagnosis._diagnosis import diagnose

@@ -179,17 +179,17 @@ class Diagnosis:
 
     @property
     def remainder(self) -> Array:
-        """Part of the error that is neither noise nor predictable from the signals, (n_joints,), N m or N."""
+        """Error that is neither noise nor predictable from the signals, (n_joints,), N m or N."""
         return np.zeros(len(self.joint_names)) if self.parts is None else self.parts.left
 
     @property
     def remainder_inflation(self) -> Array:
-        """Autocorrelation of the remainder: 1 if it is white, up to 2 for coloured noise; (n_joints,)."""
+        """Autocorrelation of the remainder: 1 if white, up to 2 for coloured noise; (n_joints,)."""
         return np.ones(len(self.joint_names)) if self.parts is None else self.parts.inflation
 
     @property
     def noise_is_coloured(self) -> bool:
-        """Whether the error exceeds the fast noise equally on all joints, as for correlated noise."""
+        """Whether the error exceeds fast noise equally on all joints, as for correlated noise."""
         return self.parts is not None and self.parts.coloured
 
     @property

@@ -66,8 +66,8 @@ def servo_motion_told(
 
 def _text(named: Sequence[ServoFinding], findings: Sequence[Finding]) -> str:
     if not named:
-        return "It requires no effect other than "
-        f"friction{' and the findings' if findings else ''}."
+        beside = " and the findings" if findings else ""
+        return f"It requires no effect other than friction{beside}."
     same = [
         f"{inside(finding.title)} on {joints_told(finding.joints)}"
         for finding in findings

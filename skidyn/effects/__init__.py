@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Physical effects: what can be added to a rigid-body model, and the catalogue of all kinds."""
+"""Physical effects that can be added to a rigid-body model, and their catalogue."""
 
 from typing import TYPE_CHECKING, Any
 

@@ -30,14 +30,14 @@ class Coefficient:
     unit : str
         Unit for a revolute joint; for a slider ``N m`` becomes ``N`` and ``rad`` becomes ``m``.
     sign : {0, 1}
-        1 where physics allows no negative value.
+        1 if negative values are physically impossible.
     limit : float
         Largest magnitude at which the formula still describes the effect.
     is_share : bool
-        Whether it is a share of a shape parameter, so that its own size says nothing.
+        Whether it is a share of a shape parameter, so that its own size has no meaning.
     is_zero : bool
-        Whether it only says where the effect is zero, as the constant beside a spring: a finding
-        must be more than chance beside it.
+        Whether it only defines the zero of the effect, as the constant of a spring: a finding must
+        be significant without it.
 
     Examples
     --------
@@ -64,18 +64,18 @@ class Shape:
     unit : str
         Unit for a revolute joint.
     grid : tuple of float
-        Values tried first, for a revolute joint; lengths are a tenth of it in m for sliders
-        when ``scales`` is True.
+        Initial values for a revolute joint; lengths are a tenth of it in m for sliders when
+        ``scales`` is True.
     low, high : float
         Range of the refined value.
     spacing : {"log", "linear"}
-        How refinement steps: by factors or by differences.
+        Spacing of the refinement: by factors or by differences.
     scales : bool
         Whether the value is an angle or angular velocity, so that it scales for sliders.
     has_interval : bool
         Whether a confidence interval of the value is stated.
     limit_kind : str
-        Simpler kind that the effect becomes where the value is too small to be resolved, as
+        Simpler kind that is equivalent to the effect if the value is too small to be resolved, as
         pre-sliding friction becomes Coulomb friction.
 
     Examples
@@ -98,74 +98,75 @@ class Shape:
 class Effect:
     r"""Base class of physical effects.
 
-    Subclasses state what the effect is in class attributes and give its columns. To add an
-    effect, write such a class in a file of ``skidyn/effects`` and list it in the catalogue (or
-    call :func:`skidyn.effects.register_effect` from your own code).
+    Subclasses declare the effect in class attributes and define its columns. To add an effect,
+    write such a class in a file of ``skidyn/effects`` and list it in the catalogue (or call
+    :func:`skidyn.effects.register_effect` from your own code).
 
     Attributes
     ----------
     kind : str
-        Name in the vocabulary.
+        Name in the catalogue.
     title : str
-        Name for people.
+        Title of the effect.
     formula : str
         Torque in LaTeX.
     coefficients : tuple of Coefficient
-        What is fitted linearly, one per column.
+        Linear coefficients, one per column.
     shapes : tuple of Shape
-        What enters nonlinearly.
+        Parameters that enter nonlinearly.
     forms : tuple of dict
-        Other forms of the formula that are tried beside the plain one, as further entries of the
-        shape: ``{"power": 2.0}``. An entry that is one of :attr:`shapes`, too, is where its search
-        starts; others stay as they are.
+        Other forms of the formula that are tested in addition to the plain one, as further entries
+        of the shape: ``{"power": 2.0}``. For an entry that is also one of :attr:`shapes` it is the
+        initial value of the search; others are fixed.
     scope : {"joint", "pair", "robot"}
         Where it acts.
     search : {"grid", "spectrum", "trajectories", "clock", "screened", "given"}
-        How its shape is found: on a grid, as a line in the spectrum over joint angle or over time,
-        as a split of the trajectories into those that have it and those that do not, from the
-        signals that the residual follows, or not at all because it is always given.
+        Method to find its shape: on a grid, as a line in the spectrum over joint angle or over
+        time, as a split of the trajectories into those with and without the effect, from the
+        signals on which the residual depends, or none because it is always given.
     nameless : bool
-        Whether it stands for something no name of the vocabulary describes (``unknown``).
+        Whether it represents an effect that is not in the catalogue (``unknown``).
     drawn_against : {"q", "dq", "ddq", "load", "temperature", "time"}
-        Signal against which reports draw it.
+        Signal against which it is plotted in reports.
     family : str
-        Effects of one family are often told apart only by special motion (``"hysteresis"``).
+        Family of effects that are often separated only by special motion (``"hysteresis"``).
     needs : tuple of str
         Optional signals it needs: ``"temperature"``, ``"time"``, ``"load"``, ``"model_torque"``,
         ``"robot"``.
     leading : int
-        With ``search="trajectories"``: how many of its first coefficients every trajectory by
-        itself can tell; all of them if 0.
+        With ``search="trajectories"``: number of first coefficients that every single trajectory
+        determines; all of them if 0.
     grows : bool
-        With ``search="trajectories"``: whether it is the trajectories with the larger first
-        coefficient that have the effect, be they the most, as a payload adds mass.
+        With ``search="trajectories"``: whether the trajectories with the larger first coefficient
+        have the effect, even if they are the majority, as a payload adds mass.
     softness : float
-        Share of its largest column's square by which its coefficients are drawn to zero when parts
-        of the data are left out; for flexible functions, which no row may determine there.
+        Ridge penalty relative to the square of its largest column when parts of the data are left
+        out; for flexible functions that may be undetermined there.
     drawn : float
-        The same share wherever a model is fitted; for functions of several signals, which are asked
-        for predictions between and beyond the places that the rows fill.
+        The same penalty in all fits; for functions of several signals, which are evaluated between
+        and beyond the data.
     by_recording : bool
-        Whether it may change from one recording to the next, and is tried for some of them alone.
+        Whether it may differ between recordings, and is also tested for some of them only.
     is_exact : bool
-        Whether the formula describes nothing but this effect, so that what it leaves is another
-        one; other formulas leave traces of themselves.
+        Whether the formula is exact for this effect, so that any residual is another effect; other
+        formulas are approximations and leave a residual.
     moves_link : bool
-        Whether it moves the link away from the position that the encoder logged. What it does may
-        be over within hundredths of a second, so that it is looked for in short averages, too.
+        Whether it moves the link away from the position that the encoder logged. It may last only
+        hundredths of a second, so that it is also searched in short averages.
     follows_acceleration : bool
-        Whether the noise of accelerations looks like it in short averages, so that it is not looked
-        for there where positions are coarse.
+        Whether it resembles the noise of accelerations in short averages, so that it is not
+        searched there if positions are coarse.
     is_slow : bool
-        Whether the formula holds for slow changes only, so that nothing swift is told beside it.
+        Whether the formula is valid for slow changes only, so that no fast effect is reported
+        together with it.
     simplicity : int
-        Rank among rivals that explain the data equally well; the lower is named.
+        Rank among rivals that explain the data equally well; the lowest is preferred.
     rivals : tuple of str
-        Kinds it is easily confused with.
+        Kinds with which it is easily confused.
     separating_motion : str
-        Motion that tells it from its rivals.
+        Motion that separates it from its rivals.
     caveat : str
-        What a finding of this kind must always say.
+        Note that is part of every finding of this kind.
     reference : str
         Paper or book.
 
@@ -214,26 +215,26 @@ class Effect:
 
     @property
     def has_shape(self) -> bool:
-        """Whether the columns depend on a shape that has to be given or found.
+        """Whether the columns depend on a shape that has to be given or estimated.
 
-        What only further forms have need not be: the plain form stands without it.
+        Entries that only further forms have are not required: the plain form does not need them.
         """
         plain = any(shape.name not in self.form_names for shape in self.shapes)
         return plain or type(self).grid is not Effect.grid
 
     @property
     def form_names(self) -> frozenset[str]:
-        """Names of what only further forms of the formula have in their shape."""
+        """Names of shape entries that only further forms of the formula have."""
         return frozenset(name for form in self.forms for name in form)
 
     @property
     def needs_fit(self) -> bool:
-        """Whether there are no columns before a model has been fitted."""
+        """Whether the columns require a fitted model."""
         return not {"load", "model_torque"}.isdisjoint(self.needs)
 
     @property
     def follows_fit(self) -> bool:
-        """Whether the columns change with the fit: with its torque, or its rigid body."""
+        """Whether the columns depend on the fit: on its torque, or its rigid body."""
         return self.needs_fit or "robot" in self.needs
 
     @property
@@ -242,7 +243,7 @@ class Effect:
         return "model_torque" in self.needs
 
     def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
-        """What is fitted linearly with some shape, one per column.
+        """Linear coefficients for a given shape, one per column.
 
         Parameters
         ----------
@@ -298,7 +299,7 @@ class Effect:
         return {joint: self.columns(signals, joint, **shape)}
 
     def not_shown(self, signals: Signals, joint: int) -> str | None:
-        """Why this data cannot show the effect on a joint; None where it can.
+        """Reason why this data cannot show the effect on a joint; None if it can.
 
         Parameters
         ----------
@@ -341,7 +342,7 @@ class Effect:
         return [(j,) for j in range(n)]
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        """Shape parameters to try first.
+        """Initial shape parameters of the search.
 
         Parameters
         ----------
@@ -371,7 +372,7 @@ class Effect:
         return [shape | form for form in forms for shape in shapes]
 
     def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
-        """Whether shape parameters lie where this data can tell them from a simpler effect.
+        """Whether this data can distinguish the effect with this shape from a simpler one.
 
         Parameters
         ----------
@@ -385,7 +386,8 @@ class Effect:
         Returns
         -------
         bool
-            True by default. A contact is one only if some samples touch and others do not.
+            True by default. A contact is admissible only if some samples are in contact and others
+            are not.
         """
         return True
 
@@ -403,7 +405,7 @@ class Effect:
         shape : mapping
             Shape parameters of the grid.
         share : float
-            Least size of a coefficient, as a share of what the shape says.
+            Least size of a coefficient, as a share of the size implied by the shape.
 
         Returns
         -------
@@ -413,7 +415,7 @@ class Effect:
         return dict(shape)
 
     def least(self, shape: Mapping[str, Any]) -> float:
-        """Smallest value at which a coefficient that must not be negative goes with its shape.
+        """Smallest value of a non-negative coefficient that is consistent with its shape.
 
         Parameters
         ----------
@@ -423,12 +425,12 @@ class Effect:
         Returns
         -------
         float
-            0 by default. A spring whose resonance is known cannot be of any stiffness.
+            0 by default. For example, a known resonance bounds the stiffness of a spring.
         """
         return 0.0
 
     def fastest(self, shape: Mapping[str, Any]) -> float:
-        """Frequency, Hz, up to which the motion must be known for short averages to tell it.
+        """Frequency, Hz, up to which the motion must be known to detect it in short averages.
 
         Parameters
         ----------
@@ -438,12 +440,12 @@ class Effect:
         Returns
         -------
         float
-            0 by default. A swing shows where it is resonant.
+            0 by default. An oscillating load is visible at its resonance.
         """
         return 0.0
 
     def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
-        """Range over which a shape parameter with linear spacing moves, in its own unit.
+        """Range of a shape parameter with linear spacing, in its own unit.
 
         Parameters
         ----------
@@ -505,7 +507,7 @@ class Effect:
         return {k: u.replace("N m", "N").replace("rad", "m") for k, u in units.items()}
 
     def describe(self) -> dict[str, Any]:
-        """Everything the catalogue, the report and the documentation print.
+        """All information printed in the catalogue, the report and the documentation.
 
         Returns
         -------

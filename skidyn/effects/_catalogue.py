@@ -76,14 +76,14 @@ TermSpec = str | tuple[str, Sequence[int]] | Term
 
 
 def make_terms(specs: Iterable[TermSpec], n_joints: int) -> list[Term]:
-    """Terms from what a user wrote.
+    """Make terms from a user's specification.
 
     Parameters
     ----------
     specs : iterable of str, (str, joints) or Term
         ``"viscous"`` is viscous friction on every joint; ``("dahl", [1, 4])`` Dahl friction on
-        joints 1 and 4, counted from 1; a :class:`Term` stands for itself, completed by the shape
-        parameters that have one usual value.
+        joints 1 and 4, counted from 1; a :class:`Term` is used as given, completed by the shape
+        parameters that have a usual value.
     n_joints : int
         Number of joints of the robot.
 

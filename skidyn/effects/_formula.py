@@ -62,7 +62,7 @@ def formula(expression: str, joint: int) -> Term:
     Raises
     ------
     EffectError
-        The expression holds anything else.
+        The expression contains anything else.
 
     Examples
     --------

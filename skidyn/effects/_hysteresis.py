@@ -138,7 +138,7 @@ def dahl_state(position: Array, segments: list[slice], presliding: float) -> Arr
     segments : list of slice
         Rows within which the path is continuous.
     presliding : float, rad or m
-        Way over which friction builds up, Fc / sigma0.
+        Distance over which friction builds up, Fc / sigma0.
 
     Returns
     -------
@@ -185,7 +185,7 @@ def stop_state(position: Array, segments: list[slice], presliding: float) -> Arr
     segments : list of slice
         Rows within which the path is continuous.
     presliding : float, rad or m
-        Way from rest to slip.
+        Distance from rest to slip.
 
     Returns
     -------

@@ -62,7 +62,7 @@ def nameless_kinds() -> list[str]:
 
 
 def register_effect(effect: Effect | type[Effect]) -> None:
-    """Add your own effect to the catalogue; diagnosis and reports then know it.
+    """Add an effect to the catalogue, for use in diagnosis and reports.
 
     Parameters
     ----------
@@ -98,12 +98,12 @@ def register_effect(effect: Effect | type[Effect]) -> None:
 
 
 def unregister_effect(kind: str) -> None:
-    """Take an effect out of the catalogue again.
+    """Remove an effect from the catalogue.
 
     Parameters
     ----------
     kind : str
-        Its name; nothing happens where the catalogue has none of it.
+        Its name; an unknown name is ignored.
 
     Examples
     --------

@@ -24,8 +24,8 @@ _JOINTS = 32
 class Term:
     """An effect on certain joints with certain shape parameters: one block of regressor columns.
 
-    Terms add up: ``Term("viscous", (1,)) + Term("coulomb", (1,))`` is a :class:`TermSum`, a part of
-    a model.
+    Terms can be added: ``Term("viscous", (1,)) + Term("coulomb", (1,))`` is a :class:`TermSum`, a
+    part of a model.
 
     Parameters
     ----------
@@ -94,8 +94,8 @@ class Term:
     def trajectories(self) -> tuple[int, ...] | None:
         """Trajectories in which the effect acts; None for all.
 
-        Any effect may act in some recordings only: a load that was carried, a sensor zeroed anew,
-        friction that rose. ``trajectories`` in the shape names them.
+        Any effect may act in some recordings only, such as a carried load, a sensor with a new
+        zero, or increased friction. ``trajectories`` in the shape lists them.
         """
         return self.shape.get("trajectories")
 
@@ -105,7 +105,7 @@ class Term:
 
     @property
     def is_further_form(self) -> bool:
-        """Whether the formula is another one than the plain one of its kind."""
+        """Whether the formula differs from the plain one of its kind."""
         return not self.effect.form_names.isdisjoint(self.shape)
 
     @property
@@ -115,7 +115,7 @@ class Term:
 
     @property
     def coefficients(self) -> tuple[Coefficient, ...]:
-        """What is fitted linearly, one per column."""
+        """Linear coefficients, one per column."""
         return self.effect.coefficients_of(self.shape)
 
     @property
@@ -132,50 +132,50 @@ class Term:
 
     @property
     def signs(self) -> Array:
-        """1 for every coefficient that physics forbids to be negative, else 0; (width,)."""
+        """1 for every coefficient that cannot be negative physically, else 0; (width,)."""
         return np.array([c.sign for c in self.coefficients], dtype=float)
 
     @property
     def lowest(self) -> Array:
-        """Smallest value of every coefficient that physics allows beside its shape, (width,)."""
+        """Smallest physically admissible value of every coefficient for its shape, (width,)."""
         return np.where(self.signs > 0, self.effect.least(self.shape), -np.inf)
 
     @property
     def zeros(self) -> NDArray[np.bool_]:
-        """Which coefficients only say where the effect is zero, (width,)."""
+        """Coefficients that only define the zero of the effect, (width,)."""
         return np.array([c.is_zero for c in self.coefficients], dtype=bool)
 
     @property
     def limits(self) -> Array:
-        """Largest magnitude of every coefficient at which the formula holds, (width,)."""
+        """Largest magnitude of every coefficient for which the formula is valid, (width,)."""
         return np.array([c.limit for c in self.coefficients])
 
     @property
     def is_open(self) -> bool:
-        """Whether the effect has a shape that this term leaves to be found."""
+        """Whether the effect has shape parameters that this term does not specify."""
         return self.effect.has_shape and not self._own_shape
 
     @property
     def is_dry(self) -> bool:
-        """Whether the torque jumps where the motion turns back, as that of dry friction does.
+        """Whether the torque is discontinuous at reversals, as for dry friction.
 
-        Found from the columns themselves: at a hundredth of a unit velocity in either direction
-        they still differ by much of what they differ by at unit velocity.
+        Determined from the columns: their difference between both directions at a hundredth of unit
+        velocity is still a large part of that at unit velocity.
         """
         return _is_dry(self.effect, self)
 
     @property
     def is_pointwise(self) -> bool:
-        """Whether the columns at a sample depend on nothing but that sample.
+        """Whether the columns at a sample depend on that sample only.
 
-        Found from the columns themselves, along a motion and at every second sample of it. False
-        where the effect cannot be tried without the robot.
+        Determined from the columns along a motion and at every second sample of it. False if the
+        effect cannot be evaluated without the robot.
         """
         return _is_pointwise(self.effect, self)
 
     @property
     def follows_position(self) -> bool:
-        """Whether it is a force over the joint's own position, as of springs and stops."""
+        """Whether it is a force that depends on the joint position, as for springs and stops."""
         effect = self.effect
         own = effect.scope == "joint" and effect.drawn_against == "q" and effect.search == "grid"
         return own and not effect.nameless and not self.is_dry
@@ -233,7 +233,7 @@ class Term:
 
 
 class TermSum(tuple[Term, ...]):
-    """Terms that add up, in order: a part of a model, with one block of coefficients.
+    """Ordered sum of terms: a part of a model, with one block of coefficients.
 
     Parameters
     ----------
@@ -267,7 +267,7 @@ class TermSum(tuple[Term, ...]):
 
     @property
     def signs(self) -> Array:
-        """1 for every coefficient that physics forbids to be negative, else 0; (width,)."""
+        """1 for every coefficient that cannot be negative physically, else 0; (width,)."""
         return np.concatenate([np.zeros(0), *(term.signs for term in self)])
 
     def slices(self, start: int = 0) -> Iterator[tuple[Term, slice]]:
@@ -276,7 +276,7 @@ class TermSum(tuple[Term, ...]):
         Parameters
         ----------
         start : int, default=0
-            Where the first coefficient of the first term stands, such as after those of the rigid
+            Index of the first coefficient of the first term, for example after those of the rigid
             body.
 
         Yields

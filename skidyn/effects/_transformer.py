@@ -23,26 +23,26 @@ from skidyn.effects._term import Term
 class FrictionTransformer(LogTransformer):
     """Append the columns of friction and other joint effects to X.
 
-    X is motion after the X contract. The new columns, one for each coefficient of each effect, are
-    called ``<kind>_<coefficient>_<joint>``, joints from 1. States of hysteresis start anew with
+    X is motion, following the X contract. The new columns, one for each coefficient of each effect,
+    are called ``<kind>_<coefficient>_<joint>``, joints from 1. States of hysteresis are reset in
     each trajectory.
 
     Parameters
     ----------
     effects : sequence of str, (str, joints) or Term, default=("viscous", "coulomb")
-        Effects that act on single joints and follow from the motion alone. Those with shape
-        parameters are given as :class:`~skidyn.effects.Term`.
+        Effects that act on single joints and depend on the motion only. Those with shape parameters
+        are given as :class:`~skidyn.effects.Term`.
     n_joints : int, default=None
-        Number of joints; from the columns if None. All joints are taken to be revolute.
+        Number of joints; from the columns if None. All joints are assumed to be revolute.
     trajectory, time : int, str or None, default="auto"
-        Key columns, handed on untouched.
+        Key columns, passed on unchanged.
 
     Attributes
     ----------
     terms_ : list of Term
         Effects per joint, in the order of the appended columns.
     columns_ : Columns
-        Which column of X means what.
+        Meaning of the columns of X.
     n_features_in_ : int
         Columns of X.
     feature_names_in_ : ndarray of str

@@ -29,14 +29,14 @@ class Controller:
     limit : float or array-like of shape (n_joints,), default=inf
         Largest torque of the drive, N m (N): a current limit.
     delay : float, default=0.0
-        Time by which the reference reaches the controller late, s.
+        Delay of the reference at the controller, s.
     deadband : float or array-like of shape (n_joints,), default=0.0
-        Position error, rad (m), inside which the controller does nothing.
+        Position error, rad (m), within which the controller output is zero.
     offset : float or array-like of shape (n_joints,), default=0.0
         Constant torque, N m (N).
     follows_velocity : bool, default=True
         Whether the velocity of the reference is fed forward; False is damping of the velocity
-        itself, as position servos have it.
+        itself, as in position servos.
 
     Examples
     --------
@@ -69,7 +69,7 @@ class Controller:
         Raises
         ------
         SkidynError
-            A gain is negative or has not one number for each joint.
+            A gain is negative or does not have one number for each joint.
         """
         values: dict[str, Any] = {}
         for name in ("stiffness", "damping", "limit", "deadband", "offset"):
@@ -109,7 +109,7 @@ def fit_controller(log: Any, torque: Any, *, follows_velocity: bool | None = Non
     """Gains of a controller from reference, motion and torque.
 
     Least squares of the torque on position error, velocity error and a constant, joint by joint.
-    The delay of the reference is that of 0 to 50 ms, in steps of the log, which fits best.
+    The delay of the reference is the best-fitting one from 0 to 50 ms, in steps of the log.
 
     Parameters
     ----------
@@ -119,12 +119,12 @@ def fit_controller(log: Any, torque: Any, *, follows_velocity: bool | None = Non
     torque : array-like of shape (n_samples, n_joints)
         Torque of the drive, N m or N.
     follows_velocity : bool or None, default=None
-        Whether the velocity of the reference is fed forward; None takes what fits better.
+        Whether the velocity of the reference is fed forward; None selects the better fit.
 
     Returns
     -------
     Controller
-        Gains below 0 are set to 0, which only a log without their effect shows.
+        Negative gains are set to 0; they only occur in logs without their effect.
 
     Raises
     ------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Logs of robots: readers of recordings, names, clock, units and the checks of a log."""
+"""Logs of robots: readers, column names, clock, units and checks."""
 
 from skidyn.logs._files import Channel
 from skidyn.logs._formats import register_reader

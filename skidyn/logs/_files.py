@@ -29,7 +29,7 @@ _ROW_NAMES, _NOTHING = "names of rows", "behind the last separator"
 
 @dataclass
 class Channel:
-    """Columns that share one clock, as a file holds them.
+    """Columns that share one clock, as stored in a file.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class Channel:
     table : DataFrame
         The columns under the names of the source.
     attributes : dict
-        What the file says about itself, such as ``joint_names``.
+        Metadata of the file, such as ``joint_names``.
 
     Examples
     --------

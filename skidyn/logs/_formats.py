@@ -38,22 +38,22 @@ _READERS: dict[str, Reader] = {
 
 
 def register_reader(suffix: str, reader: Reader | None) -> None:
-    r"""Let :func:`read_log` read files of another kind.
+    r"""Register a reader for :func:`read_log`.
 
     Parameters
     ----------
     suffix : str
-        Ending of the files, in lower case, such as ``".tdms"``. The reader of a suffix that is
-        known already is replaced.
+        Ending of the files, in lower case, such as ``".tdms"``. An existing reader of the suffix is
+        replaced.
     reader : callable or None
         ``reader(path, max_bytes, topics)`` returns a list of :class:`Channel`. It raises LogError
-        where the file would unpack to more than ``max_bytes``; ``topics`` are the names of the
-        channels that are wanted, None for all. None takes the suffix out again.
+        if the file would unpack to more than ``max_bytes``; ``topics`` are the names of the
+        requested channels, None for all. A reader of None removes the suffix.
 
     Raises
     ------
     LogError
-        The suffix is not one.
+        The suffix is invalid.
 
     Examples
     --------

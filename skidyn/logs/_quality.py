@@ -36,7 +36,7 @@ class JointQuality:
     largest_velocity : float, rad/s or m/s
         Largest absolute velocity.
     reversals : int
-        How often the direction of motion changes.
+        Number of changes of the direction of motion.
     rest_share : float
         Share of rows in which the joint does not move.
     torque_range : tuple of float, N m or N
@@ -46,8 +46,8 @@ class JointQuality:
     velocity_slope, velocity_correlation : float
         Velocity against differentiated position; both are 1 in a consistent log.
     torque_delay : float, s
-        Time by which torque lags motion (positive: torque is late); NaN where it cannot be told.
-        Pre-sliding friction looks like a lag of its joint; a delay is alike in all joints.
+        Time by which torque lags motion (positive: torque is late); NaN if it cannot be determined.
+        Pre-sliding friction resembles a lag of its joint; a delay is equal on all joints.
     excited : bool
         Whether the joint moves enough for its own parameters to be identified.
 
@@ -78,7 +78,7 @@ class JointQuality:
 
 @dataclass(frozen=True)
 class LogQuality:
-    """What :func:`check_log` found.
+    """Result of :func:`check_log`.
 
     Parameters
     ----------
@@ -101,11 +101,12 @@ class LogQuality:
     joints : tuple of JointQuality
         One per joint.
     checks : tuple of Suspicion
-        What looks wrong, what matters most first, with its evidence and the option that fixes it.
+        Suspicions in the order of their importance, each with its evidence and the option that
+        fixes it.
     faults : tuple of str
-        Rows that this report leaves out.
+        Rows that are not part of this report.
     notes : tuple of str
-        What the log cannot give although nothing is wrong with it.
+        Limitations of the log that are not errors.
 
     Examples
     --------
@@ -181,7 +182,7 @@ class LogQuality:
 
 
 def check_log(frame: pd.DataFrame, robot: Robot | None = None) -> LogQuality:
-    """Judge the quality of a log.
+    """Check the quality of a log.
 
     Parameters
     ----------
@@ -190,13 +191,12 @@ def check_log(frame: pd.DataFrame, robot: Robot | None = None) -> LogQuality:
         or N), as :func:`read_log` returns it.
     robot : Robot, optional
         For its limits (coverage, units) and its dynamics: signs, order, gravity, scale and delay of
-        what was recorded are tested by fitting the robot to it.
+        the recording are tested by fitting the robot to it.
 
     Returns
     -------
     LogQuality
-        Numbers per log and joint, and what looks wrong with the evidence. Nothing is changed in
-        ``frame``.
+        Numbers per log and joint, and suspicions with evidence. ``frame`` is not changed.
 
     Raises
     ------

@@ -71,11 +71,11 @@ def read_log(
         for the logs in it; files of a folder that hold one signal each (``q.csv``, ``tau.csv``,
         ``commands.csv``) are one recording. A LeRobot data set is its folder.
     robot : Robot, optional
-        Its joint names are looked for and order the columns; the log is checked against its
-        limits and its gravity.
+        Its joint names are searched in the column names and determine the order of the columns; the
+        log is checked against its limits and its gravity.
     columns : mapping, optional
-        Which columns hold which signals, where names do not tell: ``{"q1": "pos_a"}``,
-        ``{"q": ["pos_a", "pos_b"]}``, ``{"tau": "effort_{joint}"}``, ``{"time": 0}``.
+        Columns of the signals, if they do not have usual names: ``{"q1": "pos_a"}``, ``{"q":
+        ["pos_a", "pos_b"]}``, ``{"tau": "effort_{joint}"}``, ``{"time": 0}``.
     units : mapping, optional
         Units that are not SI, per quantity or column: ``{"q": "deg", "time": "ms", "q3": "mm"}``.
     drive_gains : sequence of float, N m/A or N/A, optional
@@ -98,42 +98,43 @@ def read_log(
         For each joint of the robot the number, from 1, of the column that holds it:
         ``[2, 1, 3]``; of one quantity only: ``{"tau": [2, 1, 3]}``.
     flip : sequence of str or int, default=()
-        Whose sign is to be changed: a joint, by name or number, means its torque; ``"q3"`` its
+        Signals whose sign is changed: a joint, by name or number, means its torque; ``"q3"`` its
         position with velocity and acceleration; ``"dq3"`` or ``"tau3"`` one column.
     gain : mapping, optional
         Factors of columns or quantities: ``{"tau3": 0.02}``.
     summed : mapping of str to str, optional
-        Positions that hold that of another joint, as angles against the base do, which is taken
-        off with velocity and acceleration: ``{"q3": "q2"}``, or ``{"q3": "-q2"}``.
+        Positions that include that of another joint, such as angles relative to the base; the
+        latter is subtracted, with velocity and acceleration: ``{"q3": "q2"}``, or ``{"q3":
+        "-q2"}``.
     zero : mapping of str to float, rad or m, optional
-        What positions read at the robot's zero, which is taken off: ``{"q2": 1.5708}``.
+        Recorded positions at the robot's zero, which are subtracted: ``{"q2": 1.5708}``.
     late : mapping of str to float, s, optional
-        Delays of columns or quantities, which are taken out: ``{"tau": 0.008}``.
+        Delays of columns or quantities, which are removed: ``{"tau": 0.008}``.
     lowpass : mapping of str to float, s, optional
-        Time constants of low passes of first order that columns or quantities went through, which
-        are undone: ``{"tau": 0.04}``. What was added after the filter, such as steps of a file,
-        grows by as much as the filter takes off noise.
+        Time constants of first-order low-pass filters of columns or quantities, which are undone:
+        ``{"tau": 0.04}``. Noise added after the filter, such as quantization in the file, is
+        amplified by the factor by which the filter reduces noise.
     unwrap : bool, default=False
-        Take leaps by a turn out of positions.
+        Remove jumps by a full turn from positions.
     torque_sign : {"recorded", "command"}, default="recorded"
         ``"command"``: torques that are never negative get the sign of commanded minus measured
         position.
     clock : {"recorded", "regular"}, default="recorded"
         ``"regular"``: samples were taken at even steps, and only the stamps jitter.
     drop_repeated : bool, default=False
-        Leave out rows that repeat all positions of the row before while joints move, or all
-        torques where they are reported less often.
+        Leave out rows that repeat all positions of the previous row while joints move, or all
+        torques if they are reported less often.
     split_leaps : bool, default=False
-        Begin a new trajectory where positions leap farther than any velocity takes them, as where
-        recordings were joined.
+        Begin a new trajectory where positions jump farther than any velocity implies, as for joined
+        recordings.
     restore_gravity : bool, default=False
-        Add the gravity torque of ``robot`` to torque from which a driver has taken it off.
+        Add the gravity torque of ``robot`` to torque from which a driver removed it.
     needs_torque : bool, default=True
-        Refuse a log without torque. False reads logs of commands and positions too, whose servos
-        are sensors of torque (:func:`skidyn.simulation.servo_torque`).
+        Refuse a log without torque. False also reads logs of commands and positions, for which the
+        torque is computed from the servos (:func:`skidyn.simulation.servo_torque`).
     check : bool, default=True
-        Judge the quality of the log (:func:`check_log`) and warn of what looks wrong. A log
-        without torque is not judged.
+        Check the quality of the log (:func:`check_log`) and warn of problems. A log without torque
+        is not checked.
     max_bytes : int
         Largest size of one file once unpacked.
 
@@ -149,7 +150,7 @@ def read_log(
     Raises
     ------
     LogError
-        The log cannot be used as it is; the message says why and what to do.
+        The log cannot be used as it is; the message states the reason and the remedy.
 
     Examples
     --------

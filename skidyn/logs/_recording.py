@@ -53,7 +53,7 @@ def load_recording(
         ``frame``: DataFrame ``time, trajectory, q1 .., dq1 .., tau1 ..`` and further signals;
         ``trajectory`` is the number of the run. ``labels``: dict from run number to its label
         (dict), with its ``name`` and ``rate`` (Hz); ``joint_names``; ``meta``: dict on the whole
-        recording; ``notes``: what was derived or left out.
+        recording; ``notes``: derived or omitted data.
 
     Raises
     ------

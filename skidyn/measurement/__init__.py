@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks of a measurement: whether its signals are what their names say."""
+"""Checks of a measurement: whether its signals agree with their names and units."""
 
 from skidyn.measurement._check import Check
 from skidyn.measurement._checks import check_measurement, list_checks, refuse_certain

@@ -12,29 +12,30 @@ from skidyn.measurement._suspicion import Certainty, Remedy, Suspicion
 
 
 class Check(ABC):
-    """One mistake that a measurement may have without its owner knowing.
+    """Check for one kind of mistake in a measurement.
 
-    A subclass says what it suspects and how it looks; :func:`skidyn.measurement.list_checks` has
-    them in the order in which they change an answer.
+    A subclass defines the suspicion and its test; :func:`skidyn.measurement.list_checks` returns
+    them in the order of their influence on the result.
 
     Attributes
     ----------
     name : str
-        Short name, as reports hold it.
+        Short name, as in reports.
     suspects : str
-        What it suspects, for the table of checks.
+        Its suspicion, for the table of checks.
     stage : {0, 1, 2}
-        0: looks at the columns alone; 1: fits the robot to find how columns are to be read; 2:
-        fits the robot to columns that are read rightly. A fit of columns in other units, or of the
-        wrong joint, means nothing, so a check is left out where one of an earlier stage has found
-        that (:func:`skidyn.measurement.check_measurement`).
+        0: uses the columns only; 1: fits the robot to find the correct interpretation of the
+        columns; 2: fits the robot to correctly interpreted columns. A fit of columns in wrong
+        units, or of the wrong joint, is meaningless, so a check is left out if one of an earlier
+        stage has found such an error (:func:`skidyn.measurement.check_measurement`).
     misnames : bool
-        Whether an effect that a diagnosis names would be that of the mistake, so that it names none
-        where the check suspects something. Not where a missing effect may be taken for the
-        mistake: a spring for a zero or a sign, a payload of one recording for an odd one.
+        Whether the mistake would be reported as a physical effect, so that a diagnosis identifies
+        no effect if the check suspects it. False if a missing effect may be confused with the
+        mistake: a spring with a zero or a sign, a payload of one recording with an inconsistent
+        recording.
     of_sensor : bool
-        Whether it suspects the sensor of the torque; left out where the torque was computed from
-        the commands of servos, which have none.
+        Whether it concerns the torque sensor; left out if the torque was computed from the commands
+        of servos.
 
     Examples
     --------
@@ -51,17 +52,17 @@ class Check(ABC):
 
     @abstractmethod
     def look(self, measurement: Measurement) -> Iterable[Suspicion]:
-        """Look at a measurement.
+        """Run the check on a measurement.
 
         Parameters
         ----------
         measurement : Measurement
-            What was recorded and the robot.
+            Recording and robot.
 
         Returns
         -------
         iterable of Suspicion
-            What the check suspects; empty where it finds nothing.
+            Suspicions of the check; empty if there are none.
         """
 
     def suspicion(
@@ -72,19 +73,19 @@ class Check(ABC):
         joints: Iterable[int] = (),
         remedy: tuple[str, str] | None = None,
     ) -> Suspicion:
-        """Say what the check suspects, under its name.
+        """Make a suspicion with the name of this check.
 
         Parameters
         ----------
         suspicion : str
-            What the measurement may be.
+            The suspicion, as a clause.
         evidence : str
-            The numbers that say so.
+            The evidence in numbers.
         certainty : {"certain", "suspected", "noted"}
-            How surely it is so.
+            Certainty of the suspicion.
         joints : iterable of int, default=()
-            Joints concerned, counted from 0; the suspicion counts them from 1. Empty where it is
-            about the whole measurement.
+            Joints concerned, counted from 0; the suspicion counts them from 1. Empty if it concerns
+            the whole measurement.
         remedy : (str, str) or None, default=None
             Option of the command line and the same as an argument in Python, as of
             :class:`skidyn.measurement.Remedy`; None where none is known.

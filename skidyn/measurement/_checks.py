@@ -85,7 +85,7 @@ CHECKS: tuple[Check, ...] = (
 
 
 def list_checks() -> tuple[Check, ...]:
-    """All checks in the order in which they change an answer.
+    """All checks in the order of their influence on the result.
 
     Returns
     -------
@@ -102,16 +102,16 @@ def list_checks() -> tuple[Check, ...]:
 
 
 def check_measurement(measurement: Measurement) -> list[Suspicion]:
-    """What is wrong with a measurement, what matters most first.
+    """Check a measurement; the most important suspicions come first.
 
-    Checks that fit the robot are left out where columns are certainly in other units, and those
-    that presume the right joints and signs where these are suspected: their fits would mean
-    nothing. Checks of the torque's sensor are left out where servos have none.
+    Checks that fit the robot are left out if columns are certainly in wrong units, and checks that
+    require correct joints and signs if these are suspected to be wrong, because their fits would be
+    meaningless. Checks of the torque sensor are left out for torque computed from servos.
 
     Parameters
     ----------
     measurement : Measurement
-        What was recorded and the robot.
+        Recording and robot.
 
     Returns
     -------
@@ -175,7 +175,7 @@ def names_in_doubt(found: list[Suspicion]) -> list[str]:
 
 
 def refuse_certain(found: list[Suspicion]) -> None:
-    """Raise if a measurement is certainly not what its names and units say.
+    """Raise if a measurement certainly does not agree with its names and units.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def refuse_certain(found: list[Suspicion]) -> None:
     Raises
     ------
     MisreadLogError
-        With the suspicions that are certain, and the option that fixes each.
+        With the certain suspicions and their remedies.
 
     Examples
     --------

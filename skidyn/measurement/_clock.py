@@ -44,10 +44,10 @@ STEPS = 3.0
 def regular_clock(time: Array, trajectory: NDArray[np.int64]) -> Array:
     """Time of every row if the samples were taken at even steps.
 
-    Rows are numbered by the recorded time where it leaves no doubt, so that a missing row stays
-    missing, and one after the other where stamps jitter by more than half a step, or stay within a
-    step of even ones although many steps are twice as long as others: they were rounded. The
-    straight line through times over numbers is the clock.
+    Rows are numbered by the recorded time if it is unambiguous, so that missing rows stay missing,
+    and consecutively if stamps jitter by more than half a step, or if they were rounded, that is,
+    stay within a step of even ones although many steps are twice as long as others. The straight
+    line through times over numbers is the clock.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def regular_clock(time: Array, trajectory: NDArray[np.int64]) -> Array:
     Returns
     -------
     ndarray of shape (n_samples,), s
-        Even steps within every stretch without a gap.
+        Even steps within every part without a gap.
 
     Examples
     --------

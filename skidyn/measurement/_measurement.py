@@ -35,35 +35,35 @@ ALIKE, SHARED = 0.9, 0.05
 
 @dataclass
 class Measurement:
-    """Motion and torque as recorded, and the robot they are said to come from.
+    """Recorded motion and torque, and the description of the robot.
 
     Parameters
     ----------
     signals : Signals
-        Recorded motion; its positions and velocities are looked at as they are.
+        Recorded motion; its positions and velocities are used as they are.
     torque : ndarray of shape (n_samples, n_joints), N m or N
         Recorded torque.
     robot : Robot or None
-        Robot as its description says; checks that need it are left out without it.
+        Robot according to its description; checks that need it are left out without it.
     joint_names : sequence of str
         Names for sentences and remedies.
     identified : bool, optional
-        Whether bodies are going to be identified, so that those of the description may be wrong; by
-        default it is not known.
+        Whether bodies will be identified, so that those of the description may be wrong; unknown by
+        default.
     of_servos : bool, default=False
-        Whether the torque was computed from the commands of position servos: there is no sensor
-        that could be wrong.
+        Whether the torque was computed from the commands of position servos, without a torque
+        sensor.
     same_stamps : int, optional
-        Rows that had the stamp of the row before although joints moved on; ``signals`` then have
-        an even clock.
+        Rows that had the time stamp of the previous row although joints moved; ``signals`` then
+        have an even clock.
     unsigned, changes, delay, copies, late_position, readable, stale, lost, odd : optional
-        What checks found that other checks use; filled in by them.
+        Results of checks that are used by other checks; set by them.
     scaled, smoothed, computed, frictionless : bool, optional
-        What checks found that other checks use; filled in by them.
+        Results of checks that are used by other checks; set by them.
     clock : float, optional
-        How many of its units the clock counts in a second; filled in by its check.
+        Number of units of the clock in a second; set by its check.
     millimetres : set of int, optional
-        Joints, from 0, whose positions are told to be in millimetres; filled in by their check.
+        Joints, from 0, whose positions are reported to be in millimetres; set by their check.
 
     Examples
     --------

@@ -14,7 +14,7 @@ CERTAINTIES: tuple[Certainty, ...] = ("certain", "suspected", "noted")
 
 @dataclass(frozen=True)
 class Remedy:
-    """The option that fixes what a check suspects.
+    """The option that fixes a suspicion.
 
     Parameters
     ----------
@@ -39,22 +39,22 @@ class Remedy:
 
 @dataclass(frozen=True)
 class Suspicion:
-    """One thing about a measurement that its owner should know.
+    """One finding of a check of a measurement.
 
     Parameters
     ----------
     check : str
         Name of the check.
     suspicion : str
-        What it suspects, as a clause.
+        The suspicion, as a clause.
     evidence : str
-        What it saw.
+        The evidence.
     certainty : {"certain", "suspected", "noted"}
-        Certain ones stop a diagnosis; noted ones are not mistakes, but limit what the log can tell.
+        Certain ones stop a diagnosis; noted ones are not mistakes, but limitations of the log.
     joints : tuple of int
         Joints concerned, counted from 1; empty if it concerns the whole log.
     remedy : Remedy or None
-        The option that fixes it; None where none can.
+        The option that fixes it; None if there is none.
 
     Examples
     --------
@@ -75,7 +75,7 @@ class Suspicion:
         return f"{self.suspicion}: {self.evidence}.{fix}"
 
     def to_dict(self) -> dict[str, Any]:
-        """As the reports hold it.
+        """As in the reports.
 
         Returns
         -------

@@ -59,18 +59,18 @@ def summarize_comparison(
     first, second : Diagnosis
         From :func:`skidyn.diagnosis.diagnose`, of robots with the same joints.
     names : sequence of two str, default=("first", "second")
-        What the two are called.
+        Names of the two.
     title : str, optional
         Heading of the page; the name of the robot by default.
     provenance : sequence of two mappings, optional
-        Where the numbers of each come from. Versions are added.
+        Provenance of each. Versions are added.
 
     Returns
     -------
     summary : dict
         ``report`` is machine-readable (schema ``skidyn.comparison/1``): errors per joint and
-        regime, findings and coefficients of both with 95 % intervals; the rest is what the page
-        draws. Errors are in N m, N for sliding joints.
+        regime, findings and coefficients of both with 95 % intervals; the rest is the data of the
+        figures. Errors are in N m, N for sliding joints.
 
     Raises
     ------

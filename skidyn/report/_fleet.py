@@ -43,7 +43,7 @@ def summarize_fleet(
     title: str = "Fleet",
     false_discovery_rate: float = 0.05,
 ) -> dict[str, Any]:
-    """Everything that the page of a fleet shows, as a dictionary of JSON values.
+    """Summarize a fleet for its page, as a dictionary of JSON values.
 
     Parameters
     ----------
@@ -59,8 +59,8 @@ def summarize_fleet(
     Returns
     -------
     summary : dict
-        ``report`` is machine-readable (schema ``skidyn.fleet/1``): robots, coefficients, what is
-        common to them and what deviates, SI units; the rest is what the page draws.
+        ``report`` is machine-readable (schema ``skidyn.fleet/1``): robots, coefficients, common
+        values and deviations, SI units; the rest is the data of the figures.
 
     Examples
     --------

@@ -22,7 +22,7 @@ def summarize(
     title: str | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """Everything that the report page shows, as a dictionary of JSON values.
+    """Summarize a diagnosis for the report page, as a dictionary of JSON values.
 
     Parameters
     ----------
@@ -31,14 +31,14 @@ def summarize(
     title : str, optional
         Heading of the page; the name of the robot by default.
     provenance : mapping, optional
-        Where the numbers come from: files with their hashes, options. Versions are added.
+        Provenance of the numbers: files with their hashes, options. Versions are added.
 
     Returns
     -------
     summary : dict
         ``report`` is the machine-readable report (schema ``skidyn.diagnosis/1``), ``story`` the
-        first screen; the rest is what the pictures of the page draw, each under its name. Long
-        signals are thinned without losing a peak. Errors are in N m, N for sliding joints.
+        first screen; the rest is the data of the figures of the page, each under its name. Long
+        signals are reduced without losing peaks. Errors are in N m, N for sliding joints.
 
     Examples
     --------

@@ -25,7 +25,7 @@ def render_html(summary: dict[str, Any]) -> str:
     Returns
     -------
     html : str
-        A whole page that loads nothing from anywhere: styles, scripts, the plotting library and
+        A self-contained page without external resources: styles, scripts, the plotting library and
         numbers are inside. Every text of the summary is escaped.
 
     Raises
@@ -53,7 +53,7 @@ def render_comparison(summary: dict[str, Any]) -> str:
     Returns
     -------
     html : str
-        A whole page that loads nothing from anywhere. Every text of the summary is escaped.
+        A self-contained page without external resources. Every text of the summary is escaped.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def render_fleet(summary: dict[str, Any]) -> str:
     Returns
     -------
     html : str
-        A whole page that loads nothing from anywhere. Every text of the summary is escaped.
+        A self-contained page without external resources. Every text of the summary is escaped.
 
     Raises
     ------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Robots: read from a URDF, checked, with batched rigid-body dynamics; base parameters."""
+"""Robots read from URDF, SDF or MJCF, with batched rigid-body dynamics and base parameters."""
 
 from skidyn.robots._base_parameters import BaseParameters, find_base_parameters
 from skidyn.robots._robot import Robot

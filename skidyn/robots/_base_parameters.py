@@ -26,7 +26,7 @@ NEGLIGIBLE = 1e-7
 
 @dataclass(frozen=True)
 class BaseParameters:
-    """Independent columns of the torque regressor and how the others join them.
+    """Independent columns of the torque regressor and the regrouping of the others.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class BaseParameters:
     regrouping : ndarray of shape (n_base, 10 * n_bodies)
         Base parameters as combinations of all inertial parameters.
     expressions : tuple of str
-        The combinations in words, such as ``"Izz_link1 + 0.04*m_link2"``.
+        The combinations as text, such as ``"Izz_link1 + 0.04*m_link2"``.
 
     Examples
     --------
@@ -65,7 +65,7 @@ class BaseParameters:
 
 
 def find_base_parameters(robot: Robot) -> BaseParameters:
-    """Base parameters of a robot, from random motion within its limits.
+    """Find the base parameters of a robot by random motion within its limits.
 
     Parameters
     ----------

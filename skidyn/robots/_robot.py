@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 class Robot(RigidBodyDynamics):
     """A robot arm or tree: joints, limits, inertial parameters and rigid-body dynamics.
 
-    Made by :meth:`from_urdf`, :meth:`from_sdf`, :meth:`from_mjcf` or :meth:`from_chain`. A robot
-    never changes; it can be pickled and shared between threads.
+    Created by :meth:`from_urdf`, :meth:`from_sdf`, :meth:`from_mjcf` or :meth:`from_chain`. A robot
+    is immutable; it can be pickled and shared between threads.
 
     Links that are fixed to each other are one body; its frame is that of the link whose joint moves
     it. All methods take joint positions ``q`` (rad, m), velocities ``dq`` and accelerations ``ddq``
@@ -113,7 +113,7 @@ class Robot(RigidBodyDynamics):
         joints: Sequence[str] | None = None,
         gravity: Sequence[float] | None = None,
     ) -> Robot:
-        """Read a robot from a URDF, an SDF or an MJCF, whichever its first element says.
+        """Read a robot from a URDF, an SDF or an MJCF, depending on its first element.
 
         Parameters
         ----------
@@ -175,8 +175,8 @@ class Robot(RigidBodyDynamics):
         source : str, bytes or path
             Path of the file, or the text itself (anything that starts with ``<``).
         joints : sequence of str, default=None
-            Joints that the logs cover; the others are locked at zero and their bodies become part
-            of what carries them. None means all. The order is always that of the URDF.
+            Joints in the logs; the others are locked at zero and their bodies become part of their
+            parent bodies. None means all. The order is always that of the URDF.
         gravity : sequence of 3 floats, default=(0, 0, -9.81)
             Gravitational acceleration in the base frame, m/s^2.
 
@@ -187,8 +187,8 @@ class Robot(RigidBodyDynamics):
         Raises
         ------
         RobotDescriptionError
-            The description is not a robot that can be modelled; the message names the link or joint
-            and says what to change.
+            The description cannot be modelled; the message names the link or joint and the required
+            change.
 
         Examples
         --------
@@ -243,8 +243,8 @@ class Robot(RigidBodyDynamics):
         Raises
         ------
         RobotDescriptionError
-            The description is not a robot that can be modelled; the message names the link or joint
-            and says what to change.
+            The description cannot be modelled; the message names the link or joint and the required
+            change.
 
         Examples
         --------
@@ -274,9 +274,10 @@ class Robot(RigidBodyDynamics):
     ) -> Robot:
         """Read a robot from an MJCF, the format of MuJoCo; needs the extra ``mujoco``.
 
-        MuJoCo compiles the model, with all its defaults; hinges and slides, several on a body too,
-        with their reference positions. Ratios between joints are read as mimic joints. Armature
-        and springs are no rigid bodies: they are left out with a warning. Sites are links.
+        MuJoCo compiles the model, with all its defaults; hinges and slides, also several on a body,
+        are read with their reference positions. Ratios between joints are read as mimic joints.
+        Armature and springs are not part of the rigid body and are left out with a warning. Sites
+        are links.
 
         Parameters
         ----------
@@ -294,8 +295,7 @@ class Robot(RigidBodyDynamics):
         Raises
         ------
         RobotDescriptionError
-            The description is not a robot that can be modelled; the message names the joint and
-            says what to change.
+            The description cannot be modelled; the message names the joint and the required change.
         ImportError
             MuJoCo is not installed.
 
@@ -322,22 +322,22 @@ class Robot(RigidBodyDynamics):
         joints: Sequence[str] | None = None,
         gravity: Sequence[float] | None = None,
     ) -> Robot:
-        """Make a robot of a chain of pytorch-kinematics; frames and joints are the chain's.
+        """Create a robot from a chain of pytorch-kinematics, with its frames and joints.
 
-        A chain holds no inertia, so it is read beside it. The robot computes in float64: offsets
-        are as exact as the chain's, which the parsers of pytorch-kinematics carry through float32
-        (1e-8 to 3e-7 m on the bundled robots), with the nearest rotation in place of a rounded one.
-        :attr:`chain` is the chain of these numbers.
+        A chain has no inertia, which is therefore read separately. The robot computes in float64:
+        offsets are as accurate as those of the chain, which the parsers of pytorch-kinematics
+        convert through float32 (1e-8 to 3e-7 m on the bundled robots), with the nearest rotation
+        instead of a rounded one. :attr:`chain` is the chain with these numbers.
 
         Parameters
         ----------
         chain : pytorch_kinematics.Chain
-            Of any precision, on any device. It is not changed.
+            Chain of any precision, on any device. It is not changed.
         inertials : str, bytes, path or mapping of str to array-like of shape (10,)
             The URDF, SDF or MJCF that the chain was built from; limits and mimic joints are read
             from it, too. Or the inertial parameters of its links, in the frames of the chain (m, m
-            cx, m cy, m cz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz; kg, kg m, kg m^2); links that are not
-            named have no mass.
+            cx, m cy, m cz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz; kg, kg m, kg m^2); other links have no
+            mass.
         joints : sequence of str, default=None
             Joints that the logs cover, as in :meth:`from_urdf`.
         gravity : sequence of 3 floats, default=None
@@ -351,9 +351,9 @@ class Robot(RigidBodyDynamics):
         Raises
         ------
         RobotDescriptionError
-            A frame of the chain is not where the description has it (parsers of pytorch-kinematics
-            0.10 take z for a missing axis in a URDF and turn poses of an SDF in another order), or
-            a link that has a mass is not in the chain.
+            A frame of the chain differs from the description (parsers of pytorch-kinematics 0.10
+            take z for a missing axis in a URDF and turn poses of an SDF in another order), or a
+            link that has a mass is not in the chain.
 
         Examples
         --------
@@ -414,7 +414,7 @@ class Robot(RigidBodyDynamics):
     def chain(self) -> Chain:
         """Chain of pytorch-kinematics: batched, differentiable kinematics, float64, on the CPU.
 
-        A new one at every access, because ``chain.to(dtype=..., device=...)`` changes it. Its
+        A new chain at every access, because ``chain.to(dtype=..., device=...)`` changes it. Its
         joints are :attr:`body_joints` in their order; where no joint mimics another, its positions
         are ``q``. ``SerialChain(robot.chain, link, dtype=torch.float64)`` gives the Jacobian of a
         link.
@@ -484,7 +484,7 @@ class Robot(RigidBodyDynamics):
         q, dq, ddq : Tensor of shape (n_samples, n_joints)
             Positions (rad, m), velocities and accelerations.
         parameters : Tensor of shape (n_bodies, 10), default=None
-            Inertial parameters in place of those of the URDF; may require gradients.
+            Inertial parameters instead of those of the URDF; may require gradients.
 
         Returns
         -------

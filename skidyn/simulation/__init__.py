@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Forward simulation of fitted models: their motion, how far it is from a log, in a loop or not."""
+"""Forward simulation of fitted models, in open or closed loop, and errors of their motion."""
 
 from skidyn.forward import Controller, fit_controller
 from skidyn.simulation._additions import judge_additions

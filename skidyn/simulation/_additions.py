@@ -43,10 +43,10 @@ def judge_additions(
 ) -> list[SimulationVerdict | None]:
     """Judge additions to a model by simulation of recordings that were left out of its fit.
 
-    Recordings are left out fold by fold, one recording in pieces of time; the model is fitted to
-    the others without and with an addition, and simulated along those left out. Each addition is
-    judged on top of those before it that did not worsen the motion. All are fitted with
-    ``consistent=True``: other bodies may have an inertia with which nothing can move.
+    Recordings are left out fold by fold (a single recording in pieces of time); the model is fitted
+    to the others without and with an addition, and simulated along those left out. Each addition is
+    judged in addition to the previous ones that did not worsen the motion. All are fitted with
+    ``consistent=True``: otherwise the inertia may be unsuitable for simulation.
 
     Parameters
     ----------
@@ -57,18 +57,18 @@ def judge_additions(
     X : DataFrame
         Motion with ``time`` (s), as in :func:`simulate`; with a controller also its reference.
     y : array-like of shape (n_samples, n_joints), N m or N
-        Torque, to which models are fitted; it drives them too unless there is a controller.
+        Torque to which models are fitted, and which drives them unless a controller is given.
     controller : Controller, optional
-        Drives the models toward ``q_ref1..`` in place of y.
+        Drives the models toward ``q_ref1..`` instead of y.
     horizon : float, s, or None, default=1.0
         Length of the pieces that are simulated; None for whole trajectories.
 
     Returns
     -------
     list of SimulationVerdict or None
-        For every addition; None where simulation says nothing: it cannot be simulated, or the
-        simulated motion is further from the logged one than that of a model without forces, with
-        the addition and without.
+        For every addition; None if simulation gives no evidence: it cannot be simulated, or the
+        simulated motion deviates more from the logged one than that of a model without forces, both
+        with and without the addition.
 
     Raises
     ------

@@ -52,18 +52,18 @@ def simulate_bam_servo(
     """Motion of a position servo with BAM's friction, from its commands alone.
 
     The servo sets the share ``clip(gain (q_ref - q), -1, 1)`` of its voltage on the motor, whose
-    torque is ``kt / R`` times what is left of it by ``kt dq``. Steps are those of BAM's simulator
+    torque is ``kt / R`` times this voltage minus ``kt dq``. Steps are those of BAM's simulator
     [1]_: friction stops the joint where it can.
 
     Parameters
     ----------
     servo : BamModel
-        With ``kt`` (N m/A), ``R`` (ohm), ``armature`` (kg m^2) and maybe ``q_offset`` (rad).
+        With ``kt`` (N m/A), ``R`` (ohm), ``armature`` (kg m^2) and optionally ``q_offset`` (rad).
     robot : Robot
-        A robot of one joint that turns, whose inertial parameters are true.
+        A robot with one revolute joint and known inertial parameters.
     log : DataFrame
-        ``time`` (s), ``q1`` (rad), of which the start is taken, the command ``q_ref1`` (rad); with
-        several recordings ``trajectory``; ``enabled``, 0 where the motor is off.
+        ``time`` (s), ``q1`` (rad), which gives the initial position, the command ``q_ref1`` (rad);
+        with several recordings ``trajectory``; ``enabled``, 0 where the motor is off.
     gain : float or array-like of shape (n_samples,)
         Share of the voltage for each rad of error: BAM's ``kp`` times its ``error_gain``.
     volts : float or array-like of shape (n_samples,)
@@ -117,15 +117,14 @@ def fit_bam_servo(
 ) -> BamModel:
     """Identify a position servo from commands and positions: motor, armature and friction.
 
-    As on BAM's bench, a known pendulum gives torque its scale. All parameters are those for which
-    :func:`simulate_bam_servo`, run through every recording as a whole, stays nearest to the logged
-    positions: least squares, with the size of large errors in place of their squares, from two
-    starts.
+    As on BAM's test bench, a known pendulum determines the scale of the torque. The parameters
+    minimise the deviation of :func:`simulate_bam_servo`, run through every recording as a whole,
+    from the logged positions: least squares with a linear loss for large errors, from two starts.
 
     Parameters
     ----------
     robot : Robot
-        A robot of one joint that turns, whose inertial parameters are true.
+        A robot with one revolute joint and known inertial parameters.
     log : DataFrame
         As for :func:`simulate_bam_servo`; several recordings with several gains and motions.
     gain, volts : float or array-like of shape (n_samples,)
@@ -133,7 +132,7 @@ def fit_bam_servo(
     name : {"m1", "m2", "m3", "m4", "m5", "m6"}, default="m6"
         Model of friction.
     actuator : str
-        Type of servo as BAM calls it, such as ``"xl330"``.
+        Name of the servo in BAM, such as ``"xl330"``.
     step : float, default=0.005
         Step of the simulation, s.
 

@@ -43,9 +43,9 @@ def simulate_closed_loop(
     holds the model against gravity. Every trajectory starts on its reference.
 
     With the reference and the gains of the robot's own controller this is the auxiliary model of
-    IDIM-IV [1]_: its motion resembles the robot's but has nothing of the noise of its sensors, and
-    so holds the instruments for ``RBDRegressor(estimator="instrumental")``. Two or three rounds of
-    simulation and fit suffice, from a first fit by least squares.
+    IDIM-IV [1]_: its motion resembles that of the robot but is independent of sensor noise, and
+    therefore provides the instruments for ``RBDRegressor(estimator="instrumental")``. Two or three
+    rounds of simulation and fit suffice, from a first fit by least squares.
 
     Parameters
     ----------
@@ -65,14 +65,14 @@ def simulate_closed_loop(
     Returns
     -------
     DataFrame
-        The reference with the simulated q, dq and ddq in place of its own, row for row; positions
-        to about 1e-4 rad.
+        The reference with the simulated q, dq and ddq instead of its own, row by row; positions to
+        about 1e-4 rad.
 
     Raises
     ------
     SkidynError
-        The model holds effects that have a memory or depend on the recording; a gain is negative
-        or has not one number for each joint; the motion grows without bound.
+        The model has effects with a memory or that depend on the recording; a gain is negative or
+        does not have one number for each joint; the motion grows without bound.
     ColumnError
         A column of the reference is missing.
 

@@ -39,7 +39,7 @@ class SimulationErrors:
     final : ndarray of shape (n_joints,)
         Root mean square of the position error at the end of the pieces.
     resting : ndarray of shape (n_joints,)
-        Position error of a model that keeps the velocity of the start: what a model must beat.
+        Position error of a model that keeps the initial velocity, as a baseline.
     pieces : ndarray of shape (n_pieces, n_joints)
         Root mean square position error of every piece; infinite where the motion grew without
         bound.
@@ -131,10 +131,10 @@ def simulation_errors(
     engine: Literal["own", "mujoco"] = "own",
     step: float = STEP,
 ) -> SimulationErrors:
-    """Simulate a fitted model along a log and measure how far it gets from it.
+    """Simulate a fitted model along a log and compute the errors of its motion.
 
-    Every ``horizon`` seconds the model is put back on the log: what it does with a wrong state
-    later on says nothing about its forces.
+    Every ``horizon`` seconds the model restarts from the logged state, because later motion from a
+    wrong state gives no information about the forces.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def simulation_errors(
     y : array-like of shape (n_samples, n_joints), optional
         Torque that drives the model, N m or N; not with a controller.
     controller : Controller, optional
-        Drives the model toward ``q_ref1..`` in place of y.
+        Drives the model toward ``q_ref1..`` instead of y.
     horizon : float, s, or None, default=1.0
         Length of the pieces; None for whole trajectories.
     engine : {"own", "mujoco"}, default="own"
@@ -285,7 +285,7 @@ def neg_simulation_error(estimator: RBDRegressor, X: Any, y: Any) -> float:
 
 @dataclass(frozen=True)
 class SimulationVerdict:
-    """What a change of a model does to its simulated motion on a log.
+    """Influence of a change of a model on its simulated motion on a log.
 
     Parameters
     ----------
@@ -295,9 +295,9 @@ class SimulationVerdict:
         Mean over the pieces of the logarithm of the error after over that before; negative is
         better. Errors count up to ten times that of a model without forces.
     low, high : float
-        95 % interval of the change, over trajectories where there are enough of them.
+        95 % interval of the change, over trajectories if there are enough of them.
     joints : ndarray of shape (n_joints,)
-        The same change joint by joint.
+        The change for every joint.
 
     Examples
     --------
@@ -313,12 +313,12 @@ class SimulationVerdict:
 
     @property
     def worsens(self) -> bool:
-        """Whether the simulated motion gets worse beyond chance."""
+        """Whether the simulated motion gets significantly worse."""
         return self.low > 0.0
 
     @property
     def improves(self) -> bool:
-        """Whether it gets better beyond chance."""
+        """Whether the simulated motion gets significantly better."""
         return self.high < 0.0
 
     @property
@@ -349,9 +349,9 @@ def judge_by_simulation(
     horizon: float | None = HORIZON,
     step: float = STEP,
 ) -> SimulationVerdict:
-    """Tell whether a changed model moves more like the robot, on a log that neither has seen.
+    """Compare the simulated motion of two models on a held-out log.
 
-    An effect that lowers the error of the torque may worsen the motion; a finding for which
+    An effect that reduces the error of the torque may worsen the motion; a finding for which
     ``worsens`` is true should not be added for simulation.
 
     Parameters
@@ -363,7 +363,7 @@ def judge_by_simulation(
     y : array-like of shape (n_samples, n_joints), optional
         Torque that drives the model, N m or N; not with a controller.
     controller : Controller, optional
-        Drives the model toward ``q_ref1..`` in place of y.
+        Drives the model toward ``q_ref1..`` instead of y.
     horizon : float, s, or None, default=1.0
         Length of the pieces; None for whole trajectories.
     step : float, default=0.002

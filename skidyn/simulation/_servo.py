@@ -34,10 +34,10 @@ BLOCKS = 10
 def servo_torque(controller: Controller, log: Any) -> Array:
     """Torque of position servos from their commands and positions.
 
-    A servo whose gain is known is a torque sensor: what it does is its gain times its error. With
-    this torque all that skidyn does with a log of torques, such as
-    :class:`~skidyn.identification.RBDRegressor` or :func:`~skidyn.diagnosis.diagnose`, is open to
-    a log without. A gain that is 10 % wrong makes every size 10 % wrong, and no name.
+    The torque of a servo with known gain is its gain times its position error. With this torque,
+    functions for logs with torque, such as :class:`~skidyn.identification.RBDRegressor` or
+    :func:`~skidyn.diagnosis.diagnose`, can be used for logs without torque. An error of 10 % of the
+    gain causes errors of 10 % of all sizes, but does not change the identified effects.
 
     Parameters
     ----------
@@ -74,28 +74,29 @@ def servo_torque(controller: Controller, log: Any) -> Array:
 def fit_servo(robot: Robot, log: Any, *, shared: bool = False) -> Controller:
     """Gain and delay of position servos from the weight of the robot.
 
-    A servo that holds a load against gravity keeps an error of position by which its gain shows:
-    the error is fitted by the URDF's rigid-body torque, viscous and dry friction and a constant,
-    joint by joint [1]_. The command's delay is the one of 0 to 0.1 s that fits best. Damping of the
-    servo and viscous friction cannot be told apart in motion alone; the model gets both. In slow
-    motion a late command looks like more of it, too: only motion of some hertz tells them apart.
+    A servo that holds a load against gravity has a position error that depends on its gain: the
+    error is fitted by the rigid-body torque of the URDF, viscous and dry friction and a constant,
+    joint by joint [1]_. The delay of the command is the best-fitting one from 0 to 0.1 s. Damping
+    of the servo and viscous friction cannot be separated by motion alone; both are included in the
+    model. In slow motion a delayed command also resembles damping: only motion at some hertz
+    separates them.
 
     Parameters
     ----------
     robot : Robot
-        Robot, whose inertial parameters are taken as true: the gains scale with them.
+        Robot, whose inertial parameters are assumed to be correct: the gains scale with them.
     log : DataFrame
         ``time`` (s), ``q1..``, ``dq1..`` and the command ``q_ref1..`` or ``cmd1..``, and
         ``trajectory`` if there are several.
     shared : bool, default=False
-        One gain for all joints: they have the same servo and settings. Needed where a joint feels
-        no gravity.
+        One gain for all joints, which have the same servo and settings. Needed for joints without
+        gravity torque.
 
     Returns
     -------
     Controller
-        With ``stiffness`` (N m/rad) and ``delay`` (s); damping 0, which the model's viscous
-        friction holds.
+        With ``stiffness`` (N m/rad) and ``delay`` (s); damping is 0, since it is included in the
+        viscous friction of the model.
 
     Raises
     ------

@@ -92,7 +92,7 @@ GEARS = ("joint_elasticity", "backlash")
 
 
 def title_of(kind: str) -> str:
-    """The effect in words."""
+    """Title of the effect."""
     return SERVO_EFFECTS[kind].title if kind in SERVO_EFFECTS else get_effect(kind).title
 
 

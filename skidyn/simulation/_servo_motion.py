@@ -58,13 +58,13 @@ MOST = 2
 
 @dataclass(frozen=True)
 class ServoFinding:
-    """An effect without which the motion of a servo cannot be simulated.
+    """An effect that is needed to simulate the motion of a servo.
 
     Parameters
     ----------
     kind : str
-        Kind of the catalogue; or ``"servo_deadband"``, which the controller lacks and not the
-        model.
+        Kind of the catalogue, or ``"servo_deadband"``, which is missing in the controller and not
+        in the model.
     joint : int
         Joint, counted from 1.
     parameters : dict of str to float
@@ -97,7 +97,7 @@ class ServoFinding:
 
     @property
     def title(self) -> str:
-        """The effect in words."""
+        """Title of the effect."""
         return title_of(self.kind)
 
     @property
@@ -113,7 +113,7 @@ class ServoFinding:
 
     @property
     def evidence(self) -> str:
-        """What it does to the simulated motion, and what the next best explanation does."""
+        """Influence on the simulated motion, compared with the next best explanation."""
         before, after, beside = (
             f"{1e3 * error:.3g}" for error in (self.before, self.after, self.beside)
         )
@@ -144,18 +144,18 @@ def explain_servo_motion(
     joints: Sequence[int] | None = None,
     known: Sequence[tuple[str, int]] = (),
 ) -> list[ServoFinding]:
-    """Name what the motion of position servos lacks in a simulation.
+    """Find effects that are missing in the simulated motion of position servos.
 
     Every joint is simulated along its command, with the bodies and rotor inertias of the model,
-    the other joints as logged, and viscous and dry friction fitted to the motion. Where this errs
-    by more than the positions are noisy, stiction, friction with the load, with the
-    direction, or with the square of the speed, presliding, delay, elasticity and backlash compete,
-    and a deadband of the servo where the controller has none. Each is fitted to half of the pieces
-    of the log and judged on the others. The one that removes the largest share of the squared error
-    of a joint is taken; then the others compete beside it, on its joint and, along the motion of
-    its link, on the others, two on a joint at most. Nothing
-    is named where the simulation errs by half as much as the command itself, or more: then the
-    gains are wrong, or the bodies.
+    the other joints as logged, and viscous and dry friction fitted to the motion. If the error
+    exceeds the noise of the positions, the following effects are compared: stiction, friction that
+    depends on the load, the direction, or the square of the speed, presliding, delay, elasticity
+    and backlash, and a deadband of the servo if the controller has none. Each is fitted to half of
+    the pieces of the log and evaluated on the others. The effect that removes the largest share of
+    the squared error of a joint is selected; then the others are tested together with it, on its
+    joint and, along the motion of its link, on the other joints, with at most two on a joint. No
+    effect is reported if the error of the simulation is at least half of that of the command
+    itself, which indicates wrong gains or bodies.
 
     Parameters
     ----------
@@ -167,15 +167,15 @@ def explain_servo_motion(
     controller : Controller
         Gains, delay and limit of the servos.
     joints : sequence of int, optional
-        Joints, counted from 1, that may get a name; all by default.
+        Joints, counted from 1, to be analysed; all by default.
     known : sequence of (str, int)
-        Kinds and joints of effects that are part of the simulation from the start; those that this
-        simulation does not have are left out.
+        Kinds and joints of effects that are part of the simulation from the start; unsupported ones
+        are left out.
 
     Returns
     -------
     list of ServoFinding
-        In the order in which they were taken.
+        In the order of selection.
 
     Raises
     ------

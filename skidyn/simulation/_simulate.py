@@ -24,12 +24,12 @@ def simulate(
     engine: Literal["own", "mujoco"] = "own",
     step: float = STEP,
 ) -> Any:
-    """Motion of a fitted model that starts where the log starts.
+    """Simulate a fitted model from the initial state of the log.
 
     Open loop, the logged torque drives the model; with a ``controller``, the logged reference does.
-    Dry friction is set-valued: a joint that it can hold stays where it is. Hysteresis starts in the
-    state into which the logged motion has brought it; elastic joints get a coordinate for their
-    link. With a horizon the model is put back on the log every ``horizon`` seconds.
+    Dry friction is set-valued: a joint that it can hold remains at rest. Hysteresis starts in the
+    state that results from the logged motion; elastic joints have an additional coordinate for
+    their link. With a horizon the model restarts from the logged state every ``horizon`` seconds.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def simulate(
     y : array-like of shape (n_samples, n_joints), optional
         Torque that drives the model, N m or N; not with a controller.
     controller : Controller, optional
-        Drives the model toward ``q_ref1..`` in place of y.
+        Drives the model toward ``q_ref1..`` instead of y.
     horizon : float, s, optional
         Length of the pieces; None simulates every trajectory as a whole.
     engine : {"own", "mujoco"}, default="own"

@@ -92,7 +92,7 @@ def test_no_semidefinite_program_finds_a_smaller_error(noise):
         ({"symmetry": {"link1": "w"}}, "'w' is not an axis"),
         (
             {"centre_of_mass": {"link1": ((0.1,) * 3, (0.2,) * 3)}, "symmetry": {"link1": "y"}},
-            "mirror image at y = 0",
+            "is symmetric about y = 0",
         ),
     ],
 )

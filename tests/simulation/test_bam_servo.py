@@ -123,7 +123,7 @@ def test_wrong_input_is_refused_by_name(robot, servo, log):
     words = {"gain": 1.0, "volts": VOLTS}
     with pytest.raises(SkidynError, match="lacks the column.*q_ref1"):
         simulate_bam_servo(servo, robot, log.drop(columns="q_ref1"), **words)
-    with pytest.raises(SkidynError, match="one joint that turns"):
+    with pytest.raises(SkidynError, match="one revolute joint"):
         simulate_bam_servo(servo, load_planar_arm(), log, **words)
     with pytest.raises(SkidynError, match="gain is to be"):
         simulate_bam_servo(servo, robot, log, gain=[1.0, 2.0], volts=VOLTS)

@@ -77,13 +77,13 @@ def make_hidden_effect_log(
     robot : Robot
         Nominal robot.
     effect : str, sequence of str, mapping or None, default="dahl"
-        What is hidden: a kind of :func:`hidden_effect_kinds`, several of them, a mapping of kinds
-        to ``{"joints": [...], "magnitude": ...}``, or None for a log that hides nothing.
+        Hidden effect: a kind of :func:`hidden_effect_kinds`, several of them, a mapping of kinds to
+        ``{"joints": [...], "magnitude": ...}``, or None for a log without a hidden effect.
     joints : sequence of int, optional
         Joints that have the effect, counted from 1; a suitable choice if None. Pairs take two.
     magnitude : float, default=1.0
-        Multiplies the usual size, at which the effect takes about a quarter of the spread of the
-        joint's rigid-body torque.
+        Factor on the usual size, for which the effect is about a quarter of the spread of the
+        rigid-body torque of the joint.
     noise : {"low", "high"} or float, default="low"
         Standard deviation of the torque noise relative to the spread of the torque; low is 1.2 %,
         high 5 %.
@@ -94,10 +94,10 @@ def make_hidden_effect_log(
     rate : float, default=100.0, Hz
         Sampling rate.
     base : sequence of str, default=("viscous", "coulomb")
-        What every joint has beside the rigid body, and a user's model already contains.
+        Effects of every joint that the model of the user already contains.
     random_state : int, Generator, RandomState or None, default=0
-        Source of chance. Motion and robot do not depend on the effect, so logs with the same seed
-        can be compared.
+        Seed of random numbers. Motion and robot do not depend on the effect, so logs with the same
+        seed can be compared.
 
     Returns
     -------
@@ -148,7 +148,7 @@ def hidden_effect_kinds() -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        Names of the vocabulary, and ``unknown_...`` for effects that no catalogue holds.
+        Kinds of the catalogue, and ``unknown_...`` for effects that are not in the catalogue.
 
     Examples
     --------

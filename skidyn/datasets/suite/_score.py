@@ -24,14 +24,15 @@ NORMAL = 1.959963984540054
 def score_answers(
     truths: Sequence[Mapping[str, Any]], answers: Sequence[Mapping[str, Any]]
 ) -> Bunch:
-    """Compare answers with what the logs of :func:`hidden_effect_suite` hide.
+    """Compare answers with the hidden effects of the logs of :func:`hidden_effect_suite`.
 
-    A log is ``solved`` if the tool is silent where nothing is hidden, names the effect first where
-    one is hidden, and names both where there are two. A name counts on the right joints: at least
-    60 % of those named are affected, and 60 % of those that the log can show are named. Claims of
-    one kind on several joints count together. A torque without a name asks for ``unknown`` and at
-    least half of its signals; an effect of one trajectory asks for that trajectory. Logs whose
-    effect drowns in noise (less than 12 standard errors) are left out, except for false claims.
+    A log is ``solved`` if the tool reports no effect where none is hidden, lists the effect first
+    where one is hidden, and lists both where there are two. A claim is correct only on the correct
+    joints: at least 60 % of the claimed joints are affected, and 60 % of those that the log can
+    show are claimed. Claims of one kind on several joints count together. An unknown effect
+    requires ``unknown`` and at least half of its signals; an effect of one trajectory requires that
+    trajectory. Logs whose effect is below the noise (less than 12 standard errors) are left out,
+    except for false claims.
 
     Parameters
     ----------
@@ -89,7 +90,7 @@ def score_answers(
 
 
 def wilson_interval(successes: float, n: int) -> tuple[float, float]:
-    """Interval of a share that holds the truth in 95 % of repeats (Wilson's score interval).
+    """95 % confidence interval of a share (Wilson's score interval).
 
     Parameters
     ----------

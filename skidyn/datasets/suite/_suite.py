@@ -56,9 +56,9 @@ class SuiteCase:
     content : str
         ``nothing``, ``one``, ``two``, ``nameless`` or ``once`` (in one trajectory only).
     kinds : tuple of str
-        What it hides: kinds of the vocabulary, or forms that no vocabulary holds.
+        Hidden effects: kinds of the catalogue, or effects that are not in the catalogue.
     entropy : tuple of int
-        Seed of the suite and number of the case; everything random comes from it.
+        Seed of the suite and number of the case; the source of all random numbers.
 
     Examples
     --------
@@ -137,13 +137,13 @@ def hidden_effect_suite(
     """Logs with and without hidden effects, for comparing tools that diagnose robot models.
 
     MuJoCo integrates every robot forward in time (0.5 ms) under a tracking controller with nominal
-    feed-forward, so that no tool is measured on its own equations. Link parameters are 10 to 20 %
+    feed-forward, so that no tool is evaluated on its own equations. Link parameters are 10 to 20 %
     off the URDF, friction is dry, encoders have steps, torque noise is partly coloured.
 
     Parameters
     ----------
     seed : int, default=0
-        Another seed draws other logs. The first logs of a larger suite are those of a smaller one.
+        Seed of the suite. The first logs of a larger suite are those of a smaller one.
     n_logs : int, default=60
         Number of logs.
     tiers : sequence of str, optional
@@ -151,7 +151,7 @@ def hidden_effect_suite(
         ``short`` (six trajectories of 2 to 6 s), ``rough`` (coarse encoder, jittered stamps, lost
         rows). All by default.
     contents : sequence of str, optional
-        Only logs that hide ``nothing``, ``one`` effect, ``two``, a ``nameless`` torque, or an
+        Only logs with ``nothing`` hidden, ``one`` effect, ``two``, a ``nameless`` torque, or an
         effect in one trajectory only (``once``). All by default, in fixed shares.
 
     Returns

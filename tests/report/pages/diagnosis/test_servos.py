@@ -32,4 +32,6 @@ def test_each_effect_has_its_size_and_a_bar_for_each_model(fakes):
 def test_a_motion_that_names_nothing_says_so(fakes):
     diagnosis = fakes.make_diagnosis("complete")
     diagnosis.servo_motion = []
-    assert "requires no effect" in section(render_html(summarize(diagnosis)))
+    assert "It requires no effect other than friction." in section(
+        render_html(summarize(diagnosis))
+    )
