@@ -79,7 +79,8 @@ def test_constants_of_other_lengths_are_left_out_with_a_word(tmp_path):
     path = tmp_path / "log.npz"
     arrays = {"time": np.arange(9.0), "q": np.ones((9, 2)), "tau": np.ones((9, 2))}
     write(path, {**arrays, "gains": np.ones(3), "q0": np.zeros(2)})
-    with pytest.warns(LogWarning, match=r"left out: gains \(3\), q0 \(2\)"):
+    told = r"left out because their length is not 9 rows: gains \(3\), q0 \(2\)"
+    with pytest.warns(LogWarning, match=told):
         assert len(read_log(path, check=False)) == 9
 
 
