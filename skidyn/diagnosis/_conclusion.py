@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from skidyn._progress import track
 from skidyn._signals import Array
+from skidyn._text import joints_told
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._comparison import Comparison
 from skidyn.diagnosis._confidence import confidence
@@ -43,7 +44,7 @@ from skidyn.diagnosis._rule import (
 )
 from skidyn.diagnosis._search_state import replace_torque
 from skidyn.diagnosis._unknown import UnknownTorque, describe_unknowns
-from skidyn.effects import Term
+from skidyn.effects import Term, get_effect
 from skidyn.evidence import Problem
 
 
@@ -100,8 +101,12 @@ def conclude(
         remarks.append(remark)
     rivals = {h.kind: rivals_of(h) for h in result.findings}
     unknowns = _unknowns(problem, result, terms)
+    slight = _slight(problem, result.findings, intervals)
+    remarks += slight.values()
     findings = []
     for i, hypothesis in enumerate(result.findings):
+        if i in slight:
+            continue
         others = rivals.get(hypothesis.kind, ())
         for candidate, chance in zip(hypothesis.candidates, hypothesis.chances, strict=True):
             drop = _drop(shown[i], shown[i + 1], tuple(candidate.rows))
@@ -277,6 +282,29 @@ def _impossible(
         if terms:
             return hypothesis, terms
     return None
+
+
+def _slight(
+    problem: Problem, findings: Sequence[Hypothesis], intervals: dict[Term, dict[str, Any]]
+) -> dict[int, str]:
+    """Places of findings of which there is too little to be told of the robot, with remarks.
+
+    They stay in the completed model, which other effects were found beside.
+    """
+    remarks = {}
+    for i, hypothesis in enumerate(findings):
+        reasons = []
+        for candidate in hypothesis.candidates:
+            told = intervals[candidate.term]
+            found = {name: v for name, v in told.items() if isinstance(v, tuple)}
+            reasons.append(candidate.term.effect.too_small(found, problem.signals))
+        if reasons and all(reasons):
+            where = joints_told(j + 1 for j in hypothesis.joints)
+            remarks[i] = (
+                f"{get_effect(hypothesis.kind).title} on {where}: {reasons[0]}. It is part of the "
+                "completed model and is not counted as a finding."
+            )
+    return remarks
 
 
 def _guess(diagnosis: Diagnosis) -> tuple[Hypothesis, list[Candidate]] | None:

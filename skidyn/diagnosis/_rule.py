@@ -211,7 +211,7 @@ class Settings:
     level: float = 0.001
     least_gain: float = 30.0
     least_share: float = 0.006
-    least_drop: float = 0.002
+    least_drop: float = 0.005
     form_tolerance: float = 0.015
     further_tolerance: float = 0.0075
     exact_tolerance: float = 0.0015

@@ -298,6 +298,25 @@ class Effect:
         (joint,) = joints
         return {joint: self.columns(signals, joint, **shape)}
 
+    def too_small(
+        self, intervals: Mapping[str, tuple[float, float, float]], signals: Signals
+    ) -> str | None:
+        """Why so little of the effect says nothing about the robot; None where it is a finding.
+
+        Parameters
+        ----------
+        intervals : mapping of str to (float, float, float)
+            Physical parameters as found, with the ends of their intervals.
+        signals : Signals
+            Motion on which they were found.
+
+        Returns
+        -------
+        str or None
+            A reason in words.
+        """
+        return None
+
     def not_shown(self, signals: Signals, joint: int) -> str | None:
         """Reason why this data cannot show the effect on a joint; None if it can.
 

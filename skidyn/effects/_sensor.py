@@ -40,6 +40,10 @@ class TorqueGain(Effect):
         return torque if sign is None else sign * np.maximum(0.0, sign * torque)
 
 
+#: Share of a sampling step within which the values of a row may have been taken.
+SAME_ROW = 0.5
+
+
 class TimeDelay(Effect):
     """The torque channel lags behind the motion channels."""
 
@@ -60,6 +64,19 @@ class TimeDelay(Effect):
         # One bus delays all joints alike; a single slow sensor delays its own joint.
         together = [tuple(range(signals.n_joints))] if signals.n_joints > 1 else []
         return together + super().sites(signals)
+
+    def too_small(
+        self, intervals: Mapping[str, tuple[float, float, float]], signals: Signals
+    ) -> str | None:
+        step = float(np.median(signals.steps))
+        delay, low, high = intervals["delay"]
+        if low > SAME_ROW * step or high < -SAME_ROW * step:
+            return None
+        return (
+            f"a delay of {1e3 * delay:.2g} ms cannot be told from half of the sampling step of "
+            f"{1e3 * step:.3g} ms or less, and loggers differ by as much in when they read the "
+            "channels of a row"
+        )
 
     def torque_columns(
         self, signals: Signals, joints: Sequence[int], **shape: Any
