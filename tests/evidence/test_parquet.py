@@ -49,7 +49,7 @@ def test_wrong_files_are_refused(tmp_path, folder):
         evidence_from_parquet(tmp_path / "b.parquet", ROBOT)
     with pytest.raises(LogError, match="more than max_rows = 300"):
         evidence_from_parquet(folder, ROBOT, max_rows=300)
-    with pytest.raises(SkidynError, match="open shape parameters"):
+    with pytest.raises(SkidynError, match="unspecified shape parameters"):
         evidence_from_parquet(folder, ROBOT, ["dahl"])
 
 
