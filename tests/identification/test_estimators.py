@@ -111,7 +111,7 @@ def test_forgetting_follows_a_change():
 def test_shape_parameters_of_a_fit_are_kept_by_parts():
     log = make_hidden_effect_log(ROBOT, "stribeck", n_trajectories=4, duration=4.0)
     model = RBDRegressor(ROBOT, ("viscous", "coulomb", ("stribeck", [1])))
-    with pytest.raises(SkidynError, match="open shape parameters"):
+    with pytest.raises(SkidynError, match="unspecified shape parameters"):
         model.partial_fit(log.X, log.y)
     model.fit(log.X, log.y)
     terms = list(model.effect_terms_)
