@@ -31,15 +31,14 @@ LARGEST_SINGLE_PRECISION_P = 0.99
 class ELMCommittee(MultiOutputMixin, RegressorMixin, BaseEstimator):
     r"""Committee of extreme learning machines, learned exactly in one pass or online.
 
-    Each member has a random hidden layer of rectifiers that stays as it is; only the linear output
-    layer is learned, by ridge regression on the hidden activations. All that the fit needs of the
-    data are their second moments, so ``partial_fit`` on parts of a log gives the machine that
-    ``fit`` on the whole log gives, with the same scaling of the inputs (up to rounding: sums are in
-    single precision up to p = 0.99).
+    Each member has a fixed random hidden layer of rectifiers; only the linear output layer is
+    learned, by ridge regression on the hidden activations. The fit only needs the second moments of
+    the data, so ``partial_fit`` on parts of a log gives the same result as ``fit`` on the whole
+    log, with the same scaling of the inputs (up to rounding: sums are in single precision up to p =
+    0.99).
 
-    Without physics it has its place only where no model of the robot exists: with a URDF, a rigid
-    body with friction predicts far better, and boosted trees may do so too
-    (:doc:`/user_guide/learners`).
+    Use it without physics only if no model of the robot exists: with a URDF, a rigid body with
+    friction predicts far better, and boosted trees may do so too (:doc:`/user_guide/learners`).
 
     Parameters
     ----------
@@ -153,7 +152,7 @@ class ELMCommittee(MultiOutputMixin, RegressorMixin, BaseEstimator):
 
     @fit_context(prefer_skip_nested_validation=True)
     def fit(self, X: Any, y: Any, sample_weight: Any = None) -> ELMCommittee:
-        """Learn a log, forgetting what was learned before.
+        """Fit to a log, discarding previous data.
 
         Parameters
         ----------
@@ -173,7 +172,7 @@ class ELMCommittee(MultiOutputMixin, RegressorMixin, BaseEstimator):
 
     @fit_context(prefer_skip_nested_validation=True)
     def partial_fit(self, X: Any, y: Any, sample_weight: Any = None) -> ELMCommittee:
-        """Learn more rows, keeping what was learned before.
+        """Fit to further rows, keeping previous data.
 
         Parameters
         ----------
@@ -277,7 +276,7 @@ class ELMCommittee(MultiOutputMixin, RegressorMixin, BaseEstimator):
         X : DataFrame or array-like of shape (n_samples, n_features)
             As in fit.
         return_std : bool, default=False
-            Return the spread of the members as well: small where the data pinned them down.
+            Return the spread of the members as well: small where the data determines them.
 
         Returns
         -------

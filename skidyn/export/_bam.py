@@ -43,9 +43,9 @@ _LARGEST = 2**20
 
 @dataclass(frozen=True)
 class BamModel:
-    r"""Friction and motor of a servo, as the BAM project [1]_ describes them.
+    r"""Friction and motor of a servo, as described by the BAM project [1]_.
 
-    Its models m1 to m6 say how large a torque friction can set against the motion,
+    Its models m1 to m6 give the maximum friction torque against the motion,
 
     .. math:: K_v|\dot q| + K_c + |K_m\tau_m - K_e\tau_e|
        + e^{-|\dot q/\dot q_s|^\alpha}(K_{cs} + |K_{ms}\tau_m - K_{es}\tau_e| + Q)
@@ -60,7 +60,7 @@ class BamModel:
     name : {"m1", "m2", "m3", "m4", "m5", "m6"}
         Model.
     actuator : str
-        Type of servo as BAM calls it, such as ``"xl330"``, on which its law of control depends.
+        Name of the servo in BAM, such as ``"xl330"``, on which its control law depends.
     parameters : mapping of str to float
         By BAM's names, SI units: those of friction, ``armature`` (kg m^2), ``kt`` (N m/A), ``R``
         (ohm) and others of the motor.
@@ -100,7 +100,7 @@ class BamModel:
     def friction(self, motor_torque: Any, external_torque: Any, dq: Any) -> Array:
         """Torque of friction while the joint moves, to be overcome by the motor.
 
-        A measured torque of the motor minus this is what bodies and armature need.
+        The measured torque of the motor minus friction is the torque of bodies and armature.
 
         Parameters
         ----------
@@ -238,31 +238,31 @@ def write_bam(
 
     Viscous and Coulomb friction become BAM's model m1, with Stribeck friction m2; rotor inertia is
     ``armature``. Friction that grows with the load, m3 to m6, depends on the motor's own torque,
-    which the friction is part of: it is no sum of columns, and is fitted by :func:`fit_bam`.
+    which includes the friction: it is not linear in coefficients, and is fitted by :func:`fit_bam`.
 
     Parameters
     ----------
     model : RBDRegressor or BamModel
-        Fitted model; or what :func:`read_bam` or :func:`fit_bam` gives.
+        Fitted model, or the result of :func:`read_bam` or :func:`fit_bam`.
     path : path
         File to write.
     joint : str or int, optional
         Joint of a fitted model, by name or counted from 1; not needed if there is one.
     actuator : str, optional
-        Type of servo as BAM calls it; needed for a fitted model.
+        Name of the servo in BAM; needed for a fitted model.
     motor : mapping of str to float, optional
-        Constants of the motor, which no torque shows: ``kt`` (N m/A), ``R`` (ohm) and what else
-        BAM's servo has. BAM takes numbers of its own for those that are missing.
+        Constants of the motor, which the torque does not determine: ``kt`` (N m/A), ``R`` (ohm) and
+        further constants of BAM's servo. BAM uses its own values for missing ones.
 
     Returns
     -------
     tuple of str
-        Names of the joint's effects that the file does not hold.
+        Names of the effects of the joint that the file cannot represent.
 
     Raises
     ------
     SkidynError
-        The joint is unknown or slides, its friction is negative, or no actuator is named.
+        The joint is unknown or prismatic, its friction is negative, or no actuator is named.
 
     Examples
     --------

@@ -46,14 +46,14 @@ def fit_bam(
 ) -> BamModel:
     """Fit one of BAM's models of friction, and the armature, to torque of a motor.
 
-    The bodies of the robot are taken as known, as on BAM's pendulum: what the motor's torque holds
-    beside theirs is armature and friction. Least squares over the samples that move, from several
-    starts; friction is not negative.
+    The bodies of the robot are assumed to be known, as for BAM's pendulum; the remaining torque of
+    the motor is due to armature and friction. Least squares over the samples that move, from
+    several starts; friction is not negative.
 
     Parameters
     ----------
     robot : Robot
-        Robot whose inertial parameters are true; identified ones by
+        Robot with correct inertial parameters; identified ones are set by
         ``dataclasses.replace(robot, inertial_parameters=model.inertial_parameters_)``.
     X : DataFrame
         Motion, with ``time`` (s), ``q1..``, ``dq1..`` (rad, rad/s); it is smoothed.
@@ -64,9 +64,9 @@ def fit_bam(
     name : {"m1", "m2", "m3", "m4", "m5", "m6"}, default="m6"
         Model of friction.
     actuator : str
-        Type of servo as BAM calls it, such as ``"xl330"``.
+        Name of the servo in BAM, such as ``"xl330"``.
     motor : mapping of str to float, optional
-        Constants of the motor, which no torque shows: ``kt``, ``R`` and others.
+        Constants of the motor, which the torque does not determine: ``kt``, ``R`` and others.
 
     Returns
     -------
@@ -76,7 +76,7 @@ def fit_bam(
     Raises
     ------
     SkidynError
-        The joint is unknown or slides, a column is missing, or too few samples move.
+        The joint is unknown or prismatic, a column is missing, or too few samples move.
 
     Examples
     --------

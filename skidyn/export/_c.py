@@ -77,7 +77,7 @@ def write_c(
     Returns
     -------
     tuple of str
-        Names of the effects that the file does not hold; empty if it holds everything.
+        Names of the effects that the file cannot represent; empty if there are none.
 
     Examples
     --------

@@ -40,9 +40,9 @@ def merge_urdf(
     """Write the identified numbers into a copy of the robot's own URDF.
 
     Changed are the ``<inertial>`` of links that a joint moves, and ``<dynamics>`` of their joints;
-    pictures, collision shapes, comments, transmissions and every other byte stay. What was
-    identified of links that are fixed to each other goes to the one that the joint moves; the
-    others keep theirs.
+    pictures, collision shapes, comments, transmissions and every other byte are unchanged. For
+    links that are fixed to each other, the identified parameters are written to the link that the
+    joint moves; the others keep theirs.
 
     Parameters
     ----------
@@ -56,12 +56,14 @@ def merge_urdf(
     Returns
     -------
     tuple of str
-        Names of the effects that a URDF does not hold, which go to ``<path>.skidyn.json``.
+        Names of the effects that a URDF cannot represent, which are written to
+        ``<path>.skidyn.json``.
 
     Raises
     ------
     SkidynError
-        The file is not that of the model's robot, or a link would get an inertia that no body has.
+        The file is not that of the model's robot, or a link would get a physically inconsistent
+        inertia.
 
     Examples
     --------
@@ -155,8 +157,9 @@ def merge_mjcf(
     Changed are, for the joints of the model's robot, found by name: ``damping``, ``frictionloss``,
     ``armature``, ``stiffness`` and ``springref``, where the file says something else; and the
     ``<inertial>`` of the bodies that they move. Actuators, sensors, geoms, defaults, comments and
-    every other byte stay. Frames of bodies may differ from those of the URDF; that the joints turn
-    about the same axes is checked at several poses. Needs MuJoCo (``pip install skidyn[mujoco]``).
+    every other byte are unchanged. Frames of bodies may differ from those of the URDF; that the
+    joints turn about the same axes is checked at several poses. Needs MuJoCo (``pip install
+    skidyn[mujoco]``).
 
     Parameters
     ----------
@@ -165,18 +168,19 @@ def merge_mjcf(
     source : path
         An MJCF with the joints of the model's robot in this one file.
     path : path
-        File to write. Files that it names by relative paths have to be reachable from there.
+        File to write. Files referenced by relative paths have to be reachable from there.
 
     Returns
     -------
     tuple of str
-        Names of the effects that MJCF does not hold, which go to ``<path>.skidyn.json``.
+        Names of the effects that MJCF cannot represent, which are written to
+        ``<path>.skidyn.json``.
 
     Raises
     ------
     SkidynError
-        A joint is not in the file, the kinematics differ, or a body would get an inertia that no
-        body has.
+        A joint is not in the file, the kinematics differ, or a body would get a physically
+        inconsistent inertia.
     ImportError
         MuJoCo is not installed.
 

@@ -29,27 +29,27 @@ def write_mjcf(model: RBDRegressor | Robot, path: PathLike) -> tuple[str, ...]:
 
     Viscous and Coulomb friction become ``damping`` and ``frictionloss``, rotor inertia
     ``armature``, a spring ``stiffness`` and ``springref``; links fixed to a body become sites,
-    joints that mimic another are tied to it by an equality constraint. What MJCF cannot hold goes
-    to ``<path>.skidyn.json``.
+    joints that mimic another are tied to it by an equality constraint. Other effects are written to
+    ``<path>.skidyn.json``.
 
     Parameters
     ----------
     model : RBDRegressor or Robot
-        Fitted model, or a robot as it is described. Identified by other means: a copy of the robot,
-        ``dataclasses.replace(robot, inertial_parameters=...)``.
+        Fitted model, or a robot as described. For parameters identified by other means, use a copy
+        of the robot, ``dataclasses.replace(robot, inertial_parameters=...)``.
     path : path
         File to write.
 
     Returns
     -------
     tuple of str
-        Names of the effects that the MJCF does not hold; empty if it holds everything.
+        Names of the effects that the MJCF cannot represent; empty if there are none.
 
     Raises
     ------
     SkidynError
-        A body has no positive mass, or an inertia that no distribution of mass has; or the model is
-        not fitted.
+        A body has no positive mass, or a physically inconsistent inertia; or the model is not
+        fitted.
 
     Examples
     --------

@@ -88,7 +88,7 @@ def write_onnx(model: RBDRegressor | Robot, path: PathLike) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        Names of the effects that the file does not hold; empty if it holds everything.
+        Names of the effects that the file cannot represent; empty if there are none.
 
     Examples
     --------

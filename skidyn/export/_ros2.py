@@ -177,8 +177,8 @@ def write_ros2(model: RBDRegressor | Robot, path: PathLike, *, package: str) -> 
     """Write a ROS 2 package with the model as a plugin and its parameters as YAML.
 
     The plugin has the interface of ``inverse_dynamics_solver`` [1]_: inertia matrix, Coriolis,
-    gravity and friction vectors and, without friction, torques. Its model is a C file that needs
-    nothing of skidyn. ``config/parameters.yaml`` has gravity, masses and first moments of the
+    gravity and friction vectors and, without friction, torques. Its model is a C file that does not
+    depend on skidyn. ``config/parameters.yaml`` has gravity, masses and first moments of the
     bodies, and coefficients of the effects on single joints as arrays in the order of the joints.
 
     Parameters
@@ -186,16 +186,17 @@ def write_ros2(model: RBDRegressor | Robot, path: PathLike, *, package: str) -> 
     model : RBDRegressor or Robot
         Fitted model, or a robot for the rigid bodies of its description.
     path : path
-        Folder of the package, which is made; files of an earlier export are replaced.
+        Folder of the package, which is created; files of an earlier export are replaced.
     package : str
         Name of the package: lower-case letters, digits and underscores.
 
     Returns
     -------
     tuple of str
-        Names of the effects that the interface does not hold: those with a memory, and those whose
-        torque is no sum of a part that is linear in the acceleration and a friction of velocity
-        alone, such as friction that grows with the load. They go to ``src/model.c.skidyn.json``.
+        Names of the effects that the interface cannot represent: those with a memory, and those
+        whose torque is not the sum of a part that is linear in the acceleration and a friction that
+        depends on the velocity only, such as load-dependent friction. They are written to
+        ``src/model.c.skidyn.json``.
 
     Raises
     ------

@@ -23,8 +23,8 @@ def write_urdf(model: RBDRegressor | Robot, path: PathLike) -> tuple[str, ...]:
     Parameters
     ----------
     model : RBDRegressor or Robot
-        Fitted model, or a robot as it is described. Identified by other means: a copy of the robot,
-        ``dataclasses.replace(robot, inertial_parameters=...)``.
+        Fitted model, or a robot as described. For parameters identified by other means, use a copy
+        of the robot, ``dataclasses.replace(robot, inertial_parameters=...)``.
     path : path
         File to write.
 

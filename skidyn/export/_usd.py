@@ -29,13 +29,13 @@ def merge_usd(
 ) -> tuple[str, ...]:
     """Write the identified numbers as a text layer over the user's own USD stage.
 
-    The stage itself is not touched: the layer names it as its sublayer and says what is otherwise.
+    The stage itself is not modified: the layer has it as its sublayer and contains the differences.
     Bodies get ``physics:mass``, ``centerOfMass``, ``diagonalInertia`` and ``principalAxes`` of
-    UsdPhysics. Friction and rotor inertia, which UsdPhysics has no attributes for, go to those of
-    PhysX (``physxJointAxis:angular:armature``, ``staticFrictionEffort``, ``dynamicFrictionEffort``,
-    ``viscousFrictionCoefficient``) and of MuJoCo (``mjc:armature``, ``mjc:damping``,
-    ``mjc:frictionloss``). Gains of drives stay. Joints and bodies are found by name; that frames
-    and axes are those of the robot is checked. Needs ``pip install skidyn[usd]``.
+    UsdPhysics. Friction and rotor inertia, for which UsdPhysics has no attributes, are written to
+    those of PhysX (``physxJointAxis:angular:armature``, ``staticFrictionEffort``,
+    ``dynamicFrictionEffort``, ``viscousFrictionCoefficient``) and of MuJoCo (``mjc:armature``,
+    ``mjc:damping``, ``mjc:frictionloss``). Gains of drives stay. Joints and bodies are found by
+    name; that frames and axes are those of the robot is checked. Needs ``pip install skidyn[usd]``.
 
     Parameters
     ----------
@@ -49,13 +49,14 @@ def merge_usd(
     Returns
     -------
     tuple of str
-        Names of the effects that the layer does not hold, which go to ``<path>.skidyn.json``.
+        Names of the effects that the layer cannot represent, which are written to
+        ``<path>.skidyn.json``.
 
     Raises
     ------
     SkidynError
-        A joint is not on the stage, a frame differs, or a body would get an inertia that no body
-        has.
+        A joint is not on the stage, a frame differs, or a body would get a physically inconsistent
+        inertia.
     ImportError
         USD is not installed.
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Many robots of one type: what they share, which deviates in which effect, and since when."""
+"""Fleets of robots of one type: common coefficients, deviating robots and drifts over time."""
 
 from skidyn.fleet._deviation import FleetComparison, compare_fleet
 from skidyn.fleet._drift import DriftReport, monitor_drift

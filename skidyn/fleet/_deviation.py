@@ -35,8 +35,8 @@ class FleetComparison:
     common : dict of str to float
         Every coefficient fitted to all robots together, SI units.
     deviation : ndarray of shape (n_robots, n_columns)
-        Each robot's coefficient less the common one, SI units; NaN where its motion does not
-        tell.
+        Coefficient of each robot minus the common one, SI units; NaN if its motion does not
+        determine it.
     score : ndarray of shape (n_robots, n_columns)
         Deviation in units of the robust scatter between the robots.
     q_value : ndarray of shape (n_robots, n_columns)
@@ -90,12 +90,12 @@ class FleetComparison:
 def compare_fleet(
     evidence: Mapping[str, Evidence], columns: Sequence[str] | None = None
 ) -> FleetComparison:
-    """Fit all robots together, then tell which of them deviates in which coefficient.
+    """Fit all robots together and find those that deviate, and in which coefficients.
 
-    The spread of normal robots is read from the fleet itself: each deviation is divided by its
-    standard error, and then centred and scaled by the median and the median absolute deviation
-    over the robots, so that neither unmodelled effects that all share nor a few worn robots are
-    taken for the norm.
+    The spread of normal robots is estimated from the fleet itself: each deviation is divided by its
+    standard error, and then centred and scaled by the median and the median absolute deviation over
+    the robots, which is insensitive to unmodelled effects common to all robots and to a few worn
+    robots.
 
     Parameters
     ----------

@@ -27,7 +27,7 @@ class DriftReport:
     Parameters
     ----------
     columns : tuple of str
-        Coefficients that are watched.
+        Monitored coefficients.
     dates : tuple
         Date of every trajectory, in the order of the rows below.
     value : ndarray of shape (n_trajectories, n_columns)
@@ -91,7 +91,7 @@ def monitor_drift(
     reference: int = 20,
     false_alarm: float = 0.01,
 ) -> DriftReport:
-    """Watch the effects of one robot, trajectory by trajectory.
+    """Monitor the effects of one robot, trajectory by trajectory.
 
     The model is fitted to the first trajectories; their spread gives the band of a moving average
     over the later ones, wide enough that a robot without drift raises any alarm at all with at
@@ -103,11 +103,11 @@ def monitor_drift(
     evidence : Evidence
         One factor for each trajectory, numbered in the order of time (``groups=None``).
     columns : sequence of str, optional
-        Coefficients to watch; by default those of the effects.
+        Coefficients to monitor; by default those of the effects.
     dates : mapping of int to object, optional
         Date of each trajectory; by default its number.
     reference : int, default=20
-        Trajectories at the beginning that are taken for healthy.
+        Number of initial trajectories that are assumed to be healthy.
     false_alarm : float, default=0.01
         Highest probability of any alarm without drift.
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One-step-ahead forecasts of a signal from its own past, the yardstick of every forecast."""
+"""One-step-ahead forecasts of a signal from its own past, as baselines."""
 
 from skidyn.forecasting._forecast import (
     AutoregressiveRegressor,

@@ -90,7 +90,7 @@ class _Forecaster(MultiOutputMixin, RegressorMixin, BaseEstimator):
 
 
 class PersistenceRegressor(_Forecaster):
-    """Forecast without change: each sample is the one before.
+    """Persistence forecast: each sample equals the previous one.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ class AutoregressiveRegressor(_Forecaster):
     Parameters
     ----------
     order : int, default=10
-        Samples of the past. Where a segment is shorter, its first sample stands in.
+        Samples of the past. In shorter segments the first sample is repeated.
     ridge : float, default=1e-8
         Ridge, as a share of the number of rows times the variance of the signal.
     trajectory, time : int, str or None, default="auto"

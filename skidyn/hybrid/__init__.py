@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Physics with a learner on what it leaves over."""
+"""Physical models with a learner for their residual."""
 
 from skidyn.hybrid._hybrid import HybridRegressor
 from skidyn.hybrid._own_joint import OwnJointRegressor

@@ -48,13 +48,13 @@ NOT_TESTED = (
 class HybridRegressor(
     CallbackSupportMixin, MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEstimator
 ):
-    """Physical model plus a learner on its residual, which is kept only where it helps.
+    """Physical model with a learner for its residual, which is used only if it helps.
 
-    The physics is cross-fitted, so that the learner sees the residual on trajectories that the
-    physics has not seen; the learner is cross-fitted in turn. A learned part is kept only if it
-    agrees with the residual of held-out trajectories beyond chance, with the weight that is certain
-    to one standard error; otherwise the hybrid is the physics. Far from the training samples the
-    learned part fades out.
+    The physics is cross-fitted, so that the learner is trained on the residual of held-out
+    trajectories; the learner is also cross-fitted. A learned part is used only if it agrees
+    significantly with the residual of held-out trajectories, with a weight reduced by one standard
+    error; otherwise the hybrid equals the physics. Far from the training samples the learned part
+    fades out.
 
     Parameters
     ----------
@@ -68,30 +68,29 @@ class HybridRegressor(
         row exactly once; for one recording of a periodic motion use ``PhaseKFold``.
     alpha : float, default=0.05
         Level of the one-sided tests over trajectories that the learned part must pass: for all
-        joints together, or for a joint alone with correction for their number. 1 keeps every joint
-        whose learned part helped on held-out data, significantly or not. Fewer than three
-        trajectories test nothing, since parts of one recording share its peculiarities: then the
-        hybrid is the physics, with a warning, unless `alpha` is 1. A long recording of a motion
-        that does not repeat may be cut into trajectories.
+        joints together, or for a joint alone with correction for their number. 1 keeps the learned
+        part of every joint that it improves on held-out data, significantly or not. With fewer than
+        three trajectories no test is possible, since parts of one recording are not independent:
+        the hybrid then equals the physics, with a warning, unless `alpha` is 1. A long recording of
+        a motion that does not repeat may be split into trajectories.
     trajectory, time : int, str or None, default="auto"
-        Key columns of X. Physics and learners that have no parameters for them do not see them.
+        Key columns of X. They are removed for physics and learners without parameters for them.
 
     Attributes
     ----------
     physics_ : estimator
         Physics fitted to all rows.
     learner_ : estimator or None
-        Learner fitted to the residuals on rows left out of the physics; None where no joint kept
-        it.
+        Learner fitted to the residuals on rows left out of the physics; None if no joint uses it.
     learned_weight_ : ndarray of shape (n_joints,)
         Factor of the learned part: its least-squares factor on held-out trajectories less one
-        standard error, between 0 and 1; 0 where it is off.
+        standard error, between 0 and 1; 0 if it is not used.
     gain_ : ndarray of shape (n_joints,)
-        Relative fall of the RMSE on held-out trajectories that the learned part brought with the
-        weight that the other trajectories give it, whether it was kept or not.
+        Relative reduction of the RMSE on held-out trajectories by the learned part, with the weight
+        from the other trajectories, whether it is used or not.
     p_value_ : ndarray of shape (n_joints,)
-        That residual and learned part agree on the joint, or over all joints if that is surer;
-        corrected. 1 where nothing is gained, and with fewer than three trajectories.
+        Corrected p-value of the agreement of residual and learned part on the joint, or over all
+        joints if that is smaller. 1 without improvement, and with fewer than three trajectories.
     radius_ : float
         Distance from the training samples that counts as outside, in standard deviations per
         feature (root mean square).
@@ -102,8 +101,8 @@ class HybridRegressor(
 
     Notes
     -----
-    Physics is fitted once for every pair of folds: a learner that is judged on a fold is trained on
-    residuals of physics that saw neither the fold nor the row's own.
+    Physics is fitted once for every pair of folds: a learner that is evaluated on a fold is trained
+    on residuals of physics fitted without this fold and without the fold of the row.
 
     Examples
     --------
@@ -153,7 +152,7 @@ class HybridRegressor(
 
     @fit_context(prefer_skip_nested_validation=False)
     def fit(self, X: Any, y: Any, sample_weight: Any = None, groups: Any = None) -> HybridRegressor:
-        """Fit the physics, then the learner on what it leaves over.
+        """Fit the physics, then the learner on its residual.
 
         Parameters
         ----------
@@ -162,7 +161,7 @@ class HybridRegressor(
         y : array-like of shape (n_samples,) or (n_samples, n_joints), N m (N if prismatic)
             Torque.
         sample_weight : array-like of shape (n_samples,), default=None
-            Weight of each row, for physics and learners that take weights.
+            Weight of each row, for physics and learners that accept weights.
         groups : array-like of shape (n_samples,), default=None
             Groups of the rows for a `cv` that splits by groups, such as ``GroupKFold``.
 
@@ -253,7 +252,7 @@ class HybridRegressor(
         return fitted_keys(self)
 
     def predict(self, X: Any) -> Array:
-        """Predict the torque: physics, plus the learned part where it was kept.
+        """Predict the torque: physics, plus the learned part if it is used.
 
         Parameters
         ----------
@@ -282,7 +281,7 @@ class HybridRegressor(
         Returns
         -------
         torque : ndarray of shape (n_samples,) or (n_samples, n_joints), N m (N if prismatic)
-            Zero where the learner is off.
+            Zero if the learner is not used.
         """
         check_is_fitted(self)
         array = validate_data(self, X, reset=False, dtype=np.float64)
@@ -315,8 +314,8 @@ class HybridRegressor(
         Returns
         -------
         outside : ndarray of bool of shape (n_samples,)
-            True where the nearest training sample is farther than `radius_`. The learned part
-            fades out from there and is gone at twice that distance.
+            True where the nearest training sample is farther than `radius_`. The learned part fades
+            out from there and is zero at twice that distance.
         """
         check_is_fitted(self)
         return self._novelty(validate_data(self, X, reset=False, dtype=np.float64)) > 1.0

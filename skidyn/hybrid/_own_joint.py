@@ -34,18 +34,18 @@ Array = NDArray[np.float64]
 class OwnJointRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEstimator):
     """One regressor per joint on that joint's own motion and pre-sliding states.
 
-    What a good physical model leaves over is mostly friction inside single joints. A learner that
-    sees only the joint it predicts cannot fit accidental relations between joints, needs less data
-    and transfers better to new motions. Friction depends on the path: around rest and reversal it
-    depends on how far the joint has gone since. States of Dahl's model [1]_ of several widths stand
-    for this memory, so that a learner without one can use it.
+    The residual of a good physical model is mostly friction of single joints. A learner that only
+    uses the motion of the predicted joint cannot fit accidental relations between joints, needs
+    less data and generalises better to new motions. Friction depends on the path: near rest and
+    reversals it depends on the distance travelled since then. States of Dahl's model [1]_ with
+    several widths represent this memory for learners without one.
 
     Parameters
     ----------
     estimator : estimator, default=None
         Regressor of one joint; a small, cautious gradient boosting if None.
     presliding : sequence of float, rad (m for prismatic joints), default=(0.003, 0.01, 0.05, 0.2)
-        Ways over which the states build up. They restart at the ends of segments.
+        Distances over which the states build up. They restart in each segment.
     joint_names : sequence of str, default=None
         Names of the joints for columns named ``q_<joint>``; ``q1, q2, ..`` or columns by position
         need none.
@@ -115,9 +115,9 @@ class OwnJointRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, Ba
         X : DataFrame or array-like of shape (n_samples, n_features)
             Positions, velocities and accelerations of all joints, with key columns.
         y : array-like of shape (n_samples,) or (n_samples, n_joints), N m (N if prismatic)
-            Torque, or what a physical model leaves over.
+            Torque, or the residual of a physical model.
         sample_weight : array-like of shape (n_samples,), default=None
-            Weight of each row, where the regressor of a joint takes weights.
+            Weight of each row, if the regressor of a joint accepts weights.
 
         Returns
         -------

@@ -24,8 +24,8 @@ class Drift:
     Parameters
     ----------
     reference, error : ndarray of shape (n_joints,), N m (N if prismatic)
-        Root mean square error where the joint moves: on trajectories of the reference that the
-        model had not seen, and on the new recording.
+        Root mean square error where the joint moves: on held-out trajectories of the reference, and
+        on the new recording.
 
     Examples
     --------
@@ -74,10 +74,10 @@ def drift(
     moving: tuple[ArrayLike, ArrayLike] | None = None,
     folds: Sequence[tuple[Any, Any]] | None = None,
 ) -> Drift:
-    """Errors of a model on a new recording against those on a reference.
+    """Compare the errors of a model on a new recording with those on a reference.
 
-    The model is fitted to the reference; what counts as its usual error is the one on trajectories
-    left out of the fit. An unchanged robot that repeats its motion gives a ratio of about 1.
+    The model is fitted to the reference; its usual error is that on trajectories left out of the
+    fit. An unchanged robot that repeats its motion gives a ratio of about 1.
 
     Parameters
     ----------
@@ -92,8 +92,8 @@ def drift(
     y_reference : array-like of shape (n_reference, n_joints), N m (N if prismatic)
         Its measured torques.
     moving : pair of array-like of shape (n_samples, n_joints) of bool, optional
-        Samples that count, of the new recording and of the reference: dry friction at rest is
-        open, so rest says nothing of wear. All by default.
+        Samples to evaluate, of the new recording and of the reference: dry friction at rest is
+        undetermined, so rest gives no information about wear. All by default.
     folds : sequence of pairs of index arrays, optional
         Splits of the reference; four folds of :class:`~skidyn.model_selection.TrajectoryKFold`
         by default.
@@ -106,7 +106,7 @@ def drift(
     Raises
     ------
     SkidynError
-        A joint has no sample that counts.
+        A joint has no evaluated sample.
 
     Examples
     --------

@@ -143,7 +143,7 @@ def min_absolute_error(
 
 
 def percent_improvement(before: ArrayLike, after: ArrayLike) -> Any:
-    """How much smaller an error became, in per cent of what it was.
+    """Reduction of an error in per cent of its previous value.
 
     Parameters
     ----------

@@ -57,7 +57,7 @@ class PairedComparison:
         RMSE of the second model over that of the first, geometric mean over recordings and joints;
         below 1 the second is better.
     low, high : float
-        Confidence interval of it, with recordings as the units of chance.
+        Confidence interval of the ratio, with recordings as independent observations.
     p_value : float
         One-sided: probability of a ratio this low if the second model were no better.
     n_recordings : int

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Cross-validation that respects recordings, and a guard against splits that do not."""
+"""Cross-validation by recordings, and a guard against leaking splits."""
 
 from skidyn.model_selection._leakage import LeakageGuard, LeakageWarning, leakage_report
 from skidyn.model_selection._learning_curve import trajectory_learning_curve

@@ -29,7 +29,7 @@ LOOKED_AT = 2000
 
 
 class LeakageWarning(UserWarning):
-    """Training and test rows of a fold are not independent; the score is too good.
+    """Training and test rows of a fold are not independent; the score is optimistic.
 
     Examples
     --------
@@ -42,14 +42,14 @@ class LeakageWarning(UserWarning):
 class LeakageGuard(BaseCrossValidator):
     """Cross-validator that warns when the folds of another one leak.
 
-    Two things are looked for. A trajectory in both training and test rows: neighbouring samples are
-    almost copies of each other. And a motion in both: test rows whose features lie closer than 0.02
-    standard deviations to a training row, as when a recording repeats one period.
+    Two kinds of leaks are detected: a trajectory in both training and test rows, whose neighbouring
+    samples are nearly identical; and a motion in both, that is, test rows whose features are closer
+    than 0.02 standard deviations to a training row, as when a recording repeats one period.
 
     Parameters
     ----------
     cv : cross-validator, int or iterable, default=5
-        What is guarded; its folds are handed on unchanged.
+        Guarded cross-validator; its folds are passed on unchanged.
     trajectory, time : int, str or None, default="auto"
         Key columns; they are no part of the motion.
 
@@ -83,7 +83,7 @@ class LeakageGuard(BaseCrossValidator):
         Parameters
         ----------
         X, y, groups : object, default=None
-            Handed on.
+            Passed on.
 
         Returns
         -------
@@ -100,7 +100,7 @@ class LeakageGuard(BaseCrossValidator):
         X : DataFrame or array-like of shape (n_samples, n_features)
             Samples with key columns.
         y, groups : array-like, default=None
-            Handed on.
+            Passed on.
 
         Yields
         ------
@@ -161,7 +161,7 @@ def leakage_report(
     time: ColumnSpec = "auto",
     scoring: Any = None,
 ) -> Bunch:
-    """Score an estimator with leaking folds and with sound ones, side by side.
+    """Compare the scores of an estimator with leaking and with correct folds.
 
     Parameters
     ----------
@@ -172,9 +172,9 @@ def leakage_report(
     y : array-like of shape (n_samples,) or (n_samples, n_joints), N m (N for prismatic joints)
         Torque.
     cv : cross-validator or int, default=5
-        The folds under suspicion.
+        The folds to be checked.
     honest_cv : cross-validator, default=None
-        What to compare with; :class:`TrajectoryKFold` with at most 5 folds if None.
+        Correct folds for comparison; :class:`TrajectoryKFold` with at most 5 folds if None.
     trajectory, time : int, str or None, default="auto"
         Key columns.
     scoring : str or callable, default=None

@@ -108,8 +108,8 @@ class TrajectoryKFold(BaseCrossValidator):
 class PhaseKFold(BaseCrossValidator):
     """K folds by the phase of a periodic motion, with a guard around every test block.
 
-    A recording of several periods of one motion repeats itself: "the last fifth" was driven before
-    and is in the training rows. Here a fold is a part of the path, in all its repetitions.
+    In a recording of several periods of one motion, a block of rows such as the last fifth repeats
+    motion of the training rows. Here a fold is a part of the path, in all its repetitions.
 
     Parameters
     ----------

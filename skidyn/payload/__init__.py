@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a robot carries, and what its motors give per ampere, from runs with and without a load."""
+"""Payloads and drive gains (torque per ampere) from runs with and without a load."""
 
 from skidyn.payload._drive_gains import DriveGainEstimate, estimate_drive_gains
 from skidyn.payload._payload import PayloadEstimate, identify_payload

@@ -39,19 +39,19 @@ class DriveGainEstimate:
     interval : ndarray of shape (n_joints, 2)
         95 % intervals.
     factors : ndarray of shape (n_joints,)
-        Gains over those by which the runs had been read.
+        Ratio of the gains to those with which the runs were read.
     by_recording : Shares
-        Gains that every recording shows by itself, the rest known from all others: ``names`` of
-        the recordings, ``values`` and ``std`` of shape (n_recordings, n_joints), N m/A or N/A. NaN
-        for the only recording with the load, or without it.
+        Gains estimated from every single recording, given the other parameters from all others:
+        ``names`` of the recordings, ``values`` and ``std`` of shape (n_recordings, n_joints), N m/A
+        or N/A. NaN for the only recording with the load, or without it.
     mass : float
-        The known mass on which all gains rest, kg.
+        The known mass to which all gains are proportional, kg.
     com : ndarray of shape (3,)
-        Centre of mass of the load in the frame of the link, as given or found on the way, m.
+        Centre of mass of the load in the frame of the link, as given or estimated, m.
     relative_error : ndarray of shape (n_joints,)
         Root mean square of the residual over that of the current, averaged rows.
     notes : tuple of str
-        What cannot be separated or was left open, in words.
+        Notes on parameters that cannot be separated or determined.
 
     Examples
     --------
@@ -130,8 +130,8 @@ def estimate_drive_gains(
     """Estimate the drive gains from runs with and without a load of known mass.
 
     Rigid body, friction, the unknown parameters of the load and all gains are fitted together
-    [1]_. The noise sits in the currents, which are what is fitted: a least-squares fit with the
-    currents as regressors would pull every gain toward zero.
+    [1]_. The noise is in the currents, which are the dependent variable: a least-squares fit with
+    the currents as regressors would bias every gain toward zero.
 
     Parameters
     ----------
@@ -145,11 +145,11 @@ def estimate_drive_gains(
     com : sequence of 3 floats, optional
         Its centre of mass in the frame of the link, m, if that is known too; found otherwise.
     drive_gains : sequence of float, N m/A or N/A, optional
-        Gains by which the torque columns were made from currents; 1 by default.
+        Gains with which the torque columns were computed from currents; 1 by default.
     link : str, optional
         Link of the URDF to which the load is fixed; the last moving link by default.
     effects : sequence of str, (str, joints) or Term
-        Effects beside the rigid body; viscous and dry friction, offset and rotor inertia by
+        Effects in addition to the rigid body; viscous and dry friction, offset and rotor inertia by
         default.
     smooth : bool or None, default=None
         Derive velocity and acceleration from the positions. None does so where the runs have no
@@ -158,12 +158,12 @@ def estimate_drive_gains(
     Returns
     -------
     DriveGainEstimate
-        Gains with intervals, and notes on what the runs leave open.
+        Gains with intervals, and notes on undetermined parameters.
 
     Raises
     ------
     SkidynError
-        Runs that cannot be used, a link that is not there, or a mass that is not positive.
+        Runs that cannot be used, an unknown link, or a mass that is not positive.
 
     References
     ----------

@@ -58,30 +58,30 @@ class PayloadEstimate:
     com_interval : ndarray of shape (3, 2)
         95 % intervals, m.
     inertial_parameters : ndarray of shape (10,)
-        ``(m, m c, Ixx, Ixy, Ixz, Iyy, Iyz, Izz)`` about the origin of the link's frame; of a body
-        that can exist.
+        ``(m, m c, Ixx, Ixy, Ixz, Iyy, Iyz, Izz)`` about the origin of the link's frame; physically
+        consistent.
     std : ndarray of shape (10,)
-        Their standard errors by the jackknife over trajectories or blocks of time; NaN where the
-        motion leaves a parameter open.
+        Their standard errors by the jackknife over trajectories or blocks of time; NaN if the
+        motion does not determine a parameter.
     link : str
         The link.
     rmse_before, rmse_after : ndarray of shape (n_joints,)
         Root mean square of the averaged loaded rows without and with the payload, N m or N.
     notes : tuple of str
-        What cannot be separated or was left open, in words.
+        Notes on parameters that cannot be separated or determined.
     first_moment : ndarray of shape (3,)
         Mass times centre of mass, kg m; NaN where the motion does not show it.
     first_moment_interval : ndarray of shape (3, 2)
         95 % intervals, kg m.
     by_joint, by_joint_std : ndarray of shape (n_joints,)
         The payload's size from every joint alone, as a share of the common one, and its standard
-        error; NaN for joints that do not feel it. Shares that differ beyond their errors point to
-        wrong drive gains, not to the payload.
+        error; NaN for joints on which it does not act. Shares that differ beyond their errors
+        indicate wrong drive gains.
     by_recording : Shares
-        Torque that every recording measures, as a share of what all others let expect of it:
-        ``names`` of the recordings, ``values`` and ``std`` of shape (n_recordings, n_joints). A
-        drive gain that was not the same in all recordings shows here. NaN for the only recording
-        with the payload, or without it.
+        Torque measured in every recording, as a share of that expected from all others: ``names``
+        of the recordings, ``values`` and ``std`` of shape (n_recordings, n_joints). They differ if
+        a drive gain was not the same in all recordings. NaN for the only recording with the
+        payload, or without it.
     joint_names : tuple of str
         Names of the joints.
     units : tuple of str
@@ -212,16 +212,16 @@ def identify_payload(
     effects: Sequence[Any] = FRICTION,
     smooth: bool | None = None,
 ) -> PayloadEstimate:
-    """Identify what a robot carries in some runs and not in others.
+    """Identify a payload that a robot carries in some runs and not in others.
 
     With unloaded runs, rigid body, friction and payload are fitted together [1]_, so that the
     interval of the payload includes the uncertainty of the robot itself. Without them a fitted
-    model stands for the robot, and its errors are not part of the intervals.
+    model is used for the robot, and its errors are not part of the intervals.
 
     Parameters
     ----------
     model : Robot or RBDRegressor
-        The robot; a fitted regressor where there are no unloaded runs.
+        The robot, or a fitted regressor if there are no unloaded runs.
     loaded : DataFrame or sequence of DataFrame
         Runs with the payload: ``time`` (s), ``q1..``, ``dq1..`` (rad, m), ``tau1..`` (N m, N) and,
         where known, ``trajectory`` and ``ddq1..``, such as :func:`skidyn.logs.read_log` gives.
@@ -231,11 +231,11 @@ def identify_payload(
         Link of the URDF to which the payload is fixed and in whose frame it is stated; the last
         moving link by default.
     com : sequence of 3 floats, optional
-        Centre of mass in the frame of the link, m, where it is known. A motion that shows the first
-        moment only, such as that of one joint, weighs the payload by it.
+        Centre of mass in the frame of the link, m, if it is known. If the motion determines the
+        first moment only, such as that of one joint, the mass is computed from it.
     effects : sequence of str, (str, joints) or Term
-        Effects beside the rigid body that are fitted with unloaded runs; viscous and dry friction,
-        offset and rotor inertia by default.
+        Effects in addition to the rigid body that are fitted with unloaded runs; viscous and dry
+        friction, offset and rotor inertia by default.
     smooth : bool or None, default=None
         Derive velocity and acceleration from the positions. None does so where the runs have no
         accelerations.
@@ -243,13 +243,12 @@ def identify_payload(
     Returns
     -------
     PayloadEstimate
-        With intervals, and notes on what the runs leave open.
+        Payload with intervals, and notes on undetermined parameters.
 
     Raises
     ------
     SkidynError
-        Runs that cannot be used, a link that is not there, or neither unloaded runs nor a fitted
-        model.
+        Runs that cannot be used, an unknown link, or neither unloaded runs nor a fitted model.
 
     See Also
     --------

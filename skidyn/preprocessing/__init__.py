@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Transformers that keep the rows of a log, and functions on logs that change them."""
+"""Transformers that keep the number of rows, and functions on logs that change it."""
 
 from skidyn.preprocessing._current import CurrentToTorque
 from skidyn.preprocessing._delay import DelayEstimate, advance_channels, estimate_delay

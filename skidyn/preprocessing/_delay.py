@@ -34,7 +34,7 @@ class DelayEstimate:
     standard_error : float, s
         From leaving out one tenth of the log at a time.
     correlation : float
-        Between the two once the delay is taken out, of their variation faster than the trend.
+        Correlation of the detrended signals after removing the delay.
 
     Examples
     --------
@@ -60,10 +60,10 @@ def estimate_delay(
     """Time by which a channel lags a reference of the same shape.
 
     Both must follow the same quantity up to scale and offset: the recorded velocity and the
-    differentiated position, the torque of two sensors, a motor current and the torque it makes.
-    The delay is where the cross-correlation of their differences is largest, between samples by a
-    parabola. For torque against motion, whose shapes differ, see the delay that
-    :func:`skidyn.logs.check_log` reports.
+    differentiated position, the torque of two sensors, a motor current and its torque. The delay is
+    where the cross-correlation of their differences is largest, between samples by a parabola. For
+    torque against motion, whose shapes differ, see the delay that :func:`skidyn.logs.check_log`
+    reports.
 
     Parameters
     ----------
@@ -76,12 +76,12 @@ def estimate_delay(
     trajectory : array-like of shape (n_samples,), optional
         Trajectory of each row; nothing is compared across their borders.
     largest : float, s, default=0.1
-        Largest delay that is looked for, either way.
+        Largest delay in the search, in both directions.
 
     Returns
     -------
     DelayEstimate
-        Delay, its standard error and the correlation that is left.
+        Delay, its standard error and the remaining correlation.
 
     Raises
     ------
@@ -183,7 +183,7 @@ def _peak(sums: Array) -> tuple[float, float]:
 
 
 def advance_channels(frame: pd.DataFrame, delays: Mapping[str, float]) -> pd.DataFrame:
-    """Take delays out of a log.
+    """Remove delays from a log.
 
     Parameters
     ----------

@@ -32,9 +32,9 @@ class SmoothDerivatives(SignalTransformer):
     """Smooth signals and append their derivatives; method and cut-off chosen by cross-validation.
 
     Every candidate predicts each sample from its neighbours without the sample itself. The lowest
-    cut-off whose error is within one standard error of the least is taken, since derivatives
-    magnify what is left of the noise. One cut-off serves all columns: joints that are filtered
-    differently would no longer belong to one motion. Nothing crosses the end of a segment.
+    cut-off whose error is within one standard error of the least is selected, since derivatives
+    amplify the remaining noise. One cut-off is used for all columns, because differently filtered
+    joints are inconsistent with one motion. Segments are processed separately.
 
     The result is X with smoothed columns, then their first derivatives (unit/s, a ``d`` before the
     name), then the second (unit/s^2, ``dd``) where two are appended.
@@ -42,21 +42,22 @@ class SmoothDerivatives(SignalTransformer):
     Parameters
     ----------
     columns : sequence of int or str, default=None
-        What to smooth and differentiate. None means the velocities (columns whose names begin with
-        ``dq``) where there are some, otherwise the positions (``q``), or without names all columns.
+        Columns to smooth and differentiate. None means the velocities (columns whose names begin
+        with ``dq``) where there are some, otherwise the positions (``q``), or without names all
+        columns.
     derivatives : {1, 2}, default=None
         How many are appended; None means one of velocities and two of anything else.
     method : {"auto", "butterworth", "savitzky_golay", "kalman"}, default="auto"
         Zero-phase Butterworth of order 4 with central differences; local polynomials of degree 4;
         Kalman smoother of a point with white jerk, the only one that uses unequal time steps as
-        they are. ``"auto"`` takes the one of least error, or the Kalman smoother where the time
-        steps vary by more than 10 %.
+        they are. ``"auto"`` selects the one with the least error, or the Kalman smoother where the
+        time steps vary by more than 10 %.
     cutoff : float, Hz, default=None
         Frequency at which half of the amplitude passes; chosen if None. State it with every result.
     rate : float, Hz, default=None
         Sampling rate where X has no time column.
     trajectory, time : int, str or None, default="auto"
-        Key columns, handed on untouched.
+        Key columns, passed on unchanged.
 
     Attributes
     ----------

@@ -18,10 +18,10 @@ Array = NDArray[np.float64]
 
 
 class DropKeys(SignalTransformer):
-    """Take the key columns out of a table, before a learner that does not know them.
+    """Remove the key columns from a table, before a learner that does not support them.
 
-    A learner takes the number of a trajectory and the time for features, and memorises the log.
-    ``HybridRegressor`` and ``BLLRegressor`` keep them from learners by themselves.
+    Otherwise a learner uses the trajectory number and the time as features, and memorises the log.
+    ``HybridRegressor`` and ``BLLRegressor`` remove them for their learners automatically.
 
     Parameters
     ----------

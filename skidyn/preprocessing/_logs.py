@@ -94,14 +94,14 @@ def _average_periods(frame: pd.DataFrame, period: float) -> pd.DataFrame:
 
 
 def cross_fitted_residual(physics: Any, X: Any, y: Any, *, cv: Any = 5) -> Array:
-    """What a physical model leaves over on trajectories that it has not seen.
+    """Residual of a physical model on held-out trajectories.
 
     Parameters
     ----------
     physics : estimator
         A scikit-learn regressor; cloned.
     X : DataFrame or array-like of shape (n_samples, n_features)
-        Samples; trajectories are told apart by a column named ``trajectory``.
+        Samples; trajectories are given by a column named ``trajectory``.
     y : array-like of shape (n_samples,) or (n_samples, n_joints), N m (N if prismatic)
         Torque.
     cv : int or cross-validator, default=5

@@ -103,7 +103,7 @@ class ButterworthFilter(SignalTransformer):
     rate : float, Hz, default=None
         Sampling rate; from the time column if None.
     trajectory, time : int, str or None, default="auto"
-        Key columns, handed on untouched.
+        Key columns, passed on unchanged.
 
     Attributes
     ----------
@@ -169,15 +169,16 @@ class TimeDerivative(SignalTransformer):
     Parameters
     ----------
     columns : sequence of int or str, default=None
-        What to differentiate; None means the velocities: columns whose names begin with ``dq``, or
-        without names the second half of the features (positions, then velocities).
+        Columns to differentiate; None means the velocities: columns whose names begin with ``dq``,
+        or without names the second half of the features (positions, then velocities).
     cutoff : float, Hz, default=None
-        Low-pass the columns first (zero-phase Butterworth of order 4); the derivative alone sees
-        the smoothed signals. State the cut-off with every result: it moves residuals a lot.
+        Low-pass the columns first (zero-phase Butterworth of order 4); only the derivatives use the
+        smoothed signals. State the cut-off with every result, since it has a large influence on
+        residuals.
     rate : float, Hz, default=None
         Sampling rate where X has no time column.
     trajectory, time : int, str or None, default="auto"
-        Key columns, handed on untouched.
+        Key columns, passed on unchanged.
 
     Attributes
     ----------
@@ -267,7 +268,7 @@ class SignalScaler(SignalTransformer):
     kind : {"minmax", "standard"}, default="minmax"
         Range 0 to 1 (eq. 8 of [1]_), or zero mean and unit variance.
     trajectory, time : int, str or None, default="auto"
-        Key columns, handed on untouched.
+        Key columns, passed on unchanged.
 
     Attributes
     ----------
