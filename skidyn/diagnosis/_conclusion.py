@@ -15,7 +15,7 @@ from skidyn._signals import Array
 from skidyn._text import joints_told
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._comparison import Comparison
-from skidyn.diagnosis._confidence import confidence
+from skidyn.diagnosis._confidence import confidence, mostly_stays
 from skidyn.diagnosis._correction import is_physics, refitted_errors
 from skidyn.diagnosis._episodes import (
     Episode,
@@ -130,7 +130,9 @@ def conclude(
     episodes, inside = find_episodes(problem, smooth, least, share_held)
     if episodes:
         findings.append(_episodic(episodes, inside, result.fit.residual))
-    findings = [_sure(f, findings, parts, problem.whole_trajectories) for f in findings]
+    errors = np.array(history[0]["rmse"]), rmse
+    whole = problem.whole_trajectories
+    findings = [_sure(f, findings, parts, errors, whole) for f in findings]
     diagnosis = Diagnosis(
         _verdict(findings, parts),
         robot.joint_names,
@@ -428,13 +430,21 @@ def _drop(before: Sequence[float], after: Sequence[float], joints: Sequence[int]
     return float(np.mean([1 - (a / b) ** 2 for b, a in pairs]))
 
 
-def _sure(finding: Finding, findings: Sequence[Finding], parts: Remainder, whole: bool) -> Finding:
+def _sure(
+    finding: Finding,
+    findings: Sequence[Finding],
+    parts: Remainder,
+    errors: tuple[Array, Array],
+    whole: bool,
+) -> Finding:
     """The finding with the probability that its name is right."""
     if not finding.terms:
         return finding
     joints = [j - 1 for j in finding.joints]
     others = [f for f in findings if f is not finding and f.kind == UNKNOWN]
     beside = any(set(f.joints) & set(finding.joints) for f in others)
+    same = sorted({j - 1 for f in findings if f.kind == finding.kind for j in f.joints})
+    before, after = (error[same] for error in errors)
     probability = confidence(
         finding.margin,
         float(parts.inflation[joints].max()),
@@ -444,6 +454,7 @@ def _sure(finding: Finding, findings: Sequence[Finding], parts: Remainder, whole
         alike=finding.alike,
         rivalled=bool(finding.rivals),
         few=finding.trajectories is not None and all(t.effect.by_recording for t in finding.terms),
+        stays=finding.kind != UNKNOWN and mostly_stays(before, after, parts.noise[same]),
         has_name=finding.kind != UNKNOWN,
     )
     # One of several pairs of joints that explain the same is right.

@@ -13,6 +13,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from skidyn._signals import Array
+
 #: Weights of the constant, of the margin, of the logarithm of the inflation of the variance by
 #: autocorrelation, of the decimal logarithm of the share of the error that is removed.
 CONSTANT, MARGIN, CORRELATED, REMOVED = 2.4, 1.8, -1.1, 1.8
@@ -22,6 +24,9 @@ CONSTANT, MARGIN, CORRELATED, REMOVED = 2.4, 1.8, -1.1, 1.8
 NAMELESS, BLOCKS, ALIKE, EQUALLED = -1.3, -0.5, -2.4, -0.5
 #: Weight of an effect that few recordings alone have, of which the plainest form alone was tried.
 FEW = -0.6
+#: Weight of an error that mostly stays on the joint where the effect is largest: more than this share
+#: of what was above the noise, and so many times the noise. Half of such names are right.
+STAYS, MOSTLY, ABOVE_NOISE = -2.2, 0.6, 1.2
 #: Margin below which another explanation of the same joints equals a name, or explains so much
 #: more; one that explains far more is of other joints, too.
 EQUAL, ABOVE = 0.005, 0.1
@@ -43,6 +48,7 @@ def confidence(
     alike: bool = False,
     rivalled: bool = False,
     few: bool = False,
+    stays: bool = False,
     has_name: bool = True,
 ) -> float:
     """Probability that a name is right.
@@ -65,6 +71,8 @@ def confidence(
         Whether the data cannot separate it from another explanation of its joints.
     few : bool, default=False
         Whether few recordings alone have it, and other forms of it were not tried there.
+    stays : bool, default=False
+        Whether most of the error above the noise stays on its joints (:func:`mostly_stays`).
     has_name : bool, default=True
         Whether it is a known effect, and not something without a name.
 
@@ -77,5 +85,30 @@ def confidence(
     logit += CORRELATED * float(np.log(max(inflation / COLOURED, 1.0)))
     logit += REMOVED * float(np.log10(min(max(removed, LEAST), ENOUGH) / ENOUGH))
     logit += NAMELESS * nameless + BLOCKS * (not whole_recordings)
-    logit += FEW * few + ALIKE * alike + EQUALLED * (rivalled and -ABOVE < margin < EQUAL)
+    logit += (
+        STAYS * stays
+        + FEW * few
+        + ALIKE * alike
+        + EQUALLED * (rivalled and -ABOVE < margin < EQUAL)
+    )
     return min(MOST if has_name else MOST_NAMELESS, float(1 / (1 + np.exp(-logit))))
+
+
+def mostly_stays(before: Array, after: Array, noise: Array) -> bool:
+    """Whether most of the error above the noise stays on the joint where it was largest.
+
+    Parameters
+    ----------
+    before, after : ndarray of shape (n_joints,), N m or N
+        Error of the joints of an effect without and with all findings.
+    noise : ndarray of shape (n_joints,), N m or N
+        Noise of these joints.
+
+    Returns
+    -------
+    bool
+    """
+    above = np.maximum(np.square(before) - np.square(noise), 0.0)
+    left = np.maximum(np.square(after) - np.square(noise), 0.0)
+    j = int(np.argmax(above / np.maximum(np.square(noise), np.finfo(float).tiny)))
+    return bool(left[j] > MOSTLY * above[j] and after[j] > ABOVE_NOISE * noise[j])

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How sure a name is rises and falls with what speaks for it."""
 
+import numpy as np
 import pytest
 
 from skidyn.diagnosis import confidence
+from skidyn.diagnosis._confidence import mostly_stays
 
 
 def test_a_clear_name_is_sure_but_never_certain():
@@ -17,6 +19,7 @@ def test_a_clear_name_is_sure_but_never_certain():
         {"whole_recordings": False},
         {"alike": True},
         {"few": True},
+        {"stays": True},
     ],
 )
 def test_what_speaks_against_a_name_lowers_it(against):
@@ -37,3 +40,11 @@ def test_an_equal_explanation_lowers_it_below_what_is_sure():
 
 def test_that_something_has_no_name_is_less_sure():
     assert confidence(1.0, 1.0, 0.3, has_name=False) < 0.9 < confidence(1.0, 1.0, 0.3)
+
+
+def test_a_name_that_leaves_most_of_the_error_is_not_sure():
+    noise = np.array([0.1, 0.1])
+    assert mostly_stays(np.array([0.2, 0.1]), np.array([0.19, 0.1]), noise)
+    assert not mostly_stays(np.array([0.2, 0.1]), np.array([0.12, 0.1]), noise)
+    assert not mostly_stays(np.array([0.105, 0.1]), np.array([0.104, 0.1]), noise)  # all is noise
+    assert confidence(1.0, 1.0, 0.3, stays=True) < 0.9
