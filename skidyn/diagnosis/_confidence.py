@@ -3,7 +3,8 @@
 
 What tells is by how much of its gain the best other explanation falls short; whether what is left
 on its joints is white, as noise is, or slow, as the rest of a torque that was given a wrong name;
-how much of the error it removes; and whether something without a name stays beside it. The weights
+how much of the error it removes, and whether most of it stays; and whether something without a name
+stays beside it. The weights
 are those of a logistic regression on names found in logs of other seeds
 (``benchmarks/diagnosis/confidence.py``), held near round values; the same benchmark prints the
 reliability on other logs.
@@ -24,8 +25,8 @@ CONSTANT, MARGIN, CORRELATED, REMOVED = 2.4, 1.8, -1.1, 1.8
 NAMELESS, BLOCKS, ALIKE, EQUALLED = -1.3, -0.5, -2.4, -0.5
 #: Weight of an effect that few recordings alone have, of which the plainest form alone was tried.
 FEW = -0.6
-#: Weight of an error that mostly stays on the joint where the effect is largest: more than this share
-#: of what was above the noise, and so many times the noise. Half of such names are right.
+#: Weight of an error that mostly stays on the joint where it was largest: more than this share of
+#: what was above the noise, and so many times the noise. Half of such names are right.
 STAYS, MOSTLY, ABOVE_NOISE = -2.2, 0.6, 1.2
 #: Margin below which another explanation of the same joints equals a name, or explains so much
 #: more; one that explains far more is of other joints, too.
