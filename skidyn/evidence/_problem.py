@@ -506,7 +506,7 @@ def motion_rows(signals: Signals, reversals: Sequence[int], window: float = WIND
     margin = np.full(signals.n_joints, max(1, round(MARGIN * signals.half_width)))
     margin[list(reversals)] = SHORT_MARGIN
     use = sliding_samples(signals, signals.usable, margin.tolist())
-    step = column_step(signals.rate, window, int(margin.min()))
+    step = column_step(signals, window, int(margin.min()))
     return window_rows(signals, use, window, step)
 
 

@@ -246,18 +246,25 @@ def sliding_samples(
     return sliding
 
 
-def column_step(rate: float, window: float, margin: int) -> int:
+def column_step(signals: Signals, window: float, margin: int) -> int:
     """Samples of which one is enough where columns are computed; odd.
 
     Parameters
     ----------
-    rate : float, Hz
-        Sampling rate.
+    signals : Signals
+        For its clock; the slowest recording counts where there are several rates.
     window : float, s
         Width of the averaging windows.
     margin : int
         Samples that are left out beside a reversal: nothing is interpolated over one.
+
+    Returns
+    -------
+    int
     """
+    pairs = zip(signals.segments, signals.steps, strict=True)
+    steps = [step for rows, step in pairs if rows.stop - rows.start > FEWEST_SAMPLES]
+    rate = 1.0 / max(steps, default=1.0)
     if rate < FAST:
         return 1
     step = int(rate * min(window / FEWEST_SAMPLES, LONGEST_STEP) * (1 + 1e-6))

@@ -96,7 +96,7 @@ class SmoothedTorque(Check):
             return  # a filter that makes late is told as such
         found = {}
         motion = smooth_motion(measurement.signals)  # noise would blur when a joint turns
-        step = column_step(motion.rate, AROUND, motion.half_width)
+        step = column_step(motion, AROUND, motion.half_width)
         index, few = motion.thinned(step)
         torque = running_mean(measurement.torque, step)[index]
         for k in np.flatnonzero(measurement.excited).tolist():

@@ -60,7 +60,7 @@ def test_columns_at_one_of_several_samples_give_the_rows_of_all_samples():
     q = np.sin(2 * np.pi * 1.3 * t)[:, None] + 0.2 * np.sin(2 * np.pi * 4.1 * t)[:, None]
     dq, ddq = np.gradient(q[:, 0], t)[:, None], np.zeros((20_000, 1))
     signals = Signals(q, dq, ddq, np.repeat([0, 1], 10_000), time=t)
-    step = column_step(1000.0, 1 / 8, margin=31)
+    step = column_step(signals, 1 / 8, margin=31)
     assert step == 9
     use = sliding_samples(signals, np.ones((20_000, 1), dtype=bool), margin=31)
     rows = window_rows(signals, use, step=step)
@@ -72,7 +72,14 @@ def test_columns_at_one_of_several_samples_give_the_rows_of_all_samples():
         np.testing.assert_allclose(thin @ values[index], whole, atol=2e-4 * np.abs(whole).max())
 
 
+def at_rate(*rates):
+    t = [np.arange(400) / rate for rate in rates]
+    still = np.zeros((400 * len(rates), 1))
+    return Signals(still, still, still, np.repeat(range(len(rates)), 400), time=np.concatenate(t))
+
+
 def test_logs_of_ordinary_rates_have_columns_at_every_sample():
-    assert {column_step(rate, 1 / 8, 20) for rate in (1.0, 50.0, 100.0, 250.0, 500.0)} == {1}
-    assert column_step(1000.0, 1 / 32, 31) == 5
-    assert column_step(1000.0, 1 / 8, margin=1) == 1
+    assert {column_step(at_rate(rate), 1 / 8, 20) for rate in (1.0, 50.0, 250.0, 500.0)} == {1}
+    assert column_step(at_rate(1000.0), 1 / 32, 31) == 5
+    assert column_step(at_rate(1000.0), 1 / 8, margin=1) == 1
+    assert column_step(at_rate(1000.0, 1000.0, 100.0), 1 / 8, 31) == 1  # the slow one, too
