@@ -40,6 +40,8 @@ from skidyn.diagnosis._rule import (
     EPISODE_LEAST_NOISE,
     EPISODE_LEAST_RANGE,
     GUESS,
+    LITTLE,
+    SURE_OF_LITTLE,
     false_discovery_rate,
 )
 from skidyn.diagnosis._search_state import replace_torque
@@ -313,12 +315,16 @@ def _guess(diagnosis: Diagnosis) -> tuple[Hypothesis, list[Candidate]] | None:
     """The last finding with terms that are more likely wrong than right, and these terms.
 
     Where another explanation on other joints equals it, one of the two is right, and both are told.
-    What removes most of an error is the best that can be said of it.
+    What removes most of an error is the best that can be said of it; what removes hardly anything
+    has to be sure.
     """
 
     def is_sure(finding: Finding) -> bool:
         likely = (finding.confidence or 1.0) * (2 if finding.alike else 1)
         likely *= 1 + len(finding.elsewhere)
+        drop = max(f.error_drop for f in diagnosis.findings if f.kind == finding.kind)
+        if drop < LITTLE and likely < SURE_OF_LITTLE:
+            return False
         return max(likely, finding.error_drop) >= GUESS
 
     sure = {term: is_sure(f) for f in diagnosis.findings for term in f.terms}
@@ -445,6 +451,8 @@ def _sure(
     beside = any(set(f.joints) & set(finding.joints) for f in others)
     same = sorted({j - 1 for f in findings if f.kind == finding.kind for j in f.joints})
     before, after = (error[same] for error in errors)
+    # Noise that is correlated in time is more than its fast part, and alike on all joints.
+    alike = max(1.0, float(np.min(errors[1] / np.maximum(parts.noise, np.finfo(float).tiny))))
     probability = confidence(
         finding.margin,
         float(parts.inflation[joints].max()),
@@ -454,7 +462,7 @@ def _sure(
         alike=finding.alike,
         rivalled=bool(finding.rivals),
         few=finding.trajectories is not None and all(t.effect.by_recording for t in finding.terms),
-        stays=finding.kind != UNKNOWN and mostly_stays(before, after, parts.noise[same]),
+        stays=finding.kind != UNKNOWN and mostly_stays(before, after, alike * parts.noise[same]),
         has_name=finding.kind != UNKNOWN,
     )
     # One of several pairs of joints that explain the same is right.

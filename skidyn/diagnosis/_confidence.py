@@ -26,8 +26,8 @@ NAMELESS, BLOCKS, ALIKE, EQUALLED = -1.3, -0.5, -2.4, -0.5
 #: Weight of an effect that few recordings alone have, of which the plainest form alone was tried.
 FEW = -0.6
 #: Weight of an error that mostly stays on the joint where it was largest: more than this share of
-#: what was above the noise, and so many times the noise. Half of such names are right.
-STAYS, MOSTLY, ABOVE_NOISE = -2.2, 0.6, 1.2
+#: what was above the noise, and so many times the noise. A third of such names are right.
+STAYS, MOSTLY, ABOVE_NOISE = -1.7, 0.6, 1.2
 #: Margin below which another explanation of the same joints equals a name, or explains so much
 #: more; one that explains far more is of other joints, too.
 EQUAL, ABOVE = 0.005, 0.1
@@ -36,6 +36,7 @@ COLOURED, LEAST, ENOUGH = 1.7, 0.003, 0.3
 #: No name is surer than the number of logs on which the weights were found allows.
 MOST = 0.98
 #: That something has no name is less sure: known effects have other formulas than the catalogue's.
+#: So is a name that leaves most of an error.
 MOST_NAMELESS = 0.88
 
 
@@ -80,7 +81,7 @@ def confidence(
     Returns
     -------
     float
-        Between 0 and 0.98, or 0.88 without a name.
+        Between 0 and 0.98, or 0.88 without a name or where most of the error stays.
     """
     logit = CONSTANT + MARGIN * min(max(margin, 0.0), 1.0)
     logit += CORRELATED * float(np.log(max(inflation / COLOURED, 1.0)))
@@ -92,7 +93,8 @@ def confidence(
         + ALIKE * alike
         + EQUALLED * (rivalled and -ABOVE < margin < EQUAL)
     )
-    return min(MOST if has_name else MOST_NAMELESS, float(1 / (1 + np.exp(-logit))))
+    most = MOST if has_name and not stays else MOST_NAMELESS
+    return min(most, float(1 / (1 + np.exp(-logit))))
 
 
 def mostly_stays(before: Array, after: Array, noise: Array) -> bool:
@@ -103,7 +105,7 @@ def mostly_stays(before: Array, after: Array, noise: Array) -> bool:
     before, after : ndarray of shape (n_joints,), N m or N
         Error of the joints of an effect without and with all findings.
     noise : ndarray of shape (n_joints,), N m or N
-        Noise of these joints.
+        Noise of these joints, with what all joints leave alike: noise that is correlated in time.
 
     Returns
     -------

@@ -272,7 +272,8 @@ def _sentence(
         many = "y" if len(trajectories) == 1 else "ies"
         where += f" in trajector{many} {', '.join(map(str, trajectories))}"
     what = next((_value(name, row) for name, row in parameters.items()), "")
-    fall = f"Adding it removes {drop:.0%} of the held-out squared error."
+    share = f"{drop:.0%}" if drop >= 0.005 else f"{drop:.1%}"
+    fall = f"Adding it removes {share} of the held-out squared error."
     if drop <= 0:
         fall = "Refitting the model with it does not reduce the error on held-out data."
     return f"{title} on {where}{what}. {fall}"

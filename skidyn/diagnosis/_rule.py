@@ -67,6 +67,9 @@ CONFINED = 0.8
 #: What is less likely right than this, and removes a smaller share of the error, is no finding,
 #: unless another name equals it: one of two (``_conclusion.py``; ``confidence.py``).
 GUESS = 0.5
+#: What removes less of the error of samples than this share is a finding only if it is so sure: of
+#: such names in generated logs, those that were less sure were wrong (``confidence.py``).
+LITTLE, SURE_OF_LITTLE = 0.005, 0.9
 
 # Torques that come and go (``_episodes.py``); no false one: ``nothing_hidden.py``.
 #: Squared residual, in units of the noise, above which a row counts as excess, and the least sum of
@@ -211,7 +214,7 @@ class Settings:
     level: float = 0.001
     least_gain: float = 30.0
     least_share: float = 0.006
-    least_drop: float = 0.005
+    least_drop: float = 0.002
     form_tolerance: float = 0.015
     further_tolerance: float = 0.0075
     exact_tolerance: float = 0.0015

@@ -16,7 +16,7 @@ ARM = ("--urdf", "arm.urdf")
 def here(work, monkeypatch):
     monkeypatch.chdir(work)
     frame = pandas.read_csv("log.csv")
-    healthy = frame["trajectory"] <= 5
+    healthy = frame["trajectory"] <= 3
     frame[healthy].to_csv("healthy.csv", index=False)
     frame[~healthy].to_csv("tonight.csv", index=False)
     worn = frame[~healthy].copy()

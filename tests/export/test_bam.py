@@ -110,7 +110,7 @@ def test_wrong_files_and_arguments_are_refused_by_name(fit, load, tmp_path):
         "expected one of": {"joint": "elbow", "actuator": "x"},
         "number from 1": {"joint": 0, "actuator": "x"},
         "actuator is missing": {"joint": 1},
-        "slides": {"joint": "joint3", "actuator": "x"},
+        "joint3 is prismatic": {"joint": "joint3", "actuator": "x"},
     }
     for message, words in cases.items():
         with pytest.raises(SkidynError, match=message):

@@ -67,7 +67,7 @@ def test_wrong_fleets_are_refused():
     with pytest.raises(SkidynError, match="no column dahl"):
         compare_fleet(fleet, ["dahl"])
     fleet["r4"] = Evidence.from_rows(("a",), {(0, 0): np.ones((3, 2))})
-    with pytest.raises(SkidynError, match="'r4' has other columns"):
+    with pytest.raises(SkidynError, match="'r4' has different columns"):
         compare_fleet(fleet)
 
 

@@ -166,7 +166,7 @@ def test_progress_counts_every_fit(make_log):
 def test_weights_need_learners_that_take_them(make_log):
     X, y = make_log(4, 30)
     hybrid = HybridRegressor(LinearRegression(), KNeighborsRegressor(), cv=2)
-    with pytest.raises(ValueError, match="KNeighborsRegressor takes no sample_weight"):
+    with pytest.raises(ValueError, match="KNeighborsRegressor does not accept sample_weight"):
         hybrid.fit(X, y, sample_weight=np.ones(len(X)))
 
 

@@ -214,7 +214,7 @@ def test_long_gap_begins_a_trajectory(tmp_path):
 
 def test_clock_that_starts_anew_begins_a_trajectory(tmp_path):
     pd.concat([table(80), table(80)]).to_csv(tmp_path / "log.csv", index=False)
-    with pytest.warns(LogWarning, match="clock starts anew 1 time"):
+    with pytest.warns(LogWarning, match="the clock restarts 1 time"):
         frame = read_log(tmp_path / "log.csv", check=False)
     assert frame["trajectory"].nunique() == 2
 

@@ -48,7 +48,7 @@ def test_range_of_the_whole_log_can_be_given(torques):
 
 
 def test_messages_name_the_joint_and_the_row():
-    with pytest.raises(ValueError, match="joint 2 has no range"):
+    with pytest.raises(ValueError, match="joint 2 is constant and has no range"):
         rmse_over_range([[0.0, 1.0], [1.0, 1.0]], np.zeros((2, 2)))
     with pytest.raises(ValueError, match="y_pred is not finite in row 1"):
         rmse_over_range([0.0, 1.0], [0.0, np.nan])

@@ -56,7 +56,7 @@ def test_numbers_lie_beside_the_page(fakes, tmp_path):
     summary = summarize_comparison(*two_logs(fakes))
     page, numbers = write_comparison(tmp_path / "wear.html", summary)
     assert json.loads(numbers.read_text()) == summary["report"]
-    with pytest.raises(SkidynError, match="another ending"):
+    with pytest.raises(SkidynError, match="another suffix"):
         write_comparison(tmp_path / "wear.json", summary)
 
 

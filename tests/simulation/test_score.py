@@ -50,7 +50,7 @@ def test_verdict_on_an_effect_that_is_there_and_its_contrary(log, models):
 def test_verdict_is_left_open_where_nothing_changes(log, models):
     test = log.frame["trajectory"] == 4
     same = judge_by_simulation(models[1], models[1], log.X[test], log.y[test])
-    assert not same.improves and not same.worsens and "chance" in same.text
+    assert not same.improves and not same.worsens and "does not change significantly" in same.text
 
 
 def test_one_piece_is_no_evidence(log, models):
