@@ -4,10 +4,10 @@
 What tells is by how much of its gain the best other explanation falls short; whether what is left
 on its joints is white, as noise is, or slow, as the rest of a torque that was given a wrong name;
 how much of the error it removes, and whether most of it stays; and whether something without a name
-stays beside it. The weights
-are those of a logistic regression on names found in logs of other seeds
-(``benchmarks/diagnosis/confidence.py``), held near round values; the same benchmark prints the
-reliability on other logs.
+stays beside it. The weights are those of a logistic regression on names found in logs of other
+seeds (``benchmarks/diagnosis/confidence.py``), held near round values; that of an error that mostly
+stays was set by five collections of logs (``docs/user_guide/diagnosis_measured.rst``). The same
+benchmark prints the reliability on other logs.
 """
 
 from __future__ import annotations
