@@ -5,12 +5,13 @@ Usage: python benchmarks/measurement/mistakes.py [--cases FOLDER] [--seed 1] [--
        [--sample 5] [--only jitter,order] [--fix] [--verbose]
 
 Logs, half of them with a hidden effect, are spoiled in one way each (see ``spoils.py`` and
-``spoils_of_*.py`` beside it). Printed are, by mistake, in how many logs it
-was named on the right joints with the right remedy, in how many of these it was certain, and in how
-many logs something else was suspected. ``--fix`` reads the spoiled log again with the remedy and
-prints in how many of the logs with one that gave back the recorded columns; ``--diagnose`` compares
-the diagnosis of the fixed log with that of the clean one where it did not. ``--cases`` takes a
-folder of logs of another simulator (``*/log.parquet`` and ``robot.urdf``).
+``spoils_of_*.py`` beside it). Printed are, by mistake, in how many logs it was named on the right
+joints with the right remedy, in how many of these it was certain, and in how many logs something
+else was suspected that is not suspected in the log without the mistake. ``--fix`` reads the spoiled
+log again with the remedy and prints in how many of the logs with one that gave back the recorded
+columns; ``--diagnose`` compares the diagnosis of the fixed log with that of the clean one where it
+did not. ``--cases`` takes a folder of logs of another simulator (``*/log.parquet`` and
+``robot.urdf``).
 """
 
 from __future__ import annotations
@@ -178,6 +179,7 @@ def main() -> None:
     cases = stored(options.cases) if options.cases else made(options.seed, options.logs)
     cases = cases[: options.first]
     known: dict[str, Any] = {}
+    own: dict[int, set[tuple[str, tuple[int, ...]]]] = {}
     totals = np.zeros(6, dtype=int)
     print(f"{'mistake':24s} {'named':>9s} {'certain':>9s} {'another':>9s} {'fixed':>9s}")
     for turn, name in enumerate(options.only.split(",") if options.only else MISTAKES):
@@ -197,6 +199,10 @@ def main() -> None:
             right = [c for c in checks if spoiled.is_right(c)]
             told = [c for c in checks if c.certainty != "noted"]
             other = [c for c in told if not spoiled.is_right(c) and not spoiled.follows(c)]
+            if other and name != "nothing":
+                if i not in own:
+                    own[i] = {(c.check, c.joints) for c in check_log(case.frame, case.robot).checks}
+                other = [c for c in other if (c.check, c.joints) not in own[i]]
             certain = any(c.certainty == "certain" for c in right)
             counts[:3] += [bool(right), certain, bool(other)]
             good = None

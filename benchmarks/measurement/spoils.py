@@ -330,12 +330,14 @@ def zero(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled |
 
 
 def shifted(names: tuple[str, ...], least: float, most: float, check: str, option: str) -> Spoil:
-    """Channels that are late."""
+    """Channels that are late; recordings begin when the first late values are there."""
 
     def spoil(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled:
         lag = float(rng.uniform(least, most))
         every = [c for c in log.columns if c.rstrip("0123456789") in names]
         changed = in_runs(log, every, lambda t, x: np.interp(t - lag, t, x))
+        begin = log.groupby("trajectory")["time"].transform("min")
+        changed = changed[log["time"] - begin >= lag].reset_index(drop=True)
         return Spoiled(changed, robot, (check,), option)
 
     return spoil

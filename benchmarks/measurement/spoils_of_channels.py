@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Mistakes of channels between sensor and file: coarse stamps, dead bands, tares, dropouts."""
+"""Mistakes of channels between sensor and file: coarse stamps, dead bands, dropouts, overflow."""
 
 from __future__ import annotations
 
 import numpy as np
 import pandas as pd
-from spoils import Spoil, Spoiled, columns, felt, in_runs, joints_of
+from spoils import Spoil, Spoiled, columns, felt, in_runs, joints_of, moved
 from spoils_of_parts import ALSO, rows_of
 
 from skidyn.robots import Robot
@@ -71,6 +71,29 @@ def dropouts(quantity: str, share: float) -> Spoil:
     return spoil
 
 
+def overflow(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled:
+    """Torque of a counter that continues at the other end of its range."""
+    name = f"tau{moved(log, robot, rng) + 1}"
+    end = float(np.quantile(log[name].abs(), 0.95))
+    changed = log.assign(**{name: (log[name] + end) % (2 * end) - end})
+    return Spoiled(changed, robot, ("overflowed_torque",), "", (int(name[3:]),))
+
+
+def accelerations(size: float, option: str) -> Spoil:
+    """Logged accelerations, those of one joint with a wrong sign or unit."""
+
+    def spoil(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled:
+        k = moved(log, robot, rng) + 1
+        speeds = columns("dq", robot.n_joints)
+        slopes = in_runs(log, speeds, lambda t, x: np.gradient(x, t))
+        changed = log.assign(**{f"d{name}": slopes[name] for name in speeds})
+        changed[f"ddq{k}"] *= size
+        told = option.replace("#", f"ddq{k}")
+        return Spoiled(changed, robot, ("acceleration",), told, (k,))
+
+    return spoil
+
+
 CHANNELS: dict[str, Spoil] = {
     "rounded_clock": rounded_clock,
     "slow_motion": slow_motion,
@@ -80,4 +103,7 @@ CHANNELS: dict[str, Spoil] = {
     "mean_taken_off": tared(True),
     "position_dropouts": dropouts("q", 0.003),
     "torque_dropouts": dropouts("tau", 0.005),
+    "overflow": overflow,
+    "acceleration_sign": accelerations(-1.0, "--flip #"),
+    "acceleration_degrees": accelerations(180 / np.pi, "--units #=deg/s^2"),
 }

@@ -188,7 +188,9 @@ def slow_torque(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Sp
     n = int(rng.choice([4, 6, 8]))
     names = columns("tau", robot.n_joints)
     changed = in_runs(log, names, lambda t, x: np.interp(t, t[::n], x[::n]))
-    return Spoiled(changed, robot, ("interpolated_rows",), "", None, ("smooth_torque",))
+    # after the last of the slower samples the torque does not change any more
+    follows = ("smooth_torque", "constant_torque")
+    return Spoiled(changed, robot, ("interpolated_rows",), "", None, follows)
 
 
 def slider_millimetres(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled | None:

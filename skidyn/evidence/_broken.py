@@ -19,7 +19,7 @@ from skidyn.evidence._rows import widened
 WIDTH = 7
 #: A broken sample is further from the median than this many times the distance between these
 #: quantiles of all such distances in its trajectory,
-FAR, TAILS = 3.0, (0.01, 0.99)
+FAR, TAILS = 3.0, (0.02, 0.98)
 #: and than this share of the range of the signal itself.
 TORQUE_SHARE, POSITION_SHARE = 0.25, 0.05
 #: and than so many steps of a coarse sensor, of which one at rest shows one or two.

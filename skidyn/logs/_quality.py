@@ -229,21 +229,24 @@ def check_log(frame: pd.DataFrame, robot: Robot | None = None) -> LogQuality:
     require_columns(frame, n, ("q", "dq", "tau"))
     if "time" not in frame.columns:
         raise LogError("the log has no time column.")
-    blocks = {name: [f"{name}{k + 1}" for k in range(n)] for name in ("q", "dq", "tau")}
-    numbers = as_numbers(frame, ["time", *blocks["q"], *blocks["dq"], *blocks["tau"]])
+    blocks = {name: [f"{name}{k + 1}" for k in range(n)] for name in ("q", "dq", "ddq", "tau")}
+    if not set(blocks["ddq"]) <= set(frame.columns):
+        del blocks["ddq"]
+    numbers = as_numbers(frame, ["time", *(name for block in blocks.values() for name in block)])
     time = numbers["time"].to_numpy()
     q, dq, tau = (numbers[blocks[name]].to_numpy() for name in ("q", "dq", "tau"))
+    ddq = numbers[blocks["ddq"]].to_numpy() if "ddq" in blocks else np.zeros_like(q)
     trajectory = (
         frame["trajectory"].to_numpy() if "trajectory" in frame else np.zeros(len(frame), int)
     )
-    finite = np.isfinite(np.column_stack([time, q, dq, tau])).all(axis=1)
+    finite = np.isfinite(np.column_stack([time, q, dq, ddq, tau])).all(axis=1)
     messages = []
     if not finite.all():
         messages.append(
             f"{int((~finite).sum())} of {len(frame)} rows hold NaN or infinite values and are left "
             "out of this report."
         )
-        time, q, dq, tau, trajectory = (a[finite] for a in (time, q, dq, tau, trajectory))
+        time, q, dq, ddq, tau, trajectory = (a[finite] for a in (time, q, dq, ddq, tau, trajectory))
     if len(time) < 2:
         raise LogError(f"the log has {len(time)} finite row(s); at least two are needed.")
     unique = check_time_order(time, trajectory)
@@ -252,14 +255,14 @@ def check_log(frame: pd.DataFrame, robot: Robot | None = None) -> LogQuality:
         time = regular_clock(time, trajectory)  # what else is wrong shows with the remedy alone
     elif not unique.all():
         messages.append(f"{int((~unique).sum())} row(s) repeat the time of the previous row.")
-        time, q, dq, tau, trajectory = (a[unique] for a in (time, q, dq, tau, trajectory))
+        time, q, dq, ddq, tau, trajectory = (a[unique] for a in (time, q, dq, ddq, tau, trajectory))
     names = list(frame.attrs.get("joint_names", ())) if robot is None else list(robot.joint_names)
     if len(names) != n:
         names = [f"joint {k + 1}" for k in range(n)]
     prismatic = np.zeros(n, dtype=bool)
     if robot is not None:
         prismatic = np.array([kind == "prismatic" for kind in robot.joint_types])
-    motion = Signals(q, dq, np.zeros_like(q), trajectory, time, prismatic=prismatic)
+    motion = Signals(q, dq, ddq, trajectory, time, prismatic=prismatic)
     measurement = Measurement(motion, tau, robot, names, same_stamps=same_stamps)
     if len(measurement.steps) == 0:
         raise LogError("every trajectory of the log has a single row and therefore no motion.")

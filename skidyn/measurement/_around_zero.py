@@ -39,13 +39,7 @@ class DeadBand(Check):
     misnames = True
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
-        told = set(cut_columns(measurement))
-        shares = {
-            k: _zeros(measurement, k)
-            for k in np.flatnonzero(measurement.excited).tolist()
-            if k not in told
-        }
-        found = {k: share for k, share in shares.items() if share > BAND}
+        found = dead_bands(measurement)
         if found:
             names = ", ".join(measurement.joint(k) for k in found)
             told_shares = ", ".join(f"{share:.1%}" for share in found.values())
@@ -56,6 +50,14 @@ class DeadBand(Check):
                 "suspected",
                 list(found),
             )
+
+
+def dead_bands(measurement: Measurement) -> dict[int, float]:
+    """Joints whose torque has a dead band, from 0, and the share of rows in which it is zero."""
+    told = set(cut_columns(measurement))
+    moving = np.flatnonzero(measurement.excited).tolist()
+    shares = {k: _zeros(measurement, k) for k in moving if k not in told}
+    return {k: share for k, share in shares.items() if share > BAND}
 
 
 def _zeros(measurement: Measurement, k: int) -> float:

@@ -16,7 +16,7 @@ from skidyn.measurement._fits import Fits, Outcome, Reading, fit_admissible, fri
 from skidyn.measurement._gains import Scales, refined_scales
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._suspicion import Suspicion
-from skidyn.measurement._torque import readable_fits
+from skidyn.measurement._torque import asked_changes, readable_fits
 
 #: Log-likelihood that another scale must gain, and where the stated bodies do not say so as well.
 LEAST, SURE = 15.0, 40.0
@@ -128,8 +128,8 @@ class TorqueScale(Check):
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         fits = readable_fits(measurement)
-        if fits is None:
-            return
+        if fits is None or any(not c.joints for c in asked_changes(measurement, fits)):
+            return  # with another gravity, torques have other scales
         known = _known_gains(fits)
         odd = [k for k, gain in known.items() if not USUAL[0] <= gain <= USUAL[1]]
         here = fits.nominal(Reading()).gain
@@ -187,8 +187,8 @@ class TorqueScale(Check):
         found = {}
         for k, gain in gains.items():
             low, high = CLEARLY if k in known else USUAL
-            if low <= gain <= high:
-                continue
+            if low <= gain <= high or (k not in known and gain < low):
+                continue  # the multiple of a torque that bodies hardly explain is small by itself
             own, gained, apart = joint_gain(fits, k, gain)
             wrong = not USUAL[0] <= gain <= USUAL[1] and k in known
             if gained > (LEAST if wrong else SURE) and apart > LEAST and not low <= own <= high:

@@ -9,6 +9,7 @@ import numpy as np
 
 from skidyn._signals import Array
 from skidyn.evidence import broken_notes
+from skidyn.measurement._around_zero import dead_bands
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import is_held, position_step
@@ -103,7 +104,7 @@ class ConstantTorque(Check):
             )
         number = measurement.signals.trajectory
         runs = np.unique(number)
-        lost = cut_columns(measurement)
+        lost = {*cut_columns(measurement), *dead_bands(measurement)}
         for k in range(measurement.n_joints):
             torque = measurement.torque[:, k]
             if k in lost:

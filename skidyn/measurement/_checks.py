@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from skidyn._exceptions import MisreadLogError
+from skidyn.measurement._acceleration import Acceleration
 from skidyn.measurement._around_zero import DeadBand, TaredTorque
 from skidyn.measurement._axes import Axes
 from skidyn.measurement._bodies import (
@@ -36,6 +37,7 @@ from skidyn.measurement._lengths import Lengths
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._odd import OddRecording
 from skidyn.measurement._odd_motion import OddMotion
+from skidyn.measurement._overflow import OverflowedTorque
 from skidyn.measurement._smoothing import SmoothedTorque
 from skidyn.measurement._suspicion import CERTAINTIES, Suspicion
 from skidyn.measurement._torque import Columns, TorqueDelay, UnsignedTorque
@@ -59,6 +61,7 @@ CHECKS: tuple[Check, ...] = (
     TARED,
     DeadBand(),
     UNSIGNED,
+    OverflowedTorque(),
     Axes(),
     OddRecording(),
     Columns(),
@@ -67,6 +70,7 @@ CHECKS: tuple[Check, ...] = (
     UnexplainedTorque(),
     Bodies(),
     VelocityDelay(),
+    Acceleration(),
     HeldTorque(),
     ComputedTorque(),
     SmoothedTorque(),

@@ -65,6 +65,8 @@ class Reading:
         Gravity in the base frame, m/s^2; the robot's own if None.
     size, stretch : float
         Factors of positions, and of time, that are to be taken off.
+    sized : frozenset of int or None
+        Joints, from 0, whose positions have that factor; all if None.
     """
 
     flip_motion: frozenset[int] = frozenset()
@@ -76,6 +78,7 @@ class Reading:
     gravity: tuple[float, float, float] | None = None
     size: float = 1.0
     stretch: float = 1.0
+    sized: frozenset[int] | None = None
 
 
 @dataclass(frozen=True)
@@ -103,9 +106,14 @@ class Outcome:
     inflation: Array
 
     def margin(self, other: Outcome) -> Array:
-        """By how much this reading is more likely than another, by joint."""
-        inflation = np.maximum(self.inflation, 1.0)
-        return np.asarray((self.likelihood - other.likelihood) / inflation)
+        """By how much this reading is more likely than another, by joint.
+
+        Neighbouring rows are as alike as the more likely of the two leaves them, so that the margin
+        of the other over this one is the same with the opposite sign.
+        """
+        change = self.likelihood - other.likelihood
+        inflation = np.where(change > 0, self.inflation, other.inflation)
+        return np.asarray(change / np.maximum(inflation, 1.0))
 
 
 @dataclass(frozen=True)
@@ -223,11 +231,14 @@ class Fits:
             zero[joint] = value
         s = self.signals
         faster = reading.stretch
+        size = np.full(self.n_joints, reading.size)
+        if reading.sized is not None:
+            size[[j for j in range(self.n_joints) if j not in reading.sized]] = 1.0
         apart = np.eye(self.n_joints)
         for joint, before in reading.summed:
             apart[joint - 1, joint] = -before
         q, dq, ddq = (
-            (values[:, order] * (sign * faster**k / reading.size)) @ apart
+            (values[:, order] * (sign * faster**k / size)) @ apart
             for k, values in enumerate((s.q, s.dq, s.ddq))
         )
         return s.with_(q=q - zero, dq=dq, ddq=ddq)

@@ -189,7 +189,7 @@ class Measurement:
             return {}  # parts between leaps have no numbers of their own
         from skidyn.measurement._odd_motion import odd_motion
 
-        return odd_motion(self.signals, self.unwrapped)
+        return odd_motion(self.whole, self.unwrapped)
 
     @cached_property
     def unwrapped(self) -> Array:

@@ -20,8 +20,9 @@ FARTHER, BEYOND, RANGE, PLACES = 4.0, 8.0, 1e-3, 2e-3
 MOSTLY_ZERO, IDLE_WAY = 0.3, 0.01
 #: Rows, and time in s, at an end of a recording in which no torque changes, to be told.
 IDLE_ROWS, IDLE_TIME = 8, 0.05
-#: Steps that a position may be held before it catches up.
-CATCH_UP = 5
+#: Steps that a position may be held before it catches up, and the share of the way that its
+#: velocity makes of a usual step by which it then moves on.
+CATCH_UP, CAUGHT = 5, 0.3
 
 
 def position_step(position: np.ndarray) -> float:
@@ -53,11 +54,34 @@ def is_repeated(position: np.ndarray, velocity: np.ndarray, trajectory: np.ndarr
     fast = np.where(np.ptp(velocity, axis=0) > 0, 0.02 * np.abs(velocity).max(axis=0), np.inf)
     moving = np.any(np.abs(velocity[1:]) > fast, axis=1)
     again[1:] = same & moving
+    again[1:] &= _caught_up(position, velocity, trajectory, same)[1:]
     # a coarse sensor holds its value too, but each joint by itself
     single = np.mean(position[1:] == position[:-1], axis=0)
     single = single[np.ptp(position, axis=0) > 0]
     at_once = len(single) < 2 or same.mean() > AT_ONCE * np.median(single)
     return again if at_once else np.zeros_like(again)
+
+
+def _caught_up(
+    position: np.ndarray, velocity: np.ndarray, trajectory: np.ndarray, same: np.ndarray
+) -> np.ndarray:
+    """Rows after which positions move on by more than in one step, as a mask.
+
+    Joints at rest whose velocity is late or noisy do not.
+    """
+    moved = np.abs(np.diff(position, axis=0))
+    moved[trajectory[1:] != trajectory[:-1]] = 0
+    fresh = np.flatnonzero(~same)  # steps in which positions change, or trajectories
+    after = np.searchsorted(fresh, np.arange(len(same)))
+    step = np.zeros_like(moved)
+    known = after < len(fresh)
+    step[known] = moved[fresh[after[known]]]
+    speed = np.abs(velocity[1:])
+    slow = np.sum(speed[~same], axis=0)
+    usual = np.sum(moved[~same], axis=0) / np.where(slow > 0, slow, 1.0)
+    caught = np.zeros(len(position), dtype=bool)
+    caught[1:] = np.any((step > CAUGHT * usual * speed) & (speed > 0) & (step > 0), axis=1)
+    return caught
 
 
 def is_held(torque: np.ndarray, moved: np.ndarray) -> np.ndarray:

@@ -16,6 +16,7 @@ from skidyn.measurement._fits import Fits, Reading, fit_admissible, friction
 from skidyn.measurement._lowpass import lowpass_of_torque, suspect_lowpass
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import reversals
+from skidyn.measurement._overflow import overflowed_columns
 from skidyn.measurement._readings import DECISIVE, HALF, Change, find_changes
 from skidyn.measurement._suspicion import Certainty, Suspicion
 
@@ -368,10 +369,13 @@ def readable_fits(measurement: Measurement) -> Fits | None:
 
 
 def _lost_columns(measurement: Measurement) -> list[int]:
-    """Columns of the torque without a sign, or that are no torque."""
+    """Columns of the torque without a sign, or that are not the torque of their joint."""
     unsigned, _ = unsigned_columns(measurement)
-    copied = [k for k, what, _ in copied_columns(measurement) if what != "torque"]
-    return [*unsigned, *cut_columns(measurement), *copied]
+    copies = copied_columns(measurement)
+    copied = [k for k, _, _ in copies]
+    originals = [j for _, what, j in copies if what == "torque"]  # either may be the copy
+    overflowed = overflowed_columns(measurement)
+    return [*unsigned, *cut_columns(measurement), *copied, *originals, *overflowed]
 
 
 class TorqueDelay(Check):

@@ -230,11 +230,10 @@ class PositionUnit(Check):
             if not outside.any():
                 return
             both = {f"{q}{j + 1}": u for q, u in both.items() for j in np.flatnonzero(outside)}
-        ratio = (
-            None
-            if len(both) > 2
-            else _fitted_size(measurement, float((largest / limits)[turning].max()))
-        )
+            joints = frozenset(np.flatnonzero(outside).tolist())
+        else:
+            joints = None
+        ratio = _fitted_size(measurement, float((largest / limits)[turning].max()), joints)
         if ratio is not None and not (degrees and abs(ratio * DEGREE - 1) < 0.06):
             value = float(f"{1 / ratio:.4g}")
             moving = dict.fromkeys(both, value)
@@ -315,33 +314,39 @@ def gained(fits: Fits, reading: Reading) -> float:
     return float(fits.nominal(reading).margin(fits.nominal(Reading())).sum())
 
 
-def _fitted_size(measurement: Measurement, least: float) -> float | None:
-    """Factor of all positions at which the robot explains the torque best; None if it is unsure."""
+def _fitted_size(
+    measurement: Measurement, least: float, joints: frozenset[int] | None
+) -> float | None:
+    """Factor of positions at which the robot explains the torque best; None if it is unsure."""
     fits = measurement.fits
     if fits is None or least < DISTANT:
         return None
     sizes = 0.8 * least * 1.03 ** np.arange(60)
-    likely = np.array([fits.nominal(Reading(size=x), 2).likelihood.sum() for x in sizes])
+    likely = np.array([fits.nominal(_sized(x, joints), 2).likelihood.sum() for x in sizes])
     best = int(np.argmax(likely))
-    inflation = max(1.0, float(np.median(fits.nominal(Reading(size=sizes[best])).inflation)))
+    inflation = max(1.0, float(np.median(fits.nominal(_sized(sizes[best], joints)).inflation)))
     far = np.abs(np.arange(len(sizes)) - best) > 4
     sure = (likely[best] - likely[far].max()) / inflation > LEAST
     if not sure or not 0 < best < len(sizes) - 1:
         return None
     finer = sizes[best] * 1.002 ** np.arange(-14, 15)
-    likely = np.array([fits.nominal(Reading(size=x), 2).likelihood.sum() for x in finer])
-    return _sharpened(fits, float(finer[int(np.argmax(likely))]))
+    likely = np.array([fits.nominal(_sized(x, joints), 2).likelihood.sum() for x in finer])
+    return _sharpened(fits, float(finer[int(np.argmax(likely))]), joints)
 
 
-def _sharpened(fits: Fits, size: float) -> float:
-    """Factor of all positions at which identified bodies fit best: those stated are not exact.
+def _sized(size: float, joints: frozenset[int] | None) -> Reading:
+    return Reading(size=float(size), sized=joints)
+
+
+def _sharpened(fits: Fits, size: float, joints: frozenset[int] | None) -> float:
+    """Factor of positions at which identified bodies fit best: those stated are not exact.
 
     Gears have whole ratios, mostly round ones.
     """
-    inflation = np.maximum(fits.identified(Reading(size=size)).inflation, 1.0)
+    inflation = np.maximum(fits.identified(_sized(size, joints)).inflation, 1.0)
 
     def likelihood(log: float) -> float:
-        outcome = fits.identified(Reading(size=float(np.exp(log))))
+        outcome = fits.identified(_sized(float(np.exp(log)), joints))
         return float(np.sum(outcome.likelihood / inflation))
 
     first = log = float(np.log(size))

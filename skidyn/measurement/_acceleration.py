@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Check of logged accelerations against the velocities."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from skidyn.measurement._check import Check
+from skidyn.measurement._measurement import ALIKE, Measurement
+from skidyn.measurement._measures import velocity_consistency
+from skidyn.measurement._suspicion import Suspicion
+from skidyn.measurement._units import NEAR, unit_remedy
+
+#: Slopes of integrated acceleration on velocity of a filtered or noisy acceleration, and the
+#: correlation below which it is another signal.
+FILTERED, UNLIKE = (0.5, 2.0), 0.5
+
+
+class Acceleration(Check):
+    """Accelerations that are not the derivative of the velocities."""
+
+    name = "acceleration"
+    suspects = (
+        "logged accelerations with the opposite sign, in degrees, or of a signal other than the "
+        "velocities"
+    )
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        s = measurement.signals
+        if measurement.lost or measurement.stale or measurement.clock != 1 or not s.ddq.any():
+            return  # not logged, or to be compared once the clock is right
+        groups: dict[str, list[int]] = {}
+        slopes = {}
+        for k, (of_velocity, likeness) in enumerate(measurement.velocities):
+            right = abs(of_velocity - 1) < NEAR and likeness > ALIKE
+            if not measurement.excited[k] or not right or not s.ddq[:, k].any():
+                continue
+            slope, alike = velocity_consistency(s.clock, s.dq[:, k], s.ddq[:, k], s.segments)
+            cause = _cause(slope, alike)
+            if cause:
+                groups.setdefault(cause, []).append(k)
+                slopes[k] = slope, alike
+        for cause, joints in groups.items():
+            yield self._told(measurement, cause, joints, [slopes[k] for k in joints])
+
+    def _told(
+        self,
+        measurement: Measurement,
+        cause: str,
+        joints: list[int],
+        slopes: list[tuple[float, float]],
+    ) -> Suspicion:
+        names = ", ".join(measurement.joint(k) for k in joints)
+        numbers = ", ".join(f"{slope:.3g} (correlation {alike:.2f})" for slope, alike in slopes)
+        evidence = (
+            f"the acceleration is {numbers} times the differentiated velocity; models that are "
+            "fitted to logged accelerations are affected, a diagnosis derives them from the "
+            "positions"
+        )
+        what, remedy = f"the acceleration of {names} is not the derivative of the velocity", None
+        if cause == "sign":
+            columns = [f"ddq{k + 1}" for k in joints]
+            what = f"the acceleration of {names} has the opposite sign"
+            remedy = (f"--flip {','.join(columns)}", f"flip={columns}")
+        elif cause == "degrees":
+            what = f"accelerations look like degrees on {names}"
+            every = len(joints) == measurement.n_joints
+            remedy = unit_remedy(
+                {"ddq": "deg/s^2"} if every else {f"ddq{k + 1}": "deg/s^2" for k in joints}
+            )
+        return self.suspicion(what, evidence, "suspected", joints, remedy)
+
+
+def _cause(slope: float, likeness: float) -> str:
+    """What is wrong with an acceleration; empty if nothing is."""
+    if not np.isfinite(slope) or (FILTERED[0] < slope < FILTERED[1] and likeness > UNLIKE):
+        return ""
+    if abs(slope + 1) < NEAR and likeness < -ALIKE:
+        return "sign"
+    if abs(np.deg2rad(slope) - 1) < NEAR and likeness > ALIKE:
+        return "degrees"
+    return "other"
