@@ -86,7 +86,7 @@ def one_recording(change: str, checks: tuple[str, ...]) -> Spoil:
         elif change == "degrees":
             if any(kind != "revolute" for kind in robot.joint_types):
                 return None
-            names = [*columns("q", n), *columns("dq", n)]
+            names = [c for x in ("q", "dq", "ddq") for c in columns(x, n) if c in log.columns]
             values = {c: np.rad2deg(own[c].to_numpy()) for c in names}
         elif change == "milliseconds":
             clock = own["time"].to_numpy()

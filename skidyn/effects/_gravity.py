@@ -11,6 +11,10 @@ import numpy as np
 from skidyn._signals import Signals
 from skidyn.effects._base import Array, Coefficient, Effect
 
+#: Share of the gravity torque of other joints below which the first joint is vertical: descriptions
+#: round their angles.
+UPRIGHT = 1e-4
+
 
 class BaseTilt(Effect):
     """Gravity has horizontal components in the base frame.
@@ -52,9 +56,10 @@ class BaseTilt(Effect):
             )
             for axis in self._horizontal(robot.gravity)
         ]
-        upright = robot.inverse_dynamics(signals.q, rest, rest)[:, 0]
+        pull = np.abs(robot.inverse_dynamics(signals.q, rest, rest))
+        upright = pull[:, 0].max(initial=0.0) < UPRIGHT * pull.max(initial=1e-9)
         first = np.zeros((signals.n_samples, 2))
-        if not signals.prismatic[0] and np.abs(upright).max(initial=0.0) < 1e-9:
+        if not signals.prismatic[0] and upright:
             first = np.column_stack([np.cos(signals.q[:, 0]), np.sin(signals.q[:, 0])])
         columns = {j: np.column_stack([*(p[:, j] for p in parts), 0 * first]) for j in joints}
         columns[0][:, 2:] = first

@@ -31,7 +31,7 @@ from skidyn.evidence._rows import (
     sliding_samples,
     window_rows,
 )
-from skidyn.robots import Robot, base_parameter_index
+from skidyn.robots import Robot, base_parameter_index, with_whole_turns
 
 #: Columns of the rigid body weaker than this (relative, after pivoting) are dependent on others.
 RANK_TOLERANCE = 2e-6
@@ -272,7 +272,7 @@ class Problem:
         """
         design = self.design([self.term_rows(t) for t in terms])
         pairs = zip(design, self.target, strict=True)
-        return np.array([own_noise(a, y, max(1, len(y) - a.shape[1])) for a, y in pairs])
+        return np.array([own_noise(a, y, max(1, len(y) - a.shape[1]), len(y)) for a, y in pairs])
 
     def sample_folds(self, joint: int, rows: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
         """Fold of samples, that of the nearest averaged row of a joint.
@@ -507,8 +507,16 @@ def motion_rows(signals: Signals, reversals: Sequence[int], window: float = WIND
     margin[list(reversals)] = SHORT_MARGIN
     use = sliding_samples(signals, signals.usable, margin.tolist())
     step = column_step(signals, window, int(margin.min()))
+    rows = window_rows(signals, use, window, step)
+    few = rows.counts < FEWEST_ROWS
+    if not (few & (rows.counts > 0)).any():
+        return rows
+    use = use & ~few  # a joint that slides for a moment now and then counts as one at rest
     return window_rows(signals, use, window, step)
 
+
+#: Rows of a joint at least: fewer are fitted by its own friction and inertia, whatever else acts.
+FEWEST_ROWS = 12
 
 _RowsAndFolds = tuple[Rows, list[NDArray[np.int64]], int, bool]
 
@@ -529,8 +537,8 @@ def _rows_and_folds(
 
 def regressor_rows(problem: Problem, index: NDArray[np.int64] | None = None) -> list[Array]:
     """Averaged columns of the torque regressor, chunk by chunk; some of them if told which."""
-    robot = problem.robot
-    assert robot is not None
+    assert problem.robot is not None
+    robot = with_whole_turns(problem.robot)
     index = np.arange(10 * robot.n_bodies) if index is None else index
     rows = [np.zeros((count, len(index))) for count in problem.rows.counts]
     s, weights = problem.sampled(problem.rows.step)
@@ -616,18 +624,27 @@ WINDOW_GUARD = 1 / 16
 RANK = 1e-7
 
 
-def own_noise(design: Array, target: Array, count: float) -> float:
+#: Rows for each direction of the columns of a joint from which its residual says what its noise is.
+ROWS_A_DIRECTION = 2.0
+
+
+def own_noise(design: Array, target: Array, count: float, rows: float | None = None) -> float:
     """Residual of a joint fitted by itself, which never hides what other joints spoil.
 
-    The rows may be a triangular factor; ``count`` says how many rows there really are.
+    The rows may be a triangular factor; ``rows`` says how many there really are, ``count`` (the
+    same by default) by how many the squared residual is divided. Where there are too few rows to
+    tell noise from what columns can do, the whole torque is its bound.
     """
+    rows = count if rows is None else rows
     if not count:
         return 1.0
     size = np.linalg.norm(design, axis=0)
     used = size > 0
     scaled = design[:, used] / size[used]
-    solution = np.linalg.lstsq(scaled, target, rcond=RANK)[0]
+    solution, _, rank, _ = np.linalg.lstsq(scaled, target, rcond=RANK)
     left, whole = np.sum((target - scaled @ solution) ** 2), np.sum(target**2)
+    if rows <= ROWS_A_DIRECTION * rank:
+        left = whole  # of a joint that hardly slides: a few rows are fitted by anything
     return float(np.sqrt(max(left, RANK**2 * whole) / count)) or 1.0
 
 

@@ -19,7 +19,7 @@ from skidyn.measurement._fits import (
     fit_together,
     friction,
 )
-from skidyn.robots import base_parameter_index
+from skidyn.robots import base_parameter_index, with_whole_turns
 
 #: Lags that are tried, s, and groups of rows that are left out in turn.
 LAGS = np.linspace(-0.06, 0.06, 13)
@@ -120,7 +120,7 @@ def find_delay(fits: Fits) -> Delay:
     own_errors, own_gains, halves = np.full(n, np.nan), np.zeros(n), np.full((n, 2), np.nan)
     unknown = Delay(np.nan, np.nan, np.full(n, np.nan), own_errors, 0.0, own_gains, halves)
     s = fits.motion(Reading())
-    regressor = fits.average(fits.robot.torque_regressor(s.q, s.dq, s.ddq))
+    regressor = fits.average(with_whole_turns(fits.robot).torque_regressor(s.q, s.dq, s.ddq))
     shifted = [fits.average(fits.torque_at(lag)) for lag in LAGS]
     tables, firsts, lags = [], [], np.full(n, np.nan)
     squares: dict[int, list[Array]] = {}

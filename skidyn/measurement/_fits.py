@@ -27,7 +27,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from skidyn._signals import SIGN_BLUR, Array, Signals
 from skidyn.evidence import REST, smooth_motion
-from skidyn.robots import Robot, base_parameter_index
+from skidyn.robots import Robot, base_parameter_index, with_whole_turns
 
 #: Width of a row in s and the samples in it; rows used at most, over all stretches of the log.
 WIDTH, SAMPLES, MOST_ROWS = 0.125, 6, 1200
@@ -468,6 +468,7 @@ class Fits:
     def mean_regressor(self, robot: Robot, s: Signals, index: NDArray[np.int64]) -> Array:
         """Some columns of the mean regressor, (n_rows, n_joints, len(index)), chunk by chunk."""
         total = np.zeros((robot.n_joints, len(index), self.n_rows))
+        robot = with_whole_turns(robot)
         for k in range(SAMPLES):  # the first samples of all rows, then the second ones
             q, dq, ddq = (x[k::SAMPLES] for x in (s.q, s.dq, s.ddq))
             for rows, regressor in robot.iter_torque_regressor(q, dq, ddq):

@@ -14,8 +14,9 @@ from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._suspicion import Suspicion
 
 #: Jump of a torque that overflows, as a share of its range, and how many at least; the largest of
-#: its other steps; least speed of rows that count, and the share of jumps in such rows.
-ACROSS, OVERFLOWS, SMALL, SLOW, MOSTLY = 0.8, 5, 0.25, 0.02, 0.5
+#: its other steps; what is near an end of the range; least speed of rows that count, and the share
+#: of jumps in such rows.
+ACROSS, OVERFLOWS, SMALL, END, SLOW, MOSTLY = 0.8, 5, 0.25, 0.1, 0.02, 0.5
 
 
 class OverflowedTorque(Check):
@@ -55,6 +56,9 @@ def _overflows(torque: Array, velocity: Array, together: NDArray[np.bool_]) -> i
     if span <= 0:
         return 0
     far = (np.abs(change) > ACROSS * span) & together
+    # from one end to the other, and not to the zero of a lost sample
+    near = np.minimum(torque - torque.min(), torque.max() - torque) < END * span
+    far &= near[1:] & near[:-1]
     usual = float(np.quantile(np.abs(change[~far & together]), 0.99)) if np.any(~far) else span
     # dry friction that is all of a torque jumps likewise, but where the joint turns
     one_way = np.sign(velocity[1:]) == np.sign(velocity[:-1])

@@ -9,7 +9,7 @@ Systems 8(4), 485-506.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -20,6 +20,9 @@ from skidyn.robots._robot import Robot
 
 #: Random states from which the structure is read, and the tolerance of its rank.
 STATES, TOLERANCE = 400, 1e-9
+#: Error of the entries of a rotation whose angles were rounded to three digits behind the point,
+#: and that of numbers.
+ROUNDED, EXACT = 5e-4, 1e-8
 #: Factors of a combination smaller than this are rounding.
 NEGLIGIBLE = 1e-7
 
@@ -95,6 +98,7 @@ def base_parameter_index(robot: Robot) -> NDArray[np.int64]:
 def _find(robot: Robot) -> BaseParameters:
     from scipy.linalg import qr, solve_triangular  # not paid for by who only reads a robot
 
+    robot = with_whole_turns(robot)
     rng = np.random.default_rng(0)
     n, p = robot.n_joints, 10 * robot.n_bodies
     # More states than unknowns, whatever the size of the robot.
@@ -121,6 +125,43 @@ def _find(robot: Robot) -> BaseParameters:
         for row, own in zip(regrouping, independent[order], strict=True)
     )
     return BaseParameters(independent[order].astype(np.int64), regrouping, expressions)
+
+
+@lru_cache(maxsize=64)
+def with_whole_turns(robot: Robot) -> Robot:
+    """Robot whose frames are quarter turns apart where its description rounds these.
+
+    Descriptions write 3.1416 for half a turn. A first joint that is vertical but for a thousandth
+    of a degree then feels the weight of the links by some millionths, and a regression would
+    identify masses of tons from these. Regressors of a fit are those of this robot; torque is
+    computed with the frames as described.
+
+    Parameters
+    ----------
+    robot : Robot
+        As described.
+
+    Returns
+    -------
+    Robot
+        The same object if no angle was rounded.
+    """
+    tree = robot.tree
+    rotations, axes = _whole(tree.rotations), _whole(tree.axes)
+    apart = max(
+        np.abs(rotations - tree.rotations).max(initial=0.0),
+        np.abs(axes - tree.axes).max(initial=0.0),
+    )
+    if apart < EXACT:
+        return robot
+    return replace(robot, tree=replace(tree, rotations=rotations, axes=axes))
+
+
+def _whole(values: Array) -> Array:
+    """Matrices or vectors, those that are nearly of zeros and ones rounded to them."""
+    rounded = np.round(values)
+    apart = np.abs(values - rounded).reshape(len(values), -1).max(axis=1, initial=0.0) < ROUNDED
+    return np.where(apart.reshape(-1, *[1] * (values.ndim - 1)), rounded + 0.0, values)
 
 
 def _expression(row: Array, own: int, names: tuple[str, ...] | list[str]) -> str:

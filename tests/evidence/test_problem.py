@@ -60,3 +60,19 @@ def test_what_is_screened_on_few_samples_of_a_fast_log_is_near_what_all_samples_
     named_or_slow = kind == "stribeck" or rate < 200
     tolerance = 0.0 if named_or_slow else 0.005
     assert np.linalg.norm(quick - exact) <= tolerance * np.linalg.norm(exact)
+
+
+def test_a_joint_that_slides_for_a_moment_counts_as_one_at_rest():
+    robot = load_planar_arm()
+    log = make_hidden_effect_log(robot, "stribeck", joints=[1], n_trajectories=5, random_state=2)
+    frame = log.frame.copy()
+    still = frame["trajectory"] > 0
+    still |= frame["time"] > frame["time"].min() + 0.5
+    frame.loc[still, "dq2"] = 0.0
+    names = [f"{quantity}{k}" for quantity in ("q", "dq") for k in (1, 2)]
+    table = frame[["time", "trajectory", *names]]
+    signals, torque = read_signals(table, frame[["tau1", "tau2"]], robot)
+    terms = make_terms(["viscous", "coulomb"], 2)
+    made = make_problem(signals, torque, robot=robot, rigid_body=True, terms=terms, smooth=False)
+    assert made.rows.counts[1] == 0 and made.rows.counts[0] > 100
+    assert not made.rows.sliding[:, 1].any()
