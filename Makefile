@@ -31,7 +31,7 @@ export MKL_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export MPLBACKEND ?= Agg
 
-.PHONY: demo test lint format docs wheel compatibility clean
+.PHONY: demo test lint check format docs wheel compatibility clean
 
 demo: $(VENV)/.demo
 	$(BIN)/python -m skidyn demo
@@ -40,7 +40,11 @@ demo: $(VENV)/.demo
 test: $(VENV)/.test
 	$(BIN)/python -m pytest -n 2 --dist worksteal $(PYTEST_ARGS)
 
-lint: $(VENV)/.lint docs
+# at the same time, after all is installed: mypy works on one core, and docs on two only in part
+lint: $(VENV)/.lint $(VENV)/.docs
+	@$(MAKE) --no-print-directory -j2 check docs
+
+check: $(VENV)/.lint
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/codespell
@@ -51,7 +55,7 @@ format: $(VENV)/.lint
 	$(BIN)/ruff format .
 
 docs: $(VENV)/.docs
-	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
+	$(BIN)/python -m sphinx -W --keep-going -q -j 2 -b html docs docs/_build/html
 
 wheel: $(VENV)/.torch
 	rm -rf build dist
