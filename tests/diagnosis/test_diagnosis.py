@@ -40,8 +40,15 @@ SIZE = {
 #: Kinds that act on all joints, or on the tool: the joints are not chosen.
 WHOLE = ("payload", "time_delay")
 HYSTERESIS = {"dahl", "lugre", "maxwell_slip"}
+SHORT = {"n_trajectories": 6, "duration": 6.0}
 #: Six joints take most of the time; where there is little noise, a shorter log shows as much.
-LENGTH = {("ur5", "low"): {"n_trajectories": 6, "duration": 6.0}}
+LENGTH = {("ur5", "low"): SHORT}
+#: Kind, robot and noise: each kind with each robot and each noise, in half of the combinations.
+CASES = [
+    (kind, robot, ("low", "high")[(k + r) % 2])
+    for r, robot in enumerate(ROBOTS)
+    for k, kind in enumerate(SIZE)
+]
 
 
 def hidden_log(kind, robot, noise):
@@ -62,9 +69,7 @@ def healthy(robot, noise):
     return diagnose(model, log.X, log.y)
 
 
-@pytest.mark.parametrize("noise", ["low", "high"])
-@pytest.mark.parametrize("robot", ROBOTS)
-@pytest.mark.parametrize("kind", SIZE)
+@pytest.mark.parametrize(("kind", "robot", "noise"), CASES)
 def test_hidden_effect_is_named_and_sized_and_the_error_falls(kind, robot, noise):
     log, model = hidden_log(kind, robot, noise)
 
@@ -111,9 +116,8 @@ def test_backlash_and_elasticity_are_told_apart():
 
 
 def test_unknown_effect_is_reported_with_its_variables():
-    length = LENGTH["ur5", "low"]
     log = make_hidden_effect_log(
-        load_ur5(), "unknown_cable", joints=[2, 3], random_state=2, **length
+        load_ur5(), "unknown_cable", joints=[2, 3], random_state=2, **SHORT
     )
 
     diagnosis = diagnose(RBDRegressor(log.robot), log.X, log.y)
