@@ -2,10 +2,17 @@
 import numpy as np
 import pandas as pd
 import pytest
+from joblib.externals.loky import get_reusable_executor
 
 from skidyn.datasets import load_planar_arm
 
 N_JOINTS = 2
+
+
+@pytest.fixture(scope="session", autouse=True)
+def fresh_processes():
+    """A process that loads torch after other work is taken for one that leaks, and replaced."""
+    get_reusable_executor().shutdown(wait=True)
 
 
 def make_hysteretic_log(n_trajectories=8, n_rows=120, seed=0, joint_scale=(1.0, 1.0)):
