@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Every kind of the vocabulary is found in a log that another code path has made.
 
-The kinds of tests/diagnosis/test_diagnosis.py are left out here, and those of test_mujoco.py that
-need six or seven joints, which take most of the time. The simulator integrates
-states and play at about 1 kHz and shares no code with the catalogue. What MuJoCo has natively is
-tested in test_mujoco.py.
+The kinds of tests/diagnosis/test_diagnosis.py are left out here, and what MuJoCo has natively,
+which is tested in test_mujoco.py. The simulator integrates states and play at about 1 kHz and
+shares no code with the catalogue.
 """
 
 from __future__ import annotations
@@ -24,17 +23,13 @@ KINDS = {
     "lugre": (load_planar_arm, None, 0),
     "maxwell_slip": (load_planar_arm, None, 0),
     "position_dependent_friction": (load_planar_arm, "A", 0.05),
-    "coupled_friction": (load_planar_arm, "Fc", 0.05),
-    "coupling_spring": (load_planar_arm, "k", 0.05),
     "nonlinear_spring": (load_planar_arm, "k3", 0.4),
     "gravity_compensator": (load_planar_arm, None, 0),
     "joint_elasticity": (load_planar_arm, "K", 0.5),
     "backlash": (load_planar_arm, "gap", 0.5),
-    "end_stop": (load_planar_arm, "q_lim", 0.02),
     "torque_gain": (load_ur5, "epsilon", 0.05),
     "saturation": (load_planar_arm, "limit", 0.06),
     "temperature_offset": (load_planar_arm, "dtau_dT", 0.05),
-    "external_wrench": (load_planar_arm, None, 0),
     "environment_contact": (load_planar_arm, "z0", 0.05),
 }
 #: Six joints take most of the time, and a shorter log shows as much on them.
@@ -43,7 +38,8 @@ ELSEWHERE = {
     *("viscous", "coulomb", "offset", "asymmetric_friction", "stribeck", "nonlinear_viscous"),
     *("load_dependent_friction", "dahl", "rotor_inertia", "spring", "torque_ripple", "payload"),
     *("time_delay", "temperature_friction"),
-    *("coupled_inertia", "base_tilt"),
+    *("coupled_friction", "coupled_inertia", "coupling_spring", "base_tilt", "end_stop"),
+    "external_wrench",
 }
 
 
