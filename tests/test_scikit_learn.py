@@ -67,8 +67,8 @@ PENDULUM = Robot.from_urdf(
 )
 NET = {"window": 2, "hidden_size": 4, "max_epochs": 1, "random_state": 0}
 LSTM = LSTMRegressor(**NET)
-#: Each estimator, and a parameter to search. A network first: a process that loads torch after its
-#: first task is taken for one that leaks memory, and replaced.
+#: Each estimator, and a parameter to search. A network first: its task loads torch, see
+#: fresh_processes.
 REGRESSORS = {
     "LSTM": (LSTM, {"hidden_size": [2, 4]}),
     "RBD": (RBDRegressor(PENDULUM), {"parameters": ["identified", "nominal"]}),
@@ -330,7 +330,7 @@ def test_copies_files_and_single_precision(model, tmp_path):
     assert np.sqrt(np.mean(error**2)) < 0.05 * Y.std()
 
 
-def test_two_processes(model):
+def test_two_processes(model, fresh_processes):
     X = table_of(model)
     scores = cross_val_score(model, X, Y, cv=SPLITS, n_jobs=2)
     np.testing.assert_allclose(scores, by_hand(model), **SAME)

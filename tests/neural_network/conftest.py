@@ -2,7 +2,6 @@
 import numpy as np
 import pandas as pd
 import pytest
-from joblib.externals.loky import get_reusable_executor
 
 from skidyn.datasets import load_planar_arm
 
@@ -10,9 +9,8 @@ N_JOINTS = 2
 
 
 @pytest.fixture(scope="session", autouse=True)
-def fresh_processes():
-    """A process that loads torch after other work is taken for one that leaks, and replaced."""
-    get_reusable_executor().shutdown(wait=True)
+def with_fresh_processes(fresh_processes):
+    """All tests of networks."""
 
 
 def make_hysteretic_log(n_trajectories=8, n_rows=120, seed=0, joint_scale=(1.0, 1.0)):
