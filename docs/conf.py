@@ -102,7 +102,7 @@ sphinx_gallery_conf = {
     "write_computation_times": False,
     "abort_on_example_error": True,
     "default_thumb_file": str(HERE / "_static" / "logo.png"),
-    "parallel": False,
+    "parallel": True,  # as many processes as sphinx is given by -j
 }
 
 

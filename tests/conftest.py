@@ -34,6 +34,17 @@ def data_dir() -> Path:
     return folder
 
 
+@pytest.fixture(scope="session")
+def fresh_processes():
+    """No processes of joblib are left from other tests.
+
+    One that loads torch after its first task is taken for one that leaks memory, and is replaced.
+    """
+    from joblib.externals.loky import get_reusable_executor
+
+    get_reusable_executor().shutdown(wait=True)
+
+
 @pytest.fixture
 def saved(tmp_path):
     """Writes a table as CSV and returns its path."""

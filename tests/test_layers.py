@@ -7,6 +7,7 @@ so on) are the ground on which all packages stand; the command line stands on al
 
 import ast
 from collections import defaultdict
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -22,11 +23,17 @@ def package_of(parts):
     return parts[0] if parts and parts[0] in PACKAGES else GROUND
 
 
+@cache
 def imports():
     """Each import of skidyn by skidyn: where it stands, its own package, and what it imports."""
+    return list(_imports())
+
+
+def _imports():
     for path in sorted(SOURCE.rglob("*.py")):
         parts = path.relative_to(SOURCE).with_suffix("").parts
         tree = ast.parse(path.read_text(encoding="utf-8"))
+        guarded = set(for_type_checks(tree))
         for node in ast.walk(tree):
             if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("skidyn"):
                 names = [f"{node.module}.{name.name}" for name in node.names]
@@ -36,14 +43,14 @@ def imports():
                 continue
             for name in names:
                 where = f"{path.relative_to(SOURCE.parent)}:{node.lineno}"
-                yield where, package_of(parts), name.split(".")[1:], in_type_check(tree, node)
+                yield where, package_of(parts), name.split(".")[1:], node in guarded
 
 
-def in_type_check(tree, node):
-    """Whether an import is for the type checker alone."""
-    blocks = [n for n in ast.walk(tree) if isinstance(n, ast.If)]
-    guarded = [n for n in blocks if getattr(n.test, "id", "") == "TYPE_CHECKING"]
-    return any(node in ast.walk(block) for block in guarded)
+def for_type_checks(tree):
+    """Nodes that the type checker alone sees."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING":
+            yield from ast.walk(node)
 
 
 def test_no_package_reaches_into_another():

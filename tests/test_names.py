@@ -135,14 +135,6 @@ def robot_with(joints):
     return Robot.from_urdf(text + "</robot>")
 
 
-def test_columns_and_names_without_end_are_refused(tmp_path):
-    many = ",".join(f"c{k}" for k in range(20_000))
-    with pytest.raises(LogError, match="20003 columns; at most 10000 are read"):
-        read(tmp_path / "log.csv", f"time,q1,tau1,{many}\n" + "1," * 20_002 + "1\n")
-    with pytest.raises(LogError, match="name has 16000 letters; at most 250"):
-        read(tmp_path / "log.csv", f"time,q1,tau1,{'a_' * 8000}\n1,2,3,4\n2,3,4,5\n")
-
-
 @pytest.mark.parametrize("piece", ["_", " ", "[", "1", "a_", "(a)", "/", "q", "]"])
 def test_twice_the_columns_are_twice_the_work(tmp_path, piece):
     path = tmp_path / "log.csv"

@@ -25,8 +25,8 @@ from skidyn.hybrid import HybridRegressor
 from skidyn.neural_network import BLLRegressor, LSTMRegressor, NDLRegressor, SDLRegressor
 from skidyn.identification import RBDRegressor
 
-log = make_hidden_effect_log(load_planar_arm(), "stribeck", joints=[2], n_trajectories=5,
-                             duration=4.0, rate=100.0)
+log = make_hidden_effect_log(load_planar_arm(), "stribeck", joints=[2], n_trajectories=4,
+                             duration=3.0, rate=100.0)
 X, y, robot = log.X, log.y, log.robot
 physics = RBDRegressor(robot).fit(X, y)
 found = diagnose(RBDRegressor(robot), X, y, effects=["stribeck", "spring", "dahl"])
@@ -34,7 +34,7 @@ said = {"identification": physics.coef_.tolist(),
         "standard errors": physics.coef_std_.tolist(),
         "verdict": [found.verdict, *[[f.kind, list(f.joints)] for f in found.findings]],
         "diagnosis": [[f.error_drop, *found.rmse_after] for f in found.findings]}
-net = {"window": 8, "hidden_size": 16, "max_epochs": 3, "random_state": 0}
+net = {"window": 8, "hidden_size": 8, "max_epochs": 2, "random_state": 0}
 learners = {"LSTM": LSTMRegressor(**net), "NDL": NDLRegressor(**net),
             "SDL": SDLRegressor(robot, **net),
             "BLL": BLLRegressor(LSTMRegressor(**net), n_estimators=2, random_state=0),

@@ -19,13 +19,14 @@ from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import Diagnosis
 
 
-def test_findings_are_judged_by_simulation_where_it_is_asked_for(work, run, monkeypatch):
+def test_findings_are_judged_by_simulation_where_it_is_asked_for(work, run, saved, monkeypatch):
     judged = []
     given = Diagnosis.judge_by_simulation
     monkeypatch.setattr(
         Diagnosis, "judge_by_simulation", lambda self: judged.append(given(self)) or judged[-1]
     )
-    words = ("diagnose", work / "log.csv", "--urdf", work / "arm.urdf", "--effects", "maxwell_slip")
+    log = make_hidden_effect_log(load_planar_arm(), "spring", n_trajectories=4, duration=2.0)
+    words = ("diagnose", saved(log.frame), "--urdf", work / "arm.urdf", "--effects", "spring")
 
     code, report = run(*words, "--simulate")
 

@@ -68,13 +68,13 @@ def test_nothing_is_kept_where_it_is_not_wanted(ask, tmp_path):
     assert ask("--no-cache")[1]
 
 
-@pytest.mark.parametrize("damage", [b"", b"{}", None])
-def test_a_damaged_answer_is_none(ask, tmp_path, damage):
+def test_a_damaged_answer_is_none(ask, tmp_path):
     first, _ = ask()
     (kept,) = (tmp_path / ".skidyn").iterdir()
     whole = kept.read_bytes()
-    kept.write_bytes(whole[: len(whole) // 2] if damage is None else damage)
-    assert ask() == (first, True)
+    for damaged in (b"", b"{}", whole[: len(whole) // 2]):
+        kept.write_bytes(damaged)
+        assert ask() == (first, True)
 
 
 def test_an_answer_that_cannot_be_kept_is_given(ask, tmp_path):

@@ -21,7 +21,7 @@ from skidyn.model_selection import TrajectoryKFold
 from skidyn.preprocessing import DropKeys, SmoothDerivatives
 
 LOG = make_hidden_effect_log(
-    load_planar_arm(), "spring", joints=[2], n_trajectories=6, duration=6.0
+    load_planar_arm(), "spring", joints=[2], n_trajectories=6, duration=4.0
 )
 KINDS = ("spring",)
 
@@ -62,7 +62,7 @@ def test_models_inside_others_are_opened(model):
         ([DropKeys(), Ridge()], []),
         ([StandardScaler().set_output(transform="pandas"), DropKeys(), Ridge()], []),
         (
-            [SmoothDerivatives().set_output(transform="pandas"), DropKeys(), Ridge()],
+            [SmoothDerivatives(cutoff=8.0).set_output(transform="pandas"), DropKeys(), Ridge()],
             ["smoothderivatives"],
         ),
     ],
@@ -94,7 +94,7 @@ def test_effects_found_on_a_pipeline_return_a_pipeline(steps, before):
 def test_weights_reach_the_steps_of_a_corrected_pipeline(tmp_path):
     weight = np.linspace(0.5, 1.5, len(LOG.X))
     given = make_pipeline(DropKeys(), Ridge()).fit(LOG.X, LOG.y)
-    diagnosis = diagnose(given, LOG.X, LOG.y, robot=LOG.robot, sample_weight=weight)
+    diagnosis = diagnose(given, LOG.X, LOG.y, robot=LOG.robot, sample_weight=weight, effects=KINDS)
     assert diagnosis.findings
     model = clone(diagnosis.model).fit(LOG.X, LOG.y, ridge__sample_weight=weight)
     own = make_pipeline(DropKeys(), Ridge()).fit(LOG.X, LOG.y, ridge__sample_weight=weight)

@@ -107,17 +107,23 @@ def turned(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 @pytest.mark.filterwarnings("ignore::skidyn.exceptions.LogWarning")
-@pytest.mark.parametrize("change", [later, restarted, reordered, renumbered, duplicated, turned])
+@pytest.mark.parametrize(
+    "changes", [(later, reordered, turned), (restarted, renumbered), (duplicated,)]
+)
 def test_how_time_trajectories_and_turns_are_counted_changes_nothing(
-    change: Callable[[pd.DataFrame], pd.DataFrame], log: Any, plain: Any
+    changes: tuple[Callable[[pd.DataFrame], pd.DataFrame], ...], log: Any, plain: Any
 ) -> None:
-    *said, figures = answer(TORSO, change(log.frame))
+    frame = log.frame
+    for change in changes:
+        frame = change(frame)
+
+    *said, figures = answer(TORSO, frame)
 
     assert said == list(plain[:3])
     np.testing.assert_allclose(figures, plain[3], rtol=1e-5)
 
 
-@pytest.mark.parametrize("factor", [1e-9, 1e-3, 1e9])
+@pytest.mark.parametrize("factor", [1e-9, 1e9])
 def test_torque_and_inertia_in_another_unit_change_nothing(
     factor: float, log: Any, plain: Any
 ) -> None:

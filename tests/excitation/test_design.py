@@ -80,8 +80,9 @@ def test_torque_limits_hold_for_the_robot_or_for_the_fitted_model_with_its_frict
     assert np.all(largest(whole) <= limits.torque)
 
 
-@pytest.mark.parametrize("motion", ["fourier", "quintic"])
-@pytest.mark.parametrize("criterion", ["determinant", "condition"])
+@pytest.mark.parametrize(
+    ("criterion", "motion"), [("determinant", "fourier"), ("condition", "quintic")]
+)
 def test_the_descent_tells_more_than_the_best_of_random_motions(criterion, motion):
     robot = load_ur5()
 

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A joint alone in its loop moves as the whole model does."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -12,15 +14,17 @@ from skidyn.simulation import simulate
 SIZES = {"viscous": (0.4, 0.03), "coulomb": (0.8, 0.06)}
 
 
-def loop_of(servo):
+@cache
+def loop_of(limit):
     """Joint 2 of a planar arm whose motion is that of the model, and its positions."""
-    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=2, duration=4.0)
+    servo = Controller((200.0, 12.0), (12.0, 0.6), limit=limit, follows_velocity=False)
+    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=2, duration=2.0)
     model = RBDRegressor(log.robot, ("viscous", "coulomb"), "nominal").fit(log.X, log.y)
     for term in model.effect_terms_:
         model.effect_coefficients_[term] = np.array([SIZES[term.kind][term.places[0]]])
     wanted = log.X.assign(q_ref1=log.X["q1"], q_ref2=log.X["q2"])
     moved = simulate(model, wanted, controller=servo)
-    task = read_task(model, moved.drop(columns=["ddq1", "ddq2"]), None, servo, 4.0)
+    task = read_task(model, moved.drop(columns=["ddq1", "ddq2"]), None, servo, 2.0)
     s = task.signals
     still, turn = np.zeros_like(s.q), np.tile([0.0, 1.0], (len(s.q), 1))
     own = log.robot.inverse_dynamics(s.q, still, turn, gravity=(0.0, 0.0, 0.0))[:, 1]
@@ -33,7 +37,7 @@ FRICTION = {"viscous": np.array([0.03]), "coulomb": np.array([0.06])}
 
 @pytest.mark.parametrize("limit", [np.inf, 1.0])
 def test_a_joint_follows_the_whole_model(limit):
-    loop = loop_of(Controller((200.0, 12.0), (12.0, 0.6), limit=limit, follows_velocity=False))
+    loop = loop_of(limit)
     error = loop.errors(FRICTION)[0]
     assert np.sqrt(np.mean(error[loop.valid] ** 2)) < 3e-4
     without = loop.errors({k: 0 * v for k, v in FRICTION.items()})[0]
@@ -41,7 +45,7 @@ def test_a_joint_follows_the_whole_model(limit):
 
 
 def test_a_stiff_gear_is_none_and_play_moves_the_motor():
-    loop = loop_of(Controller((200.0, 12.0), (12.0, 0.6), follows_velocity=False))
+    loop = loop_of(np.inf)
     plain = loop.run(FRICTION)[0]
     gear = {**FRICTION, "compliance": np.array([1e-4]), "motor": np.array([0.3])}
     np.testing.assert_allclose(loop.run(gear)[0][loop.valid], plain[loop.valid], atol=5e-4)
@@ -50,7 +54,7 @@ def test_a_stiff_gear_is_none_and_play_moves_the_motor():
 
 
 def test_models_side_by_side_are_those_one_by_one():
-    loop = loop_of(Controller((200.0, 12.0), (12.0, 0.6), follows_velocity=False))
+    loop = loop_of(np.inf)
     values = {
         "viscous": np.array([0.03, 0.05]),
         "coulomb": np.array([0.06, 0.01]),

@@ -21,7 +21,7 @@ from skidyn.logs import read_log
 
 MIB = 2**20
 #: The bound that the reader is given, what is promised beyond it, and what a bomb unpacks to.
-BOUND, OVERHEAD, BOMB = 16 * MIB, 128 * MIB, 256 * MIB
+BOUND, OVERHEAD, BOMB = 16 * MIB, 128 * MIB, 192 * MIB
 
 
 def parquet(path):

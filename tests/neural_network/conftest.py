@@ -8,6 +8,11 @@ from skidyn.datasets import load_planar_arm
 N_JOINTS = 2
 
 
+@pytest.fixture(scope="session", autouse=True)
+def with_fresh_processes(fresh_processes):
+    """All tests of networks."""
+
+
 def make_hysteretic_log(n_trajectories=8, n_rows=120, seed=0, joint_scale=(1.0, 1.0)):
     """Torque of two joints with friction that remembers the motion, so that history is needed."""
     rng = np.random.default_rng(seed)

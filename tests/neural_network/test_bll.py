@@ -25,7 +25,7 @@ SEQUENCE = {
 @parametrize_with_checks(
     [
         BLLRegressor(
-            LSTMRegressor(window=2, stride=2, hidden_size=8, max_epochs=25, learning_rate=0.03),
+            LSTMRegressor(window=2, stride=2, hidden_size=8, max_epochs=8, learning_rate=0.1),
             n_estimators=2,
             random_state=0,
         )

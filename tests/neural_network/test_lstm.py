@@ -27,15 +27,15 @@ SEQUENCE = {
 @parametrize_with_checks(
     [
         LSTMRegressor(
-            window=3, stride=3, hidden_size=8, max_epochs=40, learning_rate=0.03, random_state=0
+            window=3, stride=3, hidden_size=8, max_epochs=12, learning_rate=0.1, random_state=0
         ),
         NDLRegressor(
             window=3,
             stride=3,
             hidden_size=8,
             dropout=0,
-            max_epochs=40,
-            learning_rate=0.03,
+            max_epochs=12,
+            learning_rate=0.1,
             random_state=0,
         ),
     ],

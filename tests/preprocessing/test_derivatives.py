@@ -16,7 +16,7 @@ def motion(t, order=0):
     return (W**order * np.sin(phase)).sum(axis=1)
 
 
-def record(noise, rate=200.0, seconds=15.0, jitter=0.0):
+def record(noise, rate=200.0, seconds=10.5, jitter=0.0):
     rng = np.random.default_rng(0)
     t = np.arange(int(rate * seconds)) / rate
     t = t + jitter / rate * rng.uniform(-0.5, 0.5, t.size)

@@ -16,7 +16,7 @@ FRICTION = ("viscous", "coulomb")
 @pytest.fixture(scope="module")
 def log():
     return make_hidden_effect_log(
-        load_planar_arm(), "spring", joints=[1], n_trajectories=4, duration=4.0, random_state=0
+        load_planar_arm(), "spring", joints=[1], n_trajectories=4, duration=3.0, random_state=0
     )
 
 
@@ -38,10 +38,11 @@ class Backwards(RBDRegressor):
 
 def test_the_true_effect_improves_and_the_wrong_sign_of_it_worsens(log):
     spring = [("spring", [1])]
-    (verdict,) = judge_additions(RBDRegressor(log.robot, FRICTION), [spring], log.X, log.y)
+    given, soon = RBDRegressor(log.robot, FRICTION), {"horizon": 0.5}
+    (verdict,) = judge_additions(given, [spring], log.X, log.y, **soon)
     assert verdict.improves and not verdict.worsens
     wrong, idle = judge_additions(
-        Backwards(log.robot, FRICTION), [spring, [("offset", [2])]], log.X, log.y
+        Backwards(log.robot, FRICTION), [spring, [("offset", [2])]], log.X, log.y, **soon
     )
     assert wrong.worsens and "grows" in wrong.text
     assert idle.before.score < wrong.after.score, "judged without what has worsened the motion"
@@ -72,14 +73,14 @@ def test_a_diagnosis_keeps_what_helps_and_tells_what_does_not(log, diagnosis):
     kinds = [finding.kind for finding in diagnosis.findings]
     assert kinds == ["spring"]
     given, diagnosis.base_model = diagnosis.base_model, Backwards(log.robot, FRICTION)
-    (verdict,) = diagnosis.judge_by_simulation()
+    (verdict,) = diagnosis.judge_by_simulation(0.5)
     assert verdict.worsens and diagnosis.vetoed == diagnosis.findings
     assert not any(term.kind == "spring" for term in diagnosis.model.effect_terms_)
     told = [note for note in diagnosis.warnings if "worsens the simulated motion" in note]
     assert len(told) == 1 and "joint1" in told[0]
     assert any(t.kind == "spring" for t in diagnosis.add("spring").effect_terms_)
     diagnosis.base_model = given
-    (verdict,) = diagnosis.judge_by_simulation()
+    (verdict,) = diagnosis.judge_by_simulation(0.5)
     assert verdict.improves and diagnosis.vetoed == []
     assert any(term.kind == "spring" for term in diagnosis.model.effect_terms_)
     assert not [note for note in diagnosis.warnings if "worsens the simulated motion" in note]
@@ -102,5 +103,5 @@ def test_findings_of_a_log_of_commands_are_judged_through_the_servo(log):
 def test_only_models_with_an_inertia_are_judged(log, diagnosis):
     given, diagnosis.base_model = diagnosis.base_model, object()
     with pytest.raises(SkidynError, match="inertia of an RBDRegressor"):
-        diagnosis.judge_by_simulation()
+        diagnosis.judge_by_simulation(0.5)
     diagnosis.base_model = given
