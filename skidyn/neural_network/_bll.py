@@ -107,7 +107,7 @@ class BLLRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEst
         Number of rows on which the meta-regressor was trained: those with a prediction by members
         that had not seen them.
     n_features_in_ : int
-        Columns of X.
+        Number of columns of X.
     feature_names_in_ : ndarray of str
         Names of the columns, if X has names.
 

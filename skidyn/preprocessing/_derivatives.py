@@ -75,9 +75,9 @@ class SmoothDerivatives(SignalTransformer):
     rate_ : float, Hz
         Sampling rate of the training log.
     n_features_in_ : int
-        Columns of X.
+        Number of columns of X.
     feature_names_in_ : ndarray of str
-        Their names, where X has names.
+        Names of the columns, if X has names.
 
     References
     ----------

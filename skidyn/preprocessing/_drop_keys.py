@@ -31,9 +31,9 @@ class DropKeys(SignalTransformer):
     Attributes
     ----------
     n_features_in_ : int
-        Columns of X.
+        Number of columns of X.
     feature_names_in_ : ndarray of str
-        Their names, where X has names.
+        Names of the columns, if X has names.
 
     Examples
     --------

@@ -110,9 +110,9 @@ class ButterworthFilter(SignalTransformer):
     rate_ : float, Hz
         Sampling rate of the training log.
     n_features_in_ : int
-        Columns of X.
+        Number of columns of X.
     feature_names_in_ : ndarray of str
-        Their names, where X has names.
+        Names of the columns, if X has names.
 
     Examples
     --------
@@ -187,9 +187,9 @@ class TimeDerivative(SignalTransformer):
     rate_ : float, Hz
         Sampling rate of the training log.
     n_features_in_ : int
-        Columns of X.
+        Number of columns of X.
     feature_names_in_ : ndarray of str
-        Their names, where X has names.
+        Names of the columns, if X has names.
 
     Examples
     --------
@@ -275,9 +275,9 @@ class SignalScaler(SignalTransformer):
     offset_, scale_ : ndarray of shape (n_features,)
         ``(X - offset_) / scale_``; 0 and 1 for key columns.
     n_features_in_ : int
-        Columns of X.
+        Number of columns of X.
     feature_names_in_ : ndarray of str
-        Their names, where X has names.
+        Names of the columns, if X has names.
 
     References
     ----------
