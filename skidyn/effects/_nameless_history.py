@@ -221,7 +221,7 @@ class RelaxingSpring(NamelessEffect):
 
 def _followed(x: Array, signals: Signals, time_constant: float) -> Array:
     """First-order lag of a signal, from its value at the start of each segment."""
-    from scipy.signal import lfilter  # not paid for by who only checks a log
+    from scipy.signal import lfilter  # not needed to check a log
 
     y = np.array(x)
     for rows, step in zip(signals.segments, signals.steps, strict=True):
