@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Check of recordings against each other: one in other units, signs, or with another's torque."""
+"""Comparison of recordings: one with other units, signs, or the torque of another."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import asked_changes
 
-#: Fewest rows of a recording for a word on it.
+#: Fewest rows of a recording to be judged.
 FEWEST = 12
 #: Log-likelihood that another multiple must gain in a recording, and another zero, which is free.
 LEAST, SURE = 15.0, 40.0
@@ -49,7 +49,7 @@ FAR = 50.0
 
 @dataclass(frozen=True)
 class Multiple:
-    """What the torque of a joint in a recording is of what all recordings predict."""
+    """Torque of a joint in a recording relative to the prediction from all recordings."""
 
     joint: int
     run: int
@@ -62,7 +62,7 @@ class Multiple:
 
 
 class OddRecording(Check):
-    """A recording whose torque is not that of the others."""
+    """A recording whose torque is inconsistent with the others."""
 
     name = "odd_recording"
     suspects = (
@@ -73,7 +73,7 @@ class OddRecording(Check):
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         if measurement.stale or measurement.lost or measurement.odd:
-            return  # what is left is that of the clock, or of another robot
+            return  # the rest is due to the clock, or another robot
         seen = explained(measurement)
         if seen is None:
             return
@@ -99,7 +99,7 @@ class OddRecording(Check):
                 if not (alike or one.spoils):
                     continue
                 if _clipped(measurement, one):
-                    continue  # its torque is another multiple because it is cut
+                    continue  # its torque has another multiple because it is saturated
                 within = USUAL[0] <= one.multiple <= USUAL[1]
                 if not within and one.gain > LEAST and abs(one.likeness) > SCALED:
                     scaled.append(one)
@@ -116,7 +116,7 @@ class OddRecording(Check):
                 shifted[worst.run] = zero
                 unlike = [one for one in unlike if one.run != worst.run]
         if shifted:
-            # what is read wrongly in all recordings may be felt most in one
+            # a wrong reading of all recordings may affect one most
             asked = sum(c.gain for c in asked_changes(measurement, seen.fits) if not c.other)
             shifted = {run: zero for run, zero in shifted.items() if zero[2] > asked}
         measurement.odd = bool(scaled or unlike or shifted)
@@ -143,7 +143,7 @@ class OddRecording(Check):
                 [one.joint for one in own],
             )
         if measurement.frictionless:
-            return  # what is left is that of another friction
+            return  # the rest is due to another friction
         for run in sorted({one.run for one in unlike} - {one.run for one in scaled}):
             own = [one for one in unlike if one.run == run]
             names = ", ".join(measurement.joint(one.joint) for one in own)
@@ -211,7 +211,7 @@ def _zero_of(fits: Fits, run: int) -> tuple[int, float, float] | None:
     worst = max(before, key=lambda k: before[k], default=None)
     if worst is None or value - plain < SURE or abs(angle) < LEAST_ZERO:
         return None
-    # bodies that know of this recording as well may explain it without another zero
+    # bodies identified with this recording may explain it without another zero
     elsewhere, everywhere = fits.only(~rows).residuals(bodies, Reading()), fits.bodies()[0]
     here = own.residuals(bodies, Reading(zero=((joint, angle),)))
     known = fits.residuals(everywhere, Reading())
@@ -236,7 +236,7 @@ def _rows_of(fits: Fits, run: int) -> NDArray[np.bool_]:
 def _multiples(seen: Explained) -> list[Multiple]:
     """Multiples of every joint and recording with enough rows."""
     fits, outcome = seen.fits, seen.identified
-    # one recording of a few spoils the bodies that all of them identify
+    # one of few recordings distorts the bodies identified from all of them
     apart = bool(np.any(seen.errors[1] > SPOILED))
     told = []
     runs = np.unique(fits.signals.trajectory)
