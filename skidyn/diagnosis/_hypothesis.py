@@ -78,7 +78,7 @@ class Hypothesis:
 
     @property
     def variables(self) -> tuple[str, ...]:
-        """Signals of nameless functions."""
+        """Signals of unknown functions."""
         return tuple(sorted({v for c in self.candidates for v in c.variables}))
 
 

@@ -88,7 +88,7 @@ class Diagnosis:
     predictable : ndarray of shape (n_joints,)
         Share of the remaining squared error that a flexible learner predicts.
     unknowns : list of UnknownTorque
-        Tested variables, shape and formula of every nameless torque that was found.
+        Tested variables, shape and formula of every unknown torque that was found.
     checks : list of Suspicion
         Suspicions of the checks of the measurement, with evidence and remedy.
     parts : Remainder
@@ -313,9 +313,9 @@ class Diagnosis:
 
         A torque computed from the position error of a servo hides effects that last hundredths of a
         second. Joints are simulated in their loops (:func:`skidyn.simulation.explain_servo_motion`)
-        with the findings that the simulation supports, and without nameless functions, hysteresis,
+        with the findings that the simulation supports, and without unknown functions, hysteresis,
         offsets and saturation by the controller; joints with other findings are left out. The
-        effects found replace nameless functions and hysteresis on their joints; :attr:`findings`
+        effects found replace unknown functions and hysteresis on their joints; :attr:`findings`
         are not changed. They are stored in :attr:`servo_motion` and shown in the report and on the
         page, and a diagnosis without any other finding is no longer ``"complete"``.
 
@@ -389,7 +389,7 @@ class Diagnosis:
         Parameters
         ----------
         kind : str
-            Kind of the catalogue; ``"unknown"`` for the nameless function that was found, or
+            Kind of the catalogue; ``"unknown"`` for the unknown function that was found, or
             ``"formula"`` for the formula proposed for it.
         joints : sequence of int, optional
             Joints, counted from 1; by default those of the finding of this kind, or all joints.

@@ -135,7 +135,7 @@ class Settings:
     least_gain : float
         Twice the gain in held-out log-likelihood, minus the penalty for its parameters, that a
         finding needs: smoothing and coarse positions leave torques that are significant but small.
-        A nameless function needs this gain relative to a known effect, and a further form relative
+        An unknown function needs this gain relative to a known effect, and a further form relative
         to the plain one.
     least_share : float
         Share of the held-out squared error of averaged rows that a finding must remove on its
@@ -144,17 +144,17 @@ class Settings:
         Share of the held-out squared error of single samples that it must remove.
     form_tolerance : float
         Share of the squared error removed by an effect that its imperfect formula may leave, a
-        tenth of its size. A nameless function that is better by no more than this does not replace
+        tenth of its size. An unknown function that is better by no more than this does not replace
         a known effect, and a later finding that removes no more on the same joints is attributed to
         the earlier ones.
     further_tolerance : float
-        The same where a further form of a known effect is compared with a nameless function: it
+        The same where a further form of a known effect is compared with an unknown function: it
         was chosen among several.
     exact_tolerance : float
         The same where every formula is exact (:attr:`Effect.is_exact`).
     nameless_tolerance : float
-        The same for the residual of a nameless function, whose form only approximates the true one,
-        and for the residual that an effect that moves the link leaves to a nameless function.
+        The same for the residual of an unknown function, whose form only approximates the true one,
+        and for the residual that an effect that moves the link leaves to an unknown function.
     alike : float
         Two effects on different joints whose scores differ by less than this share cannot be
         separated by the data.
@@ -182,10 +182,10 @@ class Settings:
     white : float
         Inflation of the variance by autocorrelation up to which the remainder is considered white.
     nameless_price : int
-        Maximum number of coefficients for which a nameless function is penalised, since its
+        Maximum number of coefficients for which an unknown function is penalised, since its
         held-out error already includes them.
     nameless_tried : int
-        Number of functions of the signals from which each tested nameless candidate was selected,
+        Number of functions of the signals from which each tested unknown candidate was selected,
         and of formulas for a further form of a known effect.
     shapes_tested : int
         Number of candidates (joints and shapes) of a kind that are tested before the kind is

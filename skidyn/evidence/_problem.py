@@ -136,7 +136,7 @@ class Problem:
         return self._cache[term]
 
     def screening_rows(self, term: Term) -> dict[int, Array]:
-        """As :meth:`term_rows`, but of a nameless function from only as many samples as needed.
+        """As :meth:`term_rows`, but of an unknown function from only as many samples as needed.
 
         A window of a log at 1 kHz holds 125 samples. A function as smooth as these has the same
         mean over every seventh sample; one that jumps or oscillates does not.

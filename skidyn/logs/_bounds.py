@@ -74,7 +74,7 @@ class Budget:
                     part = decoder.decompress(rest, _STEP)
                     rest = b""
                     if not part and decoder.needs_input:
-                        return  # cut off; the reader says so
+                        return  # cut off; the reader reports it
                     self.take(len(part))
                 rest = decoder.unused_data or b""
         else:
@@ -117,7 +117,7 @@ def _bag_records(file: IO[bytes], end: int) -> Iterator[tuple[dict[bytes, bytes]
             header[name] = value
             at += 4 + length
         if len(tail := file.read(4)) < 4:
-            return  # cut off; the reader says so
+            return  # cut off; the reader reports it
         yield header, struct.unpack("<L", tail)[0]
 
 

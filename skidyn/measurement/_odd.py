@@ -23,14 +23,14 @@ from skidyn.measurement._torque import asked_changes
 FEWEST = 12
 #: Log-likelihood that another multiple must gain in a recording, and another zero, which is free.
 LEAST, SURE = 15.0, 40.0
-#: Least spread of what the other recordings predict, in residuals, for its multiple to be told.
+#: Least spread of what the other recordings predict, in residuals, for its multiple to be reported.
 CLEAR = 2.0
 #: Correlation with the prediction from which a recording is only at another scale, and below which
 #: it has nothing to do with it.
 SCALED, UNLIKE = 0.8, 0.4
 #: Multiples that are those of the other recordings, and the share of these that have one.
 ONE, MOST = (0.7, 1.4), 0.6
-#: Share of rows at the extreme torque from which its multiple in a recording says nothing.
+#: Share of rows at the extreme torque from which its multiple in a recording is meaningless.
 CUT = 0.1
 #: Residual of a recording over that of all from which its torque is of something else.
 LARGER = 3.0
@@ -38,7 +38,7 @@ LARGER = 3.0
 BETTER = 0.8
 #: Share of its residual that the best effect may leave, and still be what is odd in a recording.
 LEFT = 0.5
-#: Residual from which a different zero of a position is tried, and the least that is told, rad.
+#: Residual from which a different zero of a position is tried, and the least that is reported, rad.
 SHIFTED, LEAST_ZERO = 3.0, np.deg2rad(4)
 #: Error of identified bodies, as a share of the spread, from which recordings are predicted by the
 #: bodies of the others alone.

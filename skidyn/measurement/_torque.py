@@ -25,14 +25,14 @@ BELOW, TURNS = 0.01, 4
 CUT = 0.05
 #: Log-likelihood that the magnitude must gain over the torque itself, and to be sure.
 LEAST, SURE = 15.0, 40.0
-#: Share of a torque's spread that the robot must explain for its multiple to be told.
+#: Share of a torque's spread that the robot must explain for its multiple to be reported.
 EXPLAINED = 0.5
-#: Multiples of the robot's own torque that wrong masses may well make.
+#: Multiples of the robot's own torque that may be due to wrong masses.
 USUAL = (0.4, 2.5)
 #: Factors of units of torque.
 UNITS = {1e3: "Nmm", 1e2: "Ncm", 1e-3: "kNm"}
-#: Smallest delay that is told, s, how many standard errors it must have, and how far the lag of a
-#: joint may be from it.
+#: Smallest delay that is reported, s, how many standard errors it must have, and how far the lag of
+#: a joint may be from it.
 SMALLEST, ERRORS, ALIKE = 0.004, 5.0, 0.006
 #: How many standard errors lags in the halves of recordings must differ by: that there is a lag is
 #: known then.
@@ -134,8 +134,8 @@ def _turns(measurement: Measurement, k: int) -> int:
 def unsigned_columns(measurement: Measurement) -> tuple[list[int], dict[int, float]]:
     """Columns of the torque that contain magnitudes, and their log-likelihood gains.
 
-    A single column is told by a fit of the magnitude of the robot's torque; where no column of
-    three or more is ever negative although all joints reverse, none has a sign.
+    A single column is found by a fit of the magnitude of the robot's torque; if no column of three
+    or more is ever negative although all joints reverse, none has a sign.
     """
     if measurement.unsigned is None:
         measurement.unsigned = _unsigned(measurement)

@@ -219,7 +219,7 @@ class PositionUnit(Check):
         ]
         outside = _too_far(measurement, FAR) & ~np.array(named)
         if not outside.any():
-            return  # told by their velocities, joint by joint
+            return  # found by their velocities, joint by joint
         k = int(np.argmax(np.where(outside, largest / limits, 0)))
         where = f"the limit is {limits[k]:.3g} rad" if known[k] else "one turn is 6.28 rad"
         seen = f"q{k + 1} ({measurement.joint_names[k]}) reaches {largest[k]:.4g} rad where {where}"

@@ -32,12 +32,12 @@ from skidyn.measurement._units import (
 LEAST_MOTION, LEAST_SPEED = 0.02, 0.02
 #: Windows over which velocities are compared with positions, at most.
 WINDOWS = 3000
-#: Lags of the velocity that are tried, s; the least that is told, s and in time steps; the share
-#: of the difference that it takes away; joints that agree and how nearly, s.
+#: Lags of the velocity that are tried, s; the least that is reported, s and in time steps; the
+#: share of the difference that it takes away; joints that agree and how nearly, s.
 LAGS = np.linspace(-0.1, 0.1, 21)
 SMALLEST, STEPS, TAKEN, AGREEING, NEARLY = 0.006, 1.2, 0.3, 0.75, 0.01
-#: What a low pass leaves, as a share of what a delay leaves, to be told; how near constants of
-#: joints are that share one.
+#: Largest residual of a low pass to be reported, as a share of that of a delay; largest difference
+#: of a common time constant between joints.
 FILTERED, SAME_FILTER = 0.4, 0.15
 
 
@@ -92,7 +92,7 @@ class Velocity(Check):
             if k in measurement.millimetres:
                 continue
             if measurement.clock != 1 and _cause(slope, correlation) in ("scale", "other"):
-                continue  # to be told when time is in seconds
+                continue  # reported when time is in seconds
             groups.setdefault(_cause(slope, correlation), []).append(k)
         return [self._told(measurement, cause, joints) for cause, joints in groups.items()]
 
@@ -169,7 +169,7 @@ def _constant(measurement: Measurement) -> list[int]:
 
 
 def _of_units(slope: float) -> bool:
-    """Whether a slope that all joints share is told as a unit of the clock or of positions."""
+    """Whether a common slope of all joints is reported as a unit of the clock or of positions."""
     return any(is_near(slope, factor) for factor in (*CLOCKS, *POSITIONS))
 
 
@@ -297,7 +297,7 @@ class VelocityDelay(Check):
 
 
 def _lag(signals: Signals, k: int) -> float:
-    """Lag of a joint's velocity behind the rate of its position, s; NaN where it cannot be told."""
+    """Lag of a joint's velocity behind the rate of its position, s; NaN if undetermined."""
     errors, plain = np.zeros(len(LAGS)), 0.0
     for window in _windows(signals, k):
         errors += [window.error(lag) for lag in LAGS]

@@ -122,8 +122,8 @@ class Robot(RigidBodyDynamics):
         joints : sequence of str, default=None
             Joints that the logs cover, as in :meth:`from_urdf`.
         gravity : sequence of 3 floats, default=None
-            Gravitational acceleration in the base frame, m/s^2. None: (0, 0, -9.81), or what an
-            MJCF says.
+            Gravitational acceleration in the base frame, m/s^2. None: (0, 0, -9.81), or that of an
+            MJCF.
 
         Returns
         -------
@@ -341,8 +341,8 @@ class Robot(RigidBodyDynamics):
         joints : sequence of str, default=None
             Joints that the logs cover, as in :meth:`from_urdf`.
         gravity : sequence of 3 floats, default=None
-            Gravitational acceleration in the base frame, m/s^2. None: (0, 0, -9.81), or what an
-            MJCF says.
+            Gravitational acceleration in the base frame, m/s^2. None: (0, 0, -9.81), or that of an
+            MJCF.
 
         Returns
         -------
