@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Robot inverse dynamics for scikit-learn.
 
-Identify a rigid-body model with friction, compare it with measurements, see where it fails, learn
-which physical effect is missing, add it and watch the held-out error fall.
+Identify a rigid-body model with friction, compare it with measurements, see where it fails, find
+the missing physical effect, add it and compare the held-out errors.
 
 Importing the package loads no submodule; each one is loaded when it is first used.
 """
@@ -41,7 +41,7 @@ __all__ = [
     "simulation",
 ]
 
-#: Where the names that are no submodules come from.
+#: Modules of the names that are not submodules.
 _HOMES = {
     "load_model": "skidyn._persistence",
     "save_model": "skidyn._persistence",

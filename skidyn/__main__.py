@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The command line, as ``python -m skidyn`` and the script ``skidyn`` run it."""
+"""The command line for ``python -m skidyn`` and the script ``skidyn``."""
 
 import sys
 

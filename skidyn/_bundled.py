@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The plotting library uPlot as the pages carry it: one copy, its licence beside it."""
+"""The plotting library uPlot for the pages, with its licence."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks that a table is a log: what would make every later result wrong is refused here."""
+"""Checks that a table is a log; errors that would make all later results wrong are refused."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SIGNAL_COLUMN = re.compile(r"(q|dq|ddq|tau|temp|cmd)(\d+)")
 
 
 def warn_about_log(message: str) -> None:
-    """Issue a LogWarning that points at the line outside skidyn that led to it."""
+    """Issue a LogWarning that refers to the line outside skidyn that caused it."""
     level, frame = 1, inspect.currentframe()
     while frame is not None and frame.f_globals.get("__name__", "").startswith("skidyn."):
         level, frame = level + 1, frame.f_back
@@ -42,7 +42,7 @@ def count_joints(frame: pd.DataFrame, source: str = "the log") -> int:
     Raises
     ------
     LogError
-        No positions, a joint without one, or a column that occurs twice.
+        There are no positions, a joint has none, or a column occurs twice.
     """
     refuse_duplicates([str(name) for name in frame.columns], source)
     numbers = sorted(
@@ -69,7 +69,7 @@ def require_columns(
     quantities: Sequence[str] = ("q", "tau"),
     source: str = "the log",
 ) -> None:
-    """Raise unless the quantities are there for every joint and not for further ones.
+    """Raise unless the quantities are present for every joint and for no others.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def require_columns(
     n_joints : int
         Number of joints of the robot.
     quantities : sequence of str
-        Quantities that must be there.
+        Required quantities.
     source : str, default="the log"
         Name for messages.
 
@@ -138,11 +138,11 @@ def as_numbers(frame: pd.DataFrame, names: Sequence[str], source: str = "the log
     Raises
     ------
     LogError
-        A cell is no number; the message names column, row and content.
+        A cell is not a number; the message states column, row and content.
     """
     import pandas as pd
 
-    # All at once: one column after the other takes the square of their number.
+    # All at once: the time for one column after another grows as the square of their number.
     columns = dict(frame.items())
     for name in names:
         column = frame[name]
@@ -173,7 +173,7 @@ def handle_missing(
     missing: Literal["error", "drop"],
     source: str = "the log",
 ) -> pd.DataFrame:
-    """Refuse rows with NaN or infinite values, or drop them and say how many.
+    """Refuse rows with NaN or infinite values, or drop them and report their number.
 
     Parameters
     ----------
@@ -182,7 +182,7 @@ def handle_missing(
     names : sequence of str
         Columns that must be finite.
     missing : {"error", "drop"}
-        What to do with rows that are not.
+        Treatment of rows that are not.
     source : str, default="the log"
         Name for messages.
 
@@ -231,7 +231,7 @@ def check_time_order(
     Returns
     -------
     ndarray of shape (n_samples,) of bool
-        False where a row has the time of the row before it.
+        False for a row with the time of the previous row.
 
     Raises
     ------

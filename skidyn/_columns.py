@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which column of X means what: the one implementation of skidyn's X contract.
+"""Meaning of the columns of X: the only implementation of skidyn's X contract.
 
 A row of ``X`` is one sample. With column names the order is free and other columns are ignored:
 ``q_<joint>``, ``dq_<joint>``, ``ddq_<joint>`` (or ``q1 .. qn``, ``dq1 .. dqn``, ``ddq1 .. ddqn``),
 and optionally ``trajectory``, ``time`` and ``temp_<joint>`` (or ``temp1 .. tempn``).
-Without names the columns left after the key columns are exactly ``3 n``: all positions, all
-velocities, all accelerations, in the joint order of the robot.
+Without names the columns other than key columns are exactly ``3 n``: all positions, all velocities,
+all accelerations, in the joint order of the robot.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numpy as np
 from skidyn._exceptions import ColumnError
 from skidyn._text import suggest
 
-#: How a key column may be given to an estimator: by position, by name, found by itself, or absent.
+#: Key column of an estimator: by position, by name, found automatically, or absent.
 ColumnSpec = int | str | None
 
 
@@ -33,7 +33,7 @@ class Columns:
     q, dq : tuple of int, length n_joints
         Joint positions (rad or m) and velocities (rad/s or m/s).
     ddq : tuple of int or None
-        Joint accelerations (rad/s^2 or m/s^2); None where X has none.
+        Joint accelerations (rad/s^2 or m/s^2); None if X has none.
     trajectory, time : int or None
         Trajectory number; time in s.
     temperature : tuple of int or None
@@ -53,11 +53,11 @@ class Columns:
         return len(self.q)
 
     def state(self) -> list[int]:
-        """Positions of q, dq and ddq, in this order, for learners that want only the state."""
+        """Positions of q, dq and ddq, in this order, for learners that need only the state."""
         return [*self.q, *self.dq, *(self.ddq or ())]
 
     def used(self) -> list[int]:
-        """Positions of all columns that mean something, the key columns last."""
+        """Positions of all columns with a meaning, the key columns last."""
         keys = (self.trajectory, self.time)
         return [*self.state(), *(self.temperature or ()), *(k for k in keys if k is not None)]
 
@@ -84,7 +84,7 @@ def resolve_columns(
     trajectory, time : int, str or None, default="auto"
         Key columns; ``"auto"`` takes the column of that name if X has names and such a column.
     require_acceleration : bool, default=True
-        Whether accelerations must be there; without names they always must.
+        Whether accelerations are required; without names they always are.
 
     Raises
     ------
@@ -136,12 +136,12 @@ def _refuse_duplicates(names: Sequence[str]) -> None:
 def key_columns(
     names: Sequence[str] | None, n_features: int, trajectory: ColumnSpec, time: ColumnSpec
 ) -> tuple[int | None, int | None]:
-    """Positions of the trajectory number and of the time, None where there is no such column.
+    """Positions of the trajectory number and of the time, None if there is no such column.
 
     Raises
     ------
     ColumnError
-        There is no such column, or both are the same one.
+        A column does not exist, or both are the same.
     """
     found = (
         _key_column("trajectory", trajectory, names, n_features),
@@ -212,7 +212,7 @@ def names_of_table(X: Any, columns: str = "time, q1.., dq1..") -> list[str]:
     Raises
     ------
     ColumnError
-        X has no column names; the message says which ``columns`` it should have.
+        X has no column names; the message states the expected ``columns``.
     """
     names = column_names(X)
     if names is None:
@@ -221,7 +221,7 @@ def names_of_table(X: Any, columns: str = "time, q1.., dq1..") -> list[str]:
 
 
 def command_columns(names: Sequence[str], joint_names: Sequence[str]) -> list[str]:
-    """Names of the columns that hold the commanded positions.
+    """Names of the columns with the commanded positions.
 
     Parameters
     ----------
@@ -271,7 +271,7 @@ def with_columns(X: Any, columns: dict[str, np.ndarray]) -> Any:
 
 
 def trajectory_numbers(X: np.ndarray, columns: Columns) -> np.ndarray:
-    """Trajectory number of every row (zeros where X has no such column)."""
+    """Trajectory number of every row (zeros if X has no such column)."""
     if columns.trajectory is None:
         return np.zeros(len(X), dtype=np.int64)
     return np.asarray(X[:, columns.trajectory])

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Private and experimental names of scikit-learn: the only module that touches them.
+"""Private and experimental names of scikit-learn, which only this module uses.
 
 scikit-learn validates parameters through names that are private, and its progress callbacks (new
-in 1.9) may change without deprecation. What skidyn needs of both is collected here, so that a new
-release is answered in one place.
+in 1.9) may change without deprecation. All that skidyn needs of both is collected here, so that
+only one module has to be adapted to a new release.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ __all__ = [
 
 
 class FitProgress:
-    """Tells scikit-learn's callbacks how far a fit is, for example a progress bar.
+    """Report the progress of a fit to scikit-learn's callbacks, for example a progress bar.
 
     Parameters
     ----------
     estimator : estimator
         The estimator that is being fitted.
     context : object or None
-        Its callback context; None where scikit-learn has no callbacks.
+        Its callback context; None if scikit-learn has no callbacks.
     task_name : str, default="epoch"
         What a step is.
     """
@@ -55,13 +55,13 @@ class FitProgress:
         self._step: Any = None
 
     def begin_step(self) -> None:
-        """Announce the next step."""
+        """Report the beginning of a step."""
         if self._context is not None:
             self._step = self._context.subcontext(task_name=self._task_name)
             self._step.call_on_fit_task_begin(estimator=self._estimator)
 
     def end_step(self) -> bool:
-        """Announce its end; True when a callback asks to stop the fit."""
+        """Report the end of a step; True if a callback requests to stop the fit."""
         if self._step is None:
             return False
         return bool(self._step.call_on_fit_task_end(estimator=self._estimator))
@@ -78,9 +78,9 @@ def fit_progress(
     estimator : estimator
         Derives from ``CallbackSupportMixin``.
     n_steps : int
-        Steps at most.
+        Most steps.
     X, y : array-like
-        What is fitted, handed to the callbacks.
+        Data of the fit, passed to the callbacks.
     task_name : str, default="epoch"
         What a step is.
 

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Independent pieces of work on several cores, with the same results to the last bit as on one.
+"""Independent tasks on several cores, with exactly the same results as on one.
 
-A forked process has all that was computed so far without a copy of it, and starts within
-milliseconds; what it computes comes back through a pipe. Pieces are handed out one by one, so that
-no process waits while another has several left. Every piece is computed by the same instructions
-wherever it runs. Forking is safe on Linux while linear algebra is held to one thread, as
+A forked process shares all data computed so far without a copy, and starts within milliseconds; its
+results are returned through a pipe. Tasks are distributed one by one, so that no process waits
+while another has several left. Every task is computed by the same instructions in any process.
+Forking is safe on Linux while linear algebra is held to one thread, as
 :func:`skidyn.diagnosis.diagnose` does; elsewhere all work is done in one process.
 """
 
@@ -30,22 +30,22 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 _CORES: ContextVar[int] = ContextVar("skidyn_cores", default=1)
-#: Processes at most: starting one takes some 20 ms, which many more would not earn back.
+#: Most processes: starting one takes some 20 ms, which more processes would not save.
 MOST_PROCESSES = 8
-#: Numbers of pieces that surely fit into a pipe, of which a process takes one after the other.
+#: Number of task numbers that fit into a pipe; processes read them one after another.
 MOST_PIECES = 4096
 _NUMBER = struct.Struct("=I")
 
 
 @contextmanager
 def cores(n_jobs: int | None) -> Iterator[None]:
-    """Share what :func:`each` and :func:`aside` do inside the ``with`` block among processes.
+    """Use several processes for :func:`each` and :func:`aside` inside the ``with`` block.
 
     Parameters
     ----------
     n_jobs : int or None
-        Processes as joblib counts them: None is 1 unless a ``joblib.parallel_config`` says
-        otherwise, -1 all cores; 1 inside a process of joblib. No more than 8 are used.
+        Processes as joblib counts them: None is 1 unless set by a ``joblib.parallel_config``, -1
+        all cores; 1 inside a process of joblib. No more than 8 are used.
 
     Raises
     ------
@@ -77,17 +77,17 @@ def alone() -> bool:
 
 
 def each(function: Callable[[Item], Result], items: Iterable[Item], text: str = "") -> list[Result]:
-    """What a function returns for every item, in their order.
+    """Results of a function for every item, in their order.
 
     Parameters
     ----------
     function : callable
-        Of one item. What it returns is pickled where another process computed it; what it changes
-        is lost there.
+        Function of one item. Its result is pickled if another process computed it; its side effects
+        there are lost.
     items : iterable
         Items; they need not be picklable.
     text : str, default=""
-        What is being done, to be reported with the share of it that is done.
+        Description of the task for progress reports.
 
     Returns
     -------
@@ -96,7 +96,7 @@ def each(function: Callable[[Item], Result], items: Iterable[Item], text: str = 
     Raises
     ------
     Exception
-        What the function raises.
+        The exception of the function.
     """
     items = list(items)
     size = -(-len(items) // MOST_PIECES)
@@ -106,7 +106,7 @@ def each(function: Callable[[Item], Result], items: Iterable[Item], text: str = 
         return [function(item) for item in (track(items, text) if text else items)]
     left, filled = os.pipe()
     os.write(filled, b"".join(_NUMBER.pack(k) for k in range(len(pieces))))
-    os.close(filled)  # whoever finds the pipe empty is done
+    os.close(filled)  # a process that finds the pipe empty is done
 
     def work() -> dict[int, Result]:
         done: dict[int, Result] = {}
@@ -126,7 +126,7 @@ def each(function: Callable[[Item], Result], items: Iterable[Item], text: str = 
             done |= child.result() or {}
         if text:
             tell(text, 1.0)
-        # a process that was killed, for its memory for example, takes its pieces with it
+        # the tasks of a killed process, for example due to its memory, are lost
         return [done[k] if k in done else function(item) for k, item in enumerate(items)]
     finally:
         _CORES.reset(token)
@@ -137,19 +137,19 @@ def each(function: Callable[[Item], Result], items: Iterable[Item], text: str = 
 
 @contextmanager
 def aside(function: Callable[[], Result]) -> Iterator[Callable[[], Result]]:
-    """Compute something while the ``with`` block does something else.
+    """Compute a function in parallel with the ``with`` block.
 
     With one core it is computed at once, before the block.
 
     Parameters
     ----------
     function : callable
-        Without arguments. What it returns must be picklable, and what it changes is lost.
+        Function without arguments. Its result must be picklable, and its side effects are lost.
 
     Yields
     ------
     callable
-        Waits for the result and returns it, or raises what the function raised.
+        Function that waits for the result and returns it, or raises the exception of the function.
     """
     child = None if alone() else _started(lambda: _Boxed(function()))
     if child is None:
@@ -178,7 +178,7 @@ class _Boxed(Generic[Result]):
 
 
 class _Child(Generic[Result]):
-    """A forked process that computes something."""
+    """A forked process for one computation."""
 
     def __init__(self, function: Callable[[], Result]) -> None:
         from multiprocessing import get_context
@@ -188,7 +188,7 @@ class _Child(Generic[Result]):
         self._process = fork.Process(target=_answer, args=(function, into), daemon=True)
         try:
             with warnings.catch_warnings():
-                # Python 3.12 warns of any other thread, those of linear algebra that wait included.
+                # Python 3.12 warns of any other thread, including idle ones of linear algebra.
                 warnings.simplefilter("ignore", DeprecationWarning)
                 self._process.start()
         except OSError:
@@ -198,26 +198,26 @@ class _Child(Generic[Result]):
             into.close()
 
     def result(self) -> Result | None:
-        """What was computed; None where the process is gone without an answer."""
+        """The result; None if the process ended without one."""
         try:
             fine, value = self._pipe.recv()
-        except (EOFError, OSError):  # before an answer, or within one
+        except (EOFError, OSError):  # before or within an answer
             return None
         if not fine:
             raise value
         return value  # type: ignore[no-any-return]
 
     def end(self) -> None:
-        """End the process, if it still runs, and forget it."""
+        """End the process if it still runs."""
         self._pipe.close()
         self._process.kill()
         self._process.join()
 
 
 def _answer(function: Callable[[], Result], into: Connection) -> None:
-    """What a child process does: compute, and send the result or what was raised."""
+    """Main function of a child process: compute, and send the result or the exception."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    gc.disable()  # a collection would copy every page that holds an object
+    gc.disable()  # a collection would copy every page with an object
     _CORES.set(1)
     with listening(None):
         try:
@@ -228,7 +228,7 @@ def _answer(function: Callable[[], Result], into: Connection) -> None:
 
 
 def _started(function: Callable[[], Result]) -> _Child[Result] | None:
-    """A process that computes something; None where the system gives no further one."""
+    """A process for one computation; None if the system provides no further one."""
     try:
         return _Child(function)
     except OSError:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Errors and warnings of skidyn; every error is a ValueError that says how to fix the input."""
+"""Errors and warnings of skidyn; every error is a ValueError that states how to fix the input."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ class RobotDescriptionError(SkidynError):
 
 
 class LogWarning(UserWarning):
-    """A log can be used, but something about it looks wrong; the message holds the evidence.
+    """A log can be used, but may have an error; the message contains the evidence.
 
     Examples
     --------
@@ -123,7 +123,7 @@ class LogWarning(UserWarning):
 
 
 class RobotDescriptionWarning(UserWarning):
-    """A URDF can be used, but something in it is physically impossible.
+    """A URDF can be used, but contains something physically impossible.
 
     Examples
     --------

@@ -32,7 +32,7 @@ class Keys:
     features: tuple[int, ...]
 
     def trajectories(self, X: NDArray[Any]) -> NDArray[Any]:
-        """Trajectory number of every row; zeros where there is no such column."""
+        """Trajectory number of every row; zeros if there is no such column."""
         return np.zeros(len(X), dtype=int) if self.trajectory is None else X[:, self.trajectory]
 
     def segments(self, X: NDArray[Any]) -> list[slice]:
@@ -41,17 +41,17 @@ class Keys:
         return find_segments(self.trajectories(X), time)
 
     def for_learner(self, X: Any, learner: Any) -> Any:
-        """The columns for a learner: no key columns, unless it has parameters for them.
+        """The columns for a learner: without key columns, unless it has parameters for them.
 
-        A learner that has no parameters for trajectory and time takes them for features, and
-        memorises the log.
+        A learner without parameters for trajectory and time would use them as features and memorise
+        the log.
 
         Parameters
         ----------
         X : DataFrame or array of shape (n_samples, n_features)
             Table with key columns.
         learner : estimator
-            Whose parameters, or those of its parts, may name key columns.
+            Learner, whose parameters, or those of its parts, may specify key columns.
 
         Returns
         -------
@@ -80,7 +80,7 @@ def resolve_keys(
     trajectory: ColumnSpec = "auto",
     time: ColumnSpec = "auto",
 ) -> Keys:
-    """Find the key columns; what is left are features.
+    """Find the key columns; all others are features.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def resolve_keys(
 
 
 def fitted_keys(estimator: Any) -> Keys:
-    """Key columns of the table that an estimator was fitted to, by its ``trajectory`` and ``time``.
+    """Key columns of the table of a fitted estimator, by its ``trajectory`` and ``time``.
 
     Parameters
     ----------
@@ -125,5 +125,5 @@ def fitted_keys(estimator: Any) -> Keys:
 
 
 def keys_of(X: Any, *, trajectory: ColumnSpec = "auto", time: ColumnSpec = "auto") -> Keys:
-    """Key columns of a table or array as the user gave it."""
+    """Key columns of a table or array given by the user."""
     return resolve_keys(column_names(X), X.shape[1], trajectory=trajectory, time=time)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How much a log may hold, where more is an accident or an attack."""
+"""Limits of the size of a log, above which it is damaged or malicious."""
 
-#: Columns of one log, and letters of a column's name.
+#: Most columns of one log, and most letters of a column's name.
 MOST_COLUMNS, LONGEST_NAME = 10_000, 250

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Local polynomials on an even grid (Savitzky, Golay 1964) with the first two derivatives.
 
-``scipy.signal.savgol_filter`` solves for the polynomial and for both edges anew at every call and
-for every derivative. Here they are weights, computed once for a width and an order.
+``scipy.signal.savgol_filter`` computes the polynomial and both edges again at every call and for
+every derivative. Here they are weights, computed once for a width and an order.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ ORDERS = (0, 1, 2)
 def local_polynomial(values: Array, width: int, order: int, step: float) -> tuple[Array, ...]:
     """Smoothed values and their first two derivatives along the first axis.
 
-    At the edges the polynomial of the outermost window is followed up to the end, as
+    At the edges the polynomial of the outermost window is used up to the end, as
     ``savgol_filter(mode="interp")`` does.
 
     Parameters

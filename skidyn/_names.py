@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""From the column names that recorders write to ``q1 .. qn, dq1 .. dqn, tau1 .. taun``."""
+"""Mapping of the column names of loggers to ``q1 .. qn, dq1 .. dqn, tau1 .. taun``."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from skidyn._limits import LONGEST_NAME, MOST_COLUMNS
 from skidyn._text import suggest
 from skidyn._units import split_unit
 
-#: A joint beyond, and beyond the number of columns, is a damaged name: a list of as many joints
-#: as it says could fill the memory.
+#: A joint number above this and above the number of columns is a damaged name: a list of that many
+#: joints could fill the memory.
 MANY_JOINTS = 1000
 
 #: Spellings of each quantity in recordings, compared in lower case without separators.
@@ -48,7 +48,7 @@ _QUANTITY_OF = {word: quantity for quantity, words in SPELLINGS.items() for word
 
 @dataclass
 class NameMatch:
-    """Which source column is which signal.
+    """Assignment of source columns to signals.
 
     Attributes
     ----------
@@ -57,9 +57,9 @@ class NameMatch:
     joint_names : list of str
         Joints in column order.
     notes : list of str
-        What was decided on the way and deserves telling.
+        Decisions to be reported.
     units : dict of str to (str, str)
-        Column of the source and the unit that its header states, per name in the log.
+        Column of the source and the unit in its header, per name in the log.
     """
 
     columns: dict[str, str] = field(default_factory=dict)
@@ -75,25 +75,25 @@ def match_names(
     columns: Mapping[str, str | int | Sequence[str | int]] | None = None,
     source: str = "the log",
 ) -> NameMatch:
-    """Decide which columns hold which signals.
+    """Assign columns to signals.
 
     Parameters
     ----------
     names : sequence of str
-        Column names of the source, each once.
+        Unique column names of the source.
     robot_joints : sequence of str, optional
         Joint names of the robot; columns are put in this order.
     columns : mapping, optional
-        What the user says, which goes before any guess: ``{"q1": "pos_a"}``,
-        ``{"q": ["pos_a", "pos_b"]}``, ``{"q": "pos_{joint}"}`` or ``{"q": "pos_{i}"}``
-        (from 0 or 1, as the columns are); a number is the position of a column.
+        Assignment by the user, which has priority over any guess: ``{"q1": "pos_a"}``, ``{"q":
+        ["pos_a", "pos_b"]}``, ``{"q": "pos_{joint}"}`` or ``{"q": "pos_{i}"}`` (from 0 or 1, as the
+        columns are); a number is the position of a column.
     source : str
         Name of the file for messages.
 
     Raises
     ------
     LogError
-        A column that ``columns`` names is absent, or joints do not match the robot.
+        A column of ``columns`` is absent, or joints do not match the robot.
     """
     _refuse_too_many(names, source)
     match = NameMatch()
@@ -141,7 +141,7 @@ def match_names(
 
 
 def _refuse_too_many(names: Sequence[str], source: str) -> None:
-    """Logs have some hundred columns; more, or names without end, are an accident or an attack."""
+    """Refuse too many columns or too long names, which are due to damage or an attack."""
     if len(names) > MOST_COLUMNS:
         raise LogError(
             f"{source} has {len(names)} columns; at most {MOST_COLUMNS} are read. Store the "
@@ -192,7 +192,7 @@ def _expand(
         if robot_joints is not None:
             return [value.replace("{joint}", joint) for joint in robot_joints]
         before, *after = map(re.escape, value.split("{joint}"))
-        pattern = before + "(.+)" + r"\1".join(after)  # wherever it stands, one name
+        pattern = before + "(.+)" + r"\1".join(after)  # the same name at every position
         found = [name for name in names if re.fullmatch(pattern, name)]
         if not found:
             raise LogError(f"columns: no column matches {value!r}. There are: {_listed(names)}.")
@@ -244,13 +244,13 @@ def _guess(names: Sequence[str]) -> tuple[dict[str, _Found], dict[str, _Found]]:
 
 
 class _Found(dict[Any, str]):
-    """Column of every joint, and further ones that name the same signal."""
+    """Column of every joint, and further ones of the same signal."""
 
     def __init__(self) -> None:
         self.others: dict[Any, list[str]] = {}
 
     def add(self, joint: int | str, name: str) -> None:
-        """Take a column; the first counts until a choice is needed."""
+        """Add a column; the first is used until a choice is needed."""
         if self.setdefault(joint, name) != name:
             self.others.setdefault(joint, []).append(name)
 
@@ -265,7 +265,7 @@ class _Found(dict[Any, str]):
 
 
 def _parse(name: str) -> tuple[str | None, int | None, str | None]:
-    """Quantity, number and joint that a column name states.
+    """Quantity, number and joint of a column name.
 
     >>> _parse("q1"), _parse("dq_elbow"), _parse("/joint_states/effort[0]")
     (('q', 1, None), ('dq', None, 'elbow'), ('tau', 0, None))
@@ -279,11 +279,11 @@ def _parse(name: str) -> tuple[str | None, int | None, str | None]:
     words = tail.strip("[]")
     if _plain(words) in _QUANTITY_OF and not words[-1:].isdigit():
         quantity = _QUANTITY_OF[_plain(words)]
-        # "panda_joint1/position" of flattened ROS messages: the joint stands before the quantity
+        # "panda_joint1/position" of flattened ROS messages: the joint is before the quantity
         if quantity not in KEYS and len(parts) > 1:
             return quantity, None, parts[-2]
         return quantity, None, None
-    # what cannot end in a number is not searched for one, letter by letter
+    # a name that cannot end in a number is not searched for one, letter by letter
     ends = tail[:-1] if tail.endswith(("]", ")")) else tail
     numbered = ends[-1:].isdigit() and re.fullmatch(r"(.*?)[ _\-\[(]*(\d+)[\])]?", tail)
     if numbered and _plain(numbered[1]) in _QUANTITY_OF:
@@ -305,7 +305,7 @@ def _parse(name: str) -> tuple[str | None, int | None, str | None]:
 
 
 def quantity_of(name: str) -> str | None:
-    """Quantity that a column, or a file of one signal, is named after; None if none.
+    """Quantity in the name of a column or of a file with one signal; None if there is none.
 
     >>> quantity_of("effort_3"), quantity_of("commands"), quantity_of("volts")
     ('tau', 'cmd', None)
@@ -318,7 +318,7 @@ def _plain(text: str) -> str:
 
 
 def _place_by_index(match: NameMatch, quantity: str, found: Mapping[int, str]) -> None:
-    """Number columns from 1; a recorder that counts from 0 is told by its 0."""
+    """Number columns from 1; a logger that counts from 0 is recognised by its 0."""
     shift = 1 if 0 in found else 0
     for index, name in sorted(found.items()):
         match.columns[f"{quantity}{index + shift}"] = name
@@ -340,7 +340,7 @@ def _place_by_joint(
         return
     located = _located(robot_joints, found)
     missing = [joint for joint, hit in located.items() if hit is None]
-    # a name such as "tau_cmd" speaks of no joint
+    # a name such as "tau_cmd" contains no joint
     if len(missing) == len(robot_joints) and quantity != "q":
         return
     if missing:
@@ -371,9 +371,9 @@ def _place_by_joint(
 
 
 def _located(joints: Sequence[str], found: Mapping[str, str]) -> dict[str, str | None]:
-    """For every joint its name in ``found``: the same, or the only one that is alike.
+    """Name of every joint in ``found``: the same, or the only similar one.
 
-    Alike are names that differ in case, separators or the word joint.
+    Names are similar if they differ only in case, separators or the word joint.
     """
     known, alike = set(joints), dict[str, list[str]]()
     for name in found:
@@ -391,7 +391,7 @@ def _located(joints: Sequence[str], found: Mapping[str, str]) -> dict[str, str |
 
 
 def _core(joint: str) -> str:
-    """Joint name without case, separators and the word joint, which recorders add or leave out.
+    """Joint name without case, separators and the word joint, which loggers add or omit.
 
     >>> _core("shoulder_pan_joint") == _core("Shoulder-Pan")
     True

@@ -6,7 +6,7 @@ from types import ModuleType
 
 
 def import_optional(name: str, *, extra: str) -> ModuleType:
-    """Import an optional package, or say how to install it.
+    """Import an optional package, or raise an error that states how to install it.
 
     Parameters
     ----------
@@ -23,7 +23,7 @@ def import_optional(name: str, *, extra: str) -> ModuleType:
     Raises
     ------
     ImportError
-        If the package is not installed. The message names the extra.
+        If the package is not installed. The message states the extra.
 
     Examples
     --------
@@ -35,7 +35,7 @@ def import_optional(name: str, *, extra: str) -> ModuleType:
         return importlib.import_module(name)
     except ModuleNotFoundError as error:
         package = name.partition(".")[0]
-        # A module missing inside an installed package is a broken installation: say so as it is.
+        # A module missing inside an installed package is a broken installation: keep the error.
         if error.name is None or error.name.partition(".")[0] != package:
             raise
         raise ImportError(

@@ -14,15 +14,15 @@ from skidyn._signals import Array
 if TYPE_CHECKING:
     from skidyn._keys import Keys
 
-#: Share of steps that go back in time, or to another trajectory, from which rows count as shuffled.
+#: Share of steps back in time, or to another trajectory, from which rows count as shuffled.
 SHUFFLED = 0.1
 
 
 def order_in_time(trajectory: NDArray[Any], time: Array | None) -> NDArray[np.intp] | None:
     """Order of shuffled rows by trajectory and time.
 
-    A log has as many borders as recordings, or a few more where clocks start again. In shuffled
-    rows every second step goes back.
+    A log has as many borders as recordings, or a few more if clocks restart. In shuffled rows about
+    every second step goes back.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def order_in_time(trajectory: NDArray[Any], time: Array | None) -> NDArray[np.in
     Returns
     -------
     ndarray of shape (n_samples,) of int or None
-        Rows in order of time; None where they are already.
+        Rows in order of time; None if they already are in order.
     """
     if time is None or len(time) < 3:
         return None
@@ -48,12 +48,12 @@ def order_in_time(trajectory: NDArray[Any], time: Array | None) -> NDArray[np.in
 
 
 def refuse_shuffled(what: str, trajectory: NDArray[Any], time: Array | None) -> None:
-    """Raise a LogError where rows are shuffled and ``what`` needs to know which follow each other.
+    """Raise a LogError if rows are shuffled and ``what`` needs their order.
 
     Parameters
     ----------
     what : str
-        What needs it, as the subject of the message.
+        The operation that needs it, as the subject of the message.
     trajectory : ndarray of shape (n_samples,)
         Trajectory number of every row.
     time : ndarray of shape (n_samples,), s, or None
@@ -70,13 +70,13 @@ def refuse_shuffled(what: str, trajectory: NDArray[Any], time: Array | None) -> 
 
 
 def has_one_motion(trajectory: NDArray[Any], time: Array) -> bool:
-    """Whether ordered rows are of one motion each: hardly any moment occurs twice."""
+    """Whether the rows of each trajectory are one motion, since hardly any time occurs twice."""
     same = trajectory[1:] == trajectory[:-1]
     return bool(np.sum(same & (np.diff(time) == 0)) <= SHUFFLED * len(time))
 
 
 def time_order(X: NDArray[Any], keys: Keys) -> NDArray[np.intp] | None:
-    """Order of the rows by trajectory and time; None where they are in it, or have no time."""
+    """Order of the rows by trajectory and time; None if they are in order or have no time."""
     return order_in_time(keys.trajectories(X), None if keys.time is None else X[:, keys.time])
 
 

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Models on disk without pickle: whole files or none, and no foreign code on loading.
+"""Models on disk without pickle: no incomplete files, and no foreign code on loading.
 
-A skops file is a tree of nodes, each of which says how something is put together (its loader) and
-of which type. skops checks the types against one list, whatever is done with them; here every pair
-of loader and type has to be known, so that nothing that a file names is ever called with arguments
-of the file's choosing.
+A skops file is a tree of nodes, each with a loader and a type. skops checks the types against one
+list, independent of the loader; here every pair of loader and type has to be known, so that a file
+cannot have anything called with arguments of its choice.
 """
 
 from __future__ import annotations
@@ -24,14 +23,14 @@ from skidyn._exceptions import SkidynError
 from skidyn._optional import import_optional
 from skidyn._writing import write_bytes
 
-#: Largest model file once unpacked, in bytes: its arrays, counted each time they are named, and
-#: the description of how they belong together, which takes some 20 times as much when it is read.
+#: Largest unpacked size of a model file, in bytes: its arrays, counted at each reference, and its
+#: description, which takes some 20 times as much memory when it is read.
 MAX_BYTES, MAX_DESCRIPTION = 4 * 2**30, 128 * 2**20
 
 #: Protocol of the skops files that are read; older ones hold nodes of other forms.
 PROTOCOL = 2
 
-#: Classes of skidyn that a stored model may hold. No function is among them, and none is trusted.
+#: Classes of skidyn that a stored model may contain. Functions are never trusted.
 CLASSES = frozenset(
     f"skidyn.{name}"
     for name in (
@@ -72,7 +71,7 @@ _NUMBERS = frozenset(
     for kind, sizes in {"float": (32, 64), "int": (8, 16, 32, 64), "uint": (8, 16, 32, 64)}.items()
     for bits in sizes
 )
-#: Loaders of skops that only put data together, and the types that each may make.
+#: Loaders of skops that only assemble data, and the types that each may make.
 _DATA = {
     "BytesNode": frozenset({"builtins.bytes"}),
     "DictNode": frozenset({"builtins.dict", "collections.OrderedDict"}),
@@ -85,9 +84,8 @@ _DATA = {
     "TypeNode": frozenset(f"builtins.{name}" for name in ("bool", "float", "int", "str"))
     | _NUMBERS,
 }
-#: Loaders that make what they name from a state or from arguments. They are for classes only:
-#: those of skidyn and scikit-learn through their state, and the user's own, which may want
-#: arguments.
+#: Loaders that make an object from a state or from arguments. They are permitted only for classes:
+#: those of skidyn and scikit-learn by their state, and the user's own, which may need arguments.
 _FROM_STATE = "ObjectNode"
 _FROM_ARGUMENTS = frozenset(
     {"ConstructorFromReduceNode", "LossNode", "RandomStateNode", "SparseMatrixNode", "TreeNode"}
@@ -102,8 +100,8 @@ def save_model(path: Any, model: Any) -> Path:
     Parameters
     ----------
     path : path
-        File to write, for example ``model.skops``; it is replaced in one step, so that a full disk
-        or a killed process leaves the old file.
+        File to write, for example ``model.skops``; it is replaced in one step, so that the old file
+        remains after an error.
     model : estimator
         Any estimator of skidyn, or of scikit-learn with estimators of skidyn inside.
 
@@ -115,7 +113,7 @@ def save_model(path: Any, model: Any) -> Path:
     Raises
     ------
     SkidynError
-        There is no path or no model; or the model holds a function, or something else that
+        There is no path or no model; or the model contains a function, or another object that
         :func:`load_model` never creates.
 
     Notes
@@ -146,7 +144,7 @@ def save_model(path: Any, model: Any) -> Path:
         del model.diagnosis_, model.scorer_
     try:
         data = skops.dumps(model)
-    except Exception as error:  # whatever an object answers that cannot tell its state
+    except Exception as error:  # any error of an object without an accessible state
         raise SkidynError(
             f"{type(model).__name__} cannot be stored: {error}.{_instead(model)}"
         ) from error
@@ -163,7 +161,7 @@ def save_model(path: Any, model: Any) -> Path:
 
 
 def _instead(model: Any) -> str:
-    """What of a search can be stored."""
+    """The part of a search that can be stored."""
     found = hasattr(model, "best_estimator_")
     return " Store its best_estimator_ instead." if found else ""
 
@@ -171,9 +169,9 @@ def _instead(model: Any) -> str:
 def load_model(path: str | os.PathLike[str], *, trusted: Iterable[str] = ()) -> Any:
     """Load a model that :func:`save_model` stored.
 
-    Nothing that the file names is called, and no module is imported for it, unless its name is on
-    a list: the estimators of skidyn and the classes that they are made of, the estimators of
-    scikit-learn that skops knows to be harmless, and what ``trusted`` adds.
+    Nothing in the file is called, and no module is imported for it, unless its name is on a list:
+    the estimators of skidyn and the classes in them, the estimators of scikit-learn that skops
+    trusts, and the names in ``trusted``.
 
     Parameters
     ----------
@@ -181,7 +179,7 @@ def load_model(path: str | os.PathLike[str], *, trusted: Iterable[str] = ()) -> 
         File.
     trusted : iterable of str, default=()
         Further classes that may be created, by their full names, such as
-        ``"my_package.MyRegressor"``. They run their own code, so name only those that you know.
+        ``"my_package.MyRegressor"``. They run their own code, so list only classes that you know.
 
     Returns
     -------
@@ -191,8 +189,8 @@ def load_model(path: str | os.PathLike[str], *, trusted: Iterable[str] = ()) -> 
     Raises
     ------
     SkidynError
-        The file is a pickle or damaged, unpacks to more than 4 GiB, or holds anything else than
-        data and the classes of the list; ``trusted`` names something that is not a class.
+        The file is a pickle or damaged, unpacks to more than 4 GiB, or contains anything other than
+        data and the classes of the list; or a name in ``trusted`` is not a class.
 
     Examples
     --------
@@ -214,7 +212,7 @@ def load_model(path: str | os.PathLike[str], *, trusted: Iterable[str] = ()) -> 
                 f"{source}: not a skops file. Pickles and joblib files are refused because "
                 "loading one can run arbitrary code; store models with skidyn.save_model"
             ) from error
-        except Exception as error:  # damaged archives raise whatever their content leads to
+        except Exception as error:  # damaged archives may raise any exception
             raise SkidynError(f"{source}: cannot be loaded: {error}") from error
     foreign = sorted({name for loader, name in nodes if not _is_known(loader, name, own)})
     if not foreign:
@@ -223,7 +221,7 @@ def load_model(path: str | os.PathLike[str], *, trusted: Iterable[str] = ()) -> 
             foreign = sorted(set(skops.get_untrusted_types(file=source)) - set(named))
             if not foreign:
                 return skops.load(source, trusted=named)
-        except Exception as error:  # damaged files raise whatever their content leads to
+        except Exception as error:  # damaged files may raise any exception
             raise SkidynError(f"{source}: cannot be loaded: {error}") from error
     raise SkidynError(
         f"{source}: holds untrusted types: {', '.join(foreign)}. Functions are never loaded; if "
@@ -235,7 +233,7 @@ _LOADERS = frozenset(_DATA) | _FROM_ARGUMENTS | {_FROM_STATE}
 
 
 def _is_known(loader: str, name: str, trusted: frozenset[str]) -> bool:
-    """Whether a node may be created; skops is asked about scikit-learn's classes later."""
+    """Whether a node may be created; skops checks scikit-learn's classes later."""
     if loader in _DATA:
         return name in _DATA[loader] or (loader == "TypeNode" and name in CLASSES | trusted)
     if loader == _FROM_STATE:
@@ -244,7 +242,7 @@ def _is_known(loader: str, name: str, trusted: frozenset[str]) -> bool:
 
 
 def _description(archive: zipfile.ZipFile, source: Path) -> dict[str, Any]:
-    """How the parts of a model belong together; bounded before anything is unpacked."""
+    """Description of the parts of a model, with a bound before anything is unpacked."""
     sizes = {member.filename: member.file_size for member in archive.infolist()}
     if max(sum(sizes.values()), sizes["schema.json"] * MAX_BYTES // MAX_DESCRIPTION) > MAX_BYTES:
         raise SkidynError(
@@ -257,7 +255,7 @@ def _description(archive: zipfile.ZipFile, source: Path) -> dict[str, Any]:
             f"{source}: cannot be loaded: it has protocol {description.get('protocol')!r} of "
             f"skops, not {PROTOCOL}; store the model again with skidyn.save_model"
         )
-    # Each node that names a file reads it anew.
+    # Each node with a file reads it again.
     named = sum(sizes.get(node["file"], 0) for node in _dictionaries(description) if "file" in node)
     if named > MAX_BYTES:
         raise SkidynError(f"{source}: unpacks to {named} bytes, more than {MAX_BYTES}")
@@ -272,7 +270,7 @@ def _nodes(description: dict[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 def _dictionaries(content: Any) -> Iterator[dict[str, Any]]:
-    """Every dictionary of a description, without recursion: files may be nested without end."""
+    """Every dictionary of a description, without recursion, since files may be nested deeply."""
     stack = [content]
     while stack:
         part = stack.pop()
@@ -284,7 +282,7 @@ def _dictionaries(content: Any) -> Iterator[dict[str, Any]]:
 
 
 def _check_class(name: str) -> None:
-    """That a name the user trusts is a class."""
+    """Check that a name trusted by the user is a class."""
     module, _, last = name.rpartition(".")
     try:
         found = getattr(importlib.import_module(module), last)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Values that JSON knows."""
+"""Values in the types of JSON."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 
 
 def plain(value: Any) -> Any:
-    """Copy of a nested value in the types of JSON; what is not finite becomes None.
+    """Copy of a nested value in the types of JSON; numbers that are not finite become None.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Progress messages of long computations, for whatever listens to them.
+"""Progress messages of long computations.
 
-A function calls :func:`tell`; the command line shows them in its bar. Nothing receives them in a
-library, and then nothing happens.
+A function calls :func:`tell`; the command line shows the messages in its bar. In a library nothing
+receives them.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import TypeVar
 
-#: What is being done, and the share of it that is done (None where that is not known).
+#: Description of the task, and its finished share (None if unknown).
 Listener = Callable[[str, float | None], None]
 Item = TypeVar("Item")
 
@@ -20,14 +20,14 @@ _LISTENER: ContextVar[Listener | None] = ContextVar("skidyn_progress", default=N
 
 
 def tell(text: str, share: float | None = None) -> None:
-    """Report what is being done.
+    """Report the progress of a task.
 
     Parameters
     ----------
     text : str
-        What is being done.
+        Description of the task.
     share : float, optional
-        Share of it that is done, 0 to 1.
+        Finished share, 0 to 1.
     """
     listener = _LISTENER.get()
     if listener is not None:
@@ -35,7 +35,7 @@ def tell(text: str, share: float | None = None) -> None:
 
 
 def track(items: Iterable[Item], text: str) -> Iterator[Item]:
-    """Go through items and report before each how many are done.
+    """Iterate over items and report the finished share before each.
 
     >>> with listening(lambda text, share: print(text, share)):
     ...     letters = list(track("ab", "Reading"))
@@ -52,7 +52,7 @@ def track(items: Iterable[Item], text: str) -> Iterator[Item]:
 
 @contextmanager
 def listening(listener: Listener | None) -> Iterator[None]:
-    """Pass what is reported inside the ``with`` block to a function, or to nobody."""
+    """Pass reports inside the ``with`` block to a function, or discard them."""
     token = _LISTENER.set(listener)
     try:
         yield

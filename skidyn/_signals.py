@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The signals of a log, as regressor columns and effects see them."""
+"""The signals of a log for regressor columns and effects."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Velocity below which the direction of dry friction is blurred, as a share of ``unit_velocity``.
+#: Velocity below which the direction of dry friction is smooth, as a share of ``unit_velocity``.
 SIGN_BLUR = 0.003
 #: A time step longer than this many median steps is a gap.
 GAP_STEPS = 5.0
@@ -63,7 +63,7 @@ def _gaps(steps: Array) -> NDArray[np.intp]:
 
 @dataclass(frozen=True)
 class Signals:
-    """Motion of a robot and what goes with it, one row per sample.
+    """Motion of a robot and accompanying signals, one row per sample.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class Signals:
     temperature : ndarray of shape (n_samples, n_joints) or None
         Joint temperatures in degrees Celsius.
     prismatic : ndarray of shape (n_joints,) of bool
-        Which joints slide.
+        Whether a joint is prismatic.
     robot : Robot or None
         The robot, for effects that act through its kinematics or dynamics.
     load : ndarray of shape (n_samples, n_joints) or None
@@ -88,8 +88,8 @@ class Signals:
     inertial_parameters : ndarray of shape (n_bodies, 10) or None
         Parameters of the rigid body where effects need them; the robot's own if None.
     valid : ndarray of shape (n_samples, n_joints) of bool or None
-        False where a sample of a joint is not to be used: broken, or near the end of a segment,
-        where what was smoothed is one-sided. None for samples that are all as good.
+        False for a sample of a joint that is not to be used: broken, or near the end of a segment,
+        where the smoother is one-sided. None if all samples are good.
     half_width : int
         Half the width of the window in which the motion was smoothed, in samples; 0 as logged.
     cutoff : float
@@ -133,7 +133,7 @@ class Signals:
 
     @cached_property
     def sign(self) -> Array:
-        """Direction of motion in [-1, 1], blurred where a joint hardly moves."""
+        """Direction of motion in [-1, 1], smooth where a joint hardly moves."""
         return np.tanh(self.dq / (SIGN_BLUR * self.unit))
 
     @cached_property
@@ -143,12 +143,12 @@ class Signals:
 
     @cached_property
     def clock(self) -> Array:
-        """Time in s; the sample number where no time is logged."""
+        """Time in s; the sample number if no time is logged."""
         return np.arange(self.n_samples, dtype=float) if self.time is None else self.time
 
     @cached_property
     def rate(self) -> float:
-        """Median sampling rate, Hz; 1 where no time is logged."""
+        """Median sampling rate, Hz; 1 if no time is logged."""
         steps = np.diff(self.clock)[np.diff(self.trajectory) == 0]
         steps = steps[steps > 0]
         return 1.0 / float(np.median(steps)) if len(steps) else 1.0
@@ -167,21 +167,21 @@ class Signals:
         ]
 
     def once(self, name: Hashable, make: Callable[[], Any]) -> Any:
-        """What ``make`` derives from these signals, computed when it is first asked for.
+        """Result of ``make`` for these signals, computed at the first call and cached.
 
-        Effects are tried at many shapes; what does not depend on the shape is derived once.
+        Effects are tried at many shapes; quantities independent of the shape are computed once.
 
         Parameters
         ----------
         name : hashable
-            What it is; it must say everything that ``make`` depends on beside the signals.
+            Key, which must contain everything on which ``make`` depends other than the signals.
         make : callable
             Without arguments.
 
         Returns
         -------
         object
-            The same one at every call; it must not be changed.
+            The same object at every call; it must not be changed.
         """
         kept = self.__dict__.setdefault("_kept", {})
         if name not in kept:
@@ -218,19 +218,19 @@ class Signals:
         return replace(self, **taken)
 
     def thinned(self, step: int) -> tuple[NDArray[np.int64], Signals]:
-        """The middle one of every few samples in a row, segment by segment.
+        """The middle one of every few successive samples, segment by segment.
 
         Parameters
         ----------
         step : int
-            How many samples one stands for, odd.
+            Number of samples per kept sample, odd.
 
         Returns
         -------
         index : ndarray of shape (n,) of int
             The samples that are kept.
         signals : Signals
-            With the segments of these signals, so that no gap is closed.
+            Signals with the segments of these signals, so that no gap is closed.
         """
         parts = [np.arange(rows.start + step // 2, rows.stop, step) for rows in self.segments]
         parts = [part for part in parts if len(part)]
@@ -244,7 +244,7 @@ class Signals:
 def signals_from(
     X: Array, columns: Columns, robot: Robot | None = None, *, to_derive: bool = False
 ) -> Signals:
-    """Read the signals out of the columns of X.
+    """Read the signals from the columns of X.
 
     Parameters
     ----------
@@ -253,7 +253,7 @@ def signals_from(
     columns : Columns
         From :func:`skidyn._columns.resolve_columns`.
     robot : Robot, optional
-        Tells which joints slide.
+        Robot, whose joint types are used.
     to_derive : bool, default=False
         Whether accelerations may be missing, to be derived from the positions; they are zero until
         then.
@@ -291,7 +291,7 @@ def read_signals(
     Parameters
     ----------
     X : DataFrame or array of shape (n_samples, n_features)
-        Motion; accelerations may be missing where the columns have names, to be derived.
+        Motion; if the columns have names, accelerations may be missing and are derived.
     tau : array-like of shape (n_samples, n_joints)
         Torque, N m or N.
     robot : Robot
@@ -333,7 +333,7 @@ def read_signals(
             f"joints ({', '.join(robot.joint_names)}) are expected"
         )
     table = np.zeros(values.shape)
-    table[:, columns.used()] = values[:, columns.used()]  # other columns may hold no numbers
+    table[:, columns.used()] = values[:, columns.used()]  # other columns may not contain numbers
     signals = signals_from(table, columns, robot, to_derive=True)
     signals = signals.with_(trajectory=signals.trajectory.astype(np.int64))
     if signals.time is None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How numbers, errors, units and joints are written wherever a user reads them."""
+"""Texts of numbers, errors, units and joints for users."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterable, Sequence
 from itertools import islice
 
-#: How many names are compared with a misspelt one, and how much of them: long names take long.
+#: Number of names that are compared with a misspelt one, and of their letters, to limit the time.
 TRIED, LONGEST_TRIED = 500, 60
 #: Titles that begin with the name of a person or a model.
 NAMES = ("Coulomb", "Dahl", "LuGre", "Maxwell", "Stribeck")
@@ -36,7 +36,7 @@ def fall(before: float, after: float, noise: float, unit: str, added: bool = Tru
 
 
 def digits(value: float) -> str:
-    """Two significant digits without an exponent where the number is of a usual size."""
+    """Two significant digits, without an exponent for a number of usual size."""
     if not math.isfinite(value):
         return "–"
     if value == 0 or not 1e-4 <= abs(value) < 1e4:
@@ -46,7 +46,7 @@ def digits(value: float) -> str:
 
 
 def give_or_take(value: float, half: float) -> str:
-    """A value with half its interval, both to the digits that the interval leaves.
+    """A value with half its interval, both rounded according to the interval.
 
     >>> give_or_take(10.534, 0.013), give_or_take(3.5, 0.4), give_or_take(971.2, 316.0)
     ('10.534 ± 0.013', '3.50 ± 0.40', '971 ± 316')
@@ -57,14 +57,14 @@ def give_or_take(value: float, half: float) -> str:
     if not 1e-4 <= largest < 1e5:
         return f"{value:.3g} ± {half:.2g}"
     decimals = max(0, 1 - math.floor(math.log10(float(f"{half:.1e}"))))
-    # An interval may be far narrower than needed: five digits of the value are kept at most.
+    # The interval may be very narrow: at most five digits of the value are kept.
     decimals = min(decimals, max(0, 4 - math.floor(math.log10(largest))))
     half_text = f"{half:.{decimals}f}" if round(half, decimals) > 0 else f"{half:.1g}"
     return f"{value:.{decimals}f} ± {half_text}"
 
 
 def times(ratio: float) -> str:
-    """A ratio in words, such as ``"2.1 times"``; beyond a thousand its digits tell nothing.
+    """Text of a ratio, such as ``"2.1 times"``; beyond a thousand its digits are omitted.
 
     >>> times(2.13), times(325497.0)
     ('2.1 times', 'more than 1000 times')
@@ -73,23 +73,23 @@ def times(ratio: float) -> str:
 
 
 def raised(unit: str) -> str:
-    """Unit with its powers as they are printed."""
+    """Unit with printed powers."""
     return unit.replace("^2", "²").replace("^3", "³")
 
 
 def inside(title: str) -> str:
-    """A title inside a sentence: names of people and models keep their capital."""
+    """A title for a sentence; names of people and models keep their capital letter."""
     return title if title.startswith(NAMES) else title[:1].lower() + title[1:]
 
 
 def joints_told(joints: Iterable[int]) -> str:
-    """Joints in words, such as ``"joints 1 and 2"``."""
+    """Text of joints, such as ``"joints 1 and 2"``."""
     numbers = [str(j) for j in joints]
     return f"joint{'s' if len(numbers) > 1 else ''} {listed(numbers)}"
 
 
 def listed(parts: Sequence[str], word: str = "and") -> str:
-    """Parts of a sentence, the last one after a word."""
+    """Parts of a sentence, joined by commas and a word before the last one."""
     return f" {word} ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else list(parts))
 
 
@@ -101,7 +101,7 @@ def measure(name: str, value: object, unit: str = "") -> str:
     name : str
         Symbol.
     value : (value, low, high), float or anything else
-        What is known of it.
+        Its value, with the ends of its interval if known.
     unit : str, default=""
         Unit; ``"1"`` for none.
 
@@ -119,7 +119,7 @@ def measure(name: str, value: object, unit: str = "") -> str:
 
 
 def suggest(word: object, names: Iterable[str], cutoff: float = 0.6) -> str:
-    """The name that was probably meant, for the end of a message; empty without one.
+    """Suggestion of a similar name for the end of a message; empty without one.
 
     >>> suggest("dq_elbw", ["q_elbow", "dq_elbow"])
     " (did you mean 'dq_elbow'?)"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What all transformers of logs share: one row in, one row out."""
+"""Base of the transformers of logs, which keep the number of rows."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ Array = NDArray[np.float64]
 class LogTransformer(TransformerMixin, BaseEstimator):
     """Base of transformers of logs, which validates tables and names.
 
-    A transformer says what it learns of a log (``_learn``), what it makes of one (``_changed``) and
-    how the columns are called then (``_renamed``, the same as before if it does not say).
+    A transformer defines its fit to a log (``_learn``), its result (``_changed``) and the names of
+    the resulting columns (``_renamed``, unchanged by default).
     """
 
     _parameter_constraints: ClassVar[dict[str, list[Any]]] = {}
 
     @fit_context(prefer_skip_nested_validation=True)
     def fit(self, X: Any, y: Any = None) -> Self:
-        """Learn from a log what there is to learn.
+        """Fit the transformer to a log.
 
         Parameters
         ----------
         X : DataFrame or array-like of shape (n_samples, n_features)
-            Log; units as the class says.
+            Log, with the units of the class.
         y : None
             Ignored.
 
@@ -44,7 +44,7 @@ class LogTransformer(TransformerMixin, BaseEstimator):
         return self
 
     def transform(self, X: Any) -> Array:
-        """Make of a log what the class says.
+        """Transform a log.
 
         Parameters
         ----------
@@ -54,7 +54,7 @@ class LogTransformer(TransformerMixin, BaseEstimator):
         Returns
         -------
         X_new : ndarray of shape (n_samples, n_features_out)
-            As many rows; the columns that :meth:`get_feature_names_out` names.
+            The same number of rows, with the columns of :meth:`get_feature_names_out`.
         """
         check_is_fitted(self)
         return self._changed(validate_data(self, X, reset=False, dtype=np.float64))
@@ -89,6 +89,6 @@ class LogTransformer(TransformerMixin, BaseEstimator):
         return names
 
     def _names(self) -> list[str] | None:
-        """Names of the columns in fit, where there were some."""
+        """Names of the columns in fit, if there were any."""
         names = getattr(self, "feature_names_in_", None)
         return None if names is None else [str(name) for name in names]

@@ -20,7 +20,7 @@ _TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
 _TORQUE = {"Nm": 1.0, "N m": 1.0, "N*m": 1.0, "mNm": 1e-3, "Ncm": 1e-2, "Nmm": 1e-3, "kNm": 1e3}
 _FORCE = {"N": 1.0, "kN": 1e3, "mN": 1e-3}
 _MOTION = {**_ANGLE, **_LENGTH}
-#: Factor to SI of each unit, per quantity. Temperatures are handled apart (they shift).
+#: Factor to SI of each unit, per quantity. Temperatures are treated separately (they have offsets).
 FACTORS: dict[str, dict[str, float]] = {
     "q": _MOTION,
     "dq": {f"{unit}/s": factor for unit, factor in _MOTION.items()} | {"rpm": 2 * np.pi / 60},
@@ -45,7 +45,7 @@ _TEMPERATURE_ZERO = {"C": 0.0, "K": 273.15, "F": 32.0}
 
 
 def split_unit(name: str) -> tuple[str, str | None]:
-    """Name of a column without the unit that stands behind it in brackets, and that unit.
+    """Name of a column without the unit in brackets after it, and that unit.
 
     >>> split_unit("q1 [deg]"), split_unit("Time (ms)"), split_unit("q[1]"), split_unit("q (raw)")
     (('q1', 'deg'), ('Time', 'ms'), ('q[1]', None), ('q (raw)', None))
@@ -57,7 +57,7 @@ def split_unit(name: str) -> tuple[str, str | None]:
         return name, None
     plain = hit[2].strip()
     word = plain.lower().replace(" ", "")
-    # mNm and MNm differ by case alone, so the unit as it is written goes first
+    # mNm and MNm differ only by case, so the unit as written has priority
     exact = next((u for units in FACTORS.values() for u in units if u == plain), None)
     unit = exact or _SPELLED.get(word) or _KNOWN.get(word)
     return (hit[1], unit) if unit else (name, None)
@@ -66,21 +66,21 @@ def split_unit(name: str) -> tuple[str, str | None]:
 def refuse_stated_units(
     stated: Mapping[str, tuple[str, str]], units: Mapping[str, str], source: str
 ) -> None:
-    """Refuse columns whose header states a unit that is not SI, until it is asked to convert them.
+    """Refuse columns whose header states a unit that is not SI, unless a conversion is requested.
 
     Parameters
     ----------
     stated : mapping
         Column of the source and its unit, per column of the log.
     units : mapping of str to str
-        What is to be converted.
+        Requested conversions.
     source : str
         Name of the file for messages.
 
     Raises
     ------
     LogError
-        With the ``units`` to pass.
+        The message contains the ``units`` to pass.
     """
     wanted: dict[str, str] = {}
     example = ""
@@ -106,7 +106,7 @@ def convert_units(frame: pd.DataFrame, units: Mapping[str, str]) -> pd.DataFrame
         Columns ``time, q1 .., dq1 .., tau1 ..``.
     units : mapping of str to str
         Unit of a quantity (``{"q": "deg", "time": "ms"}``) or of one column (``{"q3": "mm"}``),
-        which goes before its quantity.
+        which has priority over its quantity.
 
     Returns
     -------
@@ -116,7 +116,7 @@ def convert_units(frame: pd.DataFrame, units: Mapping[str, str]) -> pd.DataFrame
     Raises
     ------
     LogError
-        An unknown quantity or unit, or a quantity that the log does not have.
+        A quantity or unit is unknown, or the log does not have the quantity.
 
     Examples
     --------
@@ -144,7 +144,7 @@ def convert_units(frame: pd.DataFrame, units: Mapping[str, str]) -> pd.DataFrame
 
 
 def _columns_of(quantity: str, frame: pd.DataFrame, units: Mapping[str, str]) -> list[str]:
-    """Columns of a quantity for which ``units`` says nothing of their own."""
+    """Columns of a quantity without separate entries in ``units``."""
     return [
         name
         for name in frame.columns

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Version of skidyn and of what it runs on."""
+"""Versions of skidyn, Python and dependencies."""
 
 import platform
 import sys
 
-# The order in which a reader looks for the culprit: ours, then what it computes with, then extras.
+# In order of relevance for a bug report: skidyn, its dependencies, then extras.
 _CORE = (
     "skidyn",
     "scikit-learn",
@@ -24,7 +24,7 @@ _OPTIONAL = (
 
 def package_version(package: str = "skidyn") -> str:
     """Version of an installed distribution, ``"not installed"`` where there is none."""
-    # importlib.metadata pulls in the email package: not worth it on every import of skidyn
+    # importlib.metadata imports the email package, which would slow every import of skidyn
     from importlib.metadata import PackageNotFoundError, version
 
     try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Files are written whole or not at all, and never over what they were made from."""
+"""Writing of files in one step, and never over inputs."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from skidyn._plain import plain
 
 PathLike = str | os.PathLike[str]
 
-#: Files that the running command reads; None outside a command, where they are not known.
+#: Files that the running command reads; None outside a command, where they are unknown.
 _INPUTS: ContextVar[set[tuple[int, int]] | None] = ContextVar("inputs", default=None)
 
 
 @contextmanager
 def keeping_inputs() -> Iterator[None]:
-    """Refuse to write onto what :func:`keep` names meanwhile."""
+    """Refuse to write onto files protected by :func:`keep` inside the block."""
     token = _INPUTS.set(set())
     try:
         yield
@@ -34,9 +34,9 @@ def keeping_inputs() -> Iterator[None]:
 
 
 def keep(paths: Iterable[PathLike]) -> None:
-    """Protect files that are read, under whatever name they may be written.
+    """Protect input files from being overwritten under any name.
 
-    A folder stands for all files in it, and a pattern for all that it matches.
+    A folder means all files in it, and a pattern all its matches.
     """
     known = _INPUTS.get()
     if known is None:
@@ -45,7 +45,7 @@ def keep(paths: Iterable[PathLike]) -> None:
         for name in [path, *_inside(os.fspath(path))]:
             try:
                 found = os.stat(name)
-            except (OSError, ValueError):  # the reader says what is wrong with it
+            except (OSError, ValueError):  # the reader reports the error
                 continue
             known.add((found.st_dev, found.st_ino))
 
@@ -61,12 +61,12 @@ def _inside(path: str) -> Iterator[str]:
 
 
 def writable(path: PathLike) -> Path:
-    """Where a file that is to be written really lies.
+    """Real path of a file to be written.
 
     Parameters
     ----------
     path : path
-        Name of the file. A symbolic link stands for its target.
+        Name of the file. A symbolic link means its target.
 
     Returns
     -------
@@ -76,8 +76,8 @@ def writable(path: PathLike) -> Path:
     Raises
     ------
     SkidynError
-        There is something else than a regular file (a folder, a device, a pipe), or an input of
-        the running command.
+        The path is not a regular file (a folder, a device, a pipe), or is an input of the running
+        command.
     """
     target = Path(os.path.realpath(path))
     try:
@@ -97,25 +97,25 @@ def writable(path: PathLike) -> Path:
 
 @contextmanager
 def replacing(path: PathLike) -> Iterator[Path]:
-    """Write a file in one step: a full disk, an error or a killed process leave the old one.
+    """Write a file in one step: after a full disk or a killed process the old one remains.
 
     Parameters
     ----------
     path : path
-        File to write; see :func:`writable`. Folders that are missing are made.
+        File to write; see :func:`writable`. Missing folders are created.
 
     Yields
     ------
     Path
-        File with the same ending in the same folder, to be written instead; it takes the place of
-        the other when the block ends well. Its mode is that of any new file.
+        File with the same ending in the same folder, to be written instead; it replaces the other
+        when the block ends without an error. It has the mode of a new file.
 
     Raises
     ------
     SkidynError
         See :func:`writable`.
     OSError
-        The file cannot be written; the error names it.
+        The file cannot be written; the error states its name.
     """
     target = writable(path)
     try:
@@ -123,11 +123,11 @@ def replacing(path: PathLike) -> Iterator[Path]:
         with tempfile.TemporaryDirectory(dir=target.parent, prefix=".skidyn-") as folder:
             part = Path(folder, target.name)
             yield part
-            with part.open("rb+") as file:  # on the disk before the old file is given up
+            with part.open("rb+") as file:  # on the disk before the old file is replaced
                 os.fsync(file.fileno())
             os.replace(part, target)
     except OSError as error:
-        # What fails amid the writing has no name, or that of a file the user has never seen.
+        # An error during writing has no name, or that of a file unknown to the user.
         raise OSError(error.errno, error.strerror or str(error), os.fspath(path)) from error
 
 

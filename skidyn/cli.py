@@ -15,7 +15,7 @@ from typing import Any, NoReturn, TextIO, cast
 
 from skidyn._exceptions import LogWarning, SkidynError
 
-#: Exit codes: done; a gate was failed; the input is at fault; stopped by the user.
+#: Exit codes: success; failed gate; error in the input; stopped by the user.
 DONE, FAILED, BAD_INPUT, STOPPED = 0, 1, 2, 130
 
 _DESCRIPTION = """\
@@ -42,12 +42,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Parameters
     ----------
     arguments : sequence of str, optional
-        Words after ``skidyn``; those of the process by default.
+        Arguments after ``skidyn``; those of the process by default.
 
     Returns
     -------
     int
-        Exit code: 0 done, 1 failed ``compare --fail-above``, 2 the input is at fault, 130 stopped
+        Exit code: 0 success, 1 failed ``compare --fail-above``, 2 error in the input, 130 stopped
         by Ctrl-C.
 
     Examples
@@ -57,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     0
     """
     command = "skidyn"
-    try:  # imports too: they take a second, in which somebody may press Ctrl-C
+    try:  # imports too: they take a second, in which the user may press Ctrl-C
         from skidyn._commands._arguments import check_files
         from skidyn._writing import keeping_inputs
 
@@ -75,13 +75,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
             try:
                 check_files(options)
                 passed = options.run(options) is not False
-                sys.stdout.flush()  # here, where a full disk is still told
-            finally:  # what is odd about a log often explains why it was refused
-                told = getattr(options, "told", ())  # by the command itself, among its results
+                sys.stdout.flush()  # here, where a full disk is still reported
+            finally:  # warnings often explain why a log was refused
+                told = getattr(options, "told", ())  # reported by the command itself
                 for text in dict.fromkeys(str(w.message) for w in caught if _is_ours(w)):
                     if text not in told:
                         _complain(f"warning: {text}")
-    except BrokenPipeError:  # the reader, such as head, has seen enough
+    except BrokenPipeError:  # the reader, such as head, has closed the pipe
         _give_up_output()
     except (SkidynError, OSError, ImportError) as error:
         _complain(f"{command}: {error}")
@@ -99,7 +99,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _keep_freed_memory() -> None:
-    """Let glibc use the memory of freed arrays again; giving it back and asking takes a tenth."""
+    """Let glibc reuse the memory of freed arrays, which saves a tenth of the time."""
     if not sys.platform.startswith("linux"):
         return
     import ctypes
@@ -146,7 +146,7 @@ def make_parser() -> argparse.ArgumentParser:
 
 
 def _open_closed_streams() -> None:
-    """Discard the output where it is closed, and print ASCII where it takes nothing else."""
+    """Discard output to a closed stream, and print ASCII if the stream supports nothing else."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:
@@ -156,25 +156,25 @@ def _open_closed_streams() -> None:
 
 
 def _give_up_output() -> None:
-    """What is still buffered must not raise again when Python shuts down."""
+    """Prevent buffered output from raising again when Python shuts down."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _plainly(error: UnicodeError) -> tuple[str, int]:
-    """Signs that an encoding lacks, by ones that it has."""
+    """Replacements of characters that an encoding lacks."""
     assert isinstance(error, UnicodeEncodeError)
     lost = error.object[error.start : error.end]
     return "".join(_SIGNS.get(sign, "?") for sign in lost), error.end
 
 
-#: How signs are printed where the output is ASCII.
+#: Replacements of characters for ASCII output.
 _SIGNS = {"±": "+-", "²": "^2", "·": "*", "°": " deg", "→": "->", "–": "-", "—": "-", "µ": "u"}
 PLAIN = "skidyn.plain"
 codecs.register_error(PLAIN, _plainly)
 
 
 def _fitting() -> AbstractContextManager[Any]:
-    """Print lines that fit where a person looks; the bytes of a pipe or file are left alone."""
+    """Fit lines to the width of a terminal; output to a pipe or file is unchanged."""
     from skidyn._commands._terminal import FittingStream
 
     if not sys.stdout.isatty():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Errors and warnings of skidyn; every error is a ValueError that says how to fix the input."""
+"""Errors and warnings of skidyn; every error is a ValueError that states how to fix the input."""
 
 from skidyn._exceptions import (
     ColumnError,

@@ -4,7 +4,7 @@
     python benchmarks/diagnosis/catalogue_time.py
 
 The evidence pass smooths 100,000 rows of 7 joints, evaluates the torque regressor and averages it;
-the search tries every kind on every joint and takes the second look at the reversals.
+the search tries every kind on every joint and includes the second search at the reversals.
 """
 
 from __future__ import annotations

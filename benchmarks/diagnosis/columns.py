@@ -3,8 +3,8 @@
 
 Usage: python benchmarks/diagnosis/columns.py [--rows 100000] [--old CHECKOUT]
 
-``--old`` names the root of another version (``git worktree add`` makes one). Both are run in turn;
-the last column says by how much their columns differ, relative to the largest entry.
+``--old`` is the root of another version (made by ``git worktree add``). Both are run alternately;
+the last column is the difference of their columns, relative to the largest entry.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How sure a name is: the reliability of the stated probabilities, and weights fitted to them.
+"""Reliability of the stated confidence of findings, and weights fitted to it.
 
     python benchmarks/diagnosis/confidence.py TRUTH.json REPORTS [TRUTH.json REPORTS ...]
 
-``REPORTS`` holds one ``report.json`` a log, as ``practice.py --reports`` writes it, named after its
-case. The names of an effect on several joints count once.
+``REPORTS`` contains one report per log, written by ``practice.py --reports`` and named after its
+case. An effect on several joints counts once.
 """
 
 from __future__ import annotations

@@ -3,9 +3,8 @@
 
     python benchmarks/diagnosis/coverage.py [--seeds 12] [--jobs 2]
 
-Counted are the linear coefficients of effects that were named rightly. Of a coefficient that the
-simulator makes by another formula than the one fitted (see its name) nothing is expected; these
-kinds are left out.
+The linear coefficients of correctly identified effects are counted. Kinds for which the simulator
+uses another formula than the fitted one are left out.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Do the stated limits hold? An effect as large as its limit should be found in 80 % of the logs.
+"""Test of the stated limits: an effect as large as its limit should be found in 80 % of the logs.
 
     python benchmarks/diagnosis/limits.py [--jobs 2]
 
-The limit of every effect is read from the diagnosis of a log that hides nothing. Torque of that
-effect, times a factor, is then added to the log, with the shape that is hardest to see, and the log
-is diagnosed again. An answer counts as found if a finding names the effect, or one that the finding
-itself calls indistinguishable from it, on this joint.
+The limit of every effect is read from the diagnosis of a log without a hidden effect. The torque of
+that effect, times a factor, is then added to the log, with the shape that is hardest to detect, and
+the log is diagnosed again. The effect counts as found if a finding on this joint is of its kind, or
+lists its kind as a rival.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""False alarms: simulated logs that hide nothing must be called complete.
+"""False-alarm rate: simulated logs without a hidden effect must be called complete.
 
     python benchmarks/diagnosis/nothing_hidden.py [--logs 200] [--first 0] [--jobs 2]
 

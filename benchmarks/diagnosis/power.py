@@ -4,12 +4,12 @@
     python benchmarks/diagnosis/power.py [--jobs 2] [--picture power.png]
     python benchmarks/diagnosis/power.py --table TEXT --picture power.png
 
-The second line draws the table that the first has printed; TEXT may be the page of the user guide
-that shows it, docs/user_guide/diagnosis_measured.rst.
+The second command plots the table that the first has printed; TEXT may be the page of the user
+guide with this table, docs/user_guide/diagnosis_measured.rst.
 
 The size is the root mean square of the effect's torque over the noise of the torque sensor, on the
-joint that has it; of hysteresis, which takes the place of Coulomb friction, its largest torque. An
-answer is right if it names the effect (of the hysteresis family, any member) on that joint and
+joint that has it; for hysteresis, which replaces Coulomb friction, it is its largest torque. An
+answer is right if it identifies the effect (any member for the hysteresis family) on that joint and
 nothing else.
 """
 

@@ -5,7 +5,8 @@
     python SCORE.py --truth TRUTH.json --answers OUT
 
 Every case is a folder with log.parquet, robot.urdf and meta.json (``base_model``: what the user's
-model has). One process per case, as a user would run it; answers are written one JSON a case.
+model has). Each case runs in one process, as for a user; answers are written to one JSON file per
+case.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the diagnosis finds on recordings of real robots, beside what is known of them.
+"""Findings of the diagnosis on recordings of real robots, compared with known facts.
 
     SKIDYN_DATA=FOLDER python benchmarks/diagnosis/real_recordings.py [NAME ...]
 
-Default options throughout. A recording whose folder is absent is left out and said so.
+All options have their defaults. A recording whose folder is absent is left out with a message.
 """
 
 from __future__ import annotations

@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How long an engineer waits: diagnosis of short and long logs, of more joints, and what follows.
+"""Times of commands: diagnosis of short and long logs, of more joints, and later commands.
 
 Usage: python benchmarks/diagnosis/seconds.py [--old CHECKOUT] [--only NAME ...] [--rows 300000]
 
-Every case runs in a fresh process: CPU seconds of it, the start of Python included (modules were
-compiled before, as after an installation), wall seconds and peak memory. ``--old`` names the root
-of another version (``git worktree add`` makes one) that is run in turn with this one, for the ratio
-of CPU seconds. On a machine that others use, only CPU seconds and ratios of one run are worth
-comparing.
+Every case runs in a fresh process: CPU seconds including the start of Python (modules were compiled
+before, as after an installation), wall seconds and peak memory. ``--old`` is the root of another
+version (made by ``git worktree add``), which is run alternately with this one, for the ratio of CPU
+seconds. On a shared machine, only CPU seconds and ratios of one run can be compared.
 """
 
 from __future__ import annotations

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The usual ways to choose terms, and skidyn's, on the same columns of the same logs.
+"""The usual methods of selecting terms, and skidyn's, on the same columns of the same logs.
 
     python -m pip install pysindy
     python benchmarks/diagnosis/side_by_side.py [--jobs 2]
 
-Every method sees the same averaged rows of the first eight trajectories: the torque and the columns
-of every effect of the catalogue on its grid of shapes, the rigid body with viscous and Coulomb
-friction swept out of both. It chooses columns; the model with them is fitted to these trajectories
-and its error measured on the two that are left, as a share of the base model's. A name is right if
-the hidden effect is among those chosen on its joint (of the hysteresis family, any member); every
-other kind chosen is a false alarm.
+Every method gets the same averaged rows of the first eight trajectories: the torque and the columns
+of every effect of the catalogue on its grid of shapes, with the rigid body and viscous and Coulomb
+friction eliminated from both. It selects columns; the model with them is fitted to these
+trajectories, and its error is measured on the two others, as a share of the base model's. The
+answer is right if the hidden effect is among the selected ones on its joint (any member for the
+hysteresis family); every other selected kind is a false alarm.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 """One sample at a time: Python, exported C through ctypes, pinocchio.
 
 Run with ``python benchmarks/engine/bench_single.py``. Needs pinocchio and a C compiler.
-Prints percentiles of the CPU time of a call in microseconds, less that of an empty call: the clock
-on the wall also counts how often a busy machine takes the core away.
+Prints percentiles of the CPU time of a call in microseconds, minus that of an empty call, because
+wall time includes interruptions on a busy machine.
 """
 
 from __future__ import annotations

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Dynamics and networks on a GPU beside those on a CPU: time, and how far the answers differ.
+"""Dynamics and networks on a GPU and on a CPU: times, and differences of the results.
 
 Usage: python benchmarks/engine/devices.py [--samples 100000] [--devices cpu cuda]
 
-Inverse dynamics and regressor of the Panda in float64 and float32, microseconds per sample, the
-NumPy engine beside them; then the fit of an NDLRegressor on a simulated log, seconds. Times are the
-least of five, after a first call that is not counted, with the device idle before and after.
+Inverse dynamics and regressor of the Panda in float64 and float32, microseconds per sample, and the
+same with the NumPy engine; then the fit of an NDLRegressor on a simulated log, seconds. Times are
+the smallest of five, after a first call that is not counted, with the device synchronised before
+and after.
 """
 
 from __future__ import annotations

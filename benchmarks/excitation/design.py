@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What designed motions are worth, beside random Fourier motions within the same limits.
+"""Designed motions compared with random Fourier motions within the same limits.
 
 For each robot: CPU time of the design, condition number of the base regressor, logarithm of the
 determinant of the information matrix, and the relative standard error of the base parameters that

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Motions that others designed and recorded, beside ones that skidyn designs within the same reach.
+"""Motions designed and recorded by others, compared with motions of skidyn in the same range.
 
     SKIDYN_DATA=FOLDER python benchmarks/excitation/recorded.py [--robots lwr4,tx40,panda,ur10e]
 
 LWR4+: designed by FloBaRoID; TX40: Janot and Gautier's, in figaroh's example; Panda: Gaz et al.;
 UR10e: Mamedov and Mikhel. skidyn's motions last as long and stay within the recorded positions,
 speeds, accelerations (99.9 % of them) and torques of every joint. Condition number of the columns
-of base parameters, viscous and dry friction: with columns of equal length, and in SI units as they
-are, which is what figaroh and FloBaRoID print. Precision: one over the standard error of white
-noise, geometric mean over the coefficients (the determinant), relative to the recorded motion.
+of base parameters, viscous and dry friction: with columns of equal length, and in SI units, as
+printed by figaroh and FloBaRoID. Precision: one over the standard error of white noise, geometric
+mean over the coefficients (the determinant), relative to the recorded motion.
 """
 
 from __future__ import annotations

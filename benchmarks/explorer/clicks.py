@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How soon the explorer answers a click, on recordings of a real UR10e.
+"""Response time of the explorer to a click, on recordings of a real UR10e.
 
-On every joint each of the best effects is ticked and taken back. Processor time is what a free
-core needs; the rest of the wall time is other work of the machine.
+On every joint each of the best effects is added and removed. Processor time is the time on a free
+core; the rest of the wall time is due to other processes.
 
     SKIDYN_DATA=recordings python benchmarks/explorer/clicks.py [--runs 24]
 """

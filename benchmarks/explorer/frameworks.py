@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Frameworks for the explorer's page: what they weigh and how soon their first plot is there.
+"""Frameworks for the explorer's page: their size and the time to the first plot.
 
 Each gets a fresh virtual environment and the same task: a page with one plot of 1500 points and a
-button. Measured are packages and megabytes beside a bare environment, seconds from starting Python
-to the first answer and to the plot in Chromium, and what the browser loads for it.
+button. The script measures packages and megabytes in addition to an empty environment, seconds from
+the start of Python to the first response and to the plot in Chromium, and the data loaded by the
+browser.
 
     python benchmarks/explorer/frameworks.py --folder /somewhere/with/space
 """

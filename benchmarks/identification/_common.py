@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Robots in skidyn and pinocchio, motions and interleaved timing, for the scripts beside this."""
+"""Robots in skidyn and pinocchio, motions and interleaved timing, for these scripts."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Digits that Gram matrices and triangular factors keep, and which of them is taken.
+"""Accuracy of Gram matrices and triangular factors, and the automatic choice.
 
     python benchmarks/identification/accuracy.py
 
 Exact torque of a Panda whose motion shrinks toward one pose, so that the columns become dependent.
-Printed is the largest error of a base parameter, relative to the largest; the condition number is
-that of columns of unit size.
+It prints the largest error of a base parameter, relative to the largest parameter; the condition
+number is that of columns of unit size.
 """
 
 from __future__ import annotations

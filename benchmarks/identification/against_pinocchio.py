@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Identification from arrays beside pinocchio's and figaroh's: the same numbers, and the time.
+"""Identification from arrays, compared with pinocchio and figaroh: differences and times.
 
     python benchmarks/identification/against_pinocchio.py [n_samples]
 
-Needs pinocchio (``pip install pin``); figaroh (``pip install figaroh``) where it is to be compared.
-Both sides take turns in one process on one thread; ratios of the best CPU times of 3 rounds, on the
-same columns: the rigid body, and for figaroh's regressor also with its four columns of every joint
-beside it (viscous, dry friction, rotor inertia, offset).
+Needs pinocchio (``pip install pin``); figaroh (``pip install figaroh``) for the comparison with it.
+Both sides are run alternately in one process on one thread; ratios of the best CPU times of 3
+rounds, on the same columns: the rigid body, and for figaroh's regressor also with its four
+additional columns of every joint (viscous, dry friction, rotor inertia, offset).
 """
 
 from __future__ import annotations

@@ -9,8 +9,8 @@ turn; those that BAM published were fitted to recordings that may be among them.
 
     python benchmarks/identification/bam_xl330.py bam_pendulum.npz --published bam/params/xl330
 
-``--in-bam`` lets BAM's own program (``pip install better-actuator-models``) simulate instead of our
-steps, to which ours stay fitted.
+With ``--in-bam``, BAM's own program (``pip install better-actuator-models``) is used for the
+simulation instead of our time steps, with which our parameters were fitted.
 """
 
 import argparse

@@ -6,11 +6,11 @@
 
 Both get the same filtered motion and unfiltered torque, and the same model: rigid body, viscous and
 dry friction, offset, rotor inertia. figaroh: its regressor, base parameters by QR, least squares
-weighted joint by joint, on all samples as in its examples (without those at rest it errs more on
-the TX40, as much on the UR10e). skidyn: ``RBDRegressor``, and with what its diagnosis names. TX40:
-one run of 9 s, positions low-passed at 100 Hz as in figaroh's example, every tenth sample; fitted
-to the first 6 s, tested on the rest. UR10e: as in ``ur10e.py``, one run of 30 s and one of 50 s two
-days later. Errors in percent of the torque's norm.
+weighted joint by joint, on all samples as in its examples (without those at rest its error is
+larger on the TX40, equal on the UR10e). skidyn: ``RBDRegressor``, without and with the findings of
+its diagnosis. TX40: one run of 9 s, positions low-passed at 100 Hz as in figaroh's example, every
+tenth sample; fitted to the first 6 s, tested on the rest. UR10e: as in ``ur10e.py``, one run of 30
+s and one of 50 s two days later. Errors in percent of the torque's norm.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Panda and UR10e: error of the simulated motion with and without each finding of the diagnosis.
 
-Models are driven by the measured torque of recordings, or stretches of the only one, that were left
-out of their fit, and are put back on the log every second. The error is that of the position,
-joint by joint relative to a model without forces, mean over the joints; each finding stands on top
-of those before it that do not worsen the motion.
+Models are driven by the measured torque of recordings, or intervals of a single one, that were left
+out of their fit, and are reset to the log every second. The error is that of the position of each
+joint relative to a model without forces, mean over the joints; each finding is added to previous
+ones that do not worsen the motion.
 
     python benchmarks/identification/findings_simulated.py FOLDER [--robots panda ur10e]
 """

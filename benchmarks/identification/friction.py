@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Friction of a Staubli TX40 and a Franka Panda beside the values published with the recordings.
+"""Friction of a Staubli TX40 and a Franka Panda, and values published with the recordings.
 
     SKIDYN_DATA=FOLDER python benchmarks/identification/friction.py
 

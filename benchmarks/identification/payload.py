@@ -4,7 +4,7 @@
     SKIDYN_DATA=FOLDER python benchmarks/identification/payload.py
 
 Payloads with the published drive gains times 0.91, which is one factor for all joints and days; the
-drive gains beside the published set and the recorders' own estimate.
+drive gains, the published set and the estimate of the recordings' authors.
 """
 
 from __future__ import annotations

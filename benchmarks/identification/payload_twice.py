@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The mass of a payload from one log by two ways: ``identify_payload`` and ``diagnose``.
+"""The mass of a payload from one log by two methods: ``identify_payload`` and ``diagnose``.
 
     python benchmarks/identification/payload_twice.py --seed 1 --logs 8
 
 Simulated UR5 and Panda, low and high noise; some trajectories of a log carry a payload.
-``identify_payload`` is told which, ``diagnose`` finds it. Printed are both masses with their 95 %
-intervals, and how often each holds the truth and both agree.
+``identify_payload`` is given these trajectories, ``diagnose`` finds them. The script prints both
+masses with their 95 % intervals, and how often each interval contains the truth and both agree.
 """
 
 from __future__ import annotations

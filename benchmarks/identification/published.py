@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""KUKA LWR4+ and EMPS beside what others publish for the same recordings.
+"""KUKA LWR4+ and EMPS, compared with published results for the same recordings.
 
     SKIDYN_DATA=FOLDER python benchmarks/identification/published.py
 
-LWR4+: fitted to the first recording, judged on the second one (the same motion) as FloBaRoID does,
-and on the third (a faster one), which it has no figure for; the first 500 samples of each are left
-out, as there. The figure is the mean over joints of the root mean square error over the range of
-the torque that the description allows, in percent. FloBaRoID's (documentation/analysis_findings.md)
-are for bodies that can exist, viscous and dry friction, and three ways of pulling towards the
-description. EMPS: the parameters that its authors identify (Janot, Gautier, Brunot, 2019), from
-positions and the force.
+LWR4+: fitted to the first recording, tested on the second one (the same motion) as FloBaRoID does,
+and on the third (a faster one), for which it gives no figure; the first 500 samples of each are
+left out, as there. The figure is the mean over joints of the root mean square error over the range
+of the torque in the description, in percent. FloBaRoID's (documentation/analysis_findings.md) are
+for physically consistent bodies, viscous and dry friction, and three kinds of regularisation
+towards the description. EMPS: the parameters that its authors identify (Janot, Gautier, Brunot,
+2019), from positions and the force.
 """
 
 from __future__ import annotations

@@ -4,12 +4,12 @@
 Ten motions of the SAGE project (github.com/isaac-sim2real/sage, Apache-2.0) are read from a folder
 with one folder each (``state_motor.csv.gz``, ``control.csv.gz``) and ``so101.urdf``. Gain and delay
 of the servos, and friction, are fitted to nine motions; the tenth is simulated in closed loop from
-its commands, put back on the log every second. Before: bodies of the URDF behind the servo; after:
+its commands and reset to the log every second. Before: bodies of the URDF and the servo; after:
 with viscous and dry friction, rotor inertia and offset.
 
     python benchmarks/identification/so101_simulation.py FOLDER
 
-``--gains`` prints only the gain and the delay that follow from each motion by itself.
+``--gains`` prints only the gain and the delay fitted to each motion alone.
 """
 
 import argparse

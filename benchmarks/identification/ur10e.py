@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""UR10e: held-out error of torques as they were measured, without any filter.
+"""UR10e: held-out error of the measured torques without any filter.
 
     SKIDYN_DATA=FOLDER python benchmarks/identification/ur10e.py
 
 Trained on one run of 30 s, tested on a run of 50 s recorded two days later and on point-to-point
 motion. Torque is the published drive gains times current, never filtered. Velocities are the
 measured ones, low-passed without delay at 20 Hz, and accelerations their central differences. Of
-the two exciting runs the rows are taken that the recorders use; of the last one rest before and
-after the motion is cut off. The relative error is the norm of the residual over the norm of the
+the two exciting runs, the rows used by the authors are taken; of the last one, rest before and
+after the motion is removed. The relative error is the norm of the residual over the norm of the
 torque, on all samples and on those where the joint moves by more than 0.03 rad/s.
 """
 

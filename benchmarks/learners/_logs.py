@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Recordings and simulated logs for regressors as they come: a table, a torque and folds."""
+"""Recordings and simulated logs for regressors: a table, a torque and folds."""
 
 from __future__ import annotations
 

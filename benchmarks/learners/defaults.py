@@ -3,10 +3,10 @@
 
     SKIDYN_DATA=... python benchmarks/learners/defaults.py
 
-Printed is the error on held-out parts: RMSE over the standard deviation of the torque, mean over
-the joints. Physics is ``RBDRegressor`` with plain friction; "Ridge" is ten lines of
-scikit-learn on the columns of rigid body and friction. ``--unseen`` takes the logs that had no part
-in settling learners, ``--fresh`` simulated ones that had none in anything; ``--only`` names logs,
+It prints the error on held-out parts: RMSE over the standard deviation of the torque, mean over the
+joints. Physics is ``RBDRegressor`` with plain friction; "Ridge" is ten lines of scikit-learn on the
+columns of rigid body and friction. ``--unseen`` uses the logs that were not used to develop the
+learners, ``--fresh`` simulated ones that were used for nothing; ``--only`` selects logs,
 ``--models`` estimators, ``--joints`` prints joints.
 """
 

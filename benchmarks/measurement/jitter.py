@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What stamps that jitter do to logs without a hidden effect, with the remedy and without.
+"""Influence of jittering time stamps on logs without a hidden effect, with and without the remedy.
 
 Usage: python benchmarks/measurement/jitter.py [--diagnose]
 
 Three robots and six clocks each: stamps that are off by up to 0.1, 0.3 and 1 ms, evenly and
-normally, and seconds in single precision. Printed are what is told, and held-out errors with the
-recorded and the fixed stamps over those with the true clock; ``--diagnose`` also says what a
-diagnosis of the log, fixed where that is told, finds.
+normally, and seconds in single precision. It prints the suspicions, and held-out errors with the
+recorded and the fixed stamps relative to those with the true clock; ``--diagnose`` also prints the
+findings of a diagnosis of the log, fixed if this is suggested.
 """
 
 from __future__ import annotations

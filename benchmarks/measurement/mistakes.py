@@ -1,17 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How many mistakes in logs are named, how many are named that are none, and what fixing gives.
+"""Rates of detected mistakes in logs and of false suspicions, and results of the remedies.
 
 Usage: python benchmarks/measurement/mistakes.py [--cases FOLDER] [--seed 1] [--logs 5]
        [--sample 5] [--only jitter,order] [--fix] [--verbose]
 
-Logs, half of them with a hidden effect, are spoiled in one way each (see ``spoils.py`` and
-``spoils_of_*.py`` beside it). Printed are, by mistake, in how many logs it was named on the right
-joints with the right remedy, in how many of these it was certain, and in how many logs something
-else was suspected that is not suspected in the log without the mistake. ``--fix`` reads the spoiled
-log again with the remedy and prints in how many of the logs with one that gave back the recorded
-columns; ``--diagnose`` compares the diagnosis of the fixed log with that of the clean one where it
-did not. ``--cases`` takes a folder of logs of another simulator (``*/log.parquet`` and
-``robot.urdf``).
+One mistake is made in each log, half of which have a hidden effect (see ``spoils.py`` and
+``spoils_of_*.py``). For every mistake it prints the number of logs in which it was reported on the
+right joints with the right remedy, the number of these in which it was certain, and the number of
+logs with another suspicion that the log without the mistake does not have. ``--fix`` reads the log
+again with the remedy and prints in how many cases this restored the recorded columns;
+``--diagnose`` compares the diagnosis of the fixed log with that of the clean one where it did not.
+``--cases`` takes a folder of logs of another simulator (``*/log.parquet`` and ``robot.urdf``).
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the checks say of public recordings.
+"""Suspicions of the checks about public recordings.
 
 Usage: python benchmarks/measurement/recordings.py FOLDER
 

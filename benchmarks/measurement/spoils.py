@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Mistakes that logs are spoiled with.
+"""Mistakes to be made in logs.
 
-Each returns the log, the robot that is claimed, and what should be said of it.
+Each returns the log, the stated robot, and the expected suspicion.
 """
 
 from __future__ import annotations

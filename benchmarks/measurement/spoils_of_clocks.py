@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Mistakes of clocks, of single recordings, of geometry, and of everything before the gears."""
+"""Mistakes of clocks, of single recordings, of geometry, and of signals before the gears."""
 
 from __future__ import annotations
 

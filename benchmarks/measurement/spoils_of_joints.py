@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Mistakes of the columns of single joints, as owners of robots make them."""
+"""Typical mistakes of users in the columns of single joints."""
 
 from __future__ import annotations
 

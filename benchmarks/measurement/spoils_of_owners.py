@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Mistakes of exports and descriptions, made between the recorder and the check."""
+"""Mistakes of exports and descriptions, made between the logger and the check."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Mistakes of single rows, joints and recordings, and of channels that are not what they say."""
+"""Mistakes of single rows, joints and recordings, and of channels with wrong names."""
 
 from __future__ import annotations
 

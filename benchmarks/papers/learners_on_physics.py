@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Ask whether a learner beats the physics that a diagnosis completed.
+"""Comparison of learners with physics completed by a diagnosis.
 
     SKIDYN_DATA=... python benchmarks/papers/learners_on_physics.py --only emps --learners ELM
 
 Held-out recordings (pairs of dates for the UR10e, quarters of the path for the Panda, blocks for
-EMPS) of five logs. In every fold the physics is completed anew by the diagnosis, which sees the
-training rows alone; learners come on top through HybridRegressor with its defaults. Printed are the
-RMSE relative to BASE (least squares of rigid body and plain friction on low-passed signals), and
-the learner against its own physics with a 95 % interval over recordings. The practice logs are
-simulated; they are found beside the recordings (``../practice``).
+EMPS) of five logs. In every fold the physics is completed by a diagnosis of the training rows only;
+learners are added by HybridRegressor with its defaults. The script prints the RMSE relative to BASE
+(least squares of rigid body and plain friction on low-passed signals), and relative to the
+learner's own physics with a 95 % interval over recordings. The practice logs are simulated; they
+are in a folder next to the recordings (``../practice``).
 """
 
 from __future__ import annotations

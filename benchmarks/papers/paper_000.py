@@ -4,8 +4,8 @@
     SKIDYN_DATA=... python benchmarks/papers/paper_000.py
 
 Prints the paper's uncompensated residual, tables IV to VII for one-step-ahead forecasting (the only
-protocol that reproduces the paper), for random rows, and for held-out parts of the path; the last
-one is the only one that says how well a torque model predicts a motion it has not seen.
+protocol that reproduces the paper), for random rows, and for held-out parts of the path; only the
+last one measures the error of a torque model on new motion.
 """
 
 from __future__ import annotations

@@ -3,14 +3,13 @@
 The loop
 ========
 
-Compare a model with measurements, see where it fails, learn which effect is missing, add it, watch
-the error fall. The robot is simulated here, so that what is found can be compared with what was
-hidden: the pre-sliding friction of joint 3 and a spring at joint 2.
+Compare a model with measurements, see where it fails, find the missing effect, add it, and compare
+the errors. The robot is simulated here, so that the findings can be compared with the hidden
+effects: pre-sliding friction of joint 3 and a spring at joint 2.
 """
 
 # %%
-# A log: 8 trajectories of 6 s of a UR5. Two trajectories are put aside and used by nothing below
-# until the end.
+# A log: 8 trajectories of 6 s of a UR5. Two trajectories are held out and used only at the end.
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -25,8 +24,8 @@ aside = (log.X["trajectory"] > 6).to_numpy()
 X, y = log.X[~aside], log.y[~aside]
 
 # %%
-# **Compare.** The model that most people have: a rigid body, viscous and Coulomb friction. It is
-# fitted once for every trajectory that it then predicts.
+# **Compare.** The usual model: a rigid body, viscous and Coulomb friction. Each trajectory is
+# predicted by a model that was fitted to the other ones.
 model = RBDRegressor(log.robot, effects=("viscous", "coulomb"))
 diagnosis = diagnose(model, X, y)
 TorqueDisplay.from_estimator(model.fit(X, y), X, y, joint=3, trajectory=1)
@@ -38,23 +37,23 @@ for failure in diagnosis.failures[:4]:
 ErrorMapDisplay.from_diagnosis(diagnosis)
 
 # %%
-# **Learn what is missing**, with the line of code that adds it.
+# **Find the missing effects**, with the line of code that adds each.
 for finding in diagnosis.findings:
     print(finding.sentence)
     print("   ", finding.code)
 
 # %%
-# The evidence for the first of them: what the model leaves over, against the signal that the effect
-# follows, and the effect's own curve.
+# The evidence for the first of them: the residual of the model against the signal on which the
+# effect depends, and the curve of the effect.
 ResidualDisplay.from_finding(diagnosis.findings[0])
 
 # %%
-# **Add it and watch the error fall**, here of joint 3. What is left above the noise floor lies at
-# the starts of trajectories: how far the friction was wound up before is not in the log.
+# **Add them and compare the errors**, here of joint 3. The remaining error above the noise floor is
+# at the starts of trajectories: the state of the friction before them is not in the log.
 ErrorBudgetDisplay.from_diagnosis(diagnosis, joint=3)
 
 # %%
-# **On motion that nobody has seen**: the two trajectories put aside.
+# **On new motion**: the two held-out trajectories.
 before = model.predict(log.X[aside]) - log.y[aside]
 after = diagnosis.model.predict(log.X[aside]) - log.y[aside]
 rmse = np.sqrt([(before**2).mean(axis=0), (after**2).mean(axis=0)])

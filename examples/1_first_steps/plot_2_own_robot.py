@@ -3,12 +3,12 @@
 Your own robot and your own log
 ===============================
 
-A URDF, CSV files with column names of your own, units that are not SI: from there to a model whose
-error has been judged. The files are made up here; put yours in their place.
+From a URDF and CSV files with your own column names and units to a model with a known error. The
+files are generated here; replace them by yours.
 """
 
 # %%
-# Two files, as a recorder might have written them: positions in degrees, time in milliseconds.
+# Two files, as a logger could write them: positions in degrees, time in milliseconds.
 import tempfile
 import warnings
 from pathlib import Path
@@ -56,8 +56,8 @@ for number, run in made_up.frame.groupby("trajectory"):
 print(files[0].read_text()[:200])
 
 # %%
-# **Read.** Names are matched to the joints of the URDF where they are alike; velocities that are
-# not recorded are derived. What was decided is reported.
+# **Read.** Column names are matched to the joints of the URDF; velocities that are not recorded are
+# derived. All decisions are reported.
 robot = Robot.from_urdf(folder / "arm.urdf")
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # the notes are printed instead
@@ -67,7 +67,7 @@ for note in log.attrs["notes"]:
 print(log.head(3).round(3))
 
 # %%
-# **Look at the log before any model.** Had the units been forgotten, this report would show it.
+# **Check the log before any model.** Without the units, this check would show the error.
 print(check_log(log, robot))
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # the notes have been read above
@@ -75,7 +75,7 @@ with warnings.catch_warnings():
 print("\nwithout units:", check_log(forgotten, robot).warnings[0])
 
 # %%
-# **Diagnose** and write the page that can be shown to others.
+# **Diagnose** and write a page that can be shared.
 tau = log[["tau1", "tau2"]].to_numpy()
 diagnosis = diagnose(RBDRegressor(robot), log, tau)
 for finding in diagnosis.findings:

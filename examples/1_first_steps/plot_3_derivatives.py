@@ -4,8 +4,8 @@ Velocities and accelerations from noisy positions
 =================================================
 
 Accelerations multiply the inertias, and differentiating a position twice multiplies its noise.
-How much to smooth can be read from the data: a smoother that predicts each sample from its
-neighbours, without the sample itself, neither follows the noise nor loses the motion.
+The right amount of smoothing can be found from the data: a smoother that predicts each sample well
+from its neighbours, without the sample itself, neither follows the noise nor distorts the motion.
 """
 
 # %%
@@ -51,7 +51,7 @@ right.set(xlabel="time (s)", ylabel="acceleration (rad/s²)", ylim=(-90, 90))
 right.legend()
 
 # %%
-# A second channel may come late. Here a velocity that the controller reports has passed a filter.
+# A second channel may be delayed. Here the velocity logged by the controller has passed a filter.
 log["dq1"] = motion(t - 0.0125, 1)
 found = estimate_delay(table["dq1"], log["dq1"], time=log["time"])
 print(f"late by {1e3 * found.delay:.1f} ± {1e3 * found.standard_error:.1f} ms")

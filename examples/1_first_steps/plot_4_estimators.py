@@ -3,9 +3,9 @@
 Which estimator for which log
 =============================
 
-Weighted least squares is the right start and the wrong end for three kinds of logs: those with
-broken rows, those that are too poor, and those whose motion is noisy. Here all three are made from
-an arm whose truth is known, and each gets the estimator that is made for it.
+Weighted least squares is a good start, but not sufficient for three kinds of logs: those with
+broken rows, those with too little excitation, and those with noisy motion. Here all three are
+simulated with a known arm, and each is fitted with the estimator intended for it.
 """
 
 # %%
@@ -92,8 +92,8 @@ axes[1].set_xticks(cases[1][1], [str(value) for value in cases[1][1]], minor=Fal
 axes[1].minorticks_off()
 
 # %%
-# The log itself shows whether instruments were needed. With noise of 0.4, least
-# squares is off by more than chance in the coefficients with small p-values:
+# The log itself shows whether instruments are needed. With noise of 0.4, the error of least squares
+# is significant for the coefficients with small p-values:
 X, y, reference = noisy(0.4, np.random.default_rng(0))
 model = RBDRegressor(robot, ("viscous",), estimator="instrumental")
 model.fit(X, y, instruments=reference)

@@ -3,10 +3,10 @@
 Which effect looks like what?
 =============================
 
-What a missing effect leaves in the residual, drawn against the signal that shows it best. The
-motion of one arm is simulated once without and once with each effect on joint 1; the difference of
-the two torques is the torque of the effect. A report of
-:func:`skidyn.diagnosis.diagnose` draws the same picture for what it has found: compare the two.
+The residual of a model due to each missing effect, plotted against the signal that shows it best.
+The motion of one arm is simulated without and with each effect on joint 1; the difference of the
+two torques is the torque of the effect. A report of :func:`skidyn.diagnosis.diagnose` contains the
+same picture for its findings, so the two can be compared.
 """
 
 # %%
@@ -69,8 +69,8 @@ figure.supylabel("torque of the effect in N m", fontsize=9)
 plt.show()
 
 # %%
-# Every kind of the catalogue: friction, hysteresis, what depends on the position, inertia and the
-# transmission, the torque sensor, and what acts on the whole arm.
+# Every kind of the catalogue: friction, hysteresis, functions of the position, inertia and the
+# transmission, the torque sensor, and effects on the whole arm.
 KINDS = {
     "viscous": "dq", "coulomb": "dq", "stribeck": "dq", "nonlinear_viscous": "dq",
     "asymmetric_friction": "dq", "load_dependent_friction": "dq",
@@ -93,14 +93,13 @@ plt.show()
 # What separates the families:
 #
 # * **Friction** changes its sign with the direction: two branches, one per colour. Plain Coulomb
-#   friction has two level branches; Stribeck friction rises towards zero velocity, a nonlinear
-#   viscous one bends, a load-dependent one spreads with the torque that the gear carries.
+#   friction has two level branches; Stribeck friction rises towards zero velocity, nonlinear
+#   viscous friction is curved, and load-dependent friction spreads with the torque of the gear.
 # * **Hysteresis** makes loops against position: after each reversal the torque needs some travel
-#   to come over to the other branch.
-# * **Springs, compensators, stops and ripple** are one curve against position, whatever the
-#   direction.
-# * **Rotor inertia** follows the acceleration, **gain and saturation** the torque itself.
-#   Elasticity, backlash and a delay of the torque are faint: there the report's numbers decide, and
-#   it names the motion that would separate what they cannot.
-# * **Payloads and forces at the tool** are there in some recordings only; offsets that drift follow
-#   the time.
+#   to reach the other branch.
+# * **Springs, compensators, stops and ripple** are one curve against position, in both directions.
+# * **Rotor inertia** depends on the acceleration, **gain and saturation** on the torque itself.
+#   Elasticity, backlash and a delay of the torque are hard to see: use the numbers of the report,
+#   which also states the motion that would separate effects that the log cannot separate.
+# * **Payloads and forces at the tool** are present only in some recordings; drifting offsets depend
+#   on time.

@@ -3,9 +3,9 @@
 Which friction model?
 =====================
 
-The answer is a table: fit the candidates, predict trajectories that were left out, compare.
-A model that is too poor for the joint loses; one that is richer than needed hardly does. Four arms
-are simulated that differ only in the friction of joint 1.
+Fit the candidates, predict held-out trajectories, and compare the errors in a table. A model that
+is too simple for the joint has a larger error; one that is more complex than needed is hardly
+worse. Four simulated arms differ only in the friction of joint 1.
 """
 
 # %%
@@ -52,7 +52,7 @@ for row, (arm, effect) in enumerate(ARMS.items()):
     chosen[arm] = [str(kind) for kind in search.cv_results_["added"][1:]]
 
 # %%
-# The search of the diagnosis looks at the whole catalogue; what it names first is the truth.
+# The search of the diagnosis uses the whole catalogue; its first finding is the true effect.
 for arm, kinds in chosen.items():
     print(f"{arm:20s} {', '.join(kinds) or 'nothing to add'}")
 

@@ -4,9 +4,9 @@ Add an effect of your own
 =========================
 
 An arm cleans a tank: below some angle its forearm dips into a liquid, whose drag grows with the
-square of the speed. No catalogue has that. First the diagnosis says that something without a name
-is missing; then the effect is written down in a dozen lines, and from there
-on is searched, identified and reported like any other.
+square of the speed. This effect is not in the catalogue. At first the diagnosis reports an unknown
+effect; then the effect is defined in a dozen lines, and is searched, identified and reported like
+any other.
 """
 
 # %%
@@ -27,7 +27,8 @@ y = log.y.copy()
 y[:, 1] += TRUE_DRAG * np.maximum(0, q - TRUE_ENTRY) * dq * np.abs(dq)
 
 # %%
-# Without the effect: what helps most has no name, and depends on the second joint's motion.
+# Without the effect in the catalogue: the largest finding is unknown, and depends on the second
+# joint's motion.
 model = RBDRegressor(log.robot)
 nameless = diagnose(model, log.X, y)
 print("verdict:", nameless.verdict)
@@ -35,8 +36,8 @@ print(nameless.findings[0].sentence)
 
 
 # %%
-# The effect: what it is called, its coefficients with unit and sign, its shape parameters with
-# unit, a grid to try first and a range, what it may be confused with, and its column.
+# The effect: its name, its coefficients with unit and sign, its shape parameters with unit, initial
+# grid and range, the effects with which it may be confused, and its column.
 class LiquidDrag(Effect):
     """Drag of a liquid that the link dips into."""
 

@@ -4,8 +4,8 @@ Friction as features of any regressor
 =====================================
 
 :class:`~skidyn.effects.FrictionTransformer` appends the columns of friction effects to X, so that a
-plain scikit-learn regressor can use them: here a linear model per joint, and a boosted tree that is
-told the direction of motion. It is a Pipeline step like any other.
+plain scikit-learn regressor can use them: here a linear model per joint, and boosted trees with the
+direction of motion as a feature. It can be used as a Pipeline step.
 """
 
 # %%
@@ -37,7 +37,7 @@ X, y = log.X, log.y.ravel()
 
 # %%
 # The pipeline: sine and cosine of the position for gravity, friction columns, a linear model. The
-# number of the trajectory and the time are no features; ``DropKeys`` takes them out.
+# number of the trajectory and the time are not features; ``DropKeys`` removes them.
 features = DropKeys().set_output(transform="pandas")
 friction = FrictionTransformer().set_output(transform="pandas")
 trees = HistGradientBoostingRegressor(max_iter=100, random_state=0)
@@ -57,7 +57,7 @@ for name, model in models.items():
     print(f"{name:20s} {errors[name]:.3f} N m on trajectories left out")
 
 # %%
-# What the transformer appends.
+# The columns that the transformer appends.
 print(FrictionTransformer(("viscous", "coulomb")).fit(X).get_feature_names_out()[-2:])
 
 figure, axes = plt.subplots(figsize=(6, 2.5), layout="constrained")

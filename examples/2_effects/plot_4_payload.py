@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """
-A payload, and what a wrong drive gain makes of it
-==================================================
+A payload, and the effect of a wrong drive gain
+===============================================
 
 An arm repeats its motion with a load at the flange. Runs with and without it give the load's mass
-and centre of mass with intervals; gains that are wrong give another mass with the same small
-residual, and only a known load can tell.
+and centre of mass with intervals; wrong gains give another mass with the same small residual, and
+only a known load reveals them.
 """
 
 # %%
@@ -32,8 +32,8 @@ print(f"true: {log.parameters['mass']:.3f} kg at {np.round(log.parameters['com']
 print(found.text)
 
 # %%
-# The same runs read with drive gains that are off by a common factor: the mass follows, while the
-# residual of the loaded runs, relative to the torque, stays what it was.
+# The same runs with drive gains that are wrong by a common factor: the mass changes by this factor,
+# while the residual of the loaded runs, relative to the torque, does not change.
 torques = [f"tau{j}" for j in range(1, 7)]
 factors = np.array([0.8, 0.9, 1.0, 1.1, 1.2])
 masses, low, high = [], [], []

@@ -3,13 +3,12 @@
 When nothing is missing
 =======================
 
-A good answer to "what does my model lack?" is sometimes "nothing that this data can show". Then two
-questions remain: how much better could any model be, and how large could an effect be that this
-data still hides?
+Sometimes the model lacks no effect that the data can show. Then two questions remain: how much
+better could any model be, and how large could an effect be without being detected in this data?
 """
 
 # %%
-# A SCARA arm, one of whose joints slides, with exactly the friction that the model has.
+# A SCARA arm, one of whose joints slides, with exactly the friction of the model.
 import matplotlib.pyplot as plt
 
 from skidyn.datasets import load_scara, make_hidden_effect_log
@@ -28,13 +27,14 @@ for row in zip(log.robot.joint_names, diagnosis.rmse_before, diagnosis.noise_flo
     print("{:14s} {:7.4f}  {:7.4f}".format(*row))
 
 # %%
-# What could still be hidden. Where ``largest_hidden`` is ``None``, this log cannot show the effect
-# at all, however large it is: no temperature was logged, for instance.
+# Limits of hidden effects. If ``largest_hidden`` is ``None``, this log cannot show the effect at
+# any size, for instance because no temperature was logged.
 for limit in [limit for limit in diagnosis.limits if limit.joint == 1][:8]:
     print(limit.sentence)
 
 # %%
-# The limits of dry-friction effects as a share of each joint's torque: what the log excludes.
+# The limits of dry-friction effects as a share of each joint's torque. The log excludes larger
+# effects.
 kinds = ("offset", "dahl", "stribeck", "position_dependent_friction", "maxwell_slip")
 spread = log.y.std(axis=0)
 figure, axes = plt.subplots(figsize=(7, 3), layout="constrained")

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """
-The unknown: something is missing that has no name
-==================================================
+An unknown effect
+=================
 
-A cable that is dragged along makes a torque that depends on two joints and follows no formula of
-the catalogue. The diagnosis must not call it a friction that it is not. It says ``unknown``, on
-which joints, on which signals it depends and how much of the error it is, and draws it.
+A cable that is dragged along causes a torque that depends on two joints and has no formula in the
+catalogue. The diagnosis must not report it as friction. It reports an ``unknown`` effect with its
+joints, the signals on which it depends and its share of the error, and plots it.
 """
 
 # %%
@@ -26,14 +26,14 @@ for finding in diagnosis.findings:
     print(finding.sentence)
 
 # %%
-# One finding per joint. The shapes, which whoever knows the robot may recognise and write down as
-# an effect:
+# One finding per joint. A person who knows the robot may recognise the shapes and define them as an
+# effect:
 for finding in diagnosis.findings:
     ResidualDisplay.from_finding(finding, joint=finding.joints[0])
 
 # %%
-# Where a short formula does as well as the shape that was measured, it can be added like any
-# effect; ``diagnosis.model`` has it already. The next diagnosis starts from there.
+# If a short formula fits as well as the measured shape, it can be added like any effect;
+# ``diagnosis.model`` contains it already. The next diagnosis can start from this model.
 print(diagnosis.findings[0].code)
 print("held-out RMSE", diagnosis.rmse_before.round(3), "->", diagnosis.rmse_after.round(3), "N m")
 plt.show()

@@ -3,12 +3,12 @@
 The search as a scikit-learn estimator
 ======================================
 
-:class:`~skidyn.diagnosis.EffectSearchCV` runs the loop without a person in it. It is compared with
-a grid search over hand-picked effects, both judged on trajectories that neither has seen.
+:class:`~skidyn.diagnosis.EffectSearchCV` runs the loop automatically. It is compared with a grid
+search over hand-picked effects; both are tested on held-out trajectories.
 """
 
 # %%
-# The log hides Stribeck friction in joint 2. Two of ten trajectories are for the judgement.
+# The log hides Stribeck friction in joint 2. Two of ten trajectories are held out for the test.
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
@@ -24,13 +24,13 @@ train, test = next(GroupShuffleSplit(1, test_size=2, random_state=0).split(log.X
 X, y = log.X.iloc[train], log.y[train]
 
 # %%
-# The search looks at the whole catalogue and stops where nothing more helps on held-out motion.
+# The search uses the whole catalogue and stops when no further effect helps on held-out motion.
 search = EffectSearchCV(RBDRegressor(log.robot)).fit(X, y)
 print(pd.DataFrame(search.cv_results_)[["added", "mean_test_score", "rmse1", "rmse2"]].round(4))
 
 # %%
-# A grid search compares what it is given. Folds are whole trajectories: with random rows nearly
-# every candidate would look good.
+# A grid search compares only the given candidates. Folds are whole trajectories: with random rows
+# nearly every candidate would look good.
 grid = GridSearchCV(
     RBDRegressor(log.robot),
     {
@@ -48,7 +48,7 @@ grid = GridSearchCV(
 print("best of the grid:", grid.best_params_["effects"])
 
 # %%
-# The judgement.
+# The test.
 models = {
     "start": RBDRegressor(log.robot).fit(X, y),
     "best of grid": grid.best_estimator_,

@@ -3,12 +3,12 @@
 Diagnose a model that is not skidyn's
 =====================================
 
-The model to be judged may be any fitted regressor of torque: the vendor's, a neural network, trees.
-It is taken as it is; what is diagnosed is what it leaves over on motion that it has not seen.
+The model may be any fitted regressor of torque: the vendor's, a neural network, trees. It is not
+changed; its residual on held-out motion is diagnosed.
 """
 
 # %%
-# The data hides a spring at joint 1. The first model is plain scikit-learn: a linear
+# The data contains a hidden spring at joint 1. The first model is plain scikit-learn: a linear
 # regression on the columns of the rigid body and of friction, fitted to half of the trajectories.
 import matplotlib.pyplot as plt
 import numpy as np
@@ -39,23 +39,23 @@ linear = make_pipeline(FunctionTransformer(columns), LinearRegression()).fit(
 )
 
 # %%
-# Such a regressor has no robot, so that is given.
+# Such a regressor has no robot, so the robot is given.
 diagnosis = diagnose(linear, log.X[~first], log.y[~first], robot=log.robot)
 print("verdict:", diagnosis.verdict)
 for finding in diagnosis.findings:
     print(finding.sentence)
 
 # %%
-# A regressor that is taken as it is has already bent its other coefficients towards what is
-# missing, and what is added cannot bend them back. Where the model is skidyn's own, everything is
-# fitted anew with each candidate, and the addition removes more of the error.
+# The coefficients of a fixed regressor are already biased by the missing effect, and an added
+# effect cannot correct them. A model of skidyn is fitted again with each candidate, so the addition
+# removes more of the error.
 own = diagnose(RBDRegressor(log.robot), log.X[~first], log.y[~first])
 for finding in own.findings:
     print(finding.sentence)
 
 # %%
-# Trees have no structure to bend. Where they fail is rarely a missing effect; it is motion that was
-# rare in the data that they learned from.
+# Trees have no physical structure. Their errors are rarely due to a missing effect; they occur for
+# motion that was rare in the training data.
 SIGNALS = [f"{s}{j}" for s in ("q", "dq", "ddq") for j in (1, 2)]
 trees = make_pipeline(
     FunctionTransformer(lambda X: X[SIGNALS]),

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """
-A payload that comes, and a hand that is not there
-==================================================
+An additional payload, and a missing hand
+=========================================
 
 Two loads that the model does not contain. A UR10e repeats its motion with 2.805 kg at the flange;
-and the description of a Panda has a hand of 0.73 kg that the recorded arm does not carry.
+and the description of a Panda contains a hand of 0.73 kg that the recorded arm does not have.
 """
 
 # %%
@@ -28,10 +28,10 @@ if not (DATA / "ur10e").is_dir():
     sys.exit(0)
 
 # %%
-# **UR10e.** Currents become torques by drive gains. The published set reads payloads about 10 %
-# too heavy; times 0.91 it is calibrated (a known load carried by the same robot on other days).
-# Mass and gain scale alike: without that calibration only their product is known, and the finding
-# says so.
+# **UR10e.** Currents become torques by drive gains. With the published set, payloads are about 10 %
+# too heavy; multiplied by 0.91 it is calibrated (a known load carried by the same robot on other
+# days). Without that calibration only the product of mass and gain is known, which the finding
+# states.
 gains = 0.91 * np.array([14.87, 13.26, 11.13, 10.62, 11.03, 11.47])
 log = load_recording(
     DATA / "ur10e" / "ur10e_excitation.npz",
@@ -46,7 +46,7 @@ print(PAYLOAD.sentence)
 
 # %%
 # **Panda.** The parameters of the URDF are kept (``parameters="nominal"``): otherwise the
-# identification would remove the hand without a word.
+# identification would remove the hand without a message.
 HAND = """
 <link name="hand"><inertial><origin xyz="-0.01 0 0.03"/><mass value="0.73"/>
   <inertia ixx="0.001" ixy="0" ixz="0" iyy="0.0025" iyz="0" izz="0.0017"/></inertial></link>
@@ -62,7 +62,7 @@ ABSENT = diagnose(model, log, log[[f"tau{j + 1}" for j in range(7)]], settings=o
 print(ABSENT.sentence)
 
 # %%
-# Both masses with their 95 % intervals, beside what is known of them.
+# Both masses with their 95 % intervals, compared with the known values.
 found = [finding.parameters["mass"] for finding in (PAYLOAD, ABSENT)]
 names = ["UR10e, carried", "Panda, only described"]
 fig, ax = plt.subplots(figsize=(6, 3.4), layout="constrained")

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """
-What a UR10e's model lacks
+Missing effects of a UR10e
 ==========================
 
 A rigid body with viscous and Coulomb friction, rotor inertia and offsets is fitted to a 30 s
-recording of a UR10e (motor currents times drive gains). Which effects are missing is decided on
-that recording and two more; whether they were really missing is judged on two recordings that
-played no part: 50 s of a Fourier motion, and point-to-point motion.
+recording of a UR10e (motor currents times drive gains). Missing effects are identified on that
+recording and two more, and tested on two held-out recordings: 50 s of a Fourier motion, and
+point-to-point motion.
 """
 
 # %%
-# Three recordings to learn from, two to judge by.
+# Three recordings for the identification, two for the test.
 import os
 import sys
 from pathlib import Path
@@ -28,7 +28,7 @@ if not DATA.is_dir():
     print("The UR10e recordings are not here; set SKIDYN_DATA to the folder that holds ur10e/.")
     sys.exit(0)
 
-# Newton metres per ampere, De Luca's set as in the source of the data.
+# Drive gains in N m/A, De Luca's set as in the source of the data.
 GAINS = (14.87, 13.26, 11.13, 10.62, 11.03, 11.47)
 TAU = [f"tau{j + 1}" for j in range(6)]
 
@@ -51,7 +51,7 @@ judge = {
 }
 
 # %%
-# What is missing, on the three recordings, in the order in which it was added.
+# Effects missing in the three recordings, in the order in which they were added.
 robot = Robot.from_urdf(DATA / "ur10e_min.urdf")
 model = RBDRegressor(robot, ("viscous", "coulomb", "offset", "rotor_inertia"))
 diagnosis = diagnose(model, choose, choose[TAU], settings=Settings(max_findings=6))
@@ -89,9 +89,9 @@ for name, frame in judge.items():
         print(f"   {part:26s}", np.round(before, 2), np.round(after, 2), change)
 
 # %%
-# Joints 5 and 6 stand still during most of the point-to-point run, and friction at rest is whatever
-# the controller last left there. No model of sliding friction can predict it, so an error inside
-# the dry friction is no failure.
+# Joints 5 and 6 are at rest during most of the point-to-point run, where friction has the value
+# that the controller last left. No model of sliding friction can predict it, so an error within the
+# dry friction is not a failure of the model.
 ptp = judge["point to point"]
 where = diagnose(model, ptp, ptp[TAU], settings=Settings(max_findings=0))
 REST = [error for error in where.rest_errors if error.joint in (5, 6)]

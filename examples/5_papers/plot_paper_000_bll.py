@@ -5,12 +5,12 @@ BLL: a forecast is not a model
 
 The BLL paper (Tao et al., Robotica 43, 2025) reports residual torques predicted to a few hundredths
 of a newton metre. Its network reads the residuals *measured so far* and predicts the next one. That
-is a forecast, and a forecast of a smooth signal is easy: a straight line does it. A model of the
-torque must predict it from the motion alone. Here both questions are put to the same data.
+is a forecast, and a forecast of a smooth signal is easy: a straight line is sufficient. A model of
+the torque must predict it from the motion alone. Here both are done with the same data.
 """
 
 # %%
-# A two-joint arm whose friction has a pre-sliding part that the physics does not know.
+# A two-joint arm whose friction has a pre-sliding part that the physics does not contain.
 import os
 
 import matplotlib.pyplot as plt
@@ -45,14 +45,14 @@ hidden = np.column_stack(
 y = 2 * state[2] + state[1] + 3 * hidden + 0.05 * rng.normal(size=hidden.shape)
 
 # %%
-# The physics (here linear in the signals) leaves the hidden friction over.
+# The hidden friction remains in the residual of the physics (here linear in the signals).
 physics = LinearRegression()
 residual = cross_fitted_residual(physics, X, y)
 print(f"residual of the physics: {residual.std():.3f} N m")
 
 # %%
-# **Forecasting.** Each residual from the measured ones before it. Persistence and an autoregression
-# belong beside every such number.
+# **Forecasting.** Each residual from the earlier measured ones. Such numbers should always be
+# compared with persistence and an autoregression.
 table = forecast_table(residual, X["trajectory"])
 train = table.X[:, 0] < 0.7 * X["trajectory"].max()
 epochs = 5 if small else 20
@@ -87,8 +87,8 @@ for name, error in errors.items():
     print(f"{name:28s} {error:.3f} N m")
 
 # %%
-# The forecasts look best, and a plain autoregression is as good as the network. They say nothing
-# about how well the robot's torque is understood: none of them could compute a feedforward torque.
+# The forecasts look best, and a plain autoregression is as good as the network. They are no measure
+# of a model of the robot's torque: none of them could compute a feedforward torque.
 figure, axes = plt.subplots(figsize=(7, 3), layout="constrained")
 axes.barh(list(errors), list(errors.values()), color=["C7"] * 3 + ["C0"] * 3)
 axes.invert_yaxis()

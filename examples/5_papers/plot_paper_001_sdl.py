@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """
-NDL and SDL: what the rigid body brings
-=======================================
+NDL and SDL: the benefit of the rigid body
+==========================================
 
-The SDL paper lets a network read the rigid-body torque, and trains both together. Far from the
-training data the prediction should rely on the rigid body. Here the same network is trained
-without the rigid body (NDL), as in the paper (SDL), and with the rigid-body torque added to its
-output; then all of them predict motions faster than those they were trained on.
+In the SDL paper, the rigid-body torque is an input of a network, and both are trained together. Far
+from the training data the prediction should rely on the rigid body. Here the same network is
+trained without the rigid body (NDL), as in the paper (SDL), and with the rigid-body torque added to
+its output; then all of them predict motions faster than those they were trained on.
 """
 
 # %%
@@ -59,7 +59,7 @@ for name, model in models.items():
     print(f"{name:24s}", "  ".join(f"{error:.2f} N m" for error in errors[name]))
 
 # %%
-# Out of range the network of SDL fades out, and ``outside_range`` says where.
+# Out of range the network of SDL fades out; ``outside_range`` marks these samples.
 fast, _ = tests["three times as fast"]
 print(f"fast samples outside the range: {models['SDL, residual'].outside_range(fast).mean():.0%}")
 

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """
-ELM committee: how much data, and how sure
-==========================================
+ELM committee: amount of data and uncertainty
+=============================================
 
 Bargsten, de Gea Fernández and Kassahun compare identified parameters with a committee of extreme
-learning machines, on the data that both were trained on, and announce two things for later: a
-test on other motions, and how much data each needs. Both are here, with learning on the move.
+learning machines, on the data to which both were fitted, and leave two questions to later work: a
+test on other motions, and the amount of data that each needs. Both are shown here, and incremental
+learning.
 """
 
 # %%
@@ -73,8 +74,8 @@ axes.set_ylabel("held-out RMSE (N m)")
 axes.legend()
 
 # %%
-# Learning while moving: ``partial_fit`` after every trajectory gives exactly the machine that sees
-# all of them at once. The spread of the committee falls where it has learned.
+# Incremental learning: ``partial_fit`` after every trajectory gives exactly the same result as a
+# fit to all of them at once. The spread of the committee decreases where data is available.
 committee = ELMCommittee(p=0.999, trajectory=0, random_state=0)
 last = X[:, 0] == X[-1, 0]
 spread = []

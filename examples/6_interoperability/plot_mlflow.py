@@ -49,7 +49,7 @@ with mlflow.start_run(run_name="find what is missing") as run:
     )
 
 # %%
-# Whoever finds the run later loads the model and predicts.
+# Later the model can be loaded from the run and used for prediction.
 loaded = mlflow.sklearn.load_model(stored.model_uri)
 print("same prediction:", np.array_equal(loaded.predict(log.X), diagnosis.model.predict(log.X)))
 history = mlflow.tracking.MlflowClient().get_metric_history(run.info.run_id, "held_out_rmse")
@@ -57,7 +57,7 @@ for point in history:
     print(f"step {point.step}: held-out RMSE {point.value:.4f} N m")
 
 # %%
-# The same as a picture: the error falls with every effect that is added.
+# The same as a picture: the error decreases with every added effect.
 steps = ["as given", *(f"+ {entry['added']}" for entry in diagnosis.history[1:])]
 fig, ax = plt.subplots(figsize=(6, 3.4), layout="constrained")
 ax.bar(steps, [point.value for point in history])

@@ -3,8 +3,9 @@
 The identified arm in MuJoCo
 ============================
 
-What was identified goes into a simulator: masses, inertias, viscous and Coulomb friction as MJCF
-fields. The written file is loaded by MuJoCo, and its inverse dynamics is compared with the model's.
+The identified parameters are exported to a simulator: masses, inertias, viscous and Coulomb
+friction as MJCF fields. The written file is loaded by MuJoCo, and its inverse dynamics is compared
+with the model's.
 """
 
 # %%
@@ -33,8 +34,8 @@ left_out = write_mjcf(model, file)
 print("no field for:", ", ".join(left_out) or "nothing")
 
 # %%
-# MuJoCo's inverse dynamics at 300 rows of the log. Its joint forces hold damping and dry friction
-# apart, so Coulomb friction is compared while the joint slides.
+# MuJoCo's inverse dynamics at 300 rows of the log. Its joint forces treat damping and dry friction
+# separately, so Coulomb friction is compared while the joint slides.
 arm = mujoco.MjModel.from_xml_path(str(file))
 state = mujoco.MjData(arm)
 rows = np.linspace(0, len(log.X) - 1, 300).astype(int)

@@ -3,9 +3,9 @@
 Optuna chooses the filter and the friction
 ==========================================
 
-`Optuna <https://optuna.org>`__ searches where a grid would be too large: here the cut-off of the
-derivatives on a continuous scale together with which effects to take. Every trial is judged on
-trajectories that it did not see.
+`Optuna <https://optuna.org>`__ can search spaces that are too large for a grid: here the cut-off of
+the derivatives on a continuous scale together with the effects of the model. Every trial is tested
+on held-out trajectories.
 """
 
 # %%

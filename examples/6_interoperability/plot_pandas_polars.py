@@ -33,7 +33,7 @@ table = pl.from_pandas(log.X)
 from_polars = RBDRegressor(log.robot).fit(table, log.y)
 
 # %%
-# An array: ``time`` and ``trajectory`` stand first, then q, dq, ddq of all joints.
+# An array: first ``time`` and ``trajectory``, then q, dq, ddq of all joints.
 signals = [f"{s}{j}" for s in ("q", "dq", "ddq") for j in (1, 2)]
 array = log.X[["time", "trajectory", *signals]].to_numpy()
 from_array = RBDRegressor(log.robot, time=0, trajectory=1).fit(array, log.y)
@@ -47,14 +47,14 @@ for name, model, X in (
     print(f"{name:16s} same prediction: {same}")
 
 # %%
-# Transformers answer in the kind of table that is asked for.
+# Transformers return the requested kind of table.
 positions = table.select("time", "trajectory", "q1", "q2")
 smooth = SmoothDerivatives().set_output(transform="polars")
 smoothed = smooth.fit_transform(positions)
 print(smoothed.head(3))
 
 # %%
-# What it derives from positions alone, beside the velocity that was recorded.
+# The velocity derived from positions alone, compared with the recorded one.
 part = slice(100, 300)
 time = log.X["time"].to_numpy()[part]
 fig, ax = plt.subplots(figsize=(6, 3.4), layout="constrained")

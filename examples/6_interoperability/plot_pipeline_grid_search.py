@@ -3,8 +3,8 @@
 Pipeline and GridSearchCV: choose the filter together with the model
 ====================================================================
 
-Only positions and torques were recorded. How strongly to smooth them, and which friction to take,
-are parameters of one Pipeline, and scikit-learn's grid search chooses both on whole trajectories.
+Only positions and torques were recorded. The amount of smoothing and the friction model are
+parameters of one Pipeline, and scikit-learn's grid search selects both on whole trajectories.
 """
 
 # %%
@@ -38,7 +38,8 @@ search = GridSearchCV(
 ).fit(X, log.y)
 
 # %%
-# ``None`` leaves the cut-off to the positions alone: it needs no grid and comes close to the best.
+# With ``None`` the cut-off is found from the positions alone: it needs no grid and is close to the
+# best.
 print("best:", search.best_params_)
 print(f"cut-off chosen from positions alone: {pipeline.fit(X, log.y)[0].cutoff_:.1f} Hz")
 table = pd.DataFrame(search.cv_results_)

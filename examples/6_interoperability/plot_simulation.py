@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """
-Is the motion right too?
-========================
+Errors of the simulated motion
+==============================
 
-A model is often identified to be simulated. Here a robot has a spring that its first model lacks:
-the motion of both models is compared with a recording that neither has seen.
+Models are often identified for simulation. Here a robot has a spring that its first model lacks;
+the motion of both models is compared with a held-out recording.
 """
 
 import matplotlib.pyplot as plt
@@ -19,7 +19,7 @@ plain = RBDRegressor(log.robot).fit(log.X[train], log.y[train])
 whole = plain.with_effects([("spring", [1])]).fit(log.X[train], log.y[train])
 
 # %%
-# Each second the models are put back on the log and driven by its torque.
+# Each second the models are reset to the log; they are driven by its torque.
 print(judge_by_simulation(plain, whole, log.X[test], log.y[test]))
 
 # %%

@@ -3,8 +3,8 @@
 Share a model as a file that is safe to load
 ============================================
 
-A pickle runs whatever its author wrote into it. `skops <https://skops.readthedocs.io>`__ stores a
-fitted model so that the reader sees which types it holds before anything is built.
+A pickle can run any code of its author. `skops <https://skops.readthedocs.io>`__ stores a fitted
+model so that its types can be inspected before anything is loaded.
 """
 
 # %%
@@ -31,7 +31,8 @@ sio.dump(model, file)
 print(f"{file.name}: {file.stat().st_size / 1000:.0f} kB")
 
 # %%
-# What the file holds beyond numbers and scikit-learn: read the list, then say that you trust it.
+# The types in the file other than numbers and those of scikit-learn: check the list, then trust
+# them.
 types = sio.get_untrusted_types(file=file)
 print("\n".join(types))
 loaded = sio.load(file, trusted=types)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Words that several commands share."""
+"""Arguments that several commands share."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ class Input(str):
 
 
 class Output(str):
-    """A file that a command writes; its ending says of which kind it is.
+    """A file that a command writes; its ending determines its kind.
 
-    A glob of the shell behind ``--out`` names a recording; its ending is not that of a result.
+    If a glob of the shell follows ``--out``, it is a recording, whose ending is not that of a
+    result.
     """
 
     __slots__ = ()
@@ -70,7 +71,7 @@ class TestReport(Output):
 
 
 def check_files(options: argparse.Namespace) -> None:
-    """Refuse outputs that cannot be written or would replace an input, before any work is done."""
+    """Refuse outputs that cannot be written or would replace an input, before the computation."""
     keep(word for word in _words(options) if isinstance(word, Input))
     for word in _words(options):
         if isinstance(word, Output):
@@ -95,7 +96,7 @@ def command(commands: Any, name: str, run: Any, text: str, description: str = ""
 
 
 def with_log_only(parser: Any, urdf_required: bool = True) -> None:
-    """Logs, robot, and how the columns are to be read."""
+    """Arguments for logs, robot and columns."""
     parser.add_argument(
         "logs", nargs="+", type=Input, metavar="LOG", help="recordings, one or more files"
     )
@@ -110,7 +111,7 @@ def with_log_only(parser: Any, urdf_required: bool = True) -> None:
 
 
 def with_reading(parser: Any) -> None:
-    """How the columns of logs are to be read."""
+    """Arguments for the columns of logs."""
     parser.add_argument(
         "--columns",
         metavar="JSON",
@@ -131,7 +132,7 @@ def with_reading(parser: Any) -> None:
 
 
 def with_remedies(parser: Any) -> None:
-    """Remedies for a log whose signals are not what they seem; skidyn check says which."""
+    """Remedies for a log with wrong signals, as reported by skidyn check."""
     fix = parser.add_argument_group("remedies", "skidyn check reports which of them a log needs")
     fix.add_argument(
         "--gravity",
@@ -196,7 +197,7 @@ def with_remedies(parser: Any) -> None:
 
 
 def with_log(parser: Any, urdf_required: bool = True) -> None:
-    """Logs, robot and the model to start from."""
+    """Arguments for logs, robot and initial model."""
     with_log_only(parser, urdf_required)
     parser.add_argument(
         "--model",
@@ -223,7 +224,7 @@ def with_controller(parser: Any, text: str) -> None:
 
 
 def with_report(parser: Any) -> None:
-    """A report of skidyn diagnose, which names the log and the model."""
+    """A report of skidyn diagnose, which contains the paths of the log and the model."""
     parser.add_argument(
         "--from", dest="report", type=Input, required=True, help="report.json of diagnose"
     )
@@ -231,7 +232,7 @@ def with_report(parser: Any) -> None:
 
 
 def with_other_robot(parser: Any) -> None:
-    """The robot in place of that which a report names."""
+    """The robot in place of that of a report."""
     parser.add_argument(
         "--urdf",
         type=Input,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``skidyn check``: how good a log is, before any model is fitted."""
+"""``skidyn check``: quality of a log, before any model is fitted."""
 
 from __future__ import annotations
 
@@ -53,10 +53,10 @@ def run(options: argparse.Namespace) -> None:
 
 
 def _with_remedies(words: Sequence[str], remedies: Sequence[str]) -> list[str]:
-    """The words of a command with the options that fix its log.
+    """The arguments of a command with the options that correct its log.
 
-    What belongs to an option that is there already joins its value: of two options of one name, the
-    last alone counts.
+    A value of an option that is present already is joined with its value, because only the last of
+    two options with one name counts.
     """
     fixed = list(words)
     for remedy in remedies:

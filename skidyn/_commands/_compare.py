@@ -154,7 +154,7 @@ def _compare_with_log(options: argparse.Namespace) -> None:
 
 
 def _pair(options: argparse.Namespace) -> list[argparse.Namespace] | None:
-    """Options of either side; None where there is only one."""
+    """Options of either side; None if there is only one."""
     reports = [name for name in options.logs if name.endswith(".json")]
     if reports:
         if len(options.logs) != 2 or len(reports) != 2:
@@ -172,7 +172,7 @@ def _pair(options: argparse.Namespace) -> list[argparse.Namespace] | None:
 
 
 def _names(options: argparse.Namespace, pair: list[argparse.Namespace]) -> list[str]:
-    """Names by what differs: models, or files."""
+    """Names from the difference: models, or files."""
     models = [side.model for side in pair]
     if options.urdf and not options.against:
         names = models
@@ -183,7 +183,7 @@ def _names(options: argparse.Namespace, pair: list[argparse.Namespace]) -> list[
 
 
 def _diagnosed(one: argparse.Namespace, other: argparse.Namespace) -> list[Diagnosis]:
-    """Diagnoses of both sides; what they have in common is computed once."""
+    """Diagnoses of both sides; common parts are computed once."""
     found: list[Diagnosis] = []
     for side in (one, other):
         same_log = bool(found) and _but_for(side, "model") == _but_for(one, "model")
@@ -196,7 +196,7 @@ def _diagnosed(one: argparse.Namespace, other: argparse.Namespace) -> list[Diagn
 
 
 def _but_for(options: argparse.Namespace, *names: str) -> dict[str, Any]:
-    """What was asked for, but for some of it."""
+    """The options without some of them."""
     left_out = {*names, "report", "against", "against_model", "told"}
     return {name: value for name, value in vars(options).items() if name not in left_out}
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``skidyn completion``: the script with which a shell completes skidyn's words."""
+"""``skidyn completion``: the script for completion in a shell."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ The script is generated once and needs no Python afterwards. Generating it requi
 install skidyn[shell]
 """
 
-#: What the values of arguments are, by their names in the options; all other files by their type.
-#: Words with an s may be several, separated by commas.
+#: Kinds of values of arguments, by their names in the options; all other files by their type. Words
+#: with an s may be several, separated by commas.
 WORDS = {
     "effect": "kind", "finding": "kind", "rival": "kind", "model": "kinds", "effects": "kinds",
     "against_model": "kinds", "format": "formats", "robot": "robot",
 }  # fmt: skip
 
-#: Functions of the shells; the one for several words keeps what stands before a comma.
+#: Functions of the shells; the one for several values keeps the text before a comma.
 _BASH = """\
 _skidyn_NAME() { compgen -W "WORDS" -- "$1"; }
 _skidyn_NAMEs() {
@@ -85,7 +85,7 @@ def run(options: argparse.Namespace) -> None:
         for shell, text in (("bash", _BASH), ("zsh", _ZSH))
     }
     script = shtab.complete(parser, shell=options.shell, preamble=preamble)
-    # shtab writes "one or more" so that zsh takes it for "one"
+    # shtab writes "one or more" in a form that zsh interprets as "one"
     script = script.replace('"(*):', '"*:') if options.shell == "zsh" else script
     if options.json:
         print_json({"shell": options.shell, "script": script})

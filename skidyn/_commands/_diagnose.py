@@ -86,7 +86,7 @@ def run(options: argparse.Namespace) -> None:
     if answer is None or not again:
         answer = _answer(options)
         kept.write(answer)
-    options.clock = answer["clock"]  # that of the report, so that what follows reads the log alike
+    options.clock = answer["clock"]  # that of the report, for later commands
     for note in answer["noted"]:
         warnings.warn(note, LogWarning, stacklevel=2)
     if options.out:
@@ -110,7 +110,7 @@ def run(options: argparse.Namespace) -> None:
 
 
 def _answer(options: argparse.Namespace) -> dict[str, Any]:
-    """What is found, as values that can be kept."""
+    """The results, as values that can be stored."""
     with noting() as noted:
         try:
             diagnosis, frame, controller = _diagnosed(options)
@@ -147,14 +147,14 @@ def _answer(options: argparse.Namespace) -> dict[str, Any]:
 def _diagnosed(
     options: argparse.Namespace,
 ) -> tuple[Diagnosis, pd.DataFrame, Controller | None]:
-    """The diagnosis of the log as the options have it read, the log and its controller."""
+    """The diagnosis of the log read with the options, the log and its controller."""
     model, frame, tau, controller = read_driven(options, check=False)
     diagnosis = run_diagnosis(model, frame, tau, options, controller=controller)
     return diagnosis, frame, controller
 
 
 def _mended(jitter: Suspicion) -> Suspicion:
-    """What is told of stamps in whose place even steps were taken."""
+    """Note on time stamps that were replaced by even steps."""
     evidence = (
         f"{jitter.evidence}; even steps were used, as with --clock regular (--clock recorded "
         "keeps the stamps)"
@@ -163,7 +163,7 @@ def _mended(jitter: Suspicion) -> Suspicion:
 
 
 def _next(answer: dict[str, Any], options: argparse.Namespace) -> list[str]:
-    """The commands that may follow."""
+    """Suggested next commands."""
     if not options.out:
         if options.html:
             return []
@@ -185,7 +185,7 @@ def _next(answer: dict[str, Any], options: argparse.Namespace) -> list[str]:
 
 
 def _is_of_servo(kind: str) -> bool:
-    """Whether the controller should have been given it, and no model lacks it."""
-    from skidyn.simulation import SERVO_EFFECTS  # an answer that was kept needs no simulation
+    """Whether an effect is one of the controller and not of the model."""
+    from skidyn.simulation import SERVO_EFFECTS  # a stored answer needs no simulation
 
     return kind in SERVO_EFFECTS

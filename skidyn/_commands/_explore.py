@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``skidyn explore``: the loop by hand, in a browser."""
+"""``skidyn explore``: interactive search for effects in a browser."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def run(options: argparse.Namespace) -> None:
         urdf=str(Path(options.urdf).resolve()),
         joints=covered_joints(options),
         reading=reading(options),
-        # the script computes the torque only where the log has none
+        # the script computes the torque only if the log has none
         controller=None if "tau1" in frame else controller,
         port=options.port,
         ready=ready,

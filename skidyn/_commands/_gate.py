@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``skidyn compare --fail-above``: whether the robot has changed since a healthy recording."""
+"""``skidyn compare --fail-above``: test for a change since a healthy recording."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def _check(options: argparse.Namespace) -> None:
 def _moving(
     frame: pd.DataFrame, usual: pd.DataFrame, n_joints: int
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Samples in motion: at rest dry friction may hold any torque."""
+    """Samples in motion, because dry friction at rest may have any torque."""
     columns = [f"dq{j + 1}" for j in range(n_joints)]
     speeds = [np.abs(f[columns].to_numpy()) for f in (frame, usual)]
     least = MOVING * np.quantile(speeds[1], 0.95, axis=0)
@@ -108,7 +108,7 @@ def _print(joints: list[dict[str, Any]], limit: float) -> None:
 
 
 def _write_junit(path: str, joints: list[dict[str, Any]], limit: float) -> None:
-    """Result in the form that test reports of most build servers read: one test a joint."""
+    """Result in the JUnit format of most build servers: one test per joint."""
     from skidyn._writing import write_bytes
 
     n_failed = sum(j["failed"] for j in joints)

@@ -11,7 +11,7 @@ from skidyn._commands._input import read_driven
 from skidyn._commands._output import parameters, print_json, working
 from skidyn._writing import write_json
 
-#: Those that need nothing but a log.
+#: Estimators that need only a log.
 ESTIMATORS = ("weighted", "ordinary", "robust", "ridge", "entropic", "output_error")
 DESCRIPTION = """\
 Identify inertial parameters and effects together and print them with standard errors that are valid
@@ -68,7 +68,7 @@ def run(options: argparse.Namespace) -> None:
     )
     driven: dict[str, Any] = {}
     if controller is not None and options.estimator == "output_error":
-        # pieces would begin at velocities that are differences of positions
+        # pieces would start from velocities that are differences of positions
         model.set_params(horizon=None)
         driven["controller"] = controller
     with working("Identifying", options):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the commands read: robots, logs, reports."""
+"""Inputs of the commands: robots, logs, reports."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ if TYPE_CHECKING:
 def read_model_and_log(
     options: argparse.Namespace, *, check: bool = True
 ) -> tuple[RBDRegressor, pd.DataFrame, Any]:
-    """The model that the options describe, the log, and its torques."""
+    """The model of the options, the log, and its torques."""
     return read_driven(options, check=check)[:3]
 
 
 def read_driven(
     options: argparse.Namespace, *, check: bool = True
 ) -> tuple[RBDRegressor, pd.DataFrame, Any, Controller | None]:
-    """The same with the controller that the options give; the torques may be its own."""
+    """The same with the controller of the options, which may determine the torques."""
     from skidyn._persistence import load_model
     from skidyn.identification import RBDRegressor
 
@@ -55,7 +55,7 @@ def read_driven(
 def _log(
     options: argparse.Namespace, robot: Robot, check: bool
 ) -> tuple[pd.DataFrame, Any, Controller | None]:
-    """The log, its torques or those of its servos, and the controller that the options give."""
+    """The log, its torques or those of its servos, and the controller of the options."""
     text = getattr(options, "controller", None)
     frame = read_frame(options, robot, check=check, needs_torque=text is None)
     if text is None:
@@ -74,7 +74,7 @@ def torque_of(frame: pd.DataFrame, robot: Robot) -> Any:
 
 
 def read_controller(text: str, robot: Robot, frame: pd.DataFrame) -> Controller:
-    """The controller that is given, or that of the log: by its torque, or by the robot's weight."""
+    """The given controller, or one fitted to the log by its torque or the robot's weight."""
     from skidyn.simulation import Controller, fit_controller, fit_servo
 
     word = text.strip()
@@ -99,7 +99,7 @@ def read_frame(
     check: bool = True,
     needs_torque: bool = True,
 ) -> pd.DataFrame:
-    """The log, with the columns, units and gains that the options give."""
+    """The log, with the columns, units and gains of the options."""
     from skidyn.logs import read_log
 
     said = reading(options)
@@ -110,7 +110,7 @@ def read_frame(
 
 
 def reading(options: argparse.Namespace) -> dict[str, Any]:
-    """What the options say about how the log is to be read: arguments of ``read_log``."""
+    """Arguments of ``read_log`` from the options."""
     said = vars(options)
     arguments = {
         "columns": columns_option(options.columns),
@@ -132,19 +132,19 @@ def reading(options: argparse.Namespace) -> dict[str, Any]:
         "split_leaps": said.get("split_leaps"),
         "restore_gravity": said.get("restore_gravity"),
     }
-    # what was not said is left to read_log, so that a script made of this holds nothing else
+    # defaults are left to read_log, so that a script made from this contains only given options
     always = ("columns", "units", "drive_gains", "rate")
     unsaid: tuple[Any, ...] = (None, False, [], "recorded", "auto")
     return {k: v for k, v in arguments.items() if k in always or v not in unsaid}
 
 
 def listed(text: str | None) -> list[str]:
-    """Words separated by commas."""
+    """Values separated by commas."""
     return [word.strip() for word in text.split(",") if word.strip()] if text else []
 
 
 def pairs(name: str, text: str | None, numbers: bool = False) -> Any:
-    """``q=deg,time=ms`` as a mapping; JSON is taken as it is."""
+    """``q=deg,time=ms`` as a mapping; JSON is accepted as well."""
     if text is None:
         return None
     if text.lstrip().startswith(("{", "[")):
@@ -157,7 +157,7 @@ def pairs(name: str, text: str | None, numbers: bool = False) -> Any:
         key, equals, value = (part.strip() for part in word.partition("="))
         if not equals or not key or not value:
             raise SkidynError(f"--{name} {text}: {word!r} is not NAME=VALUE")
-        if numbers and key in said:  # one check after the other found a part of it
+        if numbers and key in said:  # successive checks may each find a part
             both = number(name, value)
             said[key] = said[key] * both if name == "gain" else said[key] + both
         else:
@@ -256,7 +256,7 @@ def joint_numbers(text: str | None) -> list[int] | None:
 def recorded_options(options: argparse.Namespace) -> argparse.Namespace:
     """Options of the diagnosis that a report records, with those of this command.
 
-    Files that the report names are looked for in its own folder, then in the working directory.
+    Files of the report are searched in its own folder, then in the working directory.
     """
     try:
         report = json.loads(Path(options.report).read_text(encoding="utf-8"))
@@ -267,7 +267,7 @@ def recorded_options(options: argparse.Namespace) -> argparse.Namespace:
     recorded = provenance.get("options")
     if not isinstance(recorded, dict) or not {"logs", "urdf"} <= set(recorded):
         raise SkidynError(f"{options.report} records no log; it must come from skidyn diagnose")
-    # Nothing else is taken over, least of all where to write.
+    # Nothing else is used, in particular no output paths.
     recorded = {"model": "rigid_body", "nominal": False} | recorded
     recorded = {name: recorded.get(name) for name in RECORDED}
     for name, value in recorded.items():
@@ -298,6 +298,6 @@ def recorded_options(options: argparse.Namespace) -> argparse.Namespace:
 
 
 def _found(name: str, folder: Path) -> str:
-    """A file that a report names: beside the report, else where the command runs."""
+    """A file of a report: in the folder of the report, else in the working directory."""
     beside = folder / name
     return str(beside) if beside.exists() else name

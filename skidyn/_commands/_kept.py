@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Answers that are kept beside a log, for the same question asked again.
+"""Answers that are stored in the folder of a log, for repeated identical commands.
 
-The name of an answer is the digest of all that it depends on: the contents of log and robot, the
-options, and the code of skidyn itself with the versions of what it computes with. Another log, or
-another version, has another name, so that no answer can be out of date. What cannot be read, was
-damaged, or cannot be written is as if it had never been kept.
+The name of an answer is the digest of everything on which it depends: the contents of log and
+robot, the options, and the code of skidyn with the versions of its dependencies. Another log or
+version has another name, so no answer can be out of date. An answer that cannot be read or written,
+or is damaged, is ignored.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from skidyn._exceptions import LogWarning, SkidynError
 from skidyn._version import versions
 from skidyn._writing import write_bytes
 
-#: Folder beside the log, and answers in it at most: the oldest go.
+#: Folder next to the log, and most answers in it; the oldest are removed.
 FOLDER, MOST = ".skidyn", 16
-#: Logs and robots that are one file each, whatever lies beside them.
+#: Logs and robots that are one file each, independent of other files.
 LOGS, ROBOTS = (".csv", ".parquet"), (".urdf",)
-#: Options that do not change what is found, only where it goes.
+#: Options that do not change the results, only the outputs.
 ELSEWHERE = {"command", "run", "words", "out", "html", "json", "jobs", "no_cache"}
 
 
 @contextmanager
 def noting() -> Iterator[list[str]]:
-    """What is said about the log meanwhile; where an error ends it, it is said all the same."""
+    """Messages about the log during the computation, also if it ends with an error."""
     noted: list[str] = []
     try:
         with warnings.catch_warnings(record=True) as caught:
@@ -53,12 +53,12 @@ def _of_the_log(caught: Iterable[warnings.WarningMessage]) -> list[str]:
 
 
 class Kept:
-    """The place of one answer.
+    """The stored file of one answer.
 
     Parameters
     ----------
     options : argparse.Namespace
-        The question; its ``no_cache`` keeps nothing.
+        Options of the command; with ``no_cache`` nothing is stored.
     """
 
     def __init__(self, options: argparse.Namespace) -> None:
@@ -66,7 +66,7 @@ class Kept:
         self._name = None if options.no_cache else _name(options)
 
     def read(self) -> dict[str, Any] | None:
-        """The answer; None where there is none that is whole."""
+        """The answer; None if there is no complete one."""
         if self._name is None:
             return None
         try:
@@ -80,7 +80,7 @@ class Kept:
         return answer if isinstance(answer, dict) else None
 
     def write(self, answer: dict[str, Any]) -> None:
-        """Keep an answer, unless a file has changed since the question was asked."""
+        """Store an answer, unless a file has changed since the command began."""
         if self._name is None or _name(self._options) != self._name:
             return
         body = zlib.compress(json.dumps(answer, default=_value).encode(), 1)
@@ -96,12 +96,12 @@ class Kept:
 
 
 def _value(found: Any) -> Any:
-    """Arrays and numbers of NumPy as JSON takes them; what is not finite stays so."""
+    """Arrays and numbers of NumPy in JSON types; numbers that are not finite are kept."""
     return found.tolist()
 
 
 def _name(options: argparse.Namespace) -> str | None:
-    """Digest of all that an answer depends on; None where more than these files may matter."""
+    """Digest of everything on which an answer depends; None if other files may matter."""
     logs, robot = [Path(log) for log in options.logs], Path(options.urdf)
     model = [Path(options.model)] if options.model.endswith(".skops") else []
     if robot.suffix not in ROBOTS or any(log.suffix not in LOGS for log in logs):
@@ -113,7 +113,7 @@ def _name(options: argparse.Namespace) -> str | None:
         for file in [*logs, robot, *model, *_code()]:
             with file.open("rb") as content:
                 digest.update(hashlib.file_digest(content, "sha256").digest())
-    except OSError:  # the reader says what is wrong with it
+    except OSError:  # the reader reports the error
         return None
     return digest.hexdigest()
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the commands run, write and print. Files are written whole or not at all."""
+"""Computations, files and texts of the commands. No file is left incomplete."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ def run_diagnosis(
     wanted = getattr(options, "effects", None)
     if kinds is None and wanted:
         kinds = [kind.strip() for kind in wanted.split(",")]
-    # Without kinds nothing is searched: the model is only compared.
+    # Without kinds there is no search: the model is only compared.
     settings = Settings(max_findings=0) if kinds == () else Settings()
     rate = getattr(options, "rate", None)
-    # what a log is not does not stop a comparison, only what is concluded from it
+    # suspicions about a log do not stop a comparison, only conclusions from it
     force = kinds == () or bool(getattr(options, "force", False))
     with working("Comparing" if kinds == () else "Searching for what is missing", options):
         return diagnose(
@@ -62,7 +62,7 @@ def run_diagnosis(
 def explain_motion(
     diagnosis: Diagnosis, controller: Controller | None, frame: Any, options: argparse.Namespace
 ) -> None:
-    """Name what the motion lacks that a controller leads to; nothing where none is given."""
+    """Identify effects from the motion under a controller; nothing without a controller."""
     if controller is None:
         return
     if "tau1" not in frame:
@@ -75,7 +75,7 @@ def explain_motion(
 
 
 def _torque_told(controller: Controller, n_joints: int) -> str:
-    """Where the torque of a log without one comes from."""
+    """Source of the torque for a log without torque."""
     gains = [digits(gain) for gain in controller.checked(n_joints).stiffness]
     shown = gains[0] if len(set(gains)) == 1 else ", ".join(gains)
     late = f", {1e3 * controller.delay:.3g} ms late" if controller.delay else ""
@@ -93,7 +93,7 @@ def write_page(diagnosis: Diagnosis, html: str | None, provenance: dict[str, Any
 
 
 def write_table(frame: pd.DataFrame, path: str) -> None:
-    """Write a log in one step: an interrupted run leaves the previous file whole."""
+    """Write a log in one step, so that an interrupted run leaves the previous file unchanged."""
     write = frame.to_parquet if Path(path).suffix == ".parquet" else frame.to_csv
     with replacing(path) as part:
         write(part, index=False)
@@ -101,7 +101,7 @@ def write_table(frame: pd.DataFrame, path: str) -> None:
 
 @contextmanager
 def working(text: str, options: argparse.Namespace) -> Iterator[None]:
-    """Show how far long work is, where a person looks and rich is installed."""
+    """Show the progress of a long computation in a terminal if rich is installed."""
     if getattr(options, "json", False) or not sys.stderr.isatty():
         yield
         return
@@ -137,7 +137,7 @@ def working(text: str, options: argparse.Namespace) -> Iterator[None]:
             yield
 
 
-#: Options that a report records, and what each may be; a report comes from anywhere.
+#: Options in a report, with the permitted types, since a report may be untrusted.
 RECORDED: dict[str, tuple[type, ...]] = {
     "logs": (list,),
     "urdf": (str,),
@@ -159,7 +159,7 @@ RECORDED: dict[str, tuple[type, ...]] = {
 def provenance(options: argparse.Namespace) -> dict[str, Any]:
     from skidyn._version import versions
 
-    # the path of the interpreter says nothing about the numbers, but much about its user
+    # the path of the interpreter is irrelevant for the numbers, but reveals the user
     used = {name: version for name, version in versions().items() if name != "executable"}
     recorded = {name: getattr(options, name, None) for name in RECORDED}
     digests = hashes([*options.logs, options.urdf])
@@ -167,7 +167,7 @@ def provenance(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def hashes(files: Sequence[str]) -> dict[str, str]:
-    """SHA-256 of every file that is there."""
+    """SHA-256 of every existing file."""
     import hashlib
 
     digests = {}
@@ -228,7 +228,7 @@ def print_regimes(diagnosis: Diagnosis) -> None:
 
     print("by joint and regime (N m, N for sliders)")
     width = max(len(name) for name in diagnosis.joint_names)
-    widths = [max(8, len(name) + 1) for name in diagnosis.regimes]  # 80 columns hold seven
+    widths = [max(8, len(name) + 1) for name in diagnosis.regimes]  # seven fit into 80 columns
     heads = zip(diagnosis.regimes, widths, strict=True)
     print(f"  {'':{width}s}" + "".join(f"{head:>{w}s}" for head, w in heads))
     for name, errors in zip(diagnosis.joint_names, diagnosis.error_map(), strict=True):

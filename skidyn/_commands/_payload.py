@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``skidyn payload``: what the robot carries, or its drive gains from a known load."""
+"""``skidyn payload``: the payload of the robot, or its drive gains from a known load."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def run(options: argparse.Namespace) -> None:
     robot = read_robot(options)
     gains = options.drive_gains
     if options.known_mass is not None and gains is None:
-        options.drive_gains = str([1.0] * robot.n_joints)  # torques that are the currents
+        options.drive_gains = str([1.0] * robot.n_joints)  # the torques are the currents
     loaded = _read(options, robot)
     options.logs = options.unloaded
     unloaded = _read(options, robot)
@@ -116,7 +116,7 @@ def _numbers(text: str) -> list[float]:
 
 
 def _read(options: argparse.Namespace, robot: Robot) -> pd.DataFrame:
-    """A log that is checked as torques, or without the robot where currents are expected."""
+    """A log, checked with its torques, or without the robot if currents are expected."""
     from skidyn.logs import check_log
 
     currents = options.known_mass is not None

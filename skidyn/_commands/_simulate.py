@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``skidyn simulate``: run a fitted model along a log, or write a log that hides an effect."""
+"""``skidyn simulate``: simulate a fitted model along a log, or a log with a hidden effect."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ def _along(options: argparse.Namespace) -> None:
 
 
 def _hidden(options: argparse.Namespace) -> None:
-    """Write a log that hides an effect."""
+    """Write a log with a hidden effect."""
     from skidyn.datasets import make_hidden_effect_log
 
     if options.out is None:
@@ -157,7 +157,7 @@ def _hidden(options: argparse.Namespace) -> None:
 
 
 def _told(effect: str | None, joints: list[int], parameters: Mapping[str, Any]) -> str:
-    """What the log hides, in words."""
+    """Description of the hidden effect."""
     if effect is None:
         return "nothing"
     where = f" on joint{'s' if len(joints) > 1 else ''} {', '.join(map(str, joints))}"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A diagnosis on one screen of a terminal: verdict, joints, findings, what is left."""
+"""A diagnosis on one screen of a terminal: verdict, joints, findings, remaining error."""
 
 from __future__ import annotations
 
@@ -11,14 +11,15 @@ from typing import Any
 
 from skidyn._text import digits, joints_told, listed
 
-#: Columns of a bar at most and at least, and of the name of a joint with its number.
+#: Most and least columns of a bar, and columns of the name of a joint with its number.
 BAR, LEAST, NAME = 24, 12, 28
-#: Joints for which it is told where their error lies, and parts of the motion of each.
+#: Number of joints for which the location of the error is shown, and of parts of the motion of
+#: each.
 TOLD, PLACES = 3, 2
 
 
 def story_lines(story: Mapping[str, Any], failures: Sequence[Any] = ()) -> Iterator[str]:
-    """What ``skidyn diagnose`` prints.
+    """Text that ``skidyn diagnose`` prints.
 
     Parameters
     ----------
@@ -57,7 +58,7 @@ def story_lines(story: Mapping[str, Any], failures: Sequence[Any] = ()) -> Itera
 
 
 def answer_lines(answer: Mapping[str, Any]) -> Iterator[str]:
-    """The same of an answer that may have been kept, whose failures are mappings."""
+    """The same for a stored answer, whose failures are mappings."""
     failures = [
         SimpleNamespace(**{**told, "places": [SimpleNamespace(**p) for p in told["places"]]})
         for told in answer["failures"]
@@ -66,7 +67,7 @@ def answer_lines(answer: Mapping[str, Any]) -> Iterator[str]:
 
 
 def motion_lines(motion: Mapping[str, Any] | None) -> Iterator[str]:
-    """Errors of the simulated motion of every joint; none where no simulation was asked for."""
+    """Errors of the simulated motion of every joint; none if no simulation was requested."""
     if motion is None:
         return
     yield ""
@@ -92,7 +93,7 @@ def motion_lines(motion: Mapping[str, Any] | None) -> Iterator[str]:
 
 
 def servo_lines(motion: Mapping[str, Any] | None) -> Iterator[str]:
-    """What the motion of servos named; none where no controller was given."""
+    """Effects identified from the motion of servos; none without a controller."""
     if motion is None:
         return
     yield ""
@@ -103,7 +104,7 @@ def servo_lines(motion: Mapping[str, Any] | None) -> Iterator[str]:
 
 
 def where_lines(failures: Sequence[Any]) -> Iterator[str]:
-    """In which part of its motion each joint exceeds its noise, a line each."""
+    """Part of the motion in which each joint exceeds its noise, one line each."""
     if failures:
         yield ""
         yield "Location of the error above the noise"
@@ -122,7 +123,7 @@ def where_lines(failures: Sequence[Any]) -> Iterator[str]:
 
 
 def joint_lines(story: Mapping[str, Any]) -> Iterator[str]:
-    """A row per joint that is not at its noise, the worst first; the others in one line."""
+    """A row per joint that exceeds its noise, the worst first; the others in one line."""
     rows = [row for row in story["joints"] if row["speaks"]] or list(story["joints"])
     rows.sort(key=lambda row: -row["ratios"][0] if row["ratios"][0] == row["ratios"][0] else 0.0)
     known = [ratio for row in rows for ratio in row["ratios"] if ratio == ratio]
@@ -146,14 +147,14 @@ def joint_lines(story: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _name(row: Mapping[str, Any]) -> str:
-    """A joint by its name, shortened where it is long, and its number."""
+    """The name of a joint, shortened if it is long, and its number."""
     name, number = str(row["name"]), f" ({row['joint']})"
     room = NAME - len(number)
     return (name if len(name) <= room else name[: room - 3] + "...") + number
 
 
 def bar(ratios: Sequence[float], largest: float, width: int = BAR) -> str:
-    """Error over noise as a bar: full after, light before, and a mark at the noise.
+    """Error over noise as a bar: dark after, light before, with a mark at the noise.
 
     Parameters
     ----------

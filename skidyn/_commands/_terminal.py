@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Text that fits the terminal: what is printed, and what ``--help`` teaches."""
+"""Text that fits the terminal: output and ``--help``."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ import textwrap
 from itertools import groupby
 from typing import Any, TextIO
 
-#: Signs that move the cursor or change the terminal; names in files may hold them.
+#: Characters that move the cursor or change the terminal; names in files may contain them.
 _OBEYED = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 
 
 class FittingStream:
-    """A terminal whose long lines are broken between words, not within them.
+    """A terminal stream whose long lines are broken between words.
 
-    Programs that read the output get no such stream, and every line as it is.
+    Programs that read the output get unchanged lines.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class FittingStream:
         return getattr(self._stream, name)
 
     def write(self, text: str) -> int:
-        """Write the lines that are complete; the rest waits."""
+        """Write complete lines, and keep the rest."""
         *lines, self._rest = (self._rest + text).split("\n")
         width = shutil.get_terminal_size().columns
         for line in lines:
@@ -40,14 +40,14 @@ class FittingStream:
         return len(text)
 
     def flush(self) -> None:
-        """Write what waits."""
+        """Write the kept rest."""
         self._stream.write(self._rest)
         self._rest = ""
         self._stream.flush()
 
 
 def fit(line: str, width: int, end: str = "") -> str:
-    """A line broken between words to fit a width, without signs that a terminal obeys.
+    """A line broken between words to fit a width, without control characters.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def fit(line: str, width: int, end: str = "") -> str:
     width : int
         Columns.
     end : str, default=""
-        What ends every line but the last.
+        Text at the end of every line except the last.
 
     Returns
     -------
@@ -91,7 +91,7 @@ def fit(line: str, width: int, end: str = "") -> str:
 
 
 class TeachingFormatter(argparse.RawDescriptionHelpFormatter):
-    """Help whose paragraphs fit the terminal, and whose indented examples stay examples."""
+    """Help formatter that fits paragraphs to the terminal and keeps indented examples."""
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
         lines = []
@@ -108,7 +108,7 @@ def _is_example(line: str) -> bool:
 
 
 def _example(line: str, width: int) -> str:
-    """A command that can still be copied; what is said about it follows below where it must."""
+    """A command that can be copied; its description follows below if it does not fit."""
     if len(line) <= width:
         return line
     command, *said = re.split(r"(?<=\S) {2,}(?=\S)", line, maxsplit=1)

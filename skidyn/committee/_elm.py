@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Committee of networks whose hidden layer is random and stays as it is."""
+"""Committee of networks with a fixed random hidden layer."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from skidyn.preprocessing import scaling_of
 
 Array = NDArray[Any]
 
-#: Rows whose hidden activations are held at once.
+#: Number of rows whose hidden activations are stored at once.
 CHUNK = 2048
 #: Above this p the ridge is too weak for the rounding of single precision.
 LARGEST_SINGLE_PRECISION_P = 0.99
@@ -37,30 +37,31 @@ class ELMCommittee(MultiOutputMixin, RegressorMixin, BaseEstimator):
     log, with the same scaling of the inputs (up to rounding: sums are in single precision up to p =
     0.99).
 
-    Use it without physics only if no model of the robot exists: with a URDF, a rigid body with
-    friction predicts far better, and boosted trees may do so too (:doc:`/user_guide/learners`).
+    Use it without physics only if no model of the robot exists: with a URDF, a rigid-body model
+    with friction predicts far better, and boosted trees may also be better
+    (:doc:`/user_guide/learners`).
 
     Parameters
     ----------
     n_estimators : int, default=10
-        Members.
+        Number of members.
     n_hidden : int, default=500
         Hidden units of each member.
     p : float in (0, 1], default=0.5
         Strength of the data against the prior: the ridge is ``(1 - p) / p`` on the covariance of
         the activations.
     fit_intercept : bool, default=True
-        Learn about the means of activations and torque, which the ridge then does not shrink. False
-        takes mean second moments as they are, as eq. 4 of [1]_ does.
+        Subtract the means of activations and torque, which the ridge then does not shrink. False
+        uses second moments about zero, as eq. 4 of [1]_.
     scaling : {"standard", "minmax", None}, default="standard"
         Scaling of the inputs before the random layer, fixed by the first call of ``fit`` or
-        ``partial_fit``; None takes them as they are.
+        ``partial_fit``; None for no scaling.
     n_jobs : int, default=None
         Members computed at the same time (threads).
     trajectory, time : int, str or None, default="auto"
         Key columns of X, which are not features.
     random_state : int, RandomState or None, default=None
-        Draws the hidden layers.
+        Seed of the hidden layers.
 
     Attributes
     ----------
@@ -71,13 +72,13 @@ class ELMCommittee(MultiOutputMixin, RegressorMixin, BaseEstimator):
     coef_ : ndarray of shape (n_estimators, n_hidden, n_outputs), N m (N if prismatic)
         Weights of the output layers.
     intercept_ : ndarray of shape (n_estimators, n_outputs), N m (N if prismatic)
-        Mean torque less that of the activations; zero without `fit_intercept`.
+        Mean torque minus the output for the mean activations; zero without `fit_intercept`.
     n_samples_seen_ : float
-        Rows learned, or sum of their weights.
+        Number of rows seen, or sum of their weights.
     n_features_in_ : int
-        Columns of X.
+        Number of columns of X.
     feature_names_in_ : ndarray of str
-        Their names, where X has names.
+        Names of the columns, if X has names.
 
     Notes
     -----
@@ -87,8 +88,8 @@ class ELMCommittee(MultiOutputMixin, RegressorMixin, BaseEstimator):
 
         W = (\operatorname{cov}(h, h) + \tfrac{1 - p}{p} I)^{-1} \operatorname{cov}(h, \tau).
 
-    Eq. 4 of [1]_ has means of products in place of covariances, and prints :math:`E[\tau \tau^T]`
-    where only :math:`E[h \tau^T]` has the dimensions of the output layer. Its form is
+    Eq. 4 of [1]_ has means of products in place of covariances, and contains :math:`E[\tau
+    \tau^T]`, although only :math:`E[h \tau^T]` has the dimensions of the output layer. Its form is
     ``ELMCommittee(fit_intercept=False, scaling=None)`` (:ref:`papers_own_forms`).
 
     References
@@ -210,8 +211,8 @@ class ELMCommittee(MultiOutputMixin, RegressorMixin, BaseEstimator):
             )
         scaled = self._scaled(inputs)
         self.n_samples_seen_ += float(weight.sum())
-        # How a product is shared among threads changes how it rounds, in single precision by more
-        # than the ridge forgives; members share the cores instead.
+        # The division of a product among threads changes its rounding, in single precision by more
+        # than the ridge tolerates; members share the cores instead.
         with threadpool_limits(1, user_api="blas"):
             Parallel(n_jobs=self.n_jobs, prefer="threads")(
                 delayed(self._learn_member)(k, scaled, targets, weight)
@@ -233,7 +234,7 @@ class ELMCommittee(MultiOutputMixin, RegressorMixin, BaseEstimator):
         self.intercept_ = np.zeros((members, n_outputs))
         self.n_samples_seen_ = 0.0
         self._one_dimensional = one_dimensional
-        # near the targets' mean, so that single precision loses nothing to a large offset
+        # near the targets' mean, so that a large offset does not reduce the precision
         self._origin = np.average(targets, axis=0, weights=weight)
         # weighted sums of products of [h, 1, t] over all rows seen; h: activations, t: targets
         self._moments = np.zeros((members, *2 * (size + 1 + n_outputs,)))
@@ -261,7 +262,7 @@ class ELMCommittee(MultiOutputMixin, RegressorMixin, BaseEstimator):
             second, cross = second - np.outer(h_mean, h_mean), cross - np.outer(h_mean, t_mean)
         else:
             cross = cross + np.outer(h_mean, self._origin)
-        # the share of the trace only keeps the factorisation possible where p = 1
+        # the share of the trace is only needed for the factorisation if p = 1
         ridge = (1 - self.p) / self.p + 1e-10 * np.trace(second)
         second[np.diag_indices_from(second)] += max(ridge, np.finfo(float).tiny)
         self.coef_[k] = linalg.solve(second, cross, assume_a="pos")

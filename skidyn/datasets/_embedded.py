@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The log of the demonstration, simulated when it is asked for."""
+"""The log of the demonstration, simulated on request."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def load_demo_log() -> Bunch:
     """Log of a Panda arm whose fourth joint has pre-sliding friction and whose second has a spring.
 
-    It is simulated on request and always the same; nothing is stored or downloaded.
+    It is simulated on request with fixed random numbers; nothing is stored or downloaded.
 
     Returns
     -------

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from sklearn.utils import Bunch
 
-#: Files are named by the commit that holds them, so that their content cannot change.
+#: Addresses contain the commit of the files, so that their content cannot change.
 EMPS_URL = (
     "https://raw.githubusercontent.com/forgi86/sysid-neural-continuous/"
     "93afc131780fb1d5477472935a18ac8405683890/examples/EMPS/data/DATA_EMPS.mat"
@@ -335,7 +335,7 @@ def fetch_panda_gaz(*, data_home: str | os.PathLike[str] | None = None, url: str
 def fetch_screw_drive(
     *, data_home: str | os.PathLike[str] | None = None, url: str = "", runs: tuple[str, ...] = ()
 ) -> Bunch:
-    """Download a worm drive at constant speeds and in start-stop runs, seen from its motor.
+    """Download a worm drive at constant speeds and in start-stop runs, measured at its motor.
 
     The recordings are those of drive 3 (worm 60:1, a hanging weight of 0.096 kg) of [1]_ in the
     repository RViMLab/TRO2021-Dynamic-Modelling, whose licence is MIT. They are not part of skidyn.
@@ -391,7 +391,7 @@ def _drive_run(path: Path) -> pd.DataFrame:
     lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
     try:
         first = lines.index("ms;rpm;%") + 1
-        # Some cells carry a remark behind their number.
+        # Some cells contain a remark after their number.
         rows = [
             [float(c.split()[0]) for c in line.split(";")[:3]] for line in lines[first:] if line
         ]
@@ -415,7 +415,7 @@ def _servo_run(path: Path) -> pd.DataFrame:
             "time": entries["timestamp"],
             "q1": entries["position"],
             "dq1": entries["speed"],
-            # milliampere, kept as unsigned 16 bit in the source
+            # milliampere, stored as unsigned 16 bit in the source
             "i1": ((current + 2**15) % 2**16 - 2**15) / 1000,
             "temp1": entries["temp"],
             "volts": entries["input_volts"],
@@ -430,7 +430,7 @@ def _servo_run(path: Path) -> pd.DataFrame:
 def _retrieve(
     url: str, name: str, data_home: str | os.PathLike[str] | None, sha256: str | None
 ) -> Path:
-    """Download once, and hold the file to its checksum ever after."""
+    """Download once, and compare the file with its checksum from then on."""
     pooch = import_optional("pooch", extra="fetch")
     home = None if data_home is None else str(data_home)
     from sklearn.datasets import get_data_home

@@ -11,7 +11,7 @@ from skidyn.robots import Robot
 
 @cache
 def _load(name: str) -> Robot:
-    """Robot of an embedded URDF; read once, as robots never change."""
+    """Robot of an embedded URDF; read only once, since robots are immutable."""
     text = resources.files("skidyn.datasets").joinpath("robots", f"{name}.urdf").read_bytes()
     return Robot.from_urdf(text)
 
@@ -140,7 +140,7 @@ def load_scara() -> Robot:
     """SCARA: two revolute joints, a vertical slider and a revolute tool axis.
 
     Geometry of an Adept Cobra s600 from its data sheet; masses are estimates, inertias those of
-    uniform boxes and cylinders, because the manufacturer publishes none.
+    uniform boxes and cylinders, because the manufacturer does not publish them.
 
     Returns
     -------

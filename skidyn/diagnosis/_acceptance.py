@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which explanation of a ranking is taken, and whether the rule accepts it."""
+"""Choice of an explanation from a ranking, and its acceptance by the rule."""
 
 from __future__ import annotations
 
@@ -23,20 +23,21 @@ from skidyn.effects import NamelessEffect, get_effect
 
 
 class JudgingSearch(RankingSearch):
-    """A search that picks and judges explanations."""
+    """A search that chooses and judges explanations."""
 
     def pick(self, ranking: list[Hypothesis]) -> Hypothesis | None:
         """The best explanation, or a simpler one that is as good.
 
-        It is where it falls behind by no more than the standard error and a small share of the
-        score; beside a further form, by whatever the error is if that form says nothing more.
+        A simpler one is as good if its score is lower by no more than the standard error and a
+        small share of the score; compared with a further form, by any difference if the form adds
+        nothing to it.
         """
         if not ranking:
             return None
         best = self._named(ranking)
         for rival in ranking[1:]:
             if best.errors is None or rival.errors is None or rival.kind == best.kind:
-                continue  # forms of one kind have one name: the best fit is taken
+                continue  # forms of one kind have one name: the best fit is used
             part = self._on_joints_of(rival, best)
             if (
                 part.errors is None
@@ -49,15 +50,15 @@ class JudgingSearch(RankingSearch):
             if errors.shape != own.shape:
                 if within_recordings(best) or within_recordings(rival):
                     continue  # one is of some recordings, judged on other folds
-                # one shows in one recording alone: both are judged by parts of recordings
+                # one occurs in one recording only: both are judged by parts of recordings
                 errors, own = (self._errors(h, within=True) for h in (part, rival))
             variance = errors.sum(0) / np.maximum(self.problem.rows.counts, 1)
-            variance = np.where(variance > 0, variance, 1.0)  # a joint that rests
+            variance = np.where(variance > 0, variance, 1.0)  # a joint at rest
             behind = ((own - errors) / variance).sum(1)
             error = behind.std(ddof=1) * np.sqrt(len(behind))
             cap = self.settings.simpler_share * part.score
-            # What every further parameter must gain (G. Schwarz 1978, Annals of Statistics 6), with
-            # what is left as correlated as it is.
+            # Required gain for every further parameter (G. Schwarz 1978, Annals of Statistics 6),
+            # with the actual correlation of the residual.
             least = np.log(self.problem.rows.counts[list(part.joints)].sum())
             least *= self._price(part.candidates) * max(1, part.n_parameters - rival.n_parameters)
             near = behind.sum() < min(max(error, least), cap)
@@ -72,8 +73,8 @@ class JudgingSearch(RankingSearch):
     def _on_joints_of(self, rival: Hypothesis, best: Hypothesis) -> Hypothesis:
         """The terms of a further form on the joints of a rival that has fewer of them.
 
-        Joint by joint, a simpler effect may do as well as a form that is free on all of them. What
-        is not made of terms of single joints is compared as it is.
+        On a single joint, a simpler effect may be as good as a form that is free on all of them.
+        Explanations other than terms of single joints are compared as a whole.
         """
         apart = all(len(c.joints) == 1 for h in (rival, best) for c in h.candidates)
         fewer = set(rival.joints) < set(best.joints)
@@ -90,16 +91,16 @@ class JudgingSearch(RankingSearch):
         )
 
     def _as_good(self, plain: Array, errors: Array, further: Hypothesis) -> bool:
-        """Whether a plain formula leaves no more than it may of what a further form removes."""
+        """Whether a plain formula leaves little enough of what a further form removes."""
         left = errors.sum(0)
         removed = left * np.expm1(np.maximum(further.gain, 0) / self._counts)
         return self._good_enough(plain.sum(0), left, removed, further.joints)
 
     def _encompassed(self, best: Hypothesis, rival: Hypothesis) -> bool:
-        """Whether a further form says nothing beside a simpler explanation, which says it all [1]_.
+        """Whether a simpler explanation encompasses a further form [1]_.
 
-        Held-out errors of an effect that few recordings show differ by luck between two formulas
-        of which either would do.
+        Held-out errors of an effect in few recordings differ by chance between two formulas that
+        fit equally well.
 
         References
         ----------
@@ -113,10 +114,10 @@ class JudgingSearch(RankingSearch):
         return chance > self.settings.member
 
     def _named(self, ranking: list[Hypothesis]) -> Hypothesis:
-        """The first explanation, or one that says more whose formula is good enough beside it.
+        """The first explanation, or a more specific one with a sufficiently good formula.
 
-        A name says more than a function of signals, and an effect that holds in every recording
-        more than one that has its own size in each.
+        A known effect is more specific than a function of signals, and an effect that is equal in
+        all recordings more than one with a separate size in each.
         """
         best = ranking[0]
         single = within_recordings(best)
@@ -128,8 +129,8 @@ class JudgingSearch(RankingSearch):
             if rival.kind == UNKNOWN or rival.errors is None or within_recordings(rival):
                 continue
             covered = [c for c in best.candidates if set(c.joints) <= set(rival.joints)]
-            # What differs between recordings is one finding a joint; a function of signals is not,
-            # and may reach joints that it does not explain.
+            # An effect that differs between recordings is one finding per joint; a function of
+            # signals is not, and may act on joints that it does not explain.
             joints = sorted({j for c in covered for j in c.joints}) if single else list(best.joints)
             width = sum(c.width for c in covered)
             enough = (
@@ -138,7 +139,7 @@ class JudgingSearch(RankingSearch):
             if not joints or not enough:
                 continue
             if not single and best.score - rival.score < self.settings.least_gain:
-                return rival  # the function does not say enough more to be a finding beside it
+                return rival  # the function does not add enough to be a finding in addition
             if not single and self.denied(rival, best):
                 continue
             errors = rival.errors
@@ -150,12 +151,12 @@ class JudgingSearch(RankingSearch):
         return best
 
     def denied(self, name: Hypothesis, function: Hypothesis) -> bool:
-        """Whether what a function turned out to be cannot be what a known effect does.
+        """Whether the fitted function differs from what a known effect can do.
 
         Parameters
         ----------
         name, function : Hypothesis
-            Known effect, and function without a name, that explain about as much.
+            Known effect and unknown function that explain about equally much.
         """
         found = [(c.term.effect, c.term.shape) for c in function.candidates]
         return any(
@@ -171,20 +172,20 @@ class JudgingSearch(RankingSearch):
         joints: Sequence[int],
         tolerance: float | None = None,
     ) -> bool:
-        """Whether a name leaves no more than its formula may leave of what a function removes.
+        """Whether a known effect leaves at most the permitted part of what a function removes.
 
         Parameters
         ----------
         errors : ndarray of shape (n_joints,)
-            Held-out squared error with the name.
+            Held-out squared error with the known effect.
         least : ndarray of shape (n_joints,)
-            That with the function.
+            Held-out squared error with the function.
         removed : ndarray of shape (n_joints,)
             Squared error that the function removes.
         joints : sequence of int
-            Joints, from 0, on which they are compared, each in units of what is left there.
+            Joints, from 0, on which they are compared, each in units of its residual.
         tolerance : float, optional
-            Share of what the function removes; that of a plain formula by default.
+            Permitted share of what the function removes; that of a plain formula by default.
         """
         tolerance = self.settings.form_tolerance if tolerance is None else tolerance
         own = list(joints)
@@ -193,9 +194,9 @@ class JudgingSearch(RankingSearch):
         return behind <= tolerance * float(weight @ removed[own])
 
     def _simplest_of_family(self, best: Hypothesis, ranking: list[Hypothesis]) -> Hypothesis:
-        """Members of a family differ only in motion made for it: the simplest near one is named.
+        """The simplest member of a family among those with nearly the best score.
 
-        Of its forms, the one that explains most.
+        Of its forms, the best one is used.
         """
         family = family_of(best)
         if not family:
@@ -211,7 +212,7 @@ class JudgingSearch(RankingSearch):
         return max((h for h in [best, *near] if h.kind == kind), key=lambda h: h.score)
 
     def judged(self, hypothesis: Hypothesis) -> Hypothesis | None:
-        """The hypothesis with those of its terms that are more than chance beside the others."""
+        """The hypothesis with those of its terms that are significant in addition to the others."""
         if hypothesis.torque is not None:  # judged on single samples, by its line
             chance = hypothesis.chances[0]
             tried = self.tried()
@@ -240,11 +241,11 @@ class JudgingSearch(RankingSearch):
         return None
 
     def _judged_together(self, hypothesis: Hypothesis) -> Hypothesis | None:
-        """What differs between recordings: more than chance together, each by itself at 5 %.
+        """Terms that differ between recordings: significant together, and each alone at 5 %.
 
-        Each recording by itself would have to stand out of all candidates, and one that does not
-        would spoil the test of the others. What all recordings have is partly what bodies do:
-        one after the other is the one that the others are held against.
+        Each recording alone would have to be significant among all candidates, and one that is not
+        would bias the test of the others. A part common to all recordings may be due to bodies, so
+        each recording in turn is the reference for the others.
         """
         kept: list[Candidate] = []
         parts = grouped_by_joints(hypothesis.candidates)
@@ -264,7 +265,7 @@ class JudgingSearch(RankingSearch):
     def _each_beside_the_others(
         self, rest: list[Candidate], others: Sequence[Candidate]
     ) -> list[Candidate]:
-        """Those of some recordings that are more than chance at 5 % beside the rest of them."""
+        """Those of some recordings that are significant at 5 % in addition to the others."""
         while rest:
             chances = [self.chance(c, [*others, *(o for o in rest if o is not c)]) for c in rest]
             worst = int(np.argmax(chances))
@@ -274,23 +275,23 @@ class JudgingSearch(RankingSearch):
         return rest
 
     def shadow(self, hypothesis: Hypothesis) -> bool:
-        """Whether an explanation is so small that earlier ones' imperfect formulas may leave it."""
+        """Whether an explanation is small enough to be an error of earlier, imperfect formulas."""
         joints = sorted({j for c in hypothesis.candidates for j in c.rows})
         settings, tolerance = self.settings, self._tolerance(hypothesis)
         own, earlier = self._removed(self.left, hypothesis.gain), self.start - self.left
         if not self._mostly_small(joints, hypothesis.gain, own, tolerance * earlier):
             return False
-        # What an imperfect formula leaves does not become noise by one known effect.
+        # The error of an imperfect formula does not become noise by one known effect.
         known = hypothesis.kind != UNKNOWN and not within_recordings(hypothesis)
         most = self._mostly_small(joints, hypothesis.gain, own, 0.5 * self.left)
         return not known or most or self._price(hypothesis.candidates) > settings.white
 
     def without_pieces(self, hypothesis: Hypothesis) -> tuple[Hypothesis, bool]:
-        """The hypothesis without terms that are but pieces of a force that was found before.
+        """The hypothesis without terms that are only parts of a force found before.
 
-        A spring and a stop on one joint that are found after each other are mostly one force over
-        its position, of another form, above all where the second does little, or where the first
-        has no name.
+        A spring and a stop found one after another on a joint are mostly one force over its
+        position with another form, especially if the second explains little, or if the first is
+        unknown.
 
         Parameters
         ----------
@@ -300,7 +301,7 @@ class JudgingSearch(RankingSearch):
         Returns
         -------
         hypothesis : Hypothesis
-            As it was given where all of its terms are pieces, or none is.
+            Unchanged if all or none of its terms are parts.
         is_piece : bool
             Whether all of them are.
         """
@@ -321,7 +322,7 @@ class JudgingSearch(RankingSearch):
         return rest, False
 
     def _holds_force(self, hypothesis: Hypothesis, joint: int, small: bool) -> bool:
-        """Whether a force over the position of a joint was found that this is a piece of."""
+        """Whether this is a part of a force over the position of a joint that was found before."""
         return self.of_one_position(hypothesis, joint) and any(
             self.of_one_position(h, joint) and (small or h.kind == UNKNOWN) for h in self.findings
         )
@@ -332,7 +333,7 @@ class JudgingSearch(RankingSearch):
         Parameters
         ----------
         hypothesis : Hypothesis
-            A known effect, or a function without a name.
+            A known effect or an unknown function.
         joint : int
             Joint, from 0.
         """
@@ -344,10 +345,10 @@ class JudgingSearch(RankingSearch):
         return all(term.follows_position for term in own)
 
     def _tolerance(self, beside: Hypothesis) -> Array:
-        """Share of the squared error removed so far that formulas may have left, by joint.
+        """Share of the removed squared error that imperfect formulas may leave, by joint.
 
-        How a link swings is a formula of first order: it leaves more to a nameless function, and
-        to a delay, which is the first order of any lag.
+        The formula of an oscillating link is of first order: it leaves more to an unknown function,
+        and to a delay, which is the first order of any lag.
         """
         settings = self.settings
         first_order = beside.kind == UNKNOWN or any(
@@ -369,26 +370,27 @@ class JudgingSearch(RankingSearch):
         return shares
 
     def _mostly_small(self, joints: Sequence[int], gain: Array, own: Array, least: Array) -> bool:
-        """Whether most of a gain is had on joints of which less is removed than what is least.
+        """Whether most of a gain is on joints of which less than the least share is removed.
 
-        Joint by joint: one whose error fell by a thousandth through another effect would call
-        everything small, whatever it does elsewhere.
+        It is judged by joint: otherwise a joint whose error another effect reduced by a thousandth
+        would make every gain seem small.
         """
         gained = np.maximum(gain, 0.0)
         large = [j for j in joints if own[j] >= least[j]]
         return bool(gained[large].sum() < 0.5 * gained[list(joints)].sum())
 
     def _removed(self, errors: Array, gain: Array) -> Array:
-        """Squared error of every joint that a gain of log-likelihood takes away."""
+        """Reduction of the squared error of every joint by a gain of log-likelihood."""
         counts = np.maximum(self.problem.rows.counts, 1)
         share: Array = -np.expm1(-np.maximum(gain, 0.0) / counts)
         return errors * share
 
     def _at_its_limit(self, hypothesis: Hypothesis) -> Hypothesis | None:
-        """The hypothesis, or the simpler kind that its unresolved terms are; what has them waits.
+        """The hypothesis, or the simpler kind that is equivalent to its unresolved terms.
 
-        Pre-sliding shorter than can be seen is Coulomb friction. The terms that are resolved are
-        found again beside it. What is at the far end of its range is no such effect.
+        Pre-sliding that is too short to be resolved is Coulomb friction. Resolved terms are then
+        searched again in addition to it. A shape parameter at the far end of its range indicates
+        another effect.
         """
         inside = tuple(c for c in hypothesis.candidates if not self._beyond(c))
         if not inside:
@@ -409,10 +411,10 @@ class JudgingSearch(RankingSearch):
         return replace(hypothesis, candidates=rest) if rest else None
 
     def _beyond(self, candidate: Candidate) -> bool:
-        """Whether the first shape parameter of a name ends at the far end of its range."""
+        """Whether the first shape parameter of a known effect is at the far end of its range."""
         effect, shapes = candidate.term.effect, candidate.term.effect.shapes
         if candidate.kind == UNKNOWN or effect.search != "grid" or not shapes:
-            return False  # a line in a spectrum ends where the spectrum does
+            return False  # a line in a spectrum may be at its end
         if shapes[0].name not in candidate.term.shape:
             return False
         unit = self.problem.signals.unit[candidate.joints[0]] if shapes[0].scales else 1.0
@@ -420,7 +422,7 @@ class JudgingSearch(RankingSearch):
         return bool(candidate.term.shape[shapes[0].name] >= far)
 
     def _limit_kind(self, candidate: Candidate) -> str:
-        """The kind that a candidate cannot be told from, for a shape that is not resolved."""
+        """The simpler kind that is equivalent to a candidate with an unresolved shape."""
         unit = self.problem.signals.unit[candidate.joints[0]]
         for shape in candidate.term.effect.shapes:
             low = shape.low * (unit if shape.scales else 1.0)
@@ -430,7 +432,7 @@ class JudgingSearch(RankingSearch):
         return ""
 
     def _richer_known(self, hypothesis: Hypothesis) -> bool:
-        """Whether a member of the same family that is as rich was found on the same joints."""
+        """Whether an equally complex member of the family was found on the same joints."""
         family = family_of(hypothesis)
         return any(
             family
@@ -441,7 +443,7 @@ class JudgingSearch(RankingSearch):
         )
 
     def _alike(self, best: Hypothesis, rivals: Sequence[Hypothesis]) -> bool:
-        """Whether a known effect on other joints explains as much."""
+        """Whether a known effect on other joints explains equally much."""
         return any(
             h.kind != UNKNOWN
             and h.joints != best.joints
@@ -450,9 +452,9 @@ class JudgingSearch(RankingSearch):
         )
 
     def _elsewhere(self, best: Hypothesis) -> tuple[tuple[int, ...], ...]:
-        """Other pairs of joints on which a coupling explains as much.
+        """Other pairs of joints on which a coupling explains equally much.
 
-        Where axes are parallel, bodies take up what couples one pair in place of another.
+        With parallel axes, the bodies compensate the difference between pairs.
         """
         pairs = [c for c in best.candidates if len(c.joints) == 2]
         if best.kind == UNKNOWN or within_recordings(best) or not pairs:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Candidates: terms of the catalogue, and nameless functions of the signals, with their rows."""
+"""Candidates: terms of the catalogue, and unknown functions of the signals, with their rows."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from skidyn.evidence import Problem
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """Something that might be missing.
+    """An effect that may be missing.
 
     Attributes
     ----------
     kind : str
-        Kind of the effect, ``"unknown"`` for a nameless function.
+        Kind of the effect, ``"unknown"`` for an unknown function.
     term : Term
         Term that would be added.
     rows : dict of int to ndarray of shape (n_rows_j, n_coefficients)
-        Averaged columns, per joint it reaches.
+        Averaged columns, per joint on which it acts.
     variables : tuple of str
-        Signals a nameless function depends on.
+        Signals on which an unknown function depends.
     n_shapes : int
         Shape parameters that are refined; they count as parameters.
     """
@@ -47,12 +47,12 @@ class Candidate:
 
     @cached_property
     def lowest(self) -> Array:
-        """Smallest value of every coefficient that physics allows."""
+        """Smallest physically possible value of every coefficient."""
         return self.term.lowest
 
     @cached_property
     def zeros(self) -> NDArray[np.bool_]:
-        """Which coefficients only say where the effect is zero."""
+        """Coefficients that only define the zero of the effect."""
         return self.term.zeros
 
     @cached_property
@@ -62,11 +62,11 @@ class Candidate:
 
     @cached_property
     def is_further_form(self) -> bool:
-        """Whether the formula is another one than the plain one of its kind."""
+        """Whether the formula differs from the plain one of its kind."""
         return self.term.is_further_form
 
     def allows(self, coefficients: Array) -> bool:
-        """Whether physics allows coefficients; what is nothing beside the rest has any sign.
+        """Whether coefficients are physically possible; negligible ones may have any sign.
 
         Parameters
         ----------
@@ -90,12 +90,12 @@ class Candidate:
 
     @cached_property
     def site(self) -> tuple[str, tuple[int, ...]]:
-        """Kind and joints: what can be added once."""
+        """Kind and joints, which can be added once."""
         return self.kind, self.term.places
 
 
 def rows_together(candidates: Sequence[Candidate], counts: NDArray[np.int64]) -> dict[int, Array]:
-    """Averaged columns of several candidates side by side, per joint that any of them reaches.
+    """Averaged columns of several candidates side by side, per joint on which any of them acts.
 
     Parameters
     ----------
@@ -115,16 +115,16 @@ def rows_together(candidates: Sequence[Candidate], counts: NDArray[np.int64]) ->
 def catalogue_candidates(
     problem: Problem, kinds: Iterable[str], size_share: float = 0.0
 ) -> list[Candidate]:
-    """Terms on the grid of every kind that this data can show and the model lacks.
+    """Terms on the grid of every kind that the data can show and the model does not have.
 
     Parameters
     ----------
     problem : Problem
-        With the load and model torque of the current fit.
+        Problem with the load and model torque of the current fit.
     kinds : iterable of str
         Kinds of the catalogue.
     size_share : float, default=0
-        Least size of a coefficient, as a share of what its shape says.
+        Least size of a coefficient, as a share of that implied by its shape.
     """
     present = {(term.kind, term.places) for term in problem.terms}
     few = problem.few
@@ -132,7 +132,7 @@ def catalogue_candidates(
     for kind in kinds:
         effect = get_effect(kind)
         if effect.search == "trajectories" and not problem.rigid_body and problem.robot is not None:
-            # With the URDF's own bodies even a load carried all the time shows.
+            # With the URDF's own bodies even a permanent load can be detected.
             terms.append(Term.at(kind, tuple(range(problem.n_joints))))
             continue
         if effect.search != "grid" or ("robot" in effect.needs and problem.robot is None):
@@ -141,14 +141,14 @@ def catalogue_candidates(
             continue
         for joints in effect.sites(few):
             hidden = [effect.not_shown(few, j) for j in joints]
-            # An effect of the whole robot shows as soon as one joint shows it.
+            # An effect of the whole robot can be detected if one joint shows it.
             if (kind, joints) in present or all(hidden) or (len(joints) < 3 and any(hidden)):
                 continue
             grid = effect.grid(few, joints)
             if size_share:
                 grid = [effect.bounded(few, joints, s, size_share) for s in grid]
             terms += [Term.at(kind, joints, shape) for shape in grid]
-    # What kinds with the same needs share for a joint is kept for one joint at a time.
+    # Data shared by kinds with the same needs is cached for one joint at a time.
     ordered = sorted(terms, key=lambda term: (term.effect.needs, term.places))
     problem.prepare(ordered, text="Preparing effects")
     return [Candidate(t.kind, t, problem.term_rows(t), n_shapes=_refined(t)) for t in terms]

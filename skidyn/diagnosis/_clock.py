@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A torque periodic in time: the strongest line of the residual's spectrum over the clock."""
+"""A torque periodic in time: the strongest line of the residual's spectrum over time."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from skidyn._signals import Array, Signals
 
 #: Lowest frequency in Hz; share of the sampling rate that is the highest.
 LOWEST, HIGHEST = 0.3, 0.45
-#: Frequencies around a line whose median is the noise there, and rows of a segment at least.
+#: Number of frequencies around a line whose median is its noise, and least rows of a segment.
 NEIGHBOURS, SHORTEST = 201, 32
-#: Chance of a line, over all frequencies, at which it is worth a test.
+#: Chance of a line, over all frequencies, below which it is tested.
 WORTH = 0.01
 #: Samples used for the coherent refinement, which thins the log no further than the line allows.
 COHERENT = 4000
@@ -24,13 +24,13 @@ COHERENT = 4000
 
 @dataclass(frozen=True)
 class ClockLine:
-    """The strongest line of a residual over the clock.
+    """The strongest line of a residual over time.
 
     Attributes
     ----------
     frequency : float, Hz
     chance : float
-        Of so high a line at any frequency of the band if there were none.
+        Probability of a line of this height at any frequency of the band in noise.
     height : float
         Power over that of the noise near it, summed over the segments.
     """
@@ -47,11 +47,11 @@ def clock_line(
     rate: float,
     band: tuple[float, float] = (LOWEST, np.inf),
 ) -> ClockLine | None:
-    """The strongest line that stands out, None where none does.
+    """The strongest significant line, or None.
 
-    Spectra of the segments are added up, so that their phases do not matter; over their local
+    Spectra of the segments are added, so that their phases do not matter; relative to its local
     median the sum of m spectra of noise follows a gamma distribution of shape m. The frequency is
-    then refined over the whole log, where the phase must hold.
+    then refined over the whole log with a common phase.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def clock_line(
     residual : ndarray of shape (n_samples,), N m or N
         Residual of one joint.
     use : ndarray of shape (n_samples,) of bool
-        Samples that enter.
+        Samples that are used.
     rate : float, Hz
         Sampling rate.
     band : (float, float), Hz
@@ -98,17 +98,17 @@ def _length(signals: Signals, rows: slice, rate: float) -> int:
 
 
 def _refined(signals: Signals, clean: Array, centre: float, span: float) -> float:
-    """Frequency near a line at which the phase holds best over the whole log."""
+    """Frequency near a line with the most coherent phase over the whole log."""
     time = signals.clock
     whole = max(float(np.ptp(time)), span)
     reach, step = 0.6 / span, 0.2 / whole
     thin = max(1, len(time) // COHERENT)
-    # Samples are averaged after the line has been moved to rest, so none of it is lost.
+    # Samples are averaged after the line has been shifted to zero, so none of it is lost.
     still = clean * np.exp(-2j * np.pi * centre * time)
     starts = np.arange(0, len(time), thin)
     slow = np.add.reduceat(still, starts)
     middle = np.add.reduceat(time, starts) / np.diff(np.append(starts, len(time)))
-    # Each frequency is the one before it turned by the same angle at every sample.
+    # Each frequency is the previous one rotated by the same angle at every sample.
     slow = slow * np.exp(2j * np.pi * reach * middle)
     turn = np.exp(-2j * np.pi * step * middle)
     count = int(2 * reach / step) + 1

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from skidyn._signals import Array, Signals
 from skidyn.evidence import REST
 
-#: The first five exclude each other; the others lie across them.
+#: The first five exclude each other; the others may overlap with them.
 REGIMES = ("rest", "reversal", "slow", "medium", "fast", "loaded", "warm")
 #: Slow and fast as shares of the speed that a joint exceeds in 5 % of its motion.
 SLOW, FAST = 0.25, 0.7
@@ -116,7 +116,7 @@ class Comparison:
 
 
 def regimes(comparison: Comparison) -> dict[str, NDArray[np.bool_]]:
-    """Which samples lie in which regime, per joint.
+    """Samples of every regime, per joint.
 
     Parameters
     ----------

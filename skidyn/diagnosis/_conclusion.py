@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""From the search's result to a diagnosis: held-out errors, intervals, curves, words."""
+"""Conversion of a search result to a diagnosis: held-out errors, intervals, curves, texts."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def conclude(
     model: Any,
     data: tuple[Any, ...],
 ) -> Diagnosis:
-    """Put the result of a search into a diagnosis.
+    """Make a diagnosis from the result of a search.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def conclude(
     result : SearchResult
         Findings and the final fit.
     limits : list of Limit
-        What could still hide.
+        Limits of undetected effects.
     sliding : ndarray of shape (n_samples, n_joints) of bool
         Samples away from rest and reversals.
     torque : ndarray of shape (n_samples, n_joints)
@@ -126,7 +126,7 @@ def conclude(
         EPISODE_LEAST_RANGE * torque_range(torque), EPISODE_LEAST_NOISE * parts.noise
     )
     smooth = away_from_reversals(problem, result.fit.residual, sliding)
-    # On a joint with a finding, what is large in places is the trace of its imperfect formula.
+    # On a joint with a finding, large local residuals are errors of its imperfect formula.
     taken = {j for h in result.findings for c in h.candidates for j in c.rows}
     share_held = np.array([np.inf if j in taken else EPISODE_LEAST_HELD for j in range(len(rmse))])
     episodes, inside = find_episodes(problem, smooth, least, share_held)
@@ -164,7 +164,7 @@ def conclude(
 def _refitted(
     problem: Problem, result: SearchResult, model: Any, data: tuple[Any, ...], errors: list[Any]
 ) -> tuple[list[Any], str]:
-    """Errors that count for a model that is not physics, and what is to be said of its names."""
+    """Errors of a model without physics, and notes on its identified effects."""
     assert problem.robot is not None
     remark = (
         "This model is not a rigid-body model: the effects below describe the error of this "
@@ -190,9 +190,9 @@ def _refitted(
 def _steps(
     problem: Problem, result: SearchResult, torque: Array, sliding: NDArray[np.bool_]
 ) -> tuple[list[Comparison], list[dict[str, Any]], Array, dict[Term, Array]]:
-    """Comparison and errors of the model as given and after each finding.
+    """Comparison and errors of the given model and after each finding.
 
-    Beside them what the last one leaves, held out, and the torque of its findings.
+    Also returns the held-out residual of the last model, and the torque of its findings.
     """
     comparisons, history = [], []
     dry = [t for t in problem.terms if t.is_dry]
@@ -205,7 +205,7 @@ def _steps(
         kind, joints = (last.kind, last.joints) if last else (None, ())
         comparisons.append(comparison)
         history.append(_entry(comparison, kind, joints))
-    # All terms at every sample would be most of the memory of a long log.
+    # All terms at every sample would need most of the memory for a long log.
     return comparisons, history, residual, {t: own[t] for t in found}
 
 
@@ -221,16 +221,17 @@ def _useless(
     history: Sequence[dict[str, Any]],
     least: float,
 ) -> tuple[Hypothesis, list[Candidate]] | None:
-    """The last finding with terms that leave the error of samples as large, and these terms.
+    """The last finding with terms that do not reduce the error of samples, and these terms.
 
-    They helped averaged rows. The squared error, which few samples may dominate, and the mean
-    absolute one count alike; terms that do not lower the squared error at all are among them.
+    They reduced the error of averaged rows. The squared error, which few samples may dominate, and
+    the mean absolute one are both used; terms that do not lower the squared error at all are
+    included.
     """
     for k in reversed(range(len(findings))):
         errors = [(_mean_error(comparisons[i]), history[i]["rmse"]) for i in (k, k + 1)]
         terms = []
         for candidate in findings[k].candidates:
-            # A link that gives way moves all that it carries: other joints may feel it more.
+            # A compliant link moves everything that it carries: other joints may be affected more.
             drops = [_drop(a, b, tuple(candidate.rows)) for a, b in zip(*errors, strict=True)]
             if float(np.mean(drops)) < least or drops[1] <= 0:
                 terms.append(candidate)
@@ -242,18 +243,18 @@ def _useless(
 def _vague(
     problem: Problem, findings: Sequence[Hypothesis], intervals: dict[Term, dict[str, Any]]
 ) -> tuple[Hypothesis, list[Candidate]] | None:
-    """The last finding with terms whose coefficient may be zero when folds are left out."""
+    """The last finding with terms whose coefficient is zero within its jackknife interval."""
     for hypothesis in reversed(findings):
         if hypothesis.kind == UNKNOWN or hypothesis.torque is not None:
-            continue  # a line is judged on samples, which averaged rows may not show
+            continue  # a line is judged on samples; averaged rows may not contain it
         terms = []
         for candidate in hypothesis.candidates:
             if folds_alone(problem, candidate.term).any():
-                continue  # without the fold that tells of it, it may be anything
+                continue  # without the fold that determines it, its value is arbitrary
             effect = candidate.term.effect
             sizes = [c for c in effect.coefficients if not c.is_zero]
             if len(sizes) > 1:
-                continue  # each of them may be zero beside the others, not all together
+                continue  # each of them may be zero given the others, but not all together
             others = {s.name for s in effect.shapes}
             found = [
                 value
@@ -270,10 +271,10 @@ def _vague(
 def _impossible(
     findings: Sequence[Hypothesis], intervals: dict[Term, dict[str, Any]]
 ) -> tuple[Hypothesis, list[Candidate]] | None:
-    """The last finding with terms whose coefficients, beside all others, physics forbids.
+    """The last finding with terms whose coefficients are physically impossible given all others.
 
-    A sign that was right when an effect was found may turn where what was found later, or a
-    function without a name on the same joint, takes its place.
+    A sign that was right when an effect was found may change if a later finding, or an unknown
+    function on the same joint, takes its place.
     """
     for hypothesis in reversed(findings):
         terms = []
@@ -291,9 +292,9 @@ def _impossible(
 def _slight(
     problem: Problem, findings: Sequence[Hypothesis], intervals: dict[Term, dict[str, Any]]
 ) -> dict[int, str]:
-    """Places of findings of which there is too little to be told of the robot, with remarks.
+    """Indices of findings that are too small to be significant for the robot, with remarks.
 
-    They stay in the completed model, which other effects were found beside.
+    They remain in the completed model, with which later effects were found.
     """
     remarks = {}
     for i, hypothesis in enumerate(findings):
@@ -314,9 +315,9 @@ def _slight(
 def _guess(diagnosis: Diagnosis) -> tuple[Hypothesis, list[Candidate]] | None:
     """The last finding with terms that are more likely wrong than right, and these terms.
 
-    Where another explanation on other joints equals it, one of the two is right, and both are told.
-    What removes most of an error is the best that can be said of it; what removes hardly anything
-    has to be sure.
+    If an explanation on other joints is equally good, one of the two is right, and both are
+    reported. A finding that removes most of an error is kept as its best explanation; one that
+    removes very little needs a high confidence.
     """
 
     def is_sure(finding: Finding) -> bool:
@@ -345,7 +346,7 @@ def _mean_error(comparison: Comparison) -> list[float]:
 def _without(
     problem: Problem, result: SearchResult, wrong: Hypothesis, terms: Sequence[Candidate]
 ) -> SearchResult:
-    """The result with terms of a finding taken back and the rest fitted again."""
+    """The result with terms of a finding removed and the rest fitted again."""
     pairs = zip(wrong.candidates, wrong.chances, strict=True)
     kept = [(c, p) for c, p in pairs if c not in terms]
     rest = replace(wrong, candidates=tuple(c for c, _ in kept), chances=tuple(p for _, p in kept))
@@ -363,7 +364,7 @@ def _without(
 
 
 def _unknowns(problem: Problem, result: SearchResult, terms: Sequence[Term]) -> list[UnknownTorque]:
-    """What is known about the nameless terms, the ripple taken off."""
+    """Results for the unknown terms, after subtraction of the ripple."""
     nameless = [
         c.term
         for h in result.findings
@@ -400,7 +401,7 @@ def _held_out(
 
 
 def _on_samples(term: Term) -> bool:
-    """Whether a term is a line in a spectrum, which averaged rows do not show."""
+    """Whether a term is a line in a spectrum, which averaged rows do not contain."""
     return term.effect.search == "spectrum"
 
 
@@ -429,7 +430,7 @@ def _entry(comparison: Comparison, added: str | None, joints: Sequence[int]) -> 
 
 
 def _drop(before: Sequence[float], after: Sequence[float], joints: Sequence[int]) -> float:
-    """Share of the squared error removed, on the joints of the effect, each in its own unit."""
+    """Share of the squared error removed on the joints of the effect, each in its own unit."""
     pairs = [(before[j], after[j]) for j in joints if before[j] > 0]
     if not pairs:
         return 0.0
@@ -443,7 +444,7 @@ def _sure(
     errors: tuple[Array, Array],
     whole: bool,
 ) -> Finding:
-    """The finding with the probability that its name is right."""
+    """The finding with the probability that it is identified correctly."""
     if not finding.terms:
         return finding
     joints = [j - 1 for j in finding.joints]
@@ -451,7 +452,7 @@ def _sure(
     beside = any(set(f.joints) & set(finding.joints) for f in others)
     same = sorted({j - 1 for f in findings if f.kind == finding.kind for j in f.joints})
     before, after = (error[same] for error in errors)
-    # Noise that is correlated in time is more than its fast part, and alike on all joints.
+    # Noise that is correlated in time is larger than its fast part, and similar on all joints.
     alike = max(1.0, float(np.min(errors[1] / np.maximum(parts.noise, np.finfo(float).tiny))))
     probability = confidence(
         finding.margin,
@@ -465,14 +466,14 @@ def _sure(
         stays=finding.kind != UNKNOWN and mostly_stays(before, after, alike * parts.noise[same]),
         has_name=finding.kind != UNKNOWN,
     )
-    # One of several pairs of joints that explain the same is right.
+    # Only one of several equivalent pairs of joints is right.
     return replace(finding, confidence=probability / (1 + len(finding.elsewhere)))
 
 
 def _episodic(
     episodes: list[Episode], inside: Sequence[NDArray[np.bool_]], residual: Sequence[Array]
 ) -> Finding:
-    """A torque that comes and goes, as a finding; no model predicts it."""
+    """An intermittent torque as a finding; no model predicts it."""
     joints = tuple(sorted({j for e in episodes for j in e.joints}))
     shares = [
         float(np.sum(residual[j - 1][inside[j - 1]] ** 2) / np.sum(residual[j - 1] ** 2))
@@ -523,7 +524,7 @@ def _unexplained(
     parts: Remainder,
     rmse: Array,
 ) -> dict[str, Any] | None:
-    """What has no name: all nameless findings together, else a remainder that is material."""
+    """The unexplained part: all unknown findings together, else a material remainder."""
     nameless = [f for f in findings if f.kind == UNKNOWN]
     if nameless:
         return {

@@ -30,8 +30,8 @@ class CorrectedRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, B
     Parameters
     ----------
     regressor : regressor
-        Predicts torque, N m or N. :meth:`fit` trains a copy of it, :meth:`fit_effects` takes it as
-        it is.
+        Regressor of torque, N m or N. :meth:`fit` trains a copy of it, :meth:`fit_effects` uses it
+        unchanged.
     robot : Robot
         Robot.
     effects : sequence of str, (str, joints) or Term, default=()
@@ -84,7 +84,7 @@ class CorrectedRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, B
         return self._fit_effects(X, y, sample_weight)
 
     def fit_effects(self, X: Any, y: Any, sample_weight: Any = None) -> CorrectedRegressor:
-        """Fit the effects to the residual of the fitted regressor as it is.
+        """Fit the effects to the residual of the unchanged fitted regressor.
 
         Parameters
         ----------
@@ -168,9 +168,9 @@ def is_physics(model: Any) -> bool:
 
 
 def weights_of_fit(regressor: Any, sample_weight: Any) -> dict[str, Any]:
-    """Keyword of fit for weights of samples; those of a Pipeline go to its last step.
+    """Keyword of fit for weights of samples; those of a Pipeline are passed to its last step.
 
-    Where metadata is routed, the Pipeline sends them to the steps that request them.
+    With metadata routing, the Pipeline passes them to the steps that request them.
     """
     from sklearn._config import get_config
     from sklearn.pipeline import Pipeline
@@ -182,7 +182,7 @@ def weights_of_fit(regressor: Any, sample_weight: Any) -> dict[str, Any]:
     return {} if sample_weight is None else {name: sample_weight}
 
 
-#: Copies of a model that is not physics are refitted on so many folds at most.
+#: Most folds on which copies of a model without physics are fitted again.
 REFITS = 4
 
 
@@ -194,10 +194,10 @@ def refitted_errors(
     y: Any,
     sample_weight: Any = None,
 ) -> list[Array] | None:
-    """Error of copies of a regressor, refitted with more and more effects, on rows left out.
+    """Held-out error of copies of a regressor, fitted again with more and more effects.
 
-    A model that is not physics bends toward whatever it lacks, so that what an effect removes from
-    the residual of the fitted model need not be what a refitted one shows.
+    A model without physics is biased by the effects that it lacks, so an effect may reduce the
+    residual of the fitted model by another amount than that of a refitted one.
 
     Parameters
     ----------
@@ -206,21 +206,21 @@ def refitted_errors(
     robot : Robot
         Robot.
     steps : sequence of sequence of Term
-        Effects beside the regressor at every step.
+        Effects in addition to the regressor at every step.
     X : DataFrame or array of shape (n_samples, n_features)
         Motion, with time and trajectory.
     y : array-like of shape (n_samples, n_joints)
         Measured torque, N m or N.
     sample_weight : array-like of shape (n_samples,), default=None
-        Weight of every sample in the fits; errors count all samples alike.
+        Weight of every sample in the fits; errors use equal weights.
 
     Returns
     -------
     list of ndarray of shape (n_joints,), N m or N, or None
-        Root mean square at every step; None for a regressor that cannot be refitted, and for a
-        single trajectory, of which nothing can be left out.
+        Root mean square at every step; None for a regressor that cannot be fitted again, and for a
+        single trajectory, which cannot be held out.
     """
-    from sklearn.model_selection import GroupKFold  # with all that is imported for it: 0.2 s
+    from sklearn.model_selection import GroupKFold  # its import takes 0.2 s
 
     if not (hasattr(regressor, "fit") and hasattr(regressor, "get_params")):
         return None
@@ -253,12 +253,12 @@ class Opened:
     Attributes
     ----------
     model : regressor
-        The innermost model that knows effects, or the given regressor without the steps of a
-        Pipeline that give signals.
+        The innermost model with effects, or the given regressor without the steps of a Pipeline
+        that produce signals.
     X : table
-        What the model sees.
+        Input of the model.
     outer : tuple of Pipeline
-        What it was taken out of, the outermost first; the steps before the model are fitted.
+        Pipelines around the model, the outermost first; the steps before the model are fitted.
     """
 
     model: Any
@@ -266,21 +266,21 @@ class Opened:
     outer: tuple[Pipeline, ...] = ()
 
     def closed(self, model: Any) -> Any:
-        """A better model where the old one was, fitted."""
+        """Replace the model by a better, fitted one."""
         for pipeline in reversed(self.outer):
             model = _with_steps(pipeline, [*pipeline.steps[:-1], (pipeline.steps[-1][0], model)])
         return model
 
 
 def _with_steps(pipeline: Pipeline, steps: list[tuple[str, Any]]) -> Pipeline:
-    """A Pipeline like another, of these fitted steps."""
+    """A copy of a Pipeline with these fitted steps."""
     return pipeline.__class__(**{**pipeline.get_params(deep=False), "steps": steps})
 
 
 def _fitted(step: Any, X: Any, y: Any) -> Any:
-    """A step itself where it is fitted, else a fitted copy.
+    """A fitted step itself, else a fitted copy.
 
-    A step without a state counts as fitted before it has seen the names of its columns.
+    A step without a state counts as fitted before it knows the names of its columns.
     """
     try:
         check_is_fitted(step)
@@ -291,10 +291,10 @@ def _fitted(step: Any, X: Any, y: Any) -> Any:
 
 
 def open_model(model: Any, X: Any, y: Any) -> Opened:
-    """Take the rigid-body model out of searches, pipelines and transformed targets.
+    """Extract the rigid-body model from searches, pipelines and transformed targets.
 
-    A Pipeline without such a model is opened behind the steps that give named signals: effects are
-    functions of those, and not of what the learner's own steps make of them.
+    A Pipeline without such a model is opened after the steps that produce named signals: effects
+    are functions of these, and not of the results of the learner's own steps.
 
     Parameters
     ----------
@@ -308,11 +308,11 @@ def open_model(model: Any, X: Any, y: Any) -> Opened:
     Returns
     -------
     Opened
-        With a model of the robot inside, or the given one where none is.
+        The extracted model of the robot, or the given model if there is none.
     """
     if hasattr(model, "with_effects"):
         return Opened(model, X)
-    # What these import takes longer than most of what is done with a model that is in none of them.
+    # Their import takes longer than most operations with a model that is in none of them.
     from sklearn.compose import TransformedTargetRegressor
     from sklearn.pipeline import Pipeline
 
@@ -323,7 +323,7 @@ def open_model(model: Any, X: Any, y: Any) -> Opened:
         if isinstance(inner, BaseSearchCV):
             inner = getattr(inner, "best_estimator_", inner.estimator)
         elif isinstance(inner, TransformedTargetRegressor):
-            # A rigid body is identified from torque in N m, whatever the target was made of.
+            # A rigid body is identified from torque in N m, for any transformation of the target.
             inner = inner.regressor
         elif isinstance(inner, Pipeline):
             steps = []
@@ -342,7 +342,7 @@ def open_model(model: Any, X: Any, y: Any) -> Opened:
 
 
 def _behind_signals(pipeline: Pipeline, X: Any) -> Opened:
-    """A Pipeline opened behind the steps that give named signals, such as derivatives."""
+    """A Pipeline opened after the steps that produce named signals, such as derivatives."""
     n_before = 0
     for k, (_, step) in enumerate(pipeline.steps[:-1], 1):
         table = pipeline[k - 1 : k].transform(X) if getattr(step, "gives_signals", False) else None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The loop: compare a model with measurements, see where it fails, learn what to add, add it."""
+"""The loop: compare a model with measurements, find where it fails, identify missing effects."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ from skidyn.measurement import (
 from skidyn.robots import Robot
 from skidyn.simulation import Controller, servo_torque
 
-#: Checks of the clock after which a wave in time may be of the logger.
+#: Suspicions about the clock with which a wave in time may be due to the logger.
 UNSTEADY = {"repeated_rows", "interpolated_rows", "clock_jitter"}
 
 
@@ -87,15 +87,15 @@ def diagnose(
         where ``tau`` is None (:func:`skidyn.simulation.servo_torque`). In this case checks of the
         torque sensor are omitted, and a known limit of all servos is not an effect.
     robot : Robot, optional
-        Needed for regressors that have none of their own.
+        Robot; needed for regressors without one.
     effects : iterable of str, optional
         Kinds to try; by default the whole catalogue.
     trajectory, time : int, str or None, default="auto"
         Key columns of X; those of ``model`` if it has them.
     rate : float, Hz, optional
-        Sampling rate where X has no time.
+        Sampling rate if X has no time.
     smooth : bool, default=True
-        Derive velocity and acceleration from the positions by a zero-phase smoother; False takes
+        Derive velocity and acceleration from the positions by a zero-phase smoother; if False, use
         those of X.
     settings : Settings, optional
         Thresholds of the search.
@@ -105,12 +105,12 @@ def diagnose(
     sample_weight : array-like of shape (n_samples,), optional
         Weight of every sample in all fits; those of weight 0 are left out.
     n_jobs : int, optional
-        Processes, as joblib counts them: None is 1 unless a ``joblib.parallel_config`` says
-        otherwise, -1 all cores. The result is the same to the last bit. On systems other than
-        Linux there is one process.
+        Processes, as joblib counts them: None is 1 unless set by a ``joblib.parallel_config``, -1
+        is all cores. The result does not depend on it. On systems other than Linux there is one
+        process.
     checks : sequence of Suspicion, optional
-        What is known to be wrong with this very log: the ``checks`` of an earlier diagnosis of it.
-        It is checked otherwise, which takes a third of the time.
+        Known suspicions about this log: the ``checks`` of an earlier diagnosis of it. By default
+        the log is checked, which takes a third of the time.
 
     Returns
     -------
@@ -120,10 +120,10 @@ def diagnose(
     Raises
     ------
     ColumnError
-        X does not follow the contract, or holds no time and no ``rate`` is given.
+        X does not follow the contract, or has no time and no ``rate`` is given.
     LogError
-        X or the torque hold values that are not finite, or too few samples; or a check is certain
-        that the log is wrong, and ``force`` is False.
+        X or the torque contain values that are not finite, or too few samples; or a check is
+        certain that the log is wrong, and ``force`` is False.
     EffectError
         The catalogue has no such effect.
     ValueError
@@ -139,7 +139,7 @@ def diagnose(
     >>> [(finding.kind, finding.joints) for finding in diagnosis.findings]
     [('stribeck', (2,))]
     """
-    # many small matrices: more threads only wait for each other
+    # many small matrices: more threads would only wait for each other
     of_servos = tau is None
     if of_servos:
         if controller is None:
@@ -257,10 +257,10 @@ def _diagnose(
         try:
             problem = posed()
             _check_rows(problem)
-            # while the checks run on another core: they rarely find what changes the search
+            # while the checks run on another core: they rarely change the search
             found = None if alone() else _search(problem, kinds, settings)
         except Exception:
-            told()  # what is wrong with the log says more
+            told()  # an error in the log is more informative
             raise
         checks = told()
     notes = [str(check) for check in checks]
@@ -277,7 +277,7 @@ def _diagnose(
     steady = not {check.check for check in checks} & UNSTEADY
     if found is None or not steady:
         if not alone():
-            problem = posed()  # without what the search before has left
+            problem = posed()  # without data of the previous search
         found = _search(problem, kinds, settings, vibration=steady)
     result, wider, completed = found
     limits = _limits(problem, result, completed, settings)
@@ -296,9 +296,10 @@ def _diagnose(
 def _search(
     problem: Problem, kinds: list[str], settings: Settings, vibration: bool = True
 ) -> tuple[SearchResult, Problem, SearchResult]:
-    """What is missing in long windows, and the rows and findings with a closer look.
+    """Missing effects from long windows, then the rows and findings of the closer searches.
 
-    Where the clock is in doubt, no ``vibration`` is looked for: it may be of the logger.
+    If the clock is in doubt, there is no search for a ``vibration``, which may be due to the
+    logger.
     """
     result = search(problem, kinds, settings, vibration=vibration)
     wider, completed = look_at_reversals(problem, result, kinds, settings)
@@ -310,7 +311,7 @@ def _search(
 def _limits(
     problem: Problem, result: SearchResult, completed: SearchResult, settings: Settings
 ) -> list[Limit]:
-    """What could still hide beside everything that was found, among the sliding samples."""
+    """Limits of undetected effects in addition to all findings, on the sliding samples."""
     found = [c.term for h in completed.findings for c in h.candidates]
     blocks = [problem.term_rows(t) for t in (*problem.terms, *found)]
     counts = problem.rows.counts
@@ -357,10 +358,10 @@ def _residual_problem(
     settings: Settings,
     weight: Array | None,
 ) -> Problem:
-    """Problem of a residual that some fitted model has left.
+    """Problem of the residual of a fitted model.
 
-    A fitted model has bent toward the effect it lacks, so its rigid body is free to move back; so
-    is its viscous and Coulomb friction, unless just that is missing.
+    A fitted model is biased by the effect it lacks, so its rigid body is free to change; so is its
+    viscous and Coulomb friction, unless this is the missing effect.
     """
 
     def problem(terms: Sequence[Term]) -> Problem:
@@ -384,7 +385,7 @@ def _residual_problem(
 
 
 def own_terms(model: Any, robot: Robot, X: Any, tau: Any) -> list[Term]:
-    """Terms of the user's model, shape parameters as the model fits them."""
+    """Terms of the user's model, with the shape parameters of its fit."""
     terms = make_terms(model.effects, robot.n_joints)
     if not any(t.is_open for t in terms):
         return terms

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The loop without a person in it, as a scikit-learn search."""
+"""The automatic loop as a scikit-learn search."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from skidyn.diagnosis._rule import Settings
 from skidyn.effects import Term
 from skidyn.model_selection import held_out_folds
 
-#: Largest chance at which a gain over the folds counts as one.
+#: Largest p-value of a gain over the folds.
 LEVEL = 0.05
 
 
@@ -55,7 +55,7 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
     settings : Settings, optional
         Thresholds of the search.
     smooth : bool, default=True
-        Derive velocity and acceleration from the positions in the search; False takes those of X.
+        Derive velocity and acceleration from the positions in the search; if False, use those of X.
     scoring : str, callable or None, default=None
         Score of the models of ``cv_results_`` on held-out folds; R2 if None. The effects themselves
         are judged by :func:`diagnose`, independent of the scoring.
@@ -75,7 +75,7 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
     Attributes
     ----------
     diagnosis_ : Diagnosis
-        Everything that was found.
+        Diagnosis with all findings.
     best_estimator_ : estimator
         The given model with ``best_effects_`` added, fitted to all data; with ``refit=True``.
     fading_ : FadingCorrection
@@ -107,11 +107,11 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
     n_features_in_ : int
         Number of columns of X.
     feature_names_in_ : ndarray of str
-        Names of the columns, where X has names.
+        Names of the columns, if X has names.
 
     See Also
     --------
-    diagnose : The same with everything to look at.
+    diagnose : The same with all results.
 
     References
     ----------
@@ -163,8 +163,8 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
         y : array-like of shape (n_samples, n_joints)
             Torque, N m or N.
         sample_weight : array-like of shape (n_samples,), default=None
-            Weight of every sample in all fits, as :class:`~skidyn.identification.RBDRegressor`
-            takes it; scores count all samples alike.
+            Weight of every sample in all fits, as in :class:`~skidyn.identification.RBDRegressor`;
+            scores use equal weights.
         groups : array-like of shape (n_samples,), default=None
             Groups of the rows for a `cv` that splits by groups.
 
@@ -225,13 +225,14 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
     def _score_steps(
         self, X: Any, y: Any, groups: Any, weights: dict[str, Any], name: str, start: list[Any]
     ) -> None:
-        """Scores of the models along the history, as scikit-learn's searches hold them."""
+        """Scores of the models along the history, in the form of scikit-learn's searches."""
         from sklearn.metrics import check_scoring
         from sklearn.model_selection import check_cv
         from sklearn.utils.parallel import Parallel, delayed
 
         history, findings = self.diagnosis_.history, self.diagnosis_.findings
-        # One model a step, with the effects found up to it; what was added in several at once last.
+        # One model per step, with the effects found up to it; effects added in several steps at
+        # last.
         steps: list[list[Term]] = [[]]
         for k in range(1, len(history)):
             upto = findings if k == len(history) - 1 else findings[:k]
@@ -282,7 +283,7 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
 
     @available_if(_refits)
     def predict(self, X: Any) -> Array:
-        """Torque of the best model; what was added fades out beyond the motion of the log.
+        """Torque of the best model; added effects fade out beyond the motion of the log.
 
         Parameters
         ----------
@@ -299,10 +300,10 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
         model = getattr(self, "fading_", self.best_estimator_)
         return np.asarray(model.predict(self._table(X, array)))
 
-    # The two hooks that the common tests replace: their rows are of any width, and no motion.
+    # Two hooks that the common tests replace, because their rows have any width and are no motion.
 
     def _table(self, X: Any, array: Array) -> Any:
-        """X as it was given where its columns have names, else as an array."""
+        """X as given if its columns have names, else as an array."""
         return array if column_names(X) is None else X
 
     def _log(self, X: Any, torque: Array, weight: Array | None) -> tuple[Any, Array, Array | None]:
@@ -311,7 +312,7 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
 
 
 def _best_step(scores: Array) -> int:
-    """Last step that beats the best before it by the signed ranks of its gains over the folds."""
+    """Last step that is better than the best before it by a signed-rank test over the folds."""
     from scipy.stats import wilcoxon
 
     best = 0
@@ -320,6 +321,6 @@ def _best_step(scores: Array) -> int:
         if gain.mean() > 0:
             differing = gain[gain != 0]
             chance = wilcoxon(differing, alternative="greater").pvalue
-            # four folds can come to 1/16 at best, two to 1/4
+            # with four folds the smallest p-value is 1/16, with two it is 1/4
             best = k if chance <= max(LEVEL, 0.5 ** len(differing)) else best
     return best

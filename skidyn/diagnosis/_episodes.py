@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Torques that come and go in time: a push, something that drags, a collision.
+"""Intermittent torques: a push, a drag, a collision.
 
-No function of the motion describes them, and a robust measure of the residual does not see them. An
-episode is a run of rows whose squared residual, in units of the noise of the quiet rows, exceeds
-what noise has there; the run with the largest sum of the excess is found first (the maximum-sum
-interval), then the next, until the sum is no more than that of noise.
+No function of the motion describes them, and they do not affect a robust measure of the residual.
+An episode is a run of rows whose squared residual, in units of the noise of the quiet rows, exceeds
+that of noise; the run with the largest sum of the excess is found first (the maximum-sum interval),
+then the next, until the sum is that of noise.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from skidyn.evidence import Problem
 
 @dataclass(frozen=True)
 class Episode:
-    """A torque that is there for some time only.
+    """A torque that acts only for some time.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class Episode:
     start, end : float
         Time in it, s.
     joints : tuple of int
-        Joints that show it, counted from 1.
+        Joints on which it acts, counted from 1.
     size : tuple of float
         Root mean square of the torque on each of them, N m or N.
     link : str or None
@@ -93,16 +93,16 @@ def find_episodes(
     problem : Problem
         Rows.
     residual : sequence of ndarray of shape (n_rows_j,)
-        What the completed model leaves of every joint's rows, N m or N.
+        Residual rows of every joint of the completed model, N m or N.
     least : ndarray of shape (n_joints,)
         Torque that an episode must reach, N m or N.
     share : ndarray of shape (n_joints,)
-        Share of the squared residual that the episodes of a joint must hold.
+        Share of the squared residual that the episodes of a joint must contain.
 
     Returns
     -------
     episodes : list of Episode
-        In the order of trajectories and time, joints put together where they overlap.
+        In the order of trajectories and time; overlapping ones of several joints are merged.
     inside : list of ndarray of shape (n_rows_j,) of bool
         Rows of every joint in one of its episodes.
     """
@@ -124,7 +124,7 @@ def find_episodes(
 def away_from_reversals(
     problem: Problem, residual: Sequence[Array], sliding: NDArray[np.bool_]
 ) -> list[Array]:
-    """Residual rows, 0 where a row holds samples close to rest and reversals.
+    """Residual rows, 0 for a row with samples close to rest and reversals.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def away_from_reversals(
 def _rows_of_episodes(
     problem: Problem, joint: int, residual: Array, least: float, share: float
 ) -> NDArray[np.bool_]:
-    """Rows of a joint in its episodes; none if they are too many to come and go."""
+    """Rows of a joint in its episodes; none if they are too many for an intermittent torque."""
     chosen = np.zeros(len(residual), dtype=bool)
     if len(residual) < 40:
         return chosen
@@ -161,7 +161,7 @@ def _rows_of_episodes(
     weight = problem.rows.average(np.ones(problem.signals.n_samples), joint)
     for order in _runs(problem, joint):
         _take(excess[order], order, chosen)
-    # A row holds the torque times its weight.
+    # A row is the torque times its weight.
     large = np.abs(residual[chosen] / weight[chosen])
     if not len(large) or np.quantile(large, 0.9) < least:
         return np.zeros_like(chosen)
@@ -180,7 +180,7 @@ def _runs(problem: Problem, joint: int) -> list[NDArray[np.int64]]:
 
 
 def _take(excess: Array, order: NDArray[np.int64], chosen: NDArray[np.bool_]) -> None:
-    """Mark the intervals of largest sum, one after the other."""
+    """Mark the intervals of largest sum, one after another."""
     left = excess.copy()
     while len(left):
         total = np.concatenate([[0.0], np.cumsum(left)])
@@ -189,7 +189,7 @@ def _take(excess: Array, order: NDArray[np.int64], chosen: NDArray[np.bool_]) ->
         if total[end] - lowest[end] < EPISODE_LEAST_SUM:
             return
         start = int(np.argmin(total[: end + 1]))
-        # What is quiet for a while between two pushes belongs to neither.
+        # A quiet interval between two pushes belongs to neither.
         inside = binary_closing(np.pad(left[start:end] > 0, EPISODE_QUIET), np.ones(EPISODE_QUIET))
         chosen[order[start:end]] = inside[EPISODE_QUIET:-EPISODE_QUIET]
         left[start:end] = -EPISODE_EXCESS
@@ -215,7 +215,7 @@ def _spans(
 def _overlapping(
     spans: list[tuple[int, float, float, int]],
 ) -> list[tuple[int, float, float, list[int]]]:
-    """Spans of several joints put together where they overlap."""
+    """Overlapping spans of several joints, merged."""
     merged: list[tuple[int, float, float, list[int]]] = []
     for k, start, end, j in sorted(spans):
         if merged and merged[-1][0] == k and start <= merged[-1][2] + 0.1:
@@ -254,7 +254,7 @@ def _force(
     """The link and the mean force on it that explain the torque of all joints, if one does.
 
     One force in each of three parts of the episode, on the origin of the frame of one link; of
-    links that do equally well the one farthest out is named.
+    equally good links the outermost one is reported.
     """
     robot = problem.robot
     if robot is None or len(joints) < 2:

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Corrections that fade out beyond the motion to which they were fitted.
 
-A function of the position that was fitted to a part of the travel says little about the rest, and
-left-out recordings of the same part cannot show it. The coefficients can: their spread over the
-recordings makes the standard deviation of the corrected model's prediction grow there, and faster
-than that of the model without the correction.
+A function of the position that was fitted to a part of the travel is not reliable for the rest, and
+held-out recordings of the same part cannot show this. The coefficients can: due to their spread
+over the recordings, the standard deviation of the corrected model's prediction grows there, and
+faster than that of the model without the correction.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ from skidyn.identification import RBDRegressor
 class FadingCorrection(RegressorMixin, BaseEstimator):
     """A fitted model and its correction, which fades out beyond the motion of the training rows.
 
-    How much less sure the corrected model is than the start is the ratio of the standard deviations
-    of their predictions. The correction counts in full up to the largest ratio among the training
-    rows, or 1, and not at all at twice that ratio.
+    The relative uncertainty of the corrected model is the ratio of the standard deviations of the
+    two predictions. The correction has full weight up to the largest ratio among the training rows,
+    or 1, and zero weight at twice that ratio.
 
     Parameters
     ----------
     start, corrected : RBDRegressor
-        Fitted, alone or as the last step of a Pipeline. Corrections of other models, which know no
+        Fitted, alone or as the last step of a Pipeline. Corrections of other models, which have no
         standard deviation, do not fade out.
 
     Attributes
     ----------
     reach_ : ndarray of shape (n_joints,) or ()
-        The ratio up to which the correction counts in full.
+        The ratio up to which the correction has full weight.
     """
 
     def __init__(self, start: Any, corrected: Any) -> None:
@@ -48,13 +48,13 @@ class FadingCorrection(RegressorMixin, BaseEstimator):
         self.corrected = corrected
 
     def __getattr__(self, name: str) -> Any:
-        """What a scorer asks of the model itself, such as its effects."""
+        """Attributes of the model that a scorer needs, such as its effects."""
         if name.startswith("__") or "corrected" not in self.__dict__:
             raise AttributeError(f"{type(self).__name__} has no {name}")
         return getattr(self.corrected, name)
 
     def fit(self, X: Any, y: Any = None) -> FadingCorrection:
-        """Find how far the training rows reach.
+        """Find the range of the training rows.
 
         Parameters
         ----------
@@ -69,7 +69,7 @@ class FadingCorrection(RegressorMixin, BaseEstimator):
         return self
 
     def predict(self, X: Any) -> Array:
-        """Torque of the start, and of the correction as far as it is known.
+        """Torque of the start plus the weighted correction.
 
         Parameters
         ----------
@@ -103,7 +103,7 @@ def _knows_its_std(model: Any) -> bool:
 
 
 def _with_std(model: Any, X: Any) -> tuple[Array, Array]:
-    """Prediction and standard deviation; a Pipeline would want requests for its routed metadata."""
+    """Prediction and standard deviation; a Pipeline would need requests for routed metadata."""
     while isinstance(model, Pipeline):
         X = model[:-1].transform(X) if len(model) > 1 else X
         model = model[-1]
@@ -126,7 +126,7 @@ def step_scores(
     Parameters
     ----------
     estimator : estimator
-        To be cloned.
+        Estimator to be cloned.
     params : sequence of dict
         Parameters of each model; the first is the start of all.
     X, y : table and array
@@ -138,7 +138,7 @@ def step_scores(
     weights : dict of str to ndarray
         Weights of all rows, by their keyword of ``fit``.
     fade_out : bool
-        Score the torque that fades out.
+        Whether to score the torque with fading.
 
     Returns
     -------

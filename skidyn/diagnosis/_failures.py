@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where a model fails: on which joints, and where on each of them."""
+"""Where a model fails: joints, and parts of their motion."""
 
 from __future__ import annotations
 
@@ -16,18 +16,19 @@ from skidyn.diagnosis._comparison import Comparison, regimes
 #: A joint fails where its error on judged rows exceeds the noise by this factor: logs without an
 #: effect stay below it (benchmarks/diagnosis/nothing_hidden.py).
 FAILS = 1.5
-#: Noise below this share of the measured torque is rounding.
+#: Noise below this share of the measured torque is due to rounding.
 ROUNDING = 1e-9
-#: The excess lies somewhere if that place holds this share of it, and its odds there are this many
-#: times those of a sample.
+#: A place is reported if it contains this share of the excess, with odds this many times those of a
+#: sample.
 SHARE, ODDS = 0.4, 2.5
-#: A stretch of time says more than a regime only where it is much narrower.
+#: An interval of time is more informative than a regime only if it is much shorter.
 TIME_SHARE, TIME_ODDS = 0.5, 6.0
-#: A stretch of time is told beside its trajectories if it is at most this share of their time.
+#: An interval of time is reported in addition to its trajectories if it is at most this share of
+#: their time.
 NARROWER = 0.5
-#: Ranges of position and stretches of time are made of this many equal parts.
+#: Ranges of position and intervals of time consist of this many equal parts.
 POSITIONS, TIMES = 24, 80
-#: Samples that a joint must rest, and their share, for its error at rest to be told.
+#: Least number and share of samples at rest for the error at rest to be reported.
 FEWEST, SHORTEST = 20, 0.01
 
 _WHERE = {
@@ -47,9 +48,9 @@ class Place:
     Parameters
     ----------
     kind : {"regime", "position", "trajectory", "time"}
-        What the place is a part of.
+        Kind of the place.
     where : str
-        The place in words, such as ``"at low speed"``.
+        Text of the place, such as ``"at low speed"``.
     share_of_excess : float
         Share of the squared error of the joint above the noise.
     share_of_time : float
@@ -81,7 +82,7 @@ class Place:
 
 @dataclass(frozen=True)
 class Failure:
-    """A joint whose error is larger than the noise, and where the excess lies.
+    """A joint whose error is larger than the noise, and the places of the excess.
 
     Parameters
     ----------
@@ -167,7 +168,7 @@ def find_failures(comparison: Comparison, noise: ArrayLike) -> list[Failure]:
     Returns
     -------
     list of Failure
-        Empty where no joint exceeds its noise.
+        Empty if no joint exceeds its noise.
     """
     levels = np.asarray(noise, dtype=float)
     floor = ROUNDING * np.sqrt(np.mean(comparison.measured**2, axis=0))
@@ -175,7 +176,7 @@ def find_failures(comparison: Comparison, noise: ArrayLike) -> list[Failure]:
     found = []
     for j, rmse in enumerate(comparison.rmse(judged=True)):
         ratio = float(rmse / levels[j])
-        if not ratio >= FAILS:  # so that a noise which is not known finds nothing
+        if not ratio >= FAILS:  # so that an unknown noise gives no failure
             continue
         places = _places(comparison, j, float(levels[j]))
         name, unit = comparison.joint_names[j], comparison.units[j]
@@ -188,7 +189,7 @@ def find_failures(comparison: Comparison, noise: ArrayLike) -> list[Failure]:
 
 
 def find_rest_errors(comparison: Comparison) -> list[RestError]:
-    """Errors of the joints that rest, with what dry friction allows.
+    """Errors of the joints at rest, compared with the limit of dry friction.
 
     Parameters
     ----------
@@ -214,7 +215,7 @@ def find_rest_errors(comparison: Comparison) -> list[RestError]:
         else:
             friction = comparison.dry_friction[:, j]
             stiction = float(np.abs(friction).max())
-            # what the model says of friction at rest is one of many possible values
+            # the friction at rest in the model is one of many possible values
             free = residual + friction[here]
             beyond = float(np.sqrt(np.mean(np.maximum(np.abs(free) - stiction, 0.0) ** 2)))
             text += f"; dry friction can balance up to ±{stiction:.2g} {unit} of it"
@@ -225,7 +226,7 @@ def find_rest_errors(comparison: Comparison) -> list[RestError]:
 
 
 def _places(comparison: Comparison, joint: int, noise: float) -> tuple[Place, ...]:
-    """Where the excess of a joint lies."""
+    """Places of the excess of a joint."""
     judged = np.flatnonzero(comparison.judged_samples[:, joint])
     excess = comparison.residual[judged, joint] ** 2 - noise**2
     share = excess / excess.sum()
@@ -234,7 +235,7 @@ def _places(comparison: Comparison, joint: int, noise: float) -> tuple[Place, ..
     which = _trajectory_place(comparison, judged, share)
     when = _time_place(comparison, judged, share)
     if when and which and when.share_of_time > NARROWER * which.share_of_time:
-        when = None  # nearly the whole trajectory, which is told already
+        when = None  # nearly the whole trajectory, which is reported already
     return (*places, *(place for place in (position, which, when) if place is not None))
 
 
@@ -245,7 +246,7 @@ def _stands_out(excess: float, time: float, share: float = SHARE, odds: float = 
 def _regime_places(
     comparison: Comparison, joint: int, judged: NDArray[np.intp], share: Array
 ) -> list[Place]:
-    """The regimes that stand out, those with most of the excess first; two at most."""
+    """At most two regimes with most of the excess, the largest first."""
     found = []
     for regime, mask in regimes(comparison).items():
         here = mask[judged, joint]
@@ -291,7 +292,7 @@ def _trajectory_place(
 
 
 def _time_place(comparison: Comparison, judged: NDArray[np.intp], share: Array) -> Place | None:
-    """One stretch of time within a trajectory that holds most of the excess."""
+    """One interval of time within a trajectory with most of the excess."""
     trajectory, clock = comparison.signals.trajectory, comparison.signals.clock
     whole = len(judged)
     best: tuple[float, float, Place] | None = None
@@ -324,7 +325,7 @@ def _sums(part: NDArray[np.intp], share: Array, n: int) -> tuple[Array, Array]:
 
 
 def _densest(excess: Array, time: Array) -> tuple[int, int]:
-    """First and last part of the run that holds most excess beyond its share of time."""
+    """First and last part of the run with the most excess beyond its share of time."""
     total = np.concatenate([[0.0], np.cumsum(excess - time)])
     lowest = np.maximum.accumulate(-total)
     last = int(np.argmax(total[1:] + lowest[:-1]))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Findings: the missing effects in numbers, words and curves."""
+"""Findings: the missing effects as numbers, texts and curves."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ class Finding:
 
 
 def rivals_of(best: Hypothesis) -> tuple[str, ...]:
-    """Kinds that explain nearly as much of the same joints as the one added."""
+    """Kinds that explain nearly as much on the same joints as the added one."""
     own, least = set(best.joints), RIVAL_SHARE * best.score
     near = [h.kind for h in best.others if h.score >= least and own & set(h.joints)]
     return tuple(dict.fromkeys(near))
@@ -146,14 +146,14 @@ def make_finding(
     intervals: dict[Term, dict[str, Any]],
     unknowns: Sequence[UnknownTorque] = (),
 ) -> Finding:
-    """Put one term of a hypothesis into words and numbers.
+    """Make a finding from one term of a hypothesis.
 
     Parameters
     ----------
     problem : Problem
         Signals of the log.
     hypothesis : Hypothesis
-        What was added.
+        The added hypothesis.
     candidate : Candidate
         One of its terms.
     rivals : tuple of str
@@ -163,7 +163,7 @@ def make_finding(
     intervals : dict
         Parameters of every term with their intervals.
     unknowns : sequence of UnknownTorque, default=()
-        What is known about nameless terms.
+        Results for unknown terms.
     """
     term = candidate.term
     effect, unknown = term.effect, hypothesis.kind == UNKNOWN
@@ -222,7 +222,7 @@ def make_finding(
 
 
 def pairs_of(pairs: Sequence[Sequence[int]]) -> str:
-    """Pairs of joints inside a sentence."""
+    """Text of pairs of joints for a sentence."""
     return listed([f"joints {' and '.join(map(str, joints))}" for joints in pairs], "or")
 
 
@@ -233,7 +233,7 @@ def _joints(problem: Problem, hypothesis: Hypothesis, candidate: Candidate) -> t
 
 
 def notes(kind: str, parameters: Mapping[str, dict[str, Any]]) -> list[str]:
-    """What there is to say of a finding beside its name, size and rivals."""
+    """Notes on a finding other than its effect, size and rivals."""
     caveat = "" if kind == UNKNOWN else get_effect(kind).caveat
     sentences = [f"Note that {caveat}."] if caveat else []
     mass = parameters.get("mass", {}).get("value", 0.0)
@@ -245,7 +245,7 @@ def notes(kind: str, parameters: Mapping[str, dict[str, Any]]) -> list[str]:
 
 
 def rival_title(kind: str) -> str:
-    """Title of a kind inside a sentence."""
+    """Title of a kind for a sentence."""
     return "an unknown effect" if kind == UNKNOWN else inside(get_effect(kind).title)
 
 
@@ -280,7 +280,7 @@ def _sentence(
 
 
 def _value(name: str, row: dict[str, Any]) -> str:
-    """The first parameter of a finding in words."""
+    """Text of the first parameter of a finding."""
     value, unit = row["value"], "" if row["unit"] == "1" else f" {row['unit']}".rstrip()
     if isinstance(value, float) and row["low"] is not None:
         return f": {name} = {give_or_take(value, (row['high'] - row['low']) / 2)}{unit}"
@@ -350,7 +350,7 @@ def _reached(torque: Array) -> list[int]:
 
 
 def _main_signal(problem: Problem, term: Term, joint: int) -> tuple[str, Array, str]:
-    """Signal against which an effect is drawn."""
+    """Signal against which an effect is plotted."""
     s = problem.signals
     against = term.effect.drawn_against
     slides = bool(s.prismatic[joint])

@@ -3,8 +3,8 @@
 
 A flexible learner (random Fourier features of position, velocity, direction and acceleration of all
 joints, ridge regression; Rahimi, Recht 2007) is trained on the residual rows of all folds but one.
-What it predicts on the fold it never saw is explainable; the rest is called noise. It is an upper
-bound: effects with memory stay in it.
+The part that it predicts on the held-out fold is explainable; the rest is called noise. This is an
+upper bound, since it includes effects with memory.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ FEATURES = 200
 #: Lengths over which the learned function varies, in standard deviations of its inputs.
 LENGTHS = (2.0, 6.0)
 RIDGES = 10.0 ** np.arange(-3.0, 4.0)
-#: Ridges in a row that must do worse than a stronger one for weaker ones to be left out.
+#: Number of successive ridges that must be worse than a stronger one before weaker ones are
+#: skipped.
 WORSE = 2
 
 
@@ -73,7 +74,7 @@ def _inputs(problem: Problem, joint: int) -> Array:
 
 
 def _held_out_share(features: Array, r: Array, fold: NDArray[np.int64], n_folds: int) -> float:
-    """Best share over ridges, errors summed over the folds left out."""
+    """Best share over ridges, with errors summed over the held-out folds."""
     grams = np.array([features[fold == f].T @ features[fold == f] for f in range(n_folds)])
     cross = np.array([features[fold == f].T @ r[fold == f] for f in range(n_folds)])
     total, right = grams.sum(0), cross.sum(0)
@@ -81,11 +82,12 @@ def _held_out_share(features: Array, r: Array, fold: NDArray[np.int64], n_folds:
     for ridge in RIDGES[::-1]:
         drop = 0.0
         for gram, own in zip(grams, cross, strict=True):
-            # Triangular factors cost a small part of the eigenvectors that would serve all ridges.
+            # Triangular factors take a small part of the time of eigenvectors, which would serve
+            # all ridges.
             held = total - gram + ridge * len(r) / n_folds * np.eye(len(gram))
             b = cho_solve(cho_factor(held, check_finite=False), right - own, check_finite=False)
             drop += float(2 * b @ own - b @ gram @ b)
         best, behind = max(best, drop), 0 if drop > best else behind + 1
         if behind == WORSE:
-            break  # noise is followed the more, the weaker the ridge
+            break  # a weaker ridge follows more of the noise
     return min(1.0, best / max(float(r @ r), 1e-300))

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which signals a residual depends on, in whatever form, judged on folds left out.
+"""Signals on which a residual depends, in any form, judged on held-out folds.
 
-The functions that the diagnosis knows by form are tried anyway. This finds the signals of those it
-does not know, in two ways. Boosted trees need no form at all; how much worse they predict with one
-signal shuffled says how much of the residual hangs on it [1]_. They do not see a product of two
-signals that do nothing alone, such as two velocities: so all products of two simple functions of
-the signals are tried one by one, and a second and third beside the best.
+Functions of known form are tried in any case. This finds the signals of functions with unknown
+form, in two ways. Boosted trees need no form; the increase of their error with one signal shuffled
+measures the dependence of the residual on it [1]_. They do not detect a product of two signals that
+have no effect alone, such as two velocities: so all products of two simple functions of the signals
+are tried one by one, and a second and third in addition to the best.
 
 References
 ----------
@@ -28,19 +28,19 @@ from skidyn.diagnosis._pursuit import Products, pursue
 from skidyn.diagnosis._variables import average_at_rows, averaged_signals
 from skidyn.evidence import Problem
 
-#: Rows looked at, and signals of a set, at most.
+#: Most rows that are used, and most signals of a set.
 MOST_ROWS, MOST_SIGNALS = 2000, 3
-#: Trees after which a first look tells whether there is anything, and all of them.
+#: Number of trees of a first test for any dependence, and of the full test.
 TREES = (15, 50)
-#: Share of the squared residual that must be predictable, and the chance that it only seems so.
+#: Least share of the squared residual that must be predictable, and largest p-value.
 LEAST_SHARE, CHANCE = 0.03, 0.05
-#: A signal counts if shuffling it costs this share of what shuffling the strongest one costs.
+#: A signal counts if shuffling it increases the error by this share of that of the strongest one.
 COUNTS = 0.1
-#: A further product must bring this share of the squared residual.
+#: A further product must remove this share of the squared residual.
 WORTH = 0.05
-#: Joints nearest to one among which sums of positions are formed, and their waves per rad.
+#: Number of nearest joints among which sums of positions are formed, and their waves per rad.
 MOST_NEAR, WAVES, SIGNS = 8, (0.5, 1.0, 2.0), (1.0, -1.0)
-#: Share by which a sum may be wrong by rounding.
+#: Relative rounding error of a sum.
 ROUNDING = 1e-6
 #: A product that varies by a smaller share of its squares counts as constant.
 CONSTANT = 1e-10
@@ -50,14 +50,14 @@ Sum = tuple[tuple[int, ...], tuple[float, ...]]
 
 
 class Followed(NamedTuple):
-    """What the residual of a joint may be a function of; empty where the motion predicts nothing.
+    """Possible arguments of the residual of a joint; empty if the motion does not predict it.
 
     Attributes
     ----------
     sets : list of tuple of str
         Different sets of one to three signals.
     sums : list of Sum
-        The best sum of two positions and that of three, each added or subtracted.
+        The best sums of two and of three positions, each added or subtracted.
     """
 
     sets: list[tuple[str, ...]]
@@ -67,7 +67,7 @@ class Followed(NamedTuple):
 def followed_signals(
     problem: Problem, joint: int, residual: Array, *, accelerations: bool = True
 ) -> Followed:
-    """Sets of signals, and sums of positions, that the residual of a joint may be a function of.
+    """Sets of signals, and sums of positions, on which the residual of a joint may depend.
 
     Parameters
     ----------
@@ -76,10 +76,10 @@ def followed_signals(
     joint : int
         Joint, from 0.
     residual : ndarray of shape (n_samples,)
-        Torque that the model leaves, N m or N.
+        Residual of the model, N m or N.
     accelerations : bool, default=True
-        Whether it may be a function of accelerations. Those of coarse positions are noise, which is
-        in the residual as well.
+        Whether it may be a function of accelerations. Those of coarse positions are mostly noise,
+        which is in the residual as well.
     """
     y = average_at_rows(problem, joint, residual)
     step = max(1, -(-len(y) // MOST_ROWS))
@@ -89,7 +89,7 @@ def followed_signals(
         if accelerations or not name.startswith("ddq")
     }
     y = y[::step]
-    # numbered without gaps: trajectories that were dropped must not leave an empty quarter below
+    # numbered without gaps: dropped trajectories must not leave an empty quarter below
     numbers, fold = np.unique(problem.fold[joint][::step], return_inverse=True)
     if len(numbers) < 4:
         return Followed([], [])
@@ -101,7 +101,7 @@ def followed_signals(
 
 
 def _by_sums(positions: dict[int, Array], y: Array, fold: NDArray[np.int64]) -> list[Sum]:
-    """The best sum of two positions and that of three, those that predict something."""
+    """The best sums of two and of three positions, if they predict the residual."""
     # waves of a sum are products of those of the positions, as complex numbers
     turned = {k: np.exp(1j * np.outer(q, WAVES)) for k, q in positions.items()}
     signed = {(k, sign): x if sign > 0 else x.conj() for k, x in turned.items() for sign in SIGNS}
@@ -125,7 +125,7 @@ def _by_sums(positions: dict[int, Array], y: Array, fold: NDArray[np.int64]) -> 
 
 
 def _best_block(blocks: Array, y: Array, fold: NDArray[np.int64]) -> int | None:
-    """The block of columns whose fit predicts the folds left out best, if any does.
+    """The block of columns whose fit predicts held-out folds best, if any does.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def _best_block(blocks: Array, y: Array, fold: NDArray[np.int64]) -> int | None:
     gram = blocks.transpose(0, 2, 1) @ blocks - len(y) * mean[:, :, None] * mean[:, None]
     ridge = 1e-3 * len(y) * np.eye(blocks.shape[2])
     weights = _solved(gram + ridge, right)
-    # No fit predicts rows that are left out better than it follows them when they are not.
+    # No fit predicts held-out rows better than it fits them when they are included.
     gain = np.sum(weights * (2 * right - np.matmul(gram, weights[..., None])[..., 0]), axis=1)
     able = np.flatnonzero(gain > (1 - ROUNDING) * LEAST_SHARE * float(y @ y))
     if not len(able):
@@ -162,10 +162,10 @@ def _solved(gram: Array, right: Array) -> Array:
 
 
 def _predictable(before: Array, after: Array) -> bool:
-    """Whether a learner takes away more of the squared errors of folds left out than chance would.
+    """Whether a learner reduces the squared errors of held-out folds significantly.
 
-    The gain of a fold is relative to its own error and that of an average fold, so that neither one
-    lively fold decides nor one in which there is nothing to predict.
+    The gain of a fold is relative to its own error and that of an average fold, so that neither a
+    single fold with large errors nor one without predictable error decides.
     """
     gain = (before - after) / np.maximum(np.maximum(before, after) + before.mean(), 1e-300)
     enough = bool(after.sum() < (1 - LEAST_SHARE) * before.sum())
@@ -179,8 +179,8 @@ def _by_fold(values: Array, fold: NDArray[np.int64]) -> Array:
 def _by_trees(
     signals: dict[str, Array], y: Array, fold: NDArray[np.int64]
 ) -> list[tuple[str, ...]]:
-    """The strongest signal, it and the second, and so on."""
-    # not paid for by who only reads a report
+    """The strongest signal, then the two strongest, and so on."""
+    # not needed to read a report
     from sklearn.ensemble import HistGradientBoostingRegressor
 
     names = list(signals)
@@ -203,7 +203,7 @@ def _by_trees(
             learner.set_params(max_iter=count).fit(X[~out], y[~out])
             left[out] = (y[out] - learner.predict(X[out])) ** 2
             if left[seen].sum() >= np.sum(y[seen] ** 2):
-                return []  # noise: trees that follow it do worse than none, and more would too
+                return []  # noise: trees that fit it are worse than none
         trees.append(learner)
     if not _predictable(_by_fold(y**2, fold), _by_fold(left, fold)):
         return []
@@ -252,13 +252,13 @@ def _by_products(
 class _Pairs:
     """Products of two simple functions of the signals, less their means.
 
-    There may be many thousands. What pursuit needs of them are sums of products of three or four
-    functions, which one matrix product gives for all pairs.
+    There may be many thousands. The pursuit needs only sums of products of three or four functions,
+    which one matrix product gives for all pairs.
 
     Attributes
     ----------
     values : ndarray of shape (n_rows, n_functions)
-        Of the functions; the last one is constant.
+        Values of the functions; the last one is constant.
     signal : ndarray of shape (n_functions,)
         Number of the signal behind each, -1 for the constant.
     first, second : ndarray of shape (n_pairs,)
@@ -298,7 +298,7 @@ class _Pairs:
         parts = [np.flatnonzero(fold == f) for f in np.unique(fold)]
         square = np.array([self._squares(self.values[rows]) for rows in parts])
         size = (square + [len(rows) * self.mean**2 for rows in parts]).sum(0)
-        tells = square.sum(0) > CONSTANT * size  # else what is left is rounding
+        tells = square.sum(0) > CONSTANT * size  # else the rest is rounding
 
         def along(values: Array) -> Array:
             return np.where(tells, [self._with(values[r], self.values[r]) for r in parts], 0.0)

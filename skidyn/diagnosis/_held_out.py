@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Residual of every sample under a model that never saw its fold."""
+"""Residual of every sample under a model fitted without its fold."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ def held_out_residual(
     sigma : ndarray of shape (n_joints,)
         Noise of one row.
     keep : sequence of Term, default=()
-        Terms whose own contribution is wanted.
+        Terms whose contributions are returned.
 
     Returns
     -------
     residual : ndarray of shape (n_samples, n_joints), N m or N
         Torque less the prediction of a model fitted without the sample's fold.
     torque : dict of Term to ndarray of shape (n_samples, n_joints), N m or N
-        Contribution of the terms asked for, fitted to all data.
+        Contributions of these terms, fitted to all data.
     """
     design = problem.design([problem.term_rows(t) for t in terms])
     whole, left = left_out_coefficients(
@@ -69,7 +69,7 @@ def held_out_residual(
 
 
 def folds_alone(problem: Problem, term: Term) -> NDArray[np.bool_]:
-    """Folds that alone can tell a term, such as that of the recording that touches a stop.
+    """Folds that alone determine a term, such as that of the recording that touches a stop.
 
     Parameters
     ----------
@@ -90,10 +90,10 @@ def folds_alone(problem: Problem, term: Term) -> NDArray[np.bool_]:
 
 
 def told_alone(grams: Array, widths: Sequence[int]) -> NDArray[np.bool_]:
-    """Coefficients that the fold left out tells nearly alone, (n_folds, n_coefficients).
+    """Coefficients that the held-out fold determines nearly alone, (n_folds, n_coefficients).
 
-    What only one fold can tell is not held out with it: the little that others hold of it would be
-    taken for all of it.
+    A coefficient that only one fold determines is not held out with it, because the other folds
+    would give it an arbitrary value.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def told_alone(grams: Array, widths: Sequence[int]) -> NDArray[np.bool_]:
 
 
 def shares_of_folds(problem: Problem, rows: Mapping[int, Array]) -> Array:
-    """Shares of the squares of some columns that lie in each fold, shape (n_folds,).
+    """Share of each fold in the squares of some columns, shape (n_folds,).
 
     Parameters
     ----------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a search works with: hypotheses and what is asked of them, and its result."""
+"""Hypotheses of a search, their properties, and the result of the search."""
 
 from __future__ import annotations
 
@@ -24,32 +24,32 @@ class Hypothesis:
     Attributes
     ----------
     kind : str
-        Kind, ``"unknown"`` for nameless functions.
+        Kind, ``"unknown"`` for unknown functions.
     candidates : tuple of Candidate
         Its terms.
     gain : ndarray of shape (n_joints,)
         Twice the held-out log-likelihood gain by joint.
     score : float
-        Gain less the price of its parameters.
+        Gain minus the penalty for its parameters.
     n_parameters : int
         Coefficients and shape parameters.
     chances : tuple of float
-        Chance of every term at its acceptance, in the order of the candidates.
+        P-value of every term at its acceptance, in the order of the candidates.
     tried : int
-        Candidates among which it was chosen.
+        Number of candidates among which it was chosen.
     margin : float
-        Share of its gain that the best other explanation of the same joints falls short of.
+        Margin over the best other explanation of the same joints, as a share of its gain.
     alike : bool
-        Whether a kind that acts on other joints explains as much, so that nothing in the data tells
-        them apart: a plane that a slider touches and the slider's own stop, for example.
+        Whether a kind that acts on other joints explains equally much, so that the data cannot
+        separate them: for example a plane that a slider touches and the slider's own stop.
     elsewhere : tuple of tuple of int
-        Other pairs of joints, from 0, on which the same kind explains as much.
+        Other pairs of joints, from 0, on which the same kind explains equally much.
     errors : ndarray of shape (n_folds, n_joints) or None
-        Held-out squared error with it; None where it was judged otherwise.
+        Held-out squared error with it; None if it was judged by other means.
     torque : ndarray of shape (n_samples, n_joints) or None
-        Torque to be taken off at the full rate (ripple).
+        Torque to be subtracted at the full rate (ripple).
     others : tuple of Hypothesis
-        Explanations of other kinds that it was ranked with when it was added, best first.
+        Explanations of other kinds in its ranking when it was added, best first.
     """
 
     kind: str
@@ -73,18 +73,18 @@ class Hypothesis:
 
     @property
     def is_further_form(self) -> bool:
-        """Whether a term of it is a further form of its effect: less simple than any plain one."""
+        """Whether one of its terms is a further form of its effect, less simple than plain ones."""
         return any(c.is_further_form for c in self.candidates)
 
     @property
     def variables(self) -> tuple[str, ...]:
-        """Signals of nameless functions."""
+        """Signals of unknown functions."""
         return tuple(sorted({v for c in self.candidates for v in c.variables}))
 
 
 @dataclass
 class SearchResult:
-    """What the search found.
+    """Result of a search.
 
     Attributes
     ----------
@@ -95,9 +95,9 @@ class SearchResult:
     ripple : ndarray of shape (n_samples, n_joints)
         Torque of the ripple found, N m.
     candidates : list of Candidate
-        Named effects that were not found.
+        Known effects that were not found.
     n_tests : int
-        Everything that was tried.
+        Number of all candidates that were tried.
     """
 
     findings: list[Hypothesis]
@@ -108,12 +108,12 @@ class SearchResult:
 
 
 def ranked_with(best: Hypothesis, ranking: Sequence[Hypothesis]) -> Hypothesis:
-    """The explanation that is added, which keeps those of other kinds in its ranking."""
+    """The explanation that is added, with those of other kinds in its ranking."""
     return replace(best, others=tuple(h for h in ranking if h.kind != best.kind))
 
 
 def close_shapes(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
-    """Whether shape parameters are alike within a hundredth."""
+    """Whether shape parameters are equal within a hundredth."""
     numbers = [(one[k], other[k]) for k in one if isinstance(one[k], float)]
     return all(np.isclose(a, b, rtol=0.01) for a, b in numbers)
 
@@ -137,7 +137,7 @@ def is_vibration(hypothesis: Hypothesis) -> bool:
 
 
 def says_little(hypothesis: Hypothesis) -> bool:
-    """Whether an explanation is one in name only: a vibration, or what differs between runs."""
+    """Whether an explanation has the lowest priority: a vibration or differences between runs."""
     return is_vibration(hypothesis) or (
         hypothesis.kind == UNKNOWN and within_recordings(hypothesis)
     )
@@ -149,12 +149,12 @@ def within_recordings(hypothesis: Hypothesis) -> bool:
 
 
 def terms_on_rows(findings: Sequence[Hypothesis]) -> list[Term]:
-    """Terms of findings but lines of a spectrum, which are taken off at every sample."""
+    """Terms of findings except lines of a spectrum, which are subtracted at every sample."""
     return [c.term for h in findings if h.torque is None for c in h.candidates]
 
 
 def rivals_among(best: Hypothesis, ranking: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Other explanations of the same joints, members of the same family apart."""
+    """Other explanations of the same joints, except members of the same family."""
     own = set(best.joints)
     family = family_of(best)
     return [
@@ -170,7 +170,7 @@ def rivals_among(best: Hypothesis, ranking: Sequence[Hypothesis]) -> list[Hypoth
 
 
 def margin_over(best: Hypothesis, rivals: Sequence[Hypothesis]) -> float:
-    """Share of the best score by which the rivals fall short."""
+    """Margin over the rivals, as a share of the best score."""
     if not rivals or best.score <= 0:
         return 1.0
     return 1.0 - max(h.score for h in rivals) / best.score
@@ -182,13 +182,13 @@ def family_of(hypothesis: Hypothesis) -> str:
 
 
 def simplicity_of(hypothesis: Hypothesis) -> int:
-    """Rank of its kind among rivals that explain as much; the lower is named."""
+    """Rank of its kind among equally good rivals; the lowest is preferred."""
     if hypothesis.kind == UNKNOWN:
         return 100
     return get_effect(hypothesis.kind).simplicity + 50 * hypothesis.is_further_form
 
 
 def uses_the_fit(candidate: Candidate) -> bool:
-    """Whether its columns follow the fit of the model that it is part of."""
+    """Whether its columns depend on the fit of the model."""
     effect = candidate.term.effect
     return bool({"robot", "model_torque"} & set(effect.needs)) and effect.search == "grid"

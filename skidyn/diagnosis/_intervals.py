@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Confidence intervals of coefficients and shape parameters, by leaving out one fold at a time.
 
-The jackknife over whole trajectories (Efron, Stein 1981, Ann. Stat. 9) holds whatever the
-autocorrelation within a trajectory. Shape parameters take part through the derivative of the
-effect's torque (one Gauss-Newton step from the fitted value in every fold), which is held to the
-spacing of the grid on which they were found: along a direction that the data leaves open, a
-linear step would lead anywhere.
+The jackknife over whole trajectories (Efron, Stein 1981, Ann. Stat. 9) is valid for any
+autocorrelation within a trajectory. Shape parameters are included through the derivative of the
+effect's torque (one Gauss-Newton step from the fitted value in every fold), limited to the spacing
+of the grid on which they were found: along a direction that the data does not determine, a linear
+step could be arbitrarily large.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ from skidyn.evidence import (
 )
 
 CONFIDENCE = 0.95
-#: Relative step (or absolute, for linear parameters) of the derivative by a shape parameter.
+#: Relative step (absolute for linear parameters) of the derivative with respect to a shape
+#: parameter.
 STEP = 0.02
 
 Interval = tuple[float, float, float]
@@ -47,8 +48,8 @@ def parameter_intervals(
     sigma : ndarray of shape (n_joints,)
         Noise of one row.
     shapes : bool, default=True
-        Whether shape parameters are uncertain, too. Without them an interval says whether an
-        effect of this very shape may be absent.
+        Whether to include the uncertainty of shape parameters. Without it an interval shows whether
+        an effect of exactly this shape may be absent.
 
     Returns
     -------
@@ -101,7 +102,7 @@ def _slopes(
                 continue
             here = float(term.shape[shape.name])
             if np.isclose(here, shape.low, rtol=1e-6):
-                continue  # at the end of its range; what is beyond is no such effect
+                continue  # at the end of its range; beyond, it is another effect
             log = shape.spacing == "log"
             step = STEP * here if log else STEP * max(abs(here), 1e-3)
             sides = [
@@ -118,10 +119,10 @@ def _slopes(
 
 
 def _spacing(shape: Shape) -> float:
-    """Largest step between neighbours of the grid; of its logarithm where steps are factors."""
+    """Largest step between neighbours of the grid; of its logarithm if steps are factors."""
     log = shape.spacing == "log"
     grid = np.sort(np.log(shape.grid) if log else np.array(shape.grid, dtype=float))
-    if len(grid) < 2:  # known no better than by its range
+    if len(grid) < 2:  # only its range is known
         low, high = (np.log(shape.low), np.log(shape.high)) if log else (shape.low, shape.high)
         return float(high - low) / 2
     return float(np.diff(grid).max())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the data could still hide: the largest magnitude of every effect that was not found."""
+"""Limits: the largest magnitude with which each effect could remain undetected."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ from skidyn.evidence import (
     products_with,
 )
 
-#: Chance of finding an effect of the stated magnitude.
+#: Probability of finding an effect of the stated magnitude.
 POWER = 0.8
-#: A column of which less than this share is new to the model cannot be told from it.
+#: A column of which less than this share is new to the model cannot be separated from it.
 NEW_SHARE = 1e-4
 
 
@@ -44,7 +44,7 @@ class Limit:
     joint : int
         Joint, counted from 1.
     largest_hidden : float or None
-        Of the effect's first coefficient; None if the data cannot show the effect at all.
+        Magnitude of the effect's first coefficient; None if the data cannot show the effect at all.
     unit : str
         Its unit.
     sentence : str
@@ -75,9 +75,9 @@ class Limit:
 
 @dataclass(frozen=True)
 class Gates:
-    """What an effect must remove of a joint's squared error, in units of its noise.
+    """Squared error of a joint that an effect must remove, in units of its noise.
 
-    A limit is the size that passes every gate of the rule, not significance alone.
+    A limit is the size that passes every test of the rule, not only significance.
 
     Parameters
     ----------
@@ -86,14 +86,14 @@ class Gates:
     n_tests : int
         Candidates tried.
     free : int
-        Blocks of time that the test has, less one.
+        Number of blocks of time of the test minus one.
     counts : ndarray of shape (n_joints,)
         Averaged rows.
     whiteness : ndarray of shape (n_joints,)
-        Variance of a sample over that of an averaged row: what a share of the error of samples is
-        on rows.
+        Variance of a sample over that of an averaged row, to convert a share of the error of
+        samples to rows.
     earlier : ndarray of shape (n_joints,)
-        Squared error that earlier findings removed, in units of the noise that is left.
+        Squared error that earlier findings removed, in units of the remaining noise.
     """
 
     settings: Settings
@@ -104,7 +104,7 @@ class Gates:
     earlier: Array
 
     def needed(self, joint: int, n_parameters: int, inflation: float) -> float:
-        """Size of a column, over the noise, with which the effect is found.
+        """Size of a column relative to the noise with which the effect is found.
 
         Parameters
         ----------
@@ -135,20 +135,20 @@ def find_limits(
     inflation: Array,
     gates: Gates,
 ) -> list[Limit]:
-    """Limits of the effects on single joints that were tried and not found.
+    """Limits of the effects on single joints that were not found.
 
     Parameters
     ----------
     problem : Problem
         Rows.
     candidates : sequence of Candidate
-        What was tried.
+        Candidates that were tried.
     blocks : sequence of dict
         Columns of the final model beside the rigid body.
     sigma, inflation : ndarray of shape (n_joints,)
         Noise of one row and its variance inflation.
     gates : Gates
-        What an effect must remove to be a finding.
+        Squared error that an effect must remove to be a finding.
     """
     felt, width = felt_columns(problem, blocks, sigma)
     gram = gram_of(felt, width)
@@ -165,8 +165,8 @@ def find_limits(
         own, swept = _information(candidate, felt, width, sigma, model)
         least = needed(joint, candidate.width + candidate.n_shapes)
         size = least / np.sqrt(swept) if swept > NEW_SHARE * own else np.inf
-        # More than all that the torque holds is no limit, nor a torque beyond its range, of which
-        # the motion shows a vanishing part.
+        # A size larger than the whole torque is not a limit, nor a torque beyond its range, of
+        # which the motion contains a negligible part.
         beyond = effect.coefficients[0].unit == "N m" and size > np.ptp(problem.torque[:, joint])
         told = size if size**2 * own < power[joint] and not beyond else np.inf
         largest.setdefault((effect.kind, joint), []).append((candidate, float(told)))
@@ -175,7 +175,7 @@ def find_limits(
 
 
 def _limit(problem: Problem, joint: int, tried: Sequence[tuple[Candidate, float]]) -> Limit:
-    """The limit of one effect on one joint, which holds for every shape that would show."""
+    """The limit of one effect on one joint, valid for every detectable shape."""
     effect = tried[0][0].term.effect
     first = effect.coefficients[0]
     unit = effect.units(bool(problem.signals.prismatic[joint])).get(first.name, first.unit)
@@ -198,7 +198,7 @@ def _limit(problem: Problem, joint: int, tried: Sequence[tuple[Candidate, float]
 
 
 def _hidden_shapes(tried: Sequence[tuple[Candidate, float]]) -> list[float]:
-    """Values of the first shape parameter with which an effect would not show at any size."""
+    """Values of the first shape parameter with which an effect cannot be detected at any size."""
     effect = tried[0][0].term.effect
     if not effect.shapes:
         return []
@@ -213,7 +213,7 @@ def _hidden_shapes(tried: Sequence[tuple[Candidate, float]]) -> list[float]:
 def _information(
     candidate: Candidate, felt: Sequence[Felt], width: int, sigma: Array, model: Normal
 ) -> tuple[float, float]:
-    """Squared size of the first column before and after the model and the other columns."""
+    """Squared size of the first column before and after elimination of the other columns."""
     z = {j: block / sigma[j] for j, block in candidate.rows.items()}
     cross = products_with(felt, z, width)
     own = np.asarray(sum(block.T @ block for block in z.values()))
@@ -226,19 +226,19 @@ def _information(
 
 
 def without_withdrawn(limits: Sequence[Limit], withdrawn: Sequence[Candidate]) -> list[Limit]:
-    """Limits less those of effects that were found and withdrawn for removing too little.
+    """Limits without those of effects that were found and withdrawn because they remove too little.
 
     Parameters
     ----------
     limits : sequence of Limit
         All limits.
     withdrawn : sequence of Candidate
-        What was found and taken back.
+        Candidates that were withdrawn.
 
     Returns
     -------
     list of Limit
-        Of these effects no size is stated.
+        Limits without the effects that were withdrawn.
     """
     taken = {(c.kind, j + 1) for c in withdrawn for j in c.joints}
     return [

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Nameless functions of the signals as candidates, chosen by what the residual follows."""
+"""Unknown functions as candidates, of signals on which the residual depends."""
 
 from __future__ import annotations
 
@@ -37,20 +37,20 @@ def nameless_candidates(
     followed_on: Collection[int] | None = None,
     coarse: Collection[int] = (),
 ) -> list[Candidate]:
-    """Nameless functions of the signals for every joint.
+    """Unknown functions of the signals for every joint.
 
     Parameters
     ----------
     problem : Problem
         Rows and folds.
     residual : ndarray of shape (n_samples, n_joints)
-        Torque that the model leaves, N m or N.
+        Residual of the model, N m or N.
     followed_on : collection of int, optional
-        Joints, from 0, for which alone those are made whose signals are chosen by what the residual
-        follows, and no others; all nameless functions of all joints by default.
+        Joints, from 0, for which only functions of signals found from the residual are made; by
+        default all unknown functions of all joints.
     coarse : collection of int, default=()
-        Joints, from 0, whose torque has more noise of positions than of its sensor: no function of
-        accelerations is made for them.
+        Joints, from 0, whose torque has more noise from positions than from its sensor: no
+        functions of accelerations are made for them.
 
     Returns
     -------

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Noise of the torque sensor: what changes faster than any motion does.
+"""Noise of the torque sensor: the part that changes faster than any motion.
 
-Third differences of the residual take away whatever is smooth over four samples, the motion and
-every torque that follows it, and leave the sensor's noise. Their median size is taken, so that few
-disturbed samples do not count. Noise that is correlated over several samples is not in it: the
-figure is a lower bound, and the remainder is compared with a multiple of it.
+Third differences of the residual remove everything that is smooth over four samples, such as
+torques that depend on the motion, and leave the sensor's noise. Their median magnitude is used,
+which few disturbed samples do not affect. Noise that is correlated over several samples is not
+included: the value is a lower bound, and the remainder is compared with a multiple of it.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ def sensor_noise(signals: Signals, residual: Array) -> Array:
     Parameters
     ----------
     signals : Signals
-        Motion, which says where segments end.
+        Motion, with its segments.
     residual : ndarray of shape (n_samples, n_joints), N m or N
-        Torque that a model leaves.
+        Residual of a model.
 
     Returns
     -------
     ndarray of shape (n_joints,), N m or N
-        0 where a torque is constant or repeats; NaN with fewer than four samples in a row.
+        0 if a torque is constant or has repeated values; NaN with fewer than four samples in a row.
     """
     parts = [
         np.diff(residual[rows], n=3, axis=0)

@@ -60,7 +60,7 @@ def notebook(story: Mapping[str, Any]) -> str:
 
 
 def finding_card(finding: Finding) -> str:
-    """A finding as HTML: what, where, its size, how sure, and the line that adds it.
+    """A finding as HTML: effect, joints, size, confidence, and the line that adds it.
 
     Parameters
     ----------

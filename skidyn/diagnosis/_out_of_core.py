@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Diagnosis of recordings larger than memory: searched in a sample, judged on all the rest."""
+"""Diagnosis of recordings larger than memory: search in a sample, test on all the rest."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ from skidyn.evidence import (
 from skidyn.identification import regressor_from_evidence, weighted_solution
 from skidyn.robots import Robot, base_parameter_index
 
-#: Trajectories that cross-validation within the sample needs, and that the rest must have.
+#: Least number of trajectories in the sample, for cross-validation, and in the rest.
 FEWEST_TRAJECTORIES = 4
-#: Groups of trajectories that the rest is divided into; each is predicted from all others.
+#: Number of groups into which the rest is divided; each is predicted from all others.
 GROUPS = 20
-#: A finding whose drop of error is more likely by chance than this is not confirmed.
+#: Largest p-value with which a finding is confirmed.
 LEVEL = 0.01
 
 
@@ -82,18 +82,18 @@ class ParquetDiagnosis:
     Parameters
     ----------
     diagnosis : Diagnosis
-        Of the sampled trajectories.
+        Diagnosis of the sampled trajectories.
     confirmations : list of Confirmation
         One for each finding.
     model : RBDRegressor
-        The given model with all findings that were confirmed, identified from all trajectories
-        that the search did not see.
+        The given model with all confirmed findings, identified from all trajectories that were not
+        used in the search.
     evidence : Evidence
-        Of these trajectories, with the columns of all findings.
+        Evidence of these trajectories, with the columns of all findings.
     trajectories, sampled : int
-        How many there are, and how many of them were searched.
+        Number of all trajectories, and of those used in the search.
     rows : int
-        Rows of the whole recording.
+        Number of rows of the whole recording.
 
     Examples
     --------
@@ -148,11 +148,11 @@ def diagnose_parquet(
     max_rows : int, default=2_000_000
         Longest trajectory that is read.
     random_state : int, default=0
-        Draws the sample.
+        Seed of the sample.
     n_jobs : int, optional
         Processes that compute the evidence, see :func:`skidyn.evidence.evidence_from_parquet`.
     client : distributed.Client, optional
-        Cluster that computes it.
+        Cluster on which to compute it.
 
     Returns
     -------
@@ -163,10 +163,10 @@ def diagnose_parquet(
     Raises
     ------
     LogError
-        Fewer than eight trajectories, files without time, or what
-        :func:`~skidyn.evidence.evidence_from_parquet` refuses.
+        There are fewer than eight trajectories, files have no time, or
+        :func:`~skidyn.evidence.evidence_from_parquet` refuses a file.
     SkidynError
-        An effect of the model whose columns need a fit of the model first.
+        The columns of an effect need a fit of the model first.
 
     References
     ----------
@@ -225,7 +225,7 @@ def diagnose_parquet(
 
 
 def _draw(lengths: Sequence[Array], rows: int, seed: int) -> list[frozenset[int]]:
-    """Which trajectories of every file are searched."""
+    """Trajectories of every file that are used in the search."""
     every = np.concatenate(lengths)
     n = len(every)
     if n < 2 * FEWEST_TRAJECTORIES:
@@ -245,7 +245,7 @@ def _draw(lengths: Sequence[Array], rows: int, seed: int) -> list[frozenset[int]
 def _sample(
     sources: Sequence[Source], n_rows: int, robot: Robot, columns: ColumnMap | None, max_rows: int
 ) -> tuple[Any, Array]:
-    """The trajectories that were drawn, as a table, and their torque."""
+    """The sampled trajectories as a table, and their torque."""
     import pandas as pd
 
     names: list[str] = []
@@ -272,8 +272,8 @@ def _drawn_trajectories(
 ) -> Iterator[tuple[list[str], Array]]:
     """Columns and values of the trajectories drawn from a file, with their numbers there.
 
-    Trajectories are views of decoded blocks of many. The values are copies: whoever kept a view
-    would keep its block, while the next is decoded or for every file that is drawn from.
+    Trajectories are views of decoded blocks with several of them. The values are copied, because a
+    view would keep its whole block in memory.
     """
     path, drawn = source
     if not drawn:
@@ -310,7 +310,7 @@ def _confirm(finding: Finding, evidence: Evidence, tried: bool) -> Confirmation:
         np.array([sum(part.get((g, j), 0.0) for j in joints) for g in groups]) for part in squared
     )
     drop = float(1 - after.sum() / before.sum()) if before.sum() > 0 else 0.0
-    # Ratios, since one long or lively group would outweigh all others in differences.
+    # Ratios, since one long group or one with large errors would dominate differences.
     here = (before > 0) & (after > 0)
     ratio = np.log(before[here] / after[here])
     p = 1.0

@@ -45,17 +45,17 @@ def profile_error(
     blocks : sequence of dict
         Columns of the model beside the rigid body.
     sigma : ndarray of shape (n_joints,)
-        First guess of the noise of one row.
+        Initial noise of one row.
     target : sequence of ndarray
         Averaged torque of every joint.
     passes : int, default=2
-        Rounds of weighting.
+        Number of rounds of weighting.
     within : bool, default=False
-        Leave out interleaved parts of every trajectory instead of whole ones: what one trajectory
-        alone has cannot be learnt from the others.
+        Leave out interleaved parts of every trajectory instead of whole ones: an effect in a single
+        trajectory cannot be learnt from the others.
     soft : sequence of float, default=()
-        For each of the last blocks, by which share its coefficients are drawn to zero where no row
-        says what they are.
+        For each of the last blocks, the share by which its coefficients are drawn to zero where no
+        row determines them.
 
     Returns
     -------
@@ -78,7 +78,7 @@ def profile_error(
         for j, (own, gram) in enumerate(grams):
             part = b[:, own]
             errors[:, j] = np.sum(np.matmul(gram, part[:, :, None])[:, :, 0] * part, axis=1)
-        # A joint that rests has no rows; its weight is of no account but must be finite.
+        # A joint at rest has no rows; its weight has no effect but must be finite.
         sigma = np.where(counts > 0, np.sqrt(errors.sum(0) / np.maximum(counts, 1)) + 1e-100, 1.0)
     return errors
 
@@ -102,14 +102,14 @@ def _joint_grams(
     target: Sequence[Array],
     within: bool,
 ) -> tuple[list[tuple[NDArray[np.int64], Array]], int]:
-    """Gram matrices of [columns | torque] by fold, as far as a joint feels the columns.
+    """Gram matrices of [columns | torque] by fold, for the columns that act on a joint.
 
     Returns
     -------
     grams : list of (ndarray of shape (k,), ndarray of shape (n_folds, k, k))
-        By joint, the places of what it feels, and the products.
+        By joint, the indices of its columns, and the products.
     width : int
-        Columns of the model, behind which the torque has its place.
+        Number of columns of the model, which is the index of the torque.
     """
     felt, width = felt_columns(problem, blocks)
     labels = problem.rows.quarter if within else problem.fold
@@ -136,7 +136,7 @@ def refine(
     sigma: Array,
     target: Sequence[Array],
 ) -> list[Candidate]:
-    """Refine the shape parameters of candidates, one after the other, the model refitted.
+    """Refine the shape parameters of candidates one after another, with the model refitted.
 
     Parameters
     ----------

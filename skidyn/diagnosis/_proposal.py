@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A short formula for a nameless torque: sparse regression over a small, safe grammar.
+"""A short formula for an unknown torque: sparse regression over a small, safe grammar.
 
 Products of a few functions of the positions and of the velocities that the torque depends on are
 tried one by one, and the best is kept; then a second and a third (orthogonal matching pursuit),
@@ -19,17 +19,17 @@ from skidyn.diagnosis._pursuit import Products, pursue
 from skidyn.effects import Term, formula
 from skidyn.evidence import Problem
 
-#: Terms of a formula at most, and the share of what the nameless function explains that it needs.
+#: Most terms of a formula, and least share of the part explained by the unknown function.
 LONGEST, LEAST_SHARE = 3, 0.9
-#: A further term must bring this share of it.
+#: Least share of it for a further term.
 WORTH = 0.03
-#: An expression of which known terms leave less than this share (squares) is theirs.
+#: Least share (of squares) of an expression that known terms cannot represent.
 _ABSORBED = 1e-4
 
 
 @dataclass(frozen=True)
 class Proposal:
-    """A formula that explains the torque of a nameless function.
+    """A formula that explains the torque of an unknown function.
 
     Parameters
     ----------
@@ -42,9 +42,9 @@ class Proposal:
     coefficients : tuple of float
         Their coefficients, N m or N.
     share : float
-        Squared error that it removes on held-out folds, relative to that of the nameless function.
+        Squared error that it removes on held-out folds, relative to that of the unknown function.
     terms : tuple of Term
-        To be added to a model.
+        Terms for a model.
 
     Examples
     --------
@@ -61,7 +61,7 @@ class Proposal:
 
 
 def grammar(variables: Sequence[str], joint: int) -> list[str]:
-    """Expressions that are tried for a torque that depends on some signals.
+    """Expressions to try for a torque that depends on some signals.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def propose(
     waves: Sequence[str],
     without: Callable[[Array], Array],
 ) -> Proposal | None:
-    """The shortest formula that explains what a nameless function does.
+    """The shortest formula that explains an unknown function.
 
     Parameters
     ----------
@@ -125,20 +125,20 @@ def propose(
     joint : int
         Joint, from 0.
     residual : ndarray of shape (n_rows,)
-        Residual rows of the joint with the nameless torque in them.
+        Residual rows of the joint including the unknown torque.
     explained : ndarray of shape (n_rows,)
-        Rows of the nameless torque.
+        Rows of the unknown torque.
     variables : sequence of str
         Signals on which it depends.
     waves : sequence of str
-        Expressions in time that are tried too.
+        Expressions in time to try in addition.
     without : callable
-        Takes away from rows what the known terms of the model can do.
+        Function that removes from rows the part that known terms of the model can represent.
 
     Returns
     -------
     Proposal or None
-        None where no short formula fits.
+        None if no short formula fits.
     """
     expressions = [*grammar(variables, joint), *waves]
     if not expressions:

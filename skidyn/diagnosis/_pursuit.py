@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Orthogonal matching pursuit, judged by the error of the held-out folds.
 
-Leaving folds out takes no more than products of columns within each fold: the rows are read once at
-the start, and once for every column that is chosen.
+Leaving folds out needs only products of columns within each fold: the rows are read once at the
+start, and once for every chosen column.
 
 References
 ----------
@@ -44,21 +44,21 @@ class Products:
 
     @classmethod
     def of_columns(cls, columns: Array, residual: Array, fold: NDArray[np.int64]) -> Products:
-        """Products of columns that are given.
+        """Products of given columns.
 
         Parameters
         ----------
         columns : ndarray of shape (n_rows, n_columns)
             Candidates.
         residual : ndarray of shape (n_rows,)
-            What they are to explain.
+            Residual to be explained.
         fold : ndarray of shape (n_rows,)
             Number of the fold of every row.
 
         Returns
         -------
         Products
-            Of columns of unit size.
+            Products of columns of unit size.
         """
         size = np.sqrt(np.einsum("ij,ij->j", columns, columns))
         columns = columns / np.where(size > 0, size, 1.0)
@@ -79,7 +79,7 @@ class Products:
             cross[:, k] = block
         errors = np.zeros(n_columns)
         for f in range(n_folds):
-            # Sweep the chosen columns out of the others and of the residual of all other folds.
+            # Eliminate the chosen columns from the others and from the residual of all other folds.
             mixed = cross.sum(0) - cross[f]
             square, right = self.square.sum(0) - self.square[f], self.right.sum(0)
             right = right - self.right[f]
@@ -88,7 +88,7 @@ class Products:
             size = square - np.einsum("kc,kc->c", mimic, mixed)
             new = size > 1e-9 * np.maximum(square, 1e-300)
             gain = np.where(new, (right - right[chosen] @ mimic) / np.where(new, size, 1.0), 0.0)
-            # The error of the fold itself, multiplied out.
+            # The error of the fold itself, expanded.
             own, here = cross[f], cross[f][:, chosen]
             level = self.energy[f] - 2 * base @ self.right[f, chosen] + base @ here @ base
             slope = self.right[f] - self.right[f, chosen] @ mimic - base @ own
@@ -106,18 +106,18 @@ def pursue(
     longest: int,
     admissible: Callable[[Sequence[int]], NDArray[np.bool_]] | None = None,
 ) -> tuple[list[int], float]:
-    """Choose columns one by one, the one first that lowers the held-out error most.
+    """Choose columns one by one, each time the one that reduces the held-out error most.
 
     Parameters
     ----------
     products : Products
-        Of the columns and of what they are to explain.
+        Products of the columns and of the residual to be explained.
     worth : float
-        Squared error that a further column must take away.
+        Squared error that a further column must remove.
     longest : int
-        Columns at most.
+        Most columns.
     admissible : callable, optional
-        Which columns may join those that are chosen; all by default.
+        Function that returns the columns that may be added to the chosen ones; all by default.
 
     Returns
     -------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Explanations of what the model so far leaves, ranked by what they explain held out."""
+"""Explanations of the present residual, ranked by their held-out gain."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ from skidyn.diagnosis._split import split_effects
 from skidyn.effects import get_effect
 
 Mask = NDArray[np.bool_]
-#: Places in the pool of what is added, and by how much the held-out error falls.
+#: Indices in the pool of the added candidates, and the reduction of the held-out error.
 _Greedy = tuple[list[int], float]
-#: Names of which other forms are tried, and the share of the best score from which on the second
-#: is tried in any case.
+#: Number of kinds of which other forms are tried, and the share of the best score from which the
+#: second is always tried.
 FORMS_TRIED, NEARLY = 3, 0.9
 
 
@@ -59,16 +59,16 @@ class RankingSearch(SearchState):
         ranking += [self._against_functions(h, ranking) for h in lines]
         ranking += self._finals([own for of_kind in found[len(screening) :] for own in of_kind])
         ranking += self._other_forms(ranking)
-        # What says least comes last: differences between recordings, and vibration.
+        # The least specific explanations are last: differences between recordings, and vibration.
         return sorted(
             ranking, key=lambda h: (says_little(h) or self._holds_in_all(h, ranking), -h.score)
         )
 
     def _other_forms(self, ranking: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """Other forms of the best names, where what these leave is no noise.
+        """Other forms of the best kinds, if their residual is not noise.
 
-        On the grid, the form of a kind that screens best need not be the one that fits best. So are
-        those of a name that explains nearly as much as the best one.
+        On the grid, the form with the best screening score need not be the one that fits best.
+        Forms of a kind that explains nearly as much as the best one are tried as well.
         """
         names = [h for h in ranking if h.kind != UNKNOWN and not within_recordings(h)]
         names = sorted(names, key=lambda h: -h.score)[:FORMS_TRIED]
@@ -82,7 +82,7 @@ class RankingSearch(SearchState):
         return self._finals(found, refined=len(found))
 
     def _in_other_forms(self, hypothesis: Hypothesis) -> list[list[Candidate]]:
-        """The terms of a hypothesis, all of them in each other form of its kind."""
+        """The terms of a hypothesis in each other form of its kind."""
         names = get_effect(hypothesis.kind).form_names
         sites = {c.joints: names & set(c.term.shape) for c in hypothesis.candidates}
         strongest = self.strongest(
@@ -99,7 +99,7 @@ class RankingSearch(SearchState):
     def strongest(
         self, group: Callable[[Candidate], Any], wanted: Callable[[Candidate], bool]
     ) -> dict[Any, Candidate]:
-        """Of each group of candidates, the one that removes most by itself."""
+        """Of each group of candidates, the one that alone removes most."""
         best: dict[Any, int] = {}
         for i, candidate in enumerate(self.pool):
             if not wanted(candidate):
@@ -110,7 +110,7 @@ class RankingSearch(SearchState):
         return {key: self.pool[i] for key, i in best.items()}
 
     def _holds_in_all(self, own: Hypothesis, ranking: Sequence[Hypothesis]) -> bool:
-        """Whether what differs between many recordings is nearly had by what is alike in all."""
+        """Whether an effect common to all recordings explains nearly as much as separate ones."""
         recordings = {k for c in own.candidates for k in c.term.trajectories or ()}
         if len(recordings) <= self.settings.most_recordings or not within_recordings(own):
             return False
@@ -121,16 +121,16 @@ class RankingSearch(SearchState):
         )
 
     def _greedy_by_kind(self, nameless: bool = True) -> list[tuple[list[Candidate], float]]:
-        """For each kind, terms added joint by joint while each lowers the held-out error."""
+        """For each kind, terms added joint by joint while each reduces the held-out error."""
         return self._found(each(lambda look: look(), self._screening(nameless)))
 
     def _found(self, greedy: Iterable[_Greedy]) -> list[tuple[list[Candidate], float]]:
-        """What was added of every kind, and minus the gain of it."""
+        """Added candidates of every kind, and minus their gain."""
         rough = [([self.pool[i] for i in places], drop) for places, drop in greedy if places]
         return [(own, -(drop - 2 * sum(c.width for c in own))) for own, drop in rough]
 
     def _screening(self, nameless: bool = True) -> list[Callable[[], _Greedy]]:
-        """A look for each kind."""
+        """One result for each kind."""
         kinds = np.array([c.kind for c in self.pool])
         within = np.array([self.is_judged_within(c) for c in self.pool], dtype=bool)
         tester = self.tester(self.chosen)
@@ -157,14 +157,14 @@ class RankingSearch(SearchState):
         index: list[int] = []
         chosen: list[Candidate] = []
         widths = np.array([c.width for c in self.pool])
-        # A further form stands for all that could have been declared: it must do so much better.
+        # A further form was chosen from all possible ones, so it must be better by this much.
         further = self.settings.least_gain * np.array(
             [c.is_further_form for c in self.pool], dtype=float
         )
         while pool.any():
             drops = np.where(pool, now.sum() - errors.sum(1), -np.inf)
-            # Nameless functions have very different widths: each coefficient has its price, which
-            # is that of the noise left by the best of them.
+            # Unknown functions have very different numbers of coefficients: each coefficient has a
+            # penalty, in units of the noise left by the best of them.
             price = 2.0
             if self.pool[int(np.argmax(drops))].kind == UNKNOWN:
                 price = self._price([self.pool[int(np.argmax(drops))]], chosen) / 3
@@ -183,7 +183,7 @@ class RankingSearch(SearchState):
         return index, float(base.errors.sum() - now.sum())
 
     def _first_significant(self, drops: Array, order: Array, tester: Tester) -> int | None:
-        """The first of the best few candidates that is large enough and more than chance."""
+        """The first of the best few candidates that is large enough and significant."""
         for i in np.argsort(-order)[: self.settings.shapes_tested]:
             candidate = self.pool[i]
             n_rows = int(self.problem.rows.counts[list(candidate.joints)].sum())
@@ -194,7 +194,7 @@ class RankingSearch(SearchState):
         return None
 
     def _still_open(self, added: Candidate, chosen: list[Candidate]) -> Mask:
-        """Which candidates may join one of the same kind."""
+        """Candidates that may be added to one of the same kind."""
         if len(added.joints) == self.problem.n_joints and self.problem.n_joints > 1:
             return np.zeros(len(self.pool), dtype=bool)  # acts on the whole robot already
         if added.kind == UNKNOWN:
@@ -231,14 +231,14 @@ class RankingSearch(SearchState):
         return found
 
     def _each_by_itself(self, candidate: Candidate) -> list[Candidate]:
-        """What some recordings have, of another size in each of them."""
+        """Effects of some recordings, with a separate size in each of them."""
         terms = [
             candidate.term.with_shape(trajectories=(k,)) for k in candidate.term.trajectories or ()
         ]
         return [replace(candidate, term=t, rows=self.problem.term_rows(t)) for t in terms]
 
     def _finals(self, rough: list[list[Candidate]], refined: int | None = None) -> list[Hypothesis]:
-        """Compare the best kinds, the first of them with refined shapes, noise re-estimated."""
+        """Compare the best kinds with re-estimated noise, the first of them with refined shapes."""
         refined = self.settings.refined if refined is None else refined
         before = {
             within: profile_error(self.problem, self.blocks, self.sigma, self.target, within=within)
@@ -268,7 +268,7 @@ class RankingSearch(SearchState):
             if hypothesis.is_further_form:
                 score -= self.settings.least_gain
             if kind == UNKNOWN:
-                # The error held out has paid for its coefficients already.
+                # The held-out error includes the penalty for its coefficients already.
                 score = float(gain.sum()) - price * min(count, self.settings.nameless_price)
             ranking.append(Hypothesis(kind, tuple(candidates), gain, score, count, errors=after))
         return [h for h in ranking if h.score > self.settings.least_gain]
@@ -276,8 +276,8 @@ class RankingSearch(SearchState):
     def _refined(self, candidates: list[Candidate], within: bool) -> tuple[list[Candidate], Array]:
         """Candidates with their shapes refined, and the held-out errors with them.
 
-        What takes most of a joint's error away is refined again with the noise that it leaves:
-        until then the joint had the weight of a bad one.
+        A candidate that removes most of a joint's error is refined again with the remaining noise,
+        because the joint had too low a weight before.
         """
         sigma, reached = self.sigma.copy(), sorted({j for c in candidates for j in c.rows})
         for _ in range(ROUNDS):
@@ -298,7 +298,7 @@ class RankingSearch(SearchState):
         found = []
         least = self.settings.least_share
         if "torque_ripple" in self.kinds:
-            # A few waves a turn are what a nameless function left of its own edges.
+            # A few waves per turn are errors of an unknown function at the ends of its range.
             lines = [
                 line
                 for line in find_lines(problem, residual, self.significant)
@@ -308,7 +308,7 @@ class RankingSearch(SearchState):
             shortest = 1.0 / problem.signals.unit.max()
             found.append(self._of_lines("torque_ripple", "N", shortest, lines, least))
         if self.vibration:
-            # On samples, of which there are many more than rows.
+            # On samples, which are far more than rows.
             least = self.settings.least_drop * len(residual) / max(1, problem.rows.counts.max())
             lines = find_vibrations(problem, residual, self.significant)
             found.append(self._of_lines(UNKNOWN, "frequency", 0.1, lines, least))
@@ -317,7 +317,7 @@ class RankingSearch(SearchState):
     def _of_lines(
         self, kind: str, position: str, width: float, lines: Sequence[Line], least: float
     ) -> Hypothesis | None:
-        """The strongest line of every joint that is large enough, more than chance and new."""
+        """The strongest line of every joint that is large enough, significant and new."""
         problem = self.problem
         known = [c for h in self.findings if h.torque is not None for c in h.candidates]
         best: dict[int, Line] = {}
@@ -353,16 +353,17 @@ class RankingSearch(SearchState):
         return Hypothesis(kind, tuple(candidates), gain, score, count, chances, torque=torque)
 
     def _follows_position(self, joint: int) -> bool:
-        """Whether a nameless function of the joint's own position was added."""
+        """Whether an unknown function of the joint's own position was added."""
         own = f"q{joint + 1}"
         return any(
             h.kind == UNKNOWN and own in h.variables and joint in h.joints for h in self.findings
         )
 
     def _against_functions(self, ripple: Hypothesis, ranking: Sequence[Hypothesis]) -> Hypothesis:
-        """A ripple as it is, or judged on rows where a function of the signals says much more.
+        """A ripple, judged on averaged rows if a function of the signals explains much more there.
 
-        Few waves per turn follow any torque that depends on the position, a bump for example.
+        A wave with few periods per turn fits part of any torque that depends on the position, such
+        as a bump.
         """
         rivals = [h for h in ranking if h.kind == UNKNOWN and set(h.joints) & set(ripple.joints)]
         if not rivals or ripple.kind == UNKNOWN:
@@ -376,7 +377,7 @@ class RankingSearch(SearchState):
         return replace(ripple, score=min(score, ripple.score))
 
     def _by_kind_of_recording(self) -> list[Callable[[], list[list[Candidate]]]]:
-        """A look at what changed from one recording to the next for each kind."""
+        """Changes between recordings for each kind."""
 
         def look(kind: str) -> list[list[Candidate]]:
             pool = [c for c in self.by_recording if c.kind == kind]
@@ -393,14 +394,14 @@ class RankingSearch(SearchState):
         return [partial(look, kind) for kind in kinds if kind not in known]
 
     def can_be(self, candidate: Candidate, others: Sequence[Candidate]) -> bool:
-        """Whether a candidate's coefficients, beside others, are such as its effect can have."""
+        """Whether a candidate's coefficients, together with others, are physically possible."""
         return candidate.allows(self.tester(others).test(candidate.rows).coefficients)
 
     def _same_or_own(self, chosen: Sequence[Candidate]) -> list[list[Candidate]]:
-        """Effects of few recordings by their name, those of many without one.
+        """Effects of few recordings as known effects, those of many recordings as unknown.
 
-        Sizes of its own in many recordings are what any slow torque that is missing leaves, unless
-        what remains of the joint is white.
+        Separate sizes in many recordings can be due to any missing slow torque, unless the
+        remainder of the joint is white.
         """
         most, white = self.settings.most_recordings, self.settings.white
         few, many = [], []

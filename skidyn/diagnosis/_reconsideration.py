@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Findings beside each other: two names for one function, earlier findings again, withdrawals."""
+"""Findings judged together: replacement of functions, reconsideration, withdrawal."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from skidyn.effects import get_effect
 
 
 class ReconsideringSearch(JudgingSearch):
-    """A search that judges findings beside each other."""
+    """A search that judges findings together."""
 
     def accepted(self, ranking: list[Hypothesis]) -> Hypothesis | None:
         """The best explanation that the rule accepts, with the terms that it accepts."""
@@ -40,7 +40,7 @@ class ReconsideringSearch(JudgingSearch):
                 continue
             forces = [j for j in best.joints if self.of_one_position(best, j)]
             if traced & (set(best.joints) - set(forces)):
-                continue  # another trace of the same force, and a fainter one
+                continue  # another, weaker trace of the same force
             best = self._first_of_two_names(best, offered)
             simpler = self._at_its_limit(best)
             judged = None if simpler is None else self.judged(simpler)
@@ -58,13 +58,13 @@ class ReconsideringSearch(JudgingSearch):
         return None
 
     def _first_of_two_names(self, best: Hypothesis, ranking: list[Hypothesis]) -> Hypothesis:
-        """A nameless function, or the first of two known effects that together do as well."""
+        """An unknown function, or the first of two known effects that together are as good."""
         if (
             best.kind != UNKNOWN
             or best.errors is None
             or within_recordings(best)
             or self._reconsidering
-            # one force over the position of a joint is simpler than two that make it up
+            # one force over the position of a joint is simpler than two that add up to it
             or all(self.of_one_position(best, j) for j in best.joints)
         ):
             return best
@@ -92,13 +92,13 @@ class ReconsideringSearch(JudgingSearch):
         return best
 
     def _names_on(self, function: Hypothesis, ranking: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """The best few known effects that may be a function, in every recording."""
+        """The best few known effects of all recordings that may replace a function."""
         names = [h for h in ranking if h.kind != UNKNOWN and not within_recordings(h)]
         names = [h for h in names if set(function.joints) <= set(h.joints)]
         return [h for h in names if not self.denied(h, function)][: self.settings.refined]
 
     def reconsider(self, newest: Hypothesis) -> None:
-        """Let every kind compete again for what earlier findings explain, beside the newest."""
+        """Compare all kinds again for the part of earlier findings, in presence of the newest."""
         replaced = False
         for old in [h for h in self.findings if h is not newest and h.torque is None]:
             for _ in range(self.settings.repeated):
@@ -109,15 +109,16 @@ class ReconsideringSearch(JudgingSearch):
                     break
                 replaced = True
                 newest, old = self._settled(newest), winner
-                # What follows the fit had followed a model with the wrong name in it.
+                # Columns that depend on the fit were computed with the wrong effect in the model.
                 if not any(map(uses_the_fit, newest.candidates)):
                     break
         if replaced and newest.kind == UNKNOWN and newest.torque is None:
-            # What stood beside the wrong name without one may have one beside the right name.
+            # An unknown effect found with the wrong effect may be a known one with the right
+            # effect.
             self._competed_again(newest)
 
     def _competed_again(self, old: Hypothesis) -> Hypothesis | None:
-        """Put what now wins in the place of an earlier finding: another kind, or a better shape."""
+        """Replace an earlier finding by the now best one: another kind, or a better shape."""
         kept = self._state()
         place = self.findings.index(old)
         self.findings.remove(old)
@@ -148,10 +149,10 @@ class ReconsideringSearch(JudgingSearch):
     def _name_in_place(
         self, old: Hypothesis, ranking: Sequence[Hypothesis], with_old: Array
     ) -> Hypothesis | None:
-        """A known effect that does as well as a nameless one beside what was found later."""
+        """A known effect that is as good as an unknown one in presence of later findings."""
         own = set(old.joints)
         if any(h.kind == UNKNOWN and own & set(h.joints) for h in self.findings):
-            return None  # what another function took up of this one speaks for no name
+            return None  # its part in another function is no evidence for an effect
         removed = self.left - with_old
         for rival in self._names_on(old, ranking):
             first = self.judged(rival)
@@ -169,21 +170,21 @@ class ReconsideringSearch(JudgingSearch):
         return None
 
     def _beside_another_kind(self, shadow: Hypothesis) -> Hypothesis | None:
-        """What looks like the shadow of an earlier finding, if that was the wrong kind.
+        """An explanation that may be an error of an earlier finding, if that has the wrong kind.
 
-        Two effects on one joint may first look like a third one, beside which the second of them is
-        small.
+        Two effects on one joint may first look like a third one, in presence of which the second of
+        them is small.
         """
         if self._reconsidering or shadow.kind == UNKNOWN or within_recordings(shadow):
             return None
         if shadow.torque is not None:
-            return None  # averaged rows do not show a line
+            return None  # averaged rows do not contain a line
         own = set(shadow.joints)
         for old in [h for h in self.findings if h.torque is None and own & set(h.joints)]:
             if old.kind == UNKNOWN and all(
                 self.of_one_position(h, j) for h in (old, shadow) for j in shadow.joints
             ):
-                continue  # two pieces of one function are no two names
+                continue  # two parts of one function are not two effects
             kept = self._state()
             before = self.left
             self.add(shadow)
@@ -204,15 +205,15 @@ class ReconsideringSearch(JudgingSearch):
         return None
 
     def name_alike(self) -> None:
-        """Give joints the kind of another joint where that explains nearly as much.
+        """Use the kind of another joint if it explains nearly as much.
 
-        Joints of one robot are built alike: what one of them has, another one has rather than
-        something else that looks like it there. Where either could be called as the other is, the
-        one that explains more names both.
+        Joints of one robot have the same design: an effect of one of them is more likely on another
+        than a different effect that looks like it. If either kind is possible for both, the one
+        that explains more is used for both.
         """
         for old in list(self.findings):
             if old.kind == UNKNOWN or get_effect(old.kind).is_exact:
-                continue  # a formula that is exact, and explains as much, is right
+                continue  # an exact formula that explains equally much is right
             for other in list(self.findings):
                 if old is other or not all(map(self._of_own_joints, (old, other))):
                     continue
@@ -237,7 +238,7 @@ class ReconsideringSearch(JudgingSearch):
                 break
 
     def _of_own_joints(self, finding: Hypothesis) -> bool:
-        """Whether it is a known effect on single joints, found on averaged rows of all."""
+        """Whether it is a known effect on single joints, found on rows of all recordings."""
         if finding not in self.findings or finding.kind == UNKNOWN or within_recordings(finding):
             return False
         effect = get_effect(finding.kind)
@@ -254,15 +255,15 @@ class ReconsideringSearch(JudgingSearch):
         return max(near, key=lambda h: h.score, default=None)
 
     def withdraw(self, newest: Hypothesis | None = None) -> Hypothesis | None:
-        """Take back what no longer holds beside all that was added after it.
+        """Withdraw findings that are no longer valid in presence of later ones.
 
-        Returns the newest finding, its shapes found again where it took the place of another.
+        Returns the newest finding, with its shapes searched again if it replaced another.
         """
         for old in [h for h in self.findings if h is not newest and h.torque is None]:
             without = [c for c in self.chosen if c not in old.candidates]
             richer = newest is not None and family_of(old) == family_of(newest) != ""
             if richer and newest is not None and old.joints == newest.joints:
-                # A richer member of the family takes the place of the simpler one.
+                # A more complex member of the family replaces the simpler one.
                 self._replace(old, (), without)
                 newest = self._refined_anew(newest)
                 continue
@@ -282,7 +283,7 @@ class ReconsideringSearch(JudgingSearch):
         return newest
 
     def _refined_anew(self, finding: Hypothesis) -> Hypothesis:
-        """A finding with its shapes found again, now that others have changed."""
+        """A finding with its shapes searched again after a change of others."""
         if finding.torque is not None or not any(c.n_shapes for c in finding.candidates):
             return finding
         others = [c for c in self.chosen if c not in finding.candidates]
@@ -297,7 +298,7 @@ class ReconsideringSearch(JudgingSearch):
         return self.findings[place]
 
     def _settled(self, finding: Hypothesis) -> Hypothesis:
-        """A finding with its shapes found again; until they stay if its columns follow the fit."""
+        """A finding with its shapes searched again, repeatedly if its columns depend on the fit."""
         follows = any(map(uses_the_fit, finding.candidates))
         for _ in range(self.settings.repeated if follows else 1):
             shapes = [c.term.shape for c in finding.candidates]
@@ -308,7 +309,7 @@ class ReconsideringSearch(JudgingSearch):
         return finding
 
     def _needless(self, old: Hypothesis, without: list[Candidate]) -> bool:
-        """Whether an earlier finding became the shadow of others."""
+        """Whether an earlier finding is now explained by others."""
         within = any(map(self.is_judged_within, old.candidates))
         errors = [
             profile_error(

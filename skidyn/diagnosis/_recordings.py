@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Effects that some recordings have and others do not: friction that rose, a sensor zeroed anew.
+"""Effects of some recordings only: increased friction, a new zero of a sensor.
 
-Leaving whole trajectories out cannot judge them: what one trajectory has is seen in it alone. They
-are judged on interleaved quarters of every trajectory instead.
+They cannot be judged by leaving out whole trajectories, because only the trajectory itself shows
+its effect. They are judged on interleaved quarters of every trajectory instead.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from skidyn.diagnosis._rule import Tester
 from skidyn.effects import Term, get_effect
 from skidyn.evidence import Problem
 
-#: Candidates tested in full in every step, those with the largest drop beside nothing else.
+#: Number of candidates tested in full in every step, those with the largest drop alone.
 TESTED = 8
-#: Terms of one kind at most.
+#: Most terms of one kind.
 MOST_TERMS = 24
-#: One recording that does this share of what all of them do stands out by itself.
+#: Share of the whole gain from which a single recording is treated alone.
 MOSTLY = 0.8
 
 
 def groups_of_recordings(problem: Problem) -> list[tuple[int, ...]]:
-    """Every recording by itself, and all from one of them on.
+    """Sets of recordings: each alone, and all from each of them on.
 
     Parameters
     ----------
@@ -45,14 +45,14 @@ def groups_of_recordings(problem: Problem) -> list[tuple[int, ...]]:
 
 
 def recording_candidates(problem: Problem, kinds: Iterable[str]) -> list[Candidate]:
-    """Terms of some recordings for every effect that may change from one to the next.
+    """Terms of some recordings for every effect that may differ between them.
 
     Parameters
     ----------
     problem : Problem
         Rows.
     kinds : iterable of str
-        Kinds that may be named.
+        Kinds to try.
     """
     candidates = []
     for kind in kinds:
@@ -80,16 +80,16 @@ def choose(
     tester_beside: Callable[[Sequence[Candidate]], Tester],
     significant: Callable[[float], bool],
 ) -> list[Candidate]:
-    """Terms of one kind added one by one while each is more than chance.
+    """Terms of one kind, added one by one while each is significant.
 
     Parameters
     ----------
     candidates : sequence of Candidate
         Of one kind.
     tester_beside : callable
-        Gives the tester of the model with some candidates.
+        Function that returns the tester of the model with some candidates.
     significant : callable
-        Whether a chance is small enough.
+        Function that returns whether a p-value is small enough.
     """
     chosen = _zeroed_anew(candidates, tester_beside([]), significant)
     left = [c for c in candidates if not any(c is other for other in chosen)]
@@ -111,9 +111,9 @@ def choose(
 def _zeroed_anew(
     candidates: Sequence[Candidate], tester: Tester, significant: Callable[[float], bool]
 ) -> list[Candidate]:
-    """Terms of every single recording of a joint, where only all of them together stand out.
+    """Terms of every single recording of a joint, if only all of them together are significant.
 
-    Where every recording differs, each is lost in what the others leave.
+    If every recording differs, the residual of the others hides each of them.
     """
     chosen: list[Candidate] = []
     for joints in dict.fromkeys(c.joints for c in candidates):
@@ -123,7 +123,7 @@ def _zeroed_anew(
         together, alone = tester.test_each(rows_together(own, tester.problem.rows.counts))
         if not significant(together.chance):
             continue
-        # One that does nearly all of it stands out by itself.
+        # One that explains nearly all of it is significant alone.
         strongest = max((t.drop for t in alone if significant(t.chance)), default=0.0)
         if strongest < MOSTLY * together.drop:
             chosen += own
@@ -131,7 +131,7 @@ def _zeroed_anew(
 
 
 def _drop_alone(tester: Tester, candidate: Candidate) -> float:
-    """Squared error that a candidate would remove if the model stayed as it is."""
+    """Squared error that a candidate would remove from the unchanged model."""
     drop = 0.0
     for j, rows in candidate.rows.items():
         block = rows / tester.sigma[j]
@@ -143,7 +143,7 @@ def _drop_alone(tester: Tester, candidate: Candidate) -> float:
 
 
 def _mostly_both_ways(problem: Problem, joint: int) -> bool:
-    """Whether most recordings hold motion of a joint both ways: else an offset is friction."""
+    """Whether most recordings have motion in both directions; else an offset is friction."""
     direction = problem.rows.average(problem.signals.sign[:, joint], joint)
     trajectory = problem.rows.trajectory[joint]
     shares = [float(np.mean(direction[trajectory == n] > 0)) for n in np.unique(trajectory)]

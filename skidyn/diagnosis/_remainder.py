@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a completed model leaves, in figures that are never mixed.
+"""Remaining error of a completed model, by cause.
 
-Noise is what the sensors make: the torque sensor's fast noise, and what the noise of the encoders
-becomes on its way through differentiation and inertia. Predictable is what the logged signals still
-tell of the residual. The remainder is neither.
+Noise is due to the sensors: the torque sensor's fast noise, and the torque caused by the noise of
+the encoders through differentiation and inertia. Predictable is the part of the residual that the
+logged signals still explain. The remainder is neither.
 """
 
 from __future__ import annotations
@@ -30,36 +30,36 @@ from skidyn.diagnosis._rule import (
 from skidyn.evidence import Fit, Problem, smooth_motion
 from skidyn.measurement import position_step
 
-#: Quantiles between which the range of the torque lies.
+#: Quantiles that define the range of the torque.
 RANGE = (0.005, 0.995)
-#: Samples on which the noise of the positions is followed to the torque.
+#: Number of samples on which the noise of the positions is propagated to the torque.
 MOST_SAMPLES = 4000
 
 
 @dataclass(frozen=True)
 class Remainder:
-    """Error of the completed model on the samples judged, by what it is made of.
+    """Error of the completed model on the samples judged, by cause.
 
     Parameters
     ----------
     sensor_noise : ndarray of shape (n_joints,), N m or N
-        Of the torque sensor: what changes faster than any motion does.
+        Noise of the torque sensor, which changes faster than any motion.
     position_noise : ndarray of shape (n_joints,), N m or N
-        What the noise of the logged positions becomes in the torque of the model.
+        Torque of the model caused by the noise of the logged positions.
     predictable : ndarray of shape (n_joints,), N m or N
-        What a function of the logged signals would still take away.
+        Error that a function of the logged signals would still remove.
     left : ndarray of shape (n_joints,), N m or N
-        What is none of these.
+        Remaining error due to none of these.
     inflation : ndarray of shape (n_joints,)
         Inflation of the variance of slow torques by the autocorrelation of the error: about 1 for
-        white noise, up to 2 for coloured noise, more for a torque that is missing.
+        white noise, up to 2 for coloured noise, more for a missing torque.
     material : ndarray of shape (n_joints,) of bool
-        Whether the error is more than noise, and more than what a healthy robot leaves; or what
-        is slow is correlated, which noise is not, and stands out of averaged noise; or what is
-        predictable exceeds the noise.
+        Whether the error exceeds noise and the usual error of a healthy robot; or its slow part is
+        correlated, unlike noise, and exceeds averaged noise; or the predictable part exceeds the
+        noise.
     coloured : bool
-        Whether the error is so many times the fast noise on all joints alike that it is noise that
-        is correlated in time: a torque that is missing is larger on some joints than on others.
+        Whether the error exceeds the fast noise by a similar factor on all joints, as noise that is
+        correlated in time does; a missing torque is larger on some joints than on others.
 
     Examples
     --------
@@ -83,7 +83,7 @@ class Remainder:
 
     @property
     def coarse(self) -> NDArray[np.bool_]:
-        """Joints on which the noise of positions outweighs that of the torque twice."""
+        """Joints on which the noise of positions is more than twice that of the torque."""
         return np.asarray(self.position_noise > 2 * np.nan_to_num(self.sensor_noise))
 
 
@@ -101,14 +101,14 @@ def find_remainder(
     rmse: Array,
     share: Array,
 ) -> Remainder:
-    """Take the error of the completed model apart.
+    """Split the error of the completed model by cause.
 
     Parameters
     ----------
     problem : Problem
         Motion and rows.
     fit : Fit
-        Of the completed model; its residual rows are those over which noise is averaged.
+        Fit of the completed model, with the residual of averaged rows.
     residual : ndarray of shape (n_samples, n_joints), N m or N
         Held-out residual of the completed model.
     torque : ndarray of shape (n_samples, n_joints), N m or N
@@ -138,7 +138,7 @@ def find_remainder(
 
 
 def _is_alike(rmse: Array, noise: Array) -> bool:
-    """Whether errors are about as many times the noise on all of several joints, and not many."""
+    """Whether errors exceed the noise by a similar, small factor on all of several joints."""
     moves = noise > 0
     ratio = rmse[moves] / noise[moves]
     few = moves.sum() < COLOURED_FEWEST_JOINTS
@@ -164,15 +164,15 @@ def noise_level(problem: Problem, residual: Array) -> Array:
 
 
 def position_noise(problem: Problem, fit: Fit | None = None) -> Array:
-    """Torque that the noise of the logged positions makes in a model, (n_joints,).
+    """Torque of a model caused by the noise of the logged positions, (n_joints,).
 
-    Without a fit, in the rigid body of the robot alone: rotors, which are no part of it, may make
-    most of it.
+    Without a fit, only the rigid body of the robot is used; rotors, which it does not include, may
+    cause most of this torque.
 
-    The noise is what the smoother takes off the positions. As much of it, drawn at random, is put
-    on the smoothed positions and followed through the smoother and the inverse dynamics. Where an
-    encoder counts in visible steps, the smoothed positions are counted in them instead: of slow
-    motion such noise is slow, too, and passes the smoother.
+    The noise is the part that the smoother removes from the positions. The same amount, drawn at
+    random, is added to the smoothed positions and propagated through the smoother and the inverse
+    dynamics. If an encoder has visible steps, the smoothed positions are rounded to them instead:
+    for slow motion such noise is slow, too, and passes the smoother.
     """
     signals, motion, robot = problem.logged, problem.signals, problem.robot
     quiet = np.zeros(problem.n_joints)
@@ -188,7 +188,7 @@ def position_noise(problem: Problem, fit: Fit | None = None) -> Array:
 
 
 def _shaken(logged: Signals, motion: Signals) -> tuple[Signals, Signals]:
-    """The smoothed motion with the noise of positions, and without, both smoothed again."""
+    """The smoothed motion with and without the noise of positions, both smoothed again."""
     taken = np.median(np.abs(logged.q - motion.q), axis=0) / MEDIAN
     part = slice(0, min(logged.n_samples, MOST_SAMPLES))
     smooth = motion.take(part)
@@ -202,7 +202,7 @@ def _shaken(logged: Signals, motion: Signals) -> tuple[Signals, Signals]:
 
 
 def _torque(problem: Problem, fit: Fit | None, motion: Signals) -> Array:
-    """Torque of the bodies and of the effects that follow a motion smoothly, N m or N."""
+    """Torque of the bodies and of effects that are smooth functions of the motion, N m or N."""
     s, robot = motion, problem.robot
     assert robot is not None
     own = None if fit is None else problem.inertial_parameters(fit)

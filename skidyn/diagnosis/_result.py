@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The outcome of a diagnosis, and what a user does with it."""
+"""The result of a diagnosis, and its methods for users."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ from skidyn.simulation import (
     judge_in_turn,
 )
 
-#: How the sentence on a finding begins that the model for simulation is without.
+#: Beginning of the sentence on a finding that the model for simulation does not contain.
 _VETO = "Not in the completed model because it worsens the simulated motion:"
 
-#: Findings that every servo may have, beside which its motion may lack another effect.
+#: Findings that are usual for servos, in addition to which the motion may show another effect.
 _PLAIN = ("offset", "rotor_inertia")
 
 Verdict = Literal["complete", "missing", "unknown"]
@@ -84,11 +84,11 @@ class Diagnosis:
     problem : Problem
         Averaged rows and folds behind the diagnosis.
     result : SearchResult
-        What the search found and its last fit.
+        Result of the search with its last fit.
     predictable : ndarray of shape (n_joints,)
         Share of the remaining squared error that a flexible learner predicts.
     unknowns : list of UnknownTorque
-        Tested variables, shape and formula of every nameless torque that was found.
+        Tested variables, shape and formula of every unknown torque that was found.
     checks : list of Suspicion
         Suspicions of the checks of the measurement, with evidence and remedy.
     parts : Remainder
@@ -313,9 +313,9 @@ class Diagnosis:
 
         A torque computed from the position error of a servo hides effects that last hundredths of a
         second. Joints are simulated in their loops (:func:`skidyn.simulation.explain_servo_motion`)
-        with the findings that the simulation supports, and without nameless functions, hysteresis,
+        with the findings that the simulation supports, and without unknown functions, hysteresis,
         offsets and saturation by the controller; joints with other findings are left out. The
-        effects found replace nameless functions and hysteresis on their joints; :attr:`findings`
+        effects found replace unknown functions and hysteresis on their joints; :attr:`findings`
         are not changed. They are stored in :attr:`servo_motion` and shown in the report and on the
         page, and a diagnosis without any other finding is no longer ``"complete"``.
 
@@ -349,7 +349,7 @@ class Diagnosis:
             )
         named: set[int] = set()
         known: list[tuple[str, int]] = []
-        # A limit that the controller has is simulated, and is no name of what moves the joint.
+        # A known limit of the controller is simulated and is not an effect.
         limited = np.isfinite(controller.checked(len(self.joint_names)).limit)
         for finding in self.findings:
             effect = None if finding.kind == "unknown" else get_effect(finding.kind)
@@ -364,7 +364,7 @@ class Diagnosis:
         joints = [j for j in range(1, len(self.joint_names) + 1) if j not in named]
         found: list[ServoFinding] = []
         if joints:
-            # Bodies that were fitted without what is known would be bent by it.
+            # Bodies fitted without the known effects would be biased by them.
             terms = [t for f in self.findings if f.kind in (*LAWS, *_PLAIN) for t in f.terms]
             model = self.base_model.with_effects(terms).fit(*self.data)
             found = explain_servo_motion(
@@ -389,7 +389,7 @@ class Diagnosis:
         Parameters
         ----------
         kind : str
-            Kind of the catalogue; ``"unknown"`` for the nameless function that was found, or
+            Kind of the catalogue; ``"unknown"`` for the unknown function that was found, or
             ``"formula"`` for the formula proposed for it.
         joints : sequence of int, optional
             Joints, counted from 1; by default those of the finding of this kind, or all joints.

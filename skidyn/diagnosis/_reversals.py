@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A second look at the reversals, which the search among sliding samples leaves out.
+"""A second search at the reversals, which the search on sliding samples leaves out.
 
-Sliding friction does not say what happens while a joint turns back, so a search that judges it
-must not look there. But a joint whose friction builds up over a thousandth of a radian shows it
-nowhere else. Where the completed model fails close to reversals, the members of the hysteresis
-family are compared once more with rows that reach up to them. Only the standstill itself stays
-out: a joint that sticks while it turns back holds any torque.
+Sliding friction does not describe reversals, so a search that judges it must exclude them. But
+friction that builds up over a thousandth of a radian is visible only there. If the completed model
+fails close to reversals, the members of the hysteresis family are compared again with rows that
+reach up to them. Only the standstill itself is excluded, because a joint that sticks can have any
+friction torque.
 """
 
 from __future__ import annotations
@@ -47,23 +47,23 @@ def look_at_reversals(
     problem : Problem
         Problem of the sliding samples.
     result : SearchResult
-        What was found there.
+        Findings of the sliding samples.
     kinds : list of str
-        Kinds of the catalogue that may be named.
+        Kinds of the catalogue to try.
     settings : Settings
         Thresholds of the search.
 
     Returns
     -------
     problem : Problem
-        With rows at reversals if hysteresis was found there, else as given.
+        Problem with rows at reversals if hysteresis was found there, else as given.
     result : SearchResult
-        With the findings of both looks.
+        Result with the findings of both searches.
     """
     family = [k for k in kinds if _is_hysteresis(k)]
     others = [h for h in result.findings if not _is_hysteresis(h.kind)]
     room = settings.max_findings - len(others)
-    # A torque that lags is late at every reversal, whatever the friction does there.
+    # A delayed torque is late at every reversal, for any friction.
     lags = any(h.kind == "time_delay" for h in others)
     if not family or room < 1 or lags or problem.signals.time is None:
         return problem, result
@@ -72,7 +72,7 @@ def look_at_reversals(
     new = set(failing_joints(problem, result)) - own - before
     if not new:
         return problem, result
-    # What was found among the sliding samples has to be found again, by the same name.
+    # The findings of the sliding samples have to be found again with the same kinds.
     joints = sorted(new | before)
     terms = (*problem.terms, *terms_on_rows(others))
     wider = with_reversals(problem, terms, joints)
@@ -91,7 +91,7 @@ def look_at_reversals(
 
 
 def failing_joints(problem: Problem, result: SearchResult) -> list[int]:
-    """Joints whose error close to reversals stands out.
+    """Joints with a significant error close to reversals.
 
     Parameters
     ----------

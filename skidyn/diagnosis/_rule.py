@@ -1,26 +1,25 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The rule: what is tested, with which variance, at which level, and what is withdrawn.
+"""The rule for findings: test, variance, level, and withdrawal.
 
-Every explanation of the residual, named or nameless, of all recordings or of some, passes
+Every explanation of the residual, known or unknown, of all recordings or of some, passes
 :meth:`Rule.accepts` before it becomes a finding and :meth:`Rule.withdrawn` after each later one.
 
-**What is tested.** The coefficients of one candidate beside everything else in the model, all
-refitted. The residual whose size and correlation enter the test is the one that is left *after* the
-candidate: a smooth torque that is missing makes the residual of the model without it large and
-correlated, and would hide itself [1]_. So does the noise by which joints are weighted, where a
-candidate removes much of a joint's error: it is tested with the noise that it leaves, too.
+**Test.** The coefficients of one candidate together with all others of the model, all fitted again.
+The size and correlation of the residual *with* the candidate are used: a missing smooth torque
+makes the residual of the model without it large and correlated, which would hide the torque [1]_.
+The same applies to the noise by which joints are weighted if a candidate removes much of a joint's
+error; such a candidate is also tested with the remaining noise.
 
-**Which variance.** Two chances are computed, and the larger one decides. The first takes the sums
-of the score over blocks of time as independent, whatever happens within a block and at whatever
-size (a sandwich estimate by blocks, unbiased where few of them hold most, Hotelling's law for their
-finite number [2]_). Blocks are
-several correlation times long and never cross the border of a trajectory; each holds the rows of
-all joints. The second takes the residual as stationary and inflates its variance by its
-autocorrelation. The first knows nothing of an effect that acts in one block alone, the second
-nothing of noise that changes; a finding must be more than chance to both.
+**Variance.** Two p-values are computed, and the larger one is used. The first treats the sums of
+the score over blocks of time as independent, with any correlation and variance within a block (a
+sandwich estimate by blocks, unbiased if few of them contain most, Hotelling's law for their finite
+number [2]_). Blocks are several correlation times long and never cross the border of a trajectory;
+each holds the rows of all joints. The second treats the residual as stationary and inflates its
+variance by its autocorrelation. The first cannot judge an effect in a single block, the second does
+not account for noise that changes; a finding must be significant by both.
 
-**Which level.** ``Settings.level`` over everything that was tried (Bonferroni): the printed q-value
-is the chance times the number of candidates.
+**Level.** ``Settings.level`` over all candidates that were tried (Bonferroni): the printed q-value
+is the p-value times the number of candidates.
 
 References
 ----------
@@ -43,72 +42,74 @@ from scipy.special import fdtrc
 from skidyn._signals import Array
 from skidyn.evidence import RIDGE, Felt, Problem, column_sizes, felt_columns, gram_of, products_with
 
-#: A block is at least so long in s, and at least so many correlation times of the residual.
+#: Least length of a block in s, and in correlation times of the residual.
 SHORTEST_BLOCK, CORRELATION_TIMES = 0.5, 8.0
 #: Autocorrelations are added up to this lag in rows, or to the first one below this value.
 MOST_LAGS, SMALL = 12, 0.05
-#: Blocks needed beyond the coefficients that are tested; and blocks, beyond twice the coefficients,
-#: that are made at least where the residual stays alike for long.
+#: Number of blocks needed in addition to the tested coefficients; and least number of blocks, in
+#: addition to twice the coefficients, for a residual with a long correlation.
 FEWEST_BLOCKS, ENOUGH_BLOCKS = 6, 8
-#: Waves per turn from which a nameless function of position cannot stand for torque ripple.
+#: Waves per turn from which an unknown function of position cannot represent torque ripple.
 RESOLVED = 40.0
 #: A column of which less than this share is new to the model is not tested.
 NEW_SHARE = 1e-6
-#: Share of an effect below which a coefficient of a forbidden sign is nothing.
+#: Share of an effect below which a coefficient of the wrong sign is negligible.
 NEGLIGIBLE = 0.05
-#: A candidate that removes more than this share of the squared error of its joints was weighted
-#: by a noise that was mostly itself: unless it is more than this sure, it is tested again with what
-#: it leaves, found in so many rounds.
+#: A candidate that removes more than this share of the squared error of its joints was weighted by
+#: a noise that it mostly caused: unless its p-value is below this, it is tested again with the
+#: remaining noise, found in this many rounds.
 MASKED, SURE, ROUNDS = 0.3, 1e-9, 3
-#: Share of an effect in one fold above which the others tell nothing of it: parts of recordings are
-#: held out in place of whole ones.
+#: Share of an effect in one fold above which the others do not determine it: then parts of
+#: recordings are held out instead of whole ones.
 CONFINED = 0.8
 
-#: What is less likely right than this, and removes a smaller share of the error, is no finding,
-#: unless another name equals it: one of two (``_conclusion.py``; ``confidence.py``).
+#: An effect with a lower confidence that removes a smaller share of the error is not a finding,
+#: unless another effect is equally good (``_conclusion.py``; ``confidence.py``).
 GUESS = 0.5
-#: What removes less of the error of samples than this share is a finding only if it is so sure: of
-#: such names in generated logs, those that were less sure were wrong (``confidence.py``).
+#: An effect that removes a smaller share of the error of samples is a finding only with this
+#: confidence: in generated logs, such effects with a lower confidence were wrong
+#: (``confidence.py``).
 LITTLE, SURE_OF_LITTLE = 0.005, 0.9
 
-# Torques that come and go (``_episodes.py``); no false one: ``nothing_hidden.py``.
+# Intermittent torques (``_episodes.py``); no false one: ``nothing_hidden.py``.
 #: Squared residual, in units of the noise, above which a row counts as excess, and the least sum of
-#: the excess of an episode: several rows in a row far beyond what quiet rows show.
+#: the excess of an episode: several successive rows far above quiet ones.
 EPISODE_EXCESS, EPISODE_LEAST_SUM = 4.0, 60.0
-#: Largest share of a joint's rows in episodes, and least share of its excess that they hold: with
-#: more it does not come and go.
+#: Largest share of a joint's rows in episodes, above which a torque is not intermittent, and least
+#: share of its excess in them.
 EPISODE_MOST_ROWS, EPISODE_LEAST_EXCESS = 0.4, 0.6
-#: So many quiet rows in a row end an episode.
+#: Number of successive quiet rows that end an episode.
 EPISODE_QUIET = 5
-#: An episode must reach this share of the range of the joint's torque, and so many times its noise.
+#: Least size of an episode, as a share of the range of the joint's torque, and in units of its
+#: noise.
 EPISODE_LEAST_RANGE, EPISODE_LEAST_NOISE = 0.01, 2.0
-#: Share of the squared residual of a joint that its episodes must hold: what remains of a torque
-#: that follows the motion is large in places, too.
+#: Share of the squared residual of a joint that its episodes must contain, since the rest of a
+#: torque that depends on the motion is locally large, too.
 EPISODE_LEAST_HELD = 0.6
-#: Share of a row's weight that falls on sliding samples: dry friction at reversals is no episode.
+#: Share of a row's weight on sliding samples, since dry friction at reversals is not an episode.
 EPISODE_SLIDING = 0.9
 #: A force at one link must explain this share of the squared torque of all joints.
 EPISODE_FORCE_SHARE = 0.8
 
-# When what is left is material (``_remainder.py``); ``real_recordings.py``, ``nothing_hidden.py``.
+# When a remainder is material (``_remainder.py``); ``real_recordings.py``, ``nothing_hidden.py``.
 #: Times the noise, and share of the torque's range, above which a remainder is material: smoothing
-#: and coloured noise leave up to half as much again as the fast noise, and robots that move well
-#: leave some hundredths of the range.
+#: and coloured noise leave up to 1.5 times the fast noise, and healthy robots some hundredths of
+#: the range.
 REMAINDER_TIMES_NOISE, REMAINDER_SHARE_OF_RANGE = 2.0, 0.02
-#: Smaller remainders are told where they are slow: averaged over time they exceed so many times
-#: what noise leaves there, coloured noise included; their autocorrelation inflates the variance of
-#: a slow torque to more than coloured noise does; and they reach this share of the range.
+#: Smaller remainders are reported if they are slow: their average over time exceeds this multiple
+#: of that of noise, coloured noise included; their autocorrelation inflates the variance of a slow
+#: torque more than that of coloured noise; and they reach this share of the range.
 REMAINDER_SLOW_TIMES_NOISE, REMAINDER_CORRELATED = 3.0, 2.2
 REMAINDER_SLOW_SHARE_OF_RANGE = 0.01
-#: Errors that are at most so many times the fast noise on every joint, and alike within this factor
-#: on all of so many joints, are noise that is correlated in time.
+#: Errors that are at most this multiple of the fast noise on every joint, and equal within this
+#: factor on all of at least this many joints, are noise that is correlated in time.
 COLOURED_MOST, COLOURED_ALIKE, COLOURED_FEWEST_JOINTS = 4.0, 1.5, 3
 #: Share of the torque's range above which something predictable is material if it exceeds noise.
 REMAINDER_PREDICTABLE_SHARE = 0.01
 
-# Hysteresis that shows at reversals only (``_reversals.py``); ``practice.py``.
-#: A joint is looked at if its error close to reversals is more than this share of its dry
-#: friction, what the uncertain velocity there may leave,
+# Hysteresis that is visible at reversals only (``_reversals.py``); ``practice.py``.
+#: A joint is searched if its error close to reversals is more than this share of its dry friction,
+#: which the uncertain velocity there may cause,
 REVERSAL_SHARE_OF_FRICTION = 0.12
 #: and if its mean squared error there exceeds that of sliding by this factor.
 REVERSAL_STANDS_OUT = 2.0
@@ -118,8 +119,8 @@ REVERSAL_FEWEST_ROWS, REVERSAL_AWAY = 20, 0.6
 #: Least share of a joint's squared error that hysteresis must remove there.
 REVERSAL_LEAST_SHARE = 0.06
 
-#: Windows, in s, in which effects that move the link are looked for (``_swift.py``): flights
-#: across a play of a few mrad take as long.
+#: Windows, in s, for effects that move the link (``_swift.py``): crossing a play of a few mrad
+#: takes as long.
 SHORT_WINDOW = 1 / 32
 
 
@@ -134,7 +135,7 @@ class Settings:
     least_gain : float
         Twice the gain in held-out log-likelihood, minus the penalty for its parameters, that a
         finding needs: smoothing and coarse positions leave torques that are significant but small.
-        A nameless function needs this gain relative to a known effect, and a further form relative
+        An unknown function needs this gain relative to a known effect, and a further form relative
         to the plain one.
     least_share : float
         Share of the held-out squared error of averaged rows that a finding must remove on its
@@ -143,17 +144,17 @@ class Settings:
         Share of the held-out squared error of single samples that it must remove.
     form_tolerance : float
         Share of the squared error removed by an effect that its imperfect formula may leave, a
-        tenth of its size. A nameless function that is better by no more than this does not replace
+        tenth of its size. An unknown function that is better by no more than this does not replace
         a known effect, and a later finding that removes no more on the same joints is attributed to
         the earlier ones.
     further_tolerance : float
-        The same where a further form of a known effect is compared with a nameless function: it
+        The same where a further form of a known effect is compared with an unknown function: it
         was chosen among several.
     exact_tolerance : float
         The same where every formula is exact (:attr:`Effect.is_exact`).
     nameless_tolerance : float
-        The same for the residual of a nameless function, whose form only approximates the true one,
-        and for the residual that an effect that moves the link leaves to a nameless function.
+        The same for the residual of an unknown function, whose form only approximates the true one,
+        and for the residual that an effect that moves the link leaves to an unknown function.
     alike : float
         Two effects on different joints whose scores differ by less than this share cannot be
         separated by the data.
@@ -181,10 +182,10 @@ class Settings:
     white : float
         Inflation of the variance by autocorrelation up to which the remainder is considered white.
     nameless_price : int
-        Maximum number of coefficients for which a nameless function is penalised, since its
+        Maximum number of coefficients for which an unknown function is penalised, since its
         held-out error already includes them.
     nameless_tried : int
-        Number of functions of the signals from which each tested nameless candidate was selected,
+        Number of functions of the signals from which each tested unknown candidate was selected,
         and of formulas for a further form of a known effect.
     shapes_tested : int
         Number of candidates (joints and shapes) of a kind that are tested before the kind is
@@ -242,14 +243,14 @@ class Settings:
 
 @dataclass(frozen=True)
 class Test:
-    """Whether a candidate is more than chance beside a model.
+    """Significance of a candidate in addition to a model.
 
     Attributes
     ----------
     chance : float
-        The larger one of the two chances.
+        The larger one of the two p-values.
     coefficients : ndarray of shape (n_coefficients,)
-        Of the candidate, the model refitted.
+        Coefficients of the candidate, with the model fitted again.
     drop : float
         Squared error removed, in units of the noise.
     """
@@ -262,7 +263,7 @@ class Test:
 
 
 class Tester:
-    """Tests of candidates beside one model.
+    """Tests of candidates in addition to one model.
 
     Parameters
     ----------
@@ -299,7 +300,7 @@ class Tester:
         self._free = max(1, int(self.problem.rows.counts.sum()) - len(scale))
 
     def beside(self, blocks: Sequence[dict[int, Array]]) -> Tester:
-        """Tests beside the same model with further columns.
+        """Tests with the same model and further columns.
 
         Parameters
         ----------
@@ -328,8 +329,8 @@ class Tester:
         rows : dict of int to ndarray of shape (n_rows_j, n_coefficients)
             Averaged columns, per joint they reach.
         zeros : ndarray of shape (n_coefficients,) of bool, optional
-            Coefficients that only say where the effect is zero. The others must be more than
-            chance beside them, too: the constant beside a spring is no spring.
+            Coefficients that only define the zero of the effect. The others must be significant in
+            addition to them, too: the constant of a spring is no evidence for a spring.
         """
         test = self._tested(rows, zeros)
         error = sum(float(self.residual[j] @ self.residual[j]) for j in rows)
@@ -339,7 +340,7 @@ class Tester:
         return test
 
     def _unmasked(self, rows: dict[int, Array]) -> Tester:
-        """Tests beside the same model, joints weighted by the noise that some columns leave."""
+        """Tests with the same model, and joints weighted by the noise that some columns leave."""
         tester = self
         for _ in range(ROUNDS):
             left = tester.beside([rows]).residual
@@ -350,7 +351,7 @@ class Tester:
         return tester
 
     def _weighted(self, shares: Array) -> Tester:
-        """Tests beside the same model with so many times the noise of every joint."""
+        """Tests with the same model and a multiple of the noise of every joint."""
         other = copy(self)
         other.sigma = self.sigma * shares
         felt = [Felt(f.places, f.rows / x) for f, x in zip(self._felt, shares, strict=True)]
@@ -362,7 +363,7 @@ class Tester:
         return other
 
     def _tested(self, rows: dict[int, Array], zeros: NDArray[np.bool_] | None) -> Test:
-        """As :meth:`test`, with the noise as it is."""
+        """As :meth:`test`, with the present noise."""
         new = self._swept(rows)
         test = self._test(rows, new, self.residual)
         if zeros is None or not zeros.any() or test.chance == 1.0:
@@ -377,7 +378,7 @@ class Tester:
         return replace(test, chance=max(test.chance, alone.chance))
 
     def test_each(self, rows: dict[int, Array]) -> tuple[Test, Iterator[Test]]:
-        """Test some columns together, and, as far as it is asked for, each column by itself.
+        """Test some columns together and, if requested, each column alone.
 
         Parameters
         ----------
@@ -396,11 +397,11 @@ class Tester:
         return self._test(rows, new, self.residual), alone
 
     def _test(self, rows: dict[int, Array], new: list[Array], residual: Sequence[Array]) -> Test:
-        """Test columns from which what the model can do has been taken."""
+        """Test columns from which the part that the model can represent has been removed."""
         k = next(iter(rows.values())).shape[1]
         own = np.asarray(sum(np.sum((b / self.sigma[j]) ** 2, axis=0) for j, b in rows.items()))
         gram = np.asarray(sum(z.T @ z for z in new))
-        # Columns that the model can do by itself say nothing.
+        # Columns that the model can represent have no information.
         told = np.diag(gram) > np.maximum(NEW_SHARE * own, 0.0)
         if not told.any():
             return Test(1.0, np.zeros(k), 0.0)
@@ -417,14 +418,14 @@ class Tester:
         return Test(chance, coefficients, drop)
 
     def _swept(self, rows: dict[int, Array]) -> list[Array]:
-        """Columns less what the model can do of them, on the rows of every joint."""
+        """Columns minus the part that the model can represent, on the rows of every joint."""
         scaled = {j: b / self.sigma[j] for j, b in rows.items()}
         mimic = self._inverse @ products_with(self._felt, scaled, len(self._inverse))
         return [scaled.get(j, 0.0) - f.rows @ mimic[f.places] for j, f in enumerate(self._felt)]
 
     def _stationary(self, new: list[Array], left: list[Array], drop: float, k: int) -> float:
-        """Chance of such a drop if the residual were stationary."""
-        # The joint on which the column weighs most, and as slow a column as can be.
+        """P-value of the drop for a stationary residual."""
+        # The joint with the largest weight of the column, and the slowest possible column.
         joint = int(np.argmax([float(np.sum(z**2)) for z in new]))
         factor = float(variance_inflation(self.problem, [left[joint]], [joint])[0])
         mean = sum(float(r @ r) for r in left) / self._free
@@ -434,7 +435,7 @@ class Tester:
     def _by_blocks(
         self, rows: dict[int, Array], new: list[Array], left: list[Array], score: Array
     ) -> float:
-        """Chance of such coefficients if the scores of blocks were independent."""
+        """P-value of the coefficients for independent scores of blocks."""
         length = correlation_time(self.problem, left, list(rows)) * CORRELATION_TIMES
         k = len(score)
         longest = self._duration / (2 * k + ENOUGH_BLOCKS)
@@ -450,22 +451,22 @@ class Tester:
 
 
 def _tail(statistic: float, k: float, free: float) -> float:
-    """Chance that a figure of the F distribution is larger.
+    """Probability that a value of the F distribution is larger.
 
-    As ``scipy.stats.f.sf``, of which checking the arguments takes most of the time.
+    As ``scipy.stats.f.sf``, which spends most of its time on checking the arguments.
     """
     return 1.0 if statistic <= 0 else float(fdtrc(k, free, statistic))
 
 
 def chance_of_score(score: Array, sums: Array, unbiased: bool = False) -> float:
-    """Chance of a score if its sums over blocks were independent (Hotelling's T-squared).
+    """P-value of a score with independent sums over blocks (Hotelling's T-squared).
 
     Parameters
     ----------
     score : ndarray of shape (n_coefficients,)
-        Of the model without the candidate, over all blocks.
+        Score of the model without the candidate, over all blocks.
     sums : ndarray of shape (n_blocks, n_coefficients)
-        Of every block, with the residual that is left after the candidate.
+        Score of every block, with the residual with the candidate.
     unbiased : bool, default=False
         Whether the sums are those of :func:`unbiased_scores`.
     """
@@ -480,17 +481,17 @@ def chance_of_score(score: Array, sums: Array, unbiased: bool = False) -> float:
 
 
 def unbiased_scores(score: Array, sums: Array, grams: Array) -> tuple[Array, Array]:
-    """Scores of blocks whose sum of squares is the variance of the score also where blocks are few.
+    """Scores of blocks whose sum of squares is the variance of the score also for few blocks.
 
-    A block that holds much of what is known of a coefficient pulls it towards its own torque, and
-    has a small residual for that reason (Bell, McCaffrey 2002; [1]_, equation 2.2).
+    A block with much of the information about a coefficient draws it towards its own torque, and
+    therefore has a small residual (Bell, McCaffrey 2002; [1]_, equation 2.2).
 
     Parameters
     ----------
     score : ndarray of shape (n_coefficients,)
         Over all blocks.
     sums : ndarray of shape (n_blocks, n_coefficients)
-        Scores of blocks with the residual that is left.
+        Scores of blocks with the remaining residual.
     grams : ndarray of shape (n_blocks, n_coefficients, n_coefficients)
         Products of the columns of every block.
 
@@ -523,7 +524,7 @@ def time_blocks(problem: Problem, length: float) -> tuple[list[NDArray[np.int64]
     problem : Problem
         Rows.
     length : float, s
-        Length wanted; blocks of a trajectory are equally long, near to it.
+        Desired length; the blocks of a trajectory have equal lengths close to it.
 
     Returns
     -------
@@ -533,7 +534,7 @@ def time_blocks(problem: Problem, length: float) -> tuple[list[NDArray[np.int64]
         Number of blocks.
     """
     rows = problem.rows
-    if problem.signals.time is None:  # rows are samples: one after the other
+    if problem.signals.time is None:  # rows are successive samples
         length = float(len(np.unique(np.concatenate(rows.time)))) / 50
     place, span, share = rows.spans
     number = np.maximum(1, np.round(span / length)).astype(np.int64)
@@ -544,13 +545,13 @@ def time_blocks(problem: Problem, length: float) -> tuple[list[NDArray[np.int64]
 
 
 def _duration(problem: Problem) -> float:
-    """Time that the rows of the trajectories span together, in s."""
+    """Total time of the rows of the trajectories, in s."""
     trajectory, time = np.concatenate(problem.rows.trajectory), np.concatenate(problem.rows.time)
     return sum(float(np.ptp(time[trajectory == name])) for name in np.unique(trajectory))
 
 
 def correlation_time(problem: Problem, residual: Sequence[Array], joints: Sequence[int]) -> float:
-    """Time over which the residual of the most persistent one of some joints stays alike, in s."""
+    """Longest correlation time of the residual among some joints, in s."""
     hop = problem.rows.hop
     inflation = variance_inflation(problem, [residual[j] for j in joints], joints)
     return hop * float(np.max(inflation, initial=1.0))
@@ -559,7 +560,7 @@ def correlation_time(problem: Problem, residual: Sequence[Array], joints: Sequen
 def variance_inflation(
     problem: Problem, residual: Sequence[Array], joints: Sequence[int] | range
 ) -> Array:
-    """How much more a slow column's coefficient varies than with independent rows, by joint.
+    """Variance of a slow column's coefficient relative to that for independent rows, by joint.
 
     One plus twice the sum of the residual's autocorrelations up to the first small one.
 
@@ -594,5 +595,5 @@ def variance_inflation(
 
 
 def false_discovery_rate(chance: float, n_tests: int) -> float:
-    """The printed q-value: the chance times the number of candidates, at most 1."""
+    """The printed q-value: the p-value times the number of candidates, at most 1."""
     return min(1.0, chance * max(1, n_tests))

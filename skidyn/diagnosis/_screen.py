@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Held-out error of every candidate, with the whole model refitted, from fold Gram matrices.
+"""Held-out error of every candidate, with the whole model fitted again, from Gram matrices.
 
 Leaving a fold out needs no second pass over the rows: its Gram matrix is subtracted. Adding a
-candidate needs no refit of the model: the model's columns are swept out of the candidate's (block
-elimination), so a candidate costs one small solve a fold.
+candidate needs no new fit of the model: the model's columns are eliminated from the candidate's
+(block elimination), so a candidate takes one small solution per fold.
 """
 
 from __future__ import annotations
@@ -32,17 +32,18 @@ from skidyn.evidence import (
     solve_left_out,
 )
 
-#: Diagonal added to a candidate's swept block: what the model already spans brings nothing.
+#: Diagonal added to a candidate's reduced block, so that columns in the span of the model have no
+#: gain.
 CANDIDATE_RIDGE = 1e-6
-#: Share of the largest column's square that a column without any row counts as.
+#: Square assigned to a column without rows, as a share of the largest column's.
 TINY = 1e-9
-#: Columns of candidates that are swept at a time, about.
+#: Approximate number of columns of candidates that are eliminated at a time.
 MOST_COLUMNS = 256
 
 
 @dataclass(frozen=True)
 class _Group:
-    """Candidates that reach the same joints with the same number of columns."""
+    """Candidates on the same joints with the same number of columns."""
 
     index: NDArray[np.int64]
     joints: tuple[int, ...]
@@ -62,7 +63,7 @@ class Screen:
     sigma : ndarray of shape (n_joints,)
         Noise of one row of every joint.
     candidates : list of Candidate
-        What might be missing.
+        Effects that may be missing.
     target : list of ndarray
         Averaged torque of every joint.
     within : bool, default=False
@@ -146,8 +147,8 @@ class Screen:
     def step(self, model: Model, wanted: NDArray[np.bool_] | None = None) -> Array:
         """Held-out error of every fold after each candidate is added, (n_candidates, n_folds).
 
-        Candidates that are not ``wanted``, and those whose coefficients come out with a sign or a
-        magnitude that physics forbids, get infinity.
+        It is infinite for candidates that are not ``wanted``, and for those with physically
+        impossible coefficients.
         """
         errors = np.full((len(self.candidates), self.n_folds), np.inf)
         for some in self._in_parts(wanted):
@@ -173,7 +174,7 @@ class Screen:
         return errors
 
     def _products_of(self, model: Model, group: _Group, pick: NDArray[np.int64]) -> _Columns:
-        """Products of some candidates' columns, which are put side by side only meanwhile."""
+        """Products of some candidates' columns, which are stacked only temporarily."""
         k, n_folds = group.width, self.n_folds
         own = np.zeros((n_folds, len(pick), k, k))
         target = np.zeros((n_folds, len(pick) * k))
@@ -212,7 +213,7 @@ def _width(block: dict[int, Array]) -> int:
     return int(next(iter(block.values())).shape[1])
 
 
-#: A group, and which of its candidates.
+#: A group, and indices of its candidates.
 _Wanted = tuple[_Group, NDArray[np.int64]]
 
 
@@ -230,12 +231,12 @@ class _Columns(NamedTuple):
 
 @dataclass(frozen=True)
 class Model:
-    """Products of a model's columns by fold, as :class:`Screen` makes them.
+    """Products of a model's columns by fold, made by :class:`Screen`.
 
     Attributes
     ----------
     felt : list of Felt
-        The columns that each joint feels.
+        The columns that act on each joint.
     gram : ndarray of shape (n_folds, p, p)
     cross : ndarray of shape (n_folds, p)
         With the torque.
@@ -282,12 +283,12 @@ class Model:
 
     @cached_property
     def bends(self) -> Array:
-        """Products in the fold left out of what the model without it does, (n_folds, p, p)."""
+        """Products in the held-out fold of the solution without it, (n_folds, p, p)."""
         return np.asarray(np.matmul(self.inverses, np.matmul(self.gram, self.inverses)))
 
     @cached_property
     def errors(self) -> Array:
-        """Squared error of every fold when it is left out, shape (n_folds,)."""
+        """Held-out squared error of every fold, shape (n_folds,)."""
         b = self.solutions
         bent = np.matmul(self.gram, b[:, :, None])[:, :, 0]
         return np.asarray(self.square + np.sum(b * (bent - 2 * self.cross), axis=1))
@@ -309,7 +310,7 @@ def _products(a: Array, b: Array, k: int) -> Array:
 
 @dataclass(frozen=True)
 class _Swept:
-    """Candidates' columns beside a model fitted to some rows, and to others.
+    """Candidates' columns together with a model fitted to some rows.
 
     Attributes
     ----------
@@ -318,9 +319,9 @@ class _Swept:
     rest : ndarray of shape (n_fits, p, m)
         The same in the rows of each fit.
     mimic : ndarray of shape (n_fits, p, m)
-        The model's coefficients that come nearest to the columns there.
+        The model's coefficients that approximate the columns best there.
     along : ndarray of shape (n_fits, m)
-        Products of the columns and what the model explains there.
+        Products of the columns and the torque that the model explains there.
     """
 
     cross: Array
@@ -330,14 +331,14 @@ class _Swept:
 
     @classmethod
     def of(cls, model: Model, cross: Array) -> _Swept:
-        """Beside the fits without each fold in turn."""
+        """For the fits without each fold in turn."""
         rest = cross.sum(0) - cross
         along = np.matmul(model.solutions[:, None], rest)[:, 0]
         return cls(cross, rest, np.matmul(model.inverses, rest), along)
 
     @classmethod
     def whole(cls, model: Model, cross: Array) -> _Swept:
-        """Beside the fit to all folds."""
+        """For the fit to all folds."""
         rest = cross.sum(0, keepdims=True)
         along = np.matmul(model.solution, rest)
         return cls(cross, rest, np.matmul(model.inverse, rest), along)
@@ -352,7 +353,7 @@ class _Swept:
         )
 
     def gain(self, own: Array, target: Array, ridge: Array) -> Array:
-        """Coefficients of every candidate beside the model, (n_fits, n_candidates, k).
+        """Coefficients of every candidate added to the model, (n_fits, n_candidates, k).
 
         Parameters
         ----------
@@ -382,11 +383,11 @@ class _Swept:
         own, target, ridge : ndarray
             As in :meth:`gain`, by fold.
         bent : ndarray of shape (n_folds, p, m)
-            What :attr:`Model.bends` makes of :attr:`rest`.
+            Product of :attr:`Model.bends` and :attr:`rest`.
         """
         k, b = own.shape[2], model.solutions
         gain = self.gain(own.sum(0) - own, target.sum(0) - target, ridge)
-        # The same change judged on the fold left out.
+        # The same change evaluated on the held-out fold.
         left = model.cross - np.matmul(model.gram, b[:, :, None])[:, :, 0]
         slope = target - np.matmul(b[:, None], self.cross)[:, 0]
         slope -= np.matmul(left[:, None], self.mimic)[:, 0]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which effects are missing: add the best kind, refit, repeat until nothing significant is left."""
+"""Search for missing effects: add the best kind, refit, repeat until none is significant."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def search(
     settings : Settings
         Thresholds.
     nameless : bool, default=True
-        Whether nameless functions of the signals compete.
+        Whether unknown functions of the signals are candidates.
     vibration : bool, default=True
         Whether a wave in time is one of them.
     joints : sequence of int, optional
@@ -68,7 +68,7 @@ class _Search(ReconsideringSearch):
         self.sigma = self.weights()
         self.withdraw()
         self.name_alike()
-        # Functions without a name have no limits, and their columns take much memory.
+        # Unknown functions have no limits, and their columns take much memory.
         named = [c for c in self.pool if not c.term.effect.nameless]
         found = [c.term for h in self.findings for c in h.candidates]
         self.problem.keep([*self.problem.terms, *found, *(c.term for c in named)])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a search knows: the model so far, its fit, the pool of candidates, and tests beside them."""
+"""State of a search: the present model, its fit, the pool of candidates, and their tests."""
 
 from __future__ import annotations
 
@@ -34,12 +34,13 @@ from skidyn.diagnosis._rule import (
 from skidyn.effects import Term
 from skidyn.evidence import Problem
 
-#: Share of a joint's squared residual up to which a change of it leaves what it follows as it was.
+#: Share of a joint's squared residual up to which a change does not require a new search of
+#: signals.
 SAME = 1e-3
 
 
 class Kept(NamedTuple):
-    """What is put back where something was only tried."""
+    """State that is restored after a trial."""
 
     chosen: list[Candidate]
     findings: list[Hypothesis]
@@ -51,7 +52,7 @@ class Kept(NamedTuple):
 
 
 class SearchState:
-    """The model so far, and what it leaves."""
+    """The present model, and its residual."""
 
     def __init__(
         self, problem: Problem, kinds: Sequence[str], settings: Settings, nameless: bool
@@ -77,7 +78,7 @@ class SearchState:
         self.whole_pool = self.pool
         self._kept_target: tuple[tuple[Array | None, Array | None], list[Array]] = (None, None), []
         self.start = self.left = np.zeros(problem.n_joints)
-        #: What each candidate of the pool removes, held out, as screened last.
+        #: Held-out gain of each candidate of the pool, from the last screening.
         self._drops = np.zeros(0)
         self._reconsidering = False
         self._within: dict[Term, bool] = {}
@@ -85,7 +86,7 @@ class SearchState:
 
     @property
     def target(self) -> list[Array]:
-        """Averaged torque of every joint that is to be explained, lines of spectra taken off."""
+        """Averaged torque of every joint to be explained, without lines of spectra."""
         made_of = self.problem.torque, self.ripple
         kept, target = self._kept_target
         if any(map(is_not, kept, made_of)):
@@ -96,11 +97,11 @@ class SearchState:
 
     @property
     def blocks(self) -> list[dict[int, Array]]:
-        """Columns of the model so far."""
+        """Columns of the present model."""
         return self.blocks_with(self.chosen)
 
     def blocks_with(self, candidates: Sequence[Candidate]) -> list[dict[int, Array]]:
-        """Columns of the model as given, and of some candidates."""
+        """Columns of the given model, and of some candidates."""
         own = [self.problem.term_rows(term) for term in self.problem.terms]
         return own + [c.rows for c in candidates]
 
@@ -110,7 +111,8 @@ class SearchState:
         self.fit = problem.fit(terms, sigma=self.fit.noise)
         if not any(uses_the_fit(c) for c in self.chosen):
             return
-        # Their columns were made with the model as it was without them, which had bent toward them.
+        # Their columns were computed with the model without them, which was biased by their
+        # absence.
         for _ in range(self.settings.repeated):
             before = self.fit.noise
             self.problem.set_fit(self.fit)
@@ -122,7 +124,7 @@ class SearchState:
                 break
 
     def weights(self) -> Array:
-        """Noise by which joints are weighted in tests: that of the fit, or of each by itself."""
+        """Noise by which joints are weighted in tests: that of the fit, or of each joint alone."""
         problem = replace_torque(self.problem, self.problem.torque - self.ripple)
         terms = (*self.problem.terms, *(c.term for c in self.chosen))
         return np.minimum(self.fit.noise, problem.own_noise(terms))
@@ -158,12 +160,12 @@ class SearchState:
 
     @property
     def residual(self) -> Array:
-        """Torque that the model so far leaves at every sample, shape (n_samples, n_joints)."""
+        """Residual of the present model at every sample, shape (n_samples, n_joints)."""
         fit = replace(self.fit, terms=self.problem.terms + (c.term for c in self.chosen))
         return self.problem.torque - self.ripple - self.problem.explained(fit)
 
     def follow_again(self) -> None:
-        """Add functions of the signals that what is left follows now, which others had covered."""
+        """Add functions of signals on which the residual now depends, which others had hidden."""
         if not self.nameless:
             return
         residual, before = self.residual, self._followed
@@ -178,14 +180,14 @@ class SearchState:
         self.n_tests += len(new)
 
     def significant(self, chance: float, candidate: Candidate | None = None) -> bool:
-        """Whether a candidate is more than chance among all that were tried."""
+        """Whether a candidate is significant among all that were tried."""
         return false_discovery_rate(chance, self.tried(candidate)) <= self.settings.level
 
     def tried(self, candidate: Candidate | None = None) -> int:
-        """Candidates tried.
+        """Number of candidates tried.
 
-        Nameless ones were chosen among products of functions as well, and a further form of an
-        effect stands for all that could have been declared.
+        Unknown functions were also chosen among products of functions, and a further form of an
+        effect among all possible forms.
         """
         one_of_many = candidate is not None and (
             candidate.kind == UNKNOWN or candidate.is_further_form
@@ -193,11 +195,11 @@ class SearchState:
         return self.n_tests * (self.settings.nameless_tried if one_of_many else 1)
 
     def chance(self, candidate: Candidate, others: Sequence[Candidate]) -> float:
-        """Chance of a candidate's coefficients beside the model and other candidates."""
+        """P-value of a candidate's coefficients given the model and other candidates."""
         return self.tester(others).test(candidate.rows, candidate.zeros).chance
 
     def tester(self, others: Sequence[Candidate]) -> Tester:
-        """Tests beside the model and some candidates; those beside the model alone are kept."""
+        """Tests given the model and some candidates; those given only the model are cached."""
         further = others[len(self.chosen) :]
         if list(others[: len(self.chosen)]) != self.chosen:
             return Tester(self.problem, self.blocks_with(others), self.sigma, self.target)
@@ -210,9 +212,9 @@ class SearchState:
         return tester.beside([c.rows for c in further]) if further else tester
 
     def is_judged_within(self, candidate: Candidate) -> bool:
-        """Whether a candidate is held out by parts of recordings: in one of them it does most.
+        """Whether a candidate is held out by parts of recordings, since it acts mostly in one.
 
-        Nothing is learnt of it from the others. What each of many coefficients does is elsewhere.
+        The other recordings do not determine it. Each of many coefficients may act elsewhere.
         """
         term = candidate.term
         if term.trajectories is not None:
@@ -225,7 +227,7 @@ class SearchState:
         return self._within[term]
 
     def _left(self) -> Array:
-        """Held-out squared error of every joint with all that was found so far."""
+        """Held-out squared error of every joint with all findings so far."""
         errors = profile_error(self.problem, self.blocks, self.sigma, self.target)
         left: Array = errors.sum(0)
         return left
@@ -243,14 +245,15 @@ class SearchState:
         )
 
     def _price(self, candidates: Sequence[Candidate], others: Sequence[Candidate] = ()) -> float:
-        """Price of a parameter: the inflation of the variance that is left after candidates."""
+        """Penalty of a parameter: the inflation of the variance with the candidates."""
         fitted = self.tester([*self.chosen, *others, *candidates])
         joints = sorted({j for c in candidates for j in c.joints})
         left = [fitted.residual[j] for j in joints]
         return float(np.max(variance_inflation(self.problem, left, joints)))
 
     def _n_parameters(self, candidates: Sequence[Candidate]) -> int:
-        # What a tool carries is told by its first coefficients; the others ride along.
+        # The load of a tool is determined by its first coefficients; the others only accompany
+        # them.
         count = sum((c.term.effect.leading or c.width) + c.n_shapes for c in candidates)
         if any("trajectories" in c.term.shape for c in candidates):
             count += len(np.unique(self.problem.signals.trajectory)) // 2

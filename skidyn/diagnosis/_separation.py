@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A motion that tells rivals apart: optimised for what one explains and the other cannot.
+"""A motion that separates rivals: optimised for torque that only one of them explains.
 
-Two effects that a log cannot tell apart predict the same torque there, and another one elsewhere.
+Two effects that a log cannot separate predict the same torque there, and different ones elsewhere.
 The motion is a Fourier series on the joints in question, blended from and to rest, within the
-limits of position, velocity and acceleration. What is maximised is the squared torque of the first
-model, in units of the noise, that the rival leaves over with all its coefficients fitted anew (a
-T-optimal design; Atkinson, Fedorov 1975). The result is then simulated with sensor noise, once with
-each rival as the truth, and given to the same search that will judge the real recording.
+limits of position, velocity and acceleration. The maximised criterion is the squared torque of the
+first model, in units of the noise, that the rival does not explain with all its coefficients fitted
+again (a T-optimal design; Atkinson, Fedorov 1975). The result is then simulated with sensor noise,
+once with each rival as the truth, and analysed by the same search as the real recording.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ if TYPE_CHECKING:
 
 #: Harmonics of the series, and lowest and highest base frequency in Hz.
 HARMONICS, SLOWEST, FASTEST = 4, 0.05, 0.5
-#: Smallest amplitude tried, as a share of the largest; hysteresis shows in small strokes.
+#: Smallest amplitude tried, as a share of the largest; hysteresis is visible in small strokes.
 SMALLEST_STROKE = 0.003
 #: Time of blending from and to rest, s.
 BLEND = 0.5
-#: Squared torque, in units of the noise, below which nothing is told apart.
+#: Squared torque, in units of the noise, below which effects cannot be separated.
 LEAST_GAIN = 20.0
-#: Trajectories of the simulated check, and rounds and size of the evolution.
+#: Number of trajectories of the simulated check, and rounds and size of the evolution.
 TRAJECTORIES, ROUNDS, POPULATION = 4, 12, 6
 
 
@@ -124,7 +124,7 @@ class SeparatingMotion:
 
 @dataclass(frozen=True)
 class _Duel:
-    """Two models that explain the same log, and the limits within which the robot may move."""
+    """Two models that explain the same log, and the limits of the robot's motion."""
 
     problem: Problem
     first: Fit
@@ -184,7 +184,7 @@ class _Duel:
         )  # fmt: skip
 
     def gain(self, signals: Signals) -> float:
-        """Squared torque of the first model that the second leaves over, in noise units."""
+        """Squared torque of the first model that the second does not explain, in noise units."""
         torque = self.torque(signals, self.first)
         problem = make_problem(
             signals,
@@ -221,7 +221,7 @@ def design_separating_motion(
     Parameters
     ----------
     diagnosis : Diagnosis
-        With the finding.
+        Diagnosis with the finding.
     kind : str, optional
         Kind of the finding; by default the first one that has a rival.
     rival : str, optional
@@ -239,7 +239,7 @@ def design_separating_motion(
     Raises
     ------
     EffectError
-        No such finding, or the search has not compared it with this rival.
+        There is no such finding, or the search has not compared it with this rival.
 
     Examples
     --------
@@ -288,7 +288,7 @@ def design_separating_motion(
 def _opponents(
     diagnosis: Diagnosis, kind: str | None, rival: str | None
 ) -> tuple[Hypothesis, Hypothesis]:
-    """The finding and another explanation that it was ranked with."""
+    """The finding and another explanation of its ranking."""
     known = []
     findings = {f.kind: f for f in diagnosis.findings}
     for own in diagnosis.result.findings:
@@ -343,7 +343,7 @@ def _duel(diagnosis: Diagnosis, first: Hypothesis, second: Hypothesis, duration:
 
 
 def _moving(first: Hypothesis, second: Hypothesis, n_joints: int) -> tuple[int, ...]:
-    """Joints that have to move; those that load others are moved with effects of the load."""
+    """Joints that have to move, including those that load others for effects of the load."""
     joints = {j for h in (first, second) for j in h.joints}
     if any("load" in get_effect(h.kind).needs for h in (first, second)):
         return tuple(range(n_joints))
@@ -351,7 +351,7 @@ def _moving(first: Hypothesis, second: Hypothesis, n_joints: int) -> tuple[int, 
 
 
 def _gain_of_log(duel: _Duel) -> float:
-    """What the rival leaves over on the log itself, for as much time as the motion takes."""
+    """Torque that the rival does not explain on the log, for the duration of the motion."""
     problem = duel.problem
     bare = replace(problem, torque=problem.explained(duel.first))
     fit = bare.fit(duel.second.terms, sigma=duel.first.noise)
@@ -386,7 +386,7 @@ def _recognised(
 
 
 def _position_noise(diagnosis: Diagnosis) -> Array:
-    """Noise of the logged positions: what the smoother takes off, (n_joints,), rad or m."""
+    """Noise of the logged positions, removed by the smoother, (n_joints,), rad or m."""
     model, (X, tau, *_) = diagnosis.base_model, diagnosis.data
     robot = diagnosis.problem.robot
     assert robot is not None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the motion of servos says beside the torque, in words."""
+"""Texts on effects identified from the motion of servos."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 def servo_motion_told(
     named: Sequence[ServoFinding] | None, findings: Sequence[Finding]
 ) -> dict[str, Any] | None:
-    """What the motion of servos named, for the first screen and the page.
+    """Effects identified from the motion of servos, for the first screen and the page.
 
     Parameters
     ----------
     named : sequence of ServoFinding or None
-        None where no motion of servos was looked at.
+        None if the motion of servos was not analysed.
     findings : sequence of Finding
-        What the torque lacks.
+        Findings from the torque.
 
     Returns
     -------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the simulated motion says of a diagnosis: in the report, in words, and joint by joint."""
+"""Results of the simulated motion of a diagnosis: for the report, as text, and by joint."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from skidyn.diagnosis._findings import Finding
     from skidyn.simulation import InTurn, SimulationErrors, SimulationVerdict
 
-#: What is told of the motion of each joint, root mean squares over the held-out pieces.
+#: Reported errors of the motion of each joint, root mean squares over the held-out pieces.
 MEASURES = ("position", "final", "velocity")
 
 
@@ -54,7 +54,7 @@ def report_of(in_turn: InTurn | None) -> dict[str, Any] | None:
 
 
 def of_finding(in_turn: InTurn | None, k: int) -> dict[str, Any]:
-    """What the report says of the motion with one finding; empty where nothing was simulated."""
+    """Entry of the report on the motion with one finding; empty without a simulation."""
     if in_turn is None:
         return {}
     verdict = in_turn.verdicts[k]
@@ -65,14 +65,14 @@ def of_finding(in_turn: InTurn | None, k: int) -> dict[str, Any]:
 
 
 def simulated(in_turn: InTurn | None, findings: Sequence[Finding]) -> dict[str, Any] | None:
-    """The same for a reader.
+    """The same for display.
 
     Parameters
     ----------
     in_turn : InTurn or None
         None where no simulation was asked for.
     findings : sequence of Finding
-        What was found.
+        Findings of the diagnosis.
 
     Returns
     -------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lines in spectra of the residual at the full rate: torque ripple over the angle, vibration."""
+"""Lines in spectra of the residual at the full rate: torque ripple over angle, vibration."""
 
 from __future__ import annotations
 
@@ -21,25 +21,26 @@ from skidyn.evidence import Problem
 SPAN, BINS = 4 * np.pi, 32768
 #: Waves per rad searched, or per 0.1 m.
 LOWEST, HIGHEST = 8.0, 420.0
-#: Waves that must lie within the range of the joint: fewer make any function of its position.
+#: Least number of waves within the range of the joint; fewer can represent any function of
+#: position.
 WITHIN_RANGE = 2.0
-#: Slowest vibration in Hz: what is slower shows in averaged rows (window of 1/8 s).
+#: Slowest vibration in Hz; slower ones are visible in averaged rows (window of 1/8 s).
 SLOWEST = 8.0
-#: A line lower than this, in units of the local noise, is not looked at.
+#: Least height of a line, in units of the local noise.
 LEAST_HEIGHT = 8.0
 #: Width in bins of the running median that gives the local noise level.
 MEDIAN_WIDTH = 161
-#: Blocks of samples that a line is tested by at least: a wave turns so often that what stands
-#: beside it is forgotten within a part of a second.
+#: Least number of blocks of samples for the test of a line, since its wave is fast and the
+#: correlation with other torques lasts only a part of a second.
 LINE_BLOCKS = 60
-#: Waves within the range of a joint from which they do not look like what bodies do, and places
-#: of that range over which fewer are fitted.
+#: Number of waves within the range of a joint from which they differ from torques of bodies, and
+#: number of positions at which fewer waves are fitted.
 MANY, PLACES = 8.0, 400
 
 
 @dataclass(frozen=True)
 class Line:
-    """A line in the spectrum of a joint's residual over its angle or over the clock.
+    """A line in the spectrum of a joint's residual over its angle or over time.
 
     Attributes
     ----------
@@ -48,7 +49,7 @@ class Line:
     term : Term
         Its sine and cosine.
     chance : float
-        Of so high a line anywhere in the spectrum of the joint if there were none.
+        Probability of a line of this height anywhere in the spectrum of the joint in noise.
     gain : ndarray of shape (n_folds,)
         Twice the held-out log-likelihood gain, by fold.
     torque : ndarray of shape (n_samples,), N m or N
@@ -69,7 +70,7 @@ def _any(chance: float) -> bool:
 def find_lines(
     problem: Problem, residual: Array, significant: Callable[[float], bool] = _any
 ) -> list[Line]:
-    """The strongest lines of each joint that stand out of the local noise level.
+    """The strongest significant lines of each joint above the local noise level.
 
     Parameters
     ----------
@@ -86,12 +87,13 @@ def find_lines(
         use = problem.rows.sliding[:, joint]
         if use.sum() < 100:
             continue
-        unit = float(problem.signals.unit[joint])  # waves of a slider are so many times shorter
+        unit = float(problem.signals.unit[joint])  # waves of a slider are shorter by this factor
         q, r = problem.signals.q[:, joint] / unit, residual[:, joint]
         for waves, height in _peaks(q[use], r[use]):
             if height < LEAST_HEIGHT:
                 continue
-            # Power over its level is exponentially distributed; any wave of a joint may be highest.
+            # Power over its level is exponentially distributed; the highest wave of a joint is
+            # tested.
             chance = min(1.0, 2 * HIGHEST * float(np.exp(-height)))
             if not significant(chance):
                 continue
@@ -106,7 +108,7 @@ def find_lines(
 def find_vibrations(
     problem: Problem, residual: Array, significant: Callable[[float], bool] = _any
 ) -> list[Line]:
-    """The strongest wave in time of each joint that averaged rows are too slow for.
+    """The strongest wave in time of each joint that is too fast for averaged rows.
 
     Parameters
     ----------
@@ -132,7 +134,7 @@ def find_vibrations(
 
 
 def _capped(line: Line, height: float) -> Line:
-    """A line whose gain is no more than its height over the local noise tells."""
+    """A line whose gain is limited to that of its height over the local noise."""
     total = float(line.gain.sum())
     return replace(line, gain=line.gain * min(1.0, 2.4 * height / total)) if total > 0 else line
 
@@ -148,7 +150,7 @@ def _spectrum(q: Array, r: Array) -> tuple[Array, Array]:
 
 
 def _peaks(q: Array, r: Array) -> list[tuple[float, float]]:
-    """Waves and heights (power over the level that stays without the line) of the top two lines."""
+    """Waves and heights (power over the level without the line) of the top two lines."""
     power, level = _spectrum(q, r)
     ratio = power / level
     lowest = max(LOWEST, WITHIN_RANGE * 2 * np.pi / max(float(np.ptp(q)), 1e-12))
@@ -165,9 +167,9 @@ def _peaks(q: Array, r: Array) -> list[tuple[float, float]]:
 
 
 def _strongest_wave(q: Array, r: Array, lowest: float, highest: float, count: int = 21) -> float:
-    """Of evenly spaced waves, the one that a signal over q holds most of."""
-    # Each wave is the one before it turned by the same angle at every sample: one product of
-    # complex numbers in place of a sine and a cosine.
+    """Of evenly spaced waves, the one with the largest amplitude in a signal over q."""
+    # Each wave is the previous one rotated by the same angle at every sample: one product of
+    # complex numbers instead of a sine and a cosine.
     turned, turn = r * np.exp(-1j * lowest * q), np.exp(-1j * (highest - lowest) / (count - 1) * q)
     strength = []
     for _ in range(count):
@@ -177,10 +179,10 @@ def _strongest_wave(q: Array, r: Array, lowest: float, highest: float, count: in
 
 
 def _refined_wave(q: Array, r: Array, waves: float) -> float:
-    """Waves that explain most of a signal beside what bodies and springs do of so few of them.
+    """Waves that explain most of a signal in addition to torques of bodies and springs.
 
-    A wave that is no longer many times in the range of q is not orthogonal to the functions that
-    the model has taken out of the signal, so that its peak has moved.
+    A wave with few periods in the range of q is not orthogonal to the functions that the model has
+    removed from the signal, so its peak is shifted.
     """
     span = float(np.ptp(q))
     if waves * span > MANY * 2 * np.pi:
@@ -198,7 +200,7 @@ def _refined_wave(q: Array, r: Array, waves: float) -> float:
         block *= weight[:, None]
         return float(np.sum((y - block @ np.linalg.lstsq(block, y, rcond=None)[0]) ** 2))
 
-    width = np.pi / span  # half the distance of waves that the range tells apart
+    width = np.pi / span  # half the distance of waves that the range can separate
     lowest = max(waves - width, WITHIN_RANGE * 2 * width)
     found = minimize_scalar(left, bounds=(lowest, waves + width), method="bounded")
     return float(found.x) if found.fun < left(waves) else waves

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Effects that some trajectories have and others do not: payloads and tool forces.
+"""Effects of some trajectories only: payloads and tool forces.
 
-Leaving whole trajectories out cannot judge them: what a trajectory carries is seen in that
-trajectory alone. They are judged on interleaved quarters of every trajectory instead.
+They cannot be judged by leaving out whole trajectories, because only the trajectory itself shows
+its load. They are judged on interleaved quarters of every trajectory instead.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from skidyn.diagnosis._profile import QUARTERS
 from skidyn.effects import Term, get_effect
 from skidyn.evidence import Felt, Problem, column_sizes, felt_columns, left_out_errors
 
-#: Largest gaps between the sorted estimates that are tried as the border of the split.
+#: Number of largest gaps between the sorted estimates that are tried as the border of the split.
 CUTS = 3
 
 
@@ -35,7 +35,7 @@ class Split:
     drop : ndarray of shape (4,)
         Held-out drop of squared error by quarter, in units of the noise.
     apart : bool
-        Whether its trajectories were chosen for effects of another size in each of them.
+        Whether its trajectories were chosen for effects with a separate size in each.
     """
 
     candidate: Candidate
@@ -52,14 +52,14 @@ def split_effects(
 ) -> list[Split]:
     """Best splits of the trajectories for each kind of effect that needs one.
 
-    One for the same effect in all of its trajectories, and one for effects of their own.
+    One for the same effect in all of its trajectories, and one for separate sizes.
 
     Parameters
     ----------
     problem : Problem
         Rows.
     kinds : sequence of str
-        Kinds to try; those without ``search = "trajectories"`` are passed over.
+        Kinds to try; those without ``search = "trajectories"`` are skipped.
     blocks : sequence of dict
         Columns of the model beside the rigid body.
     sigma : ndarray of shape (n_joints,)
@@ -83,7 +83,7 @@ def split_effects(
         groups = _splits(effect.grows, own, names)
         alone = {name: products.drop(names == name) for name in {n for g in groups for n in g}}
         together = [(products.drop(np.isin(names, group)), group) for group in groups]
-        # Of another size in most recordings is what any slow torque that is missing leaves.
+        # Separate sizes in most recordings can be due to any missing slow torque.
         few = [group for group in groups if 3 * len(group) <= 2 * len(names)]
         apart = [(np.sum([alone[name] for name in group], axis=0), group) for group in few]
         for drops, is_apart in ((together, False), (apart, True)):
@@ -97,7 +97,7 @@ def split_effects(
 
 
 def _within(problem: Problem, term: Term, names: Iterable[Any]) -> dict[int, Array]:
-    """Averaged columns of a term in some trajectories only; no window reaches into another."""
+    """Averaged columns of a term in some trajectories only; windows do not cross their borders."""
     own = list(names)
     return {
         j: np.where(np.isin(problem.rows.trajectory[j], own)[:, None], block, 0.0)
@@ -109,7 +109,7 @@ def _within(problem: Problem, term: Term, names: Iterable[Any]) -> dict[int, Arr
 class _Products:
     """Products of the model's columns, an effect's and the torque.
 
-    An effect in some trajectories needs those of these trajectories alone, so that any choice of
+    An effect in some trajectories needs only those of these trajectories, so that any choice of
     them is a sum.
 
     Attributes
@@ -193,7 +193,7 @@ class _Products:
 
 
 def _splits(grows: bool, own: Array, names: NDArray[Any]) -> list[list[Any]]:
-    """Groups of trajectories worth trying: those beyond a gap in the estimates."""
+    """Groups of trajectories to try: those beyond a gap in the estimates."""
     away = own - np.median(own, axis=0)
     moved = away @ np.linalg.svd(away, full_matrices=False)[2][0]
     groups = _beyond_gaps(moved, names, sides=2)
@@ -201,7 +201,7 @@ def _splits(grows: bool, own: Array, names: NDArray[Any]) -> list[list[Any]]:
         # A force acts in the smaller group; forces of several directions are all far from the rest.
         far = _beyond_gaps(np.linalg.norm(away, axis=1), names, sides=1)
         return groups + [group for group in far if len(group) <= len(names) / 2]
-    # A payload adds mass, be it to most of the trajectories.
+    # A payload adds mass, possibly in most of the trajectories.
     mass = own[:, 0]
     lighter = [mass[inside].mean() < mass[~inside].mean() for inside in _members(groups, names)]
     groups = [g for g, light in zip(groups, lighter, strict=True) if not light]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The first screen of a diagnosis in words and numbers: where, what, how sure, and how far."""
+"""The first screen of a diagnosis: location, effect, confidence and error reduction."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ if TYPE_CHECKING:
     from skidyn.diagnosis._findings import Finding
     from skidyn.diagnosis._result import Diagnosis
 
-#: Mark of a model that lacks nothing.
+#: Mark of a complete model.
 SOUND = "✓"
-#: An error that changes by less than this share is the same.
+#: A relative change of an error below this counts as none.
 SAME = 0.02
-#: Confidence below which a name is doubtful.
+#: Confidence below which a finding is doubtful.
 SURE = 0.9
-#: Parameters in one line, by the number of joints that have their own.
+#: Number of parameters in one line, by the number of joints with separate ones.
 TOLD = {1: 3, 2: 2, 3: 1}
-#: Joints whose sizes stand in one line.
+#: Number of joints whose sizes are shown in one line.
 LISTED = 2
-#: A headline names up to this many findings.
+#: Most findings in a headline.
 SHORT = 2
 
 
 def story(diagnosis: Diagnosis) -> dict[str, Any]:
-    """What the first screen, the command line and a notebook say of a diagnosis.
+    """Content of a diagnosis for the first screen, the command line and a notebook.
 
     Parameters
     ----------
@@ -45,11 +45,10 @@ def story(diagnosis: Diagnosis) -> dict[str, Any]:
     dict
         ``mark`` and ``headline`` of the verdict, ``text`` below it, ``findings`` in one line per
         kind (``what``, ``where``, ``size``, ``sure``, ``change``, ``when``), ``cards`` with the
-        same for every finding, ``joints`` (a row each, with
-        ``speaks`` where it is not at its noise), ``quiet`` (a sentence on the others) and
-        ``left`` (a sentence on what stays), ``doubts`` (what is suspected of the log, to be
-        looked at before a name is believed) and other ``warnings``; ``servo_motion`` with what the
-        motion of servos named.
+        same for every finding, ``joints`` (a row each, with ``speaks`` if it exceeds its noise),
+        ``quiet`` (a sentence on the others) and ``left`` (a sentence on the remaining error),
+        ``doubts`` (suspicions about the log, to be checked before a finding is accepted) and other
+        ``warnings``; ``servo_motion`` with effects from the motion of servos.
     """
     rows = joint_rows(diagnosis)
     cards = [_line(diagnosis, k, rows) for k in range(len(diagnosis.findings))]
@@ -90,8 +89,8 @@ def joint_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     list of dict
         ``joint`` (from 1), ``name``, ``unit``, ``before``, ``after``, ``noise``, ``ratios`` (of
         before and after to the noise), ``state`` (``"fails"``, ``"better"``, ``"worse"`` or
-        ``"quiet"``), ``material`` (more is left than a healthy robot
-        leaves), ``speaks`` and ``text``.
+        ``"quiet"``), ``material`` (the remaining error exceeds that of a healthy robot), ``speaks``
+        and ``text``.
     """
     parts = diagnosis.parts
     found = {joint for finding in diagnosis.findings for joint in finding.joints}
@@ -196,12 +195,12 @@ def _what_and_where(line: dict[str, Any]) -> str:
 
 
 def _brief(title: str) -> str:
-    """Title of a finding inside a headline: its family where the member is not certain."""
+    """Title of a finding for a headline: its family if the member is not certain."""
     return inside(title.partition(", best described by ")[0])
 
 
 def _line(diagnosis: Diagnosis, k: int, rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """A finding in one line: what, where, size, how sure, and what its own step changes."""
+    """A finding in one line: effect, joints, size, confidence, and error reduction of its step."""
     finding = diagnosis.findings[k]
     at = _step(diagnosis.history, finding)
     steps = [diagnosis.history[i]["rmse"] for i in ((0, -1) if at is None else (at - 1, at))]
@@ -249,7 +248,7 @@ def _grouped(cards: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _together(group: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """A line for several findings: the first parameter of each, what helped most, how sure."""
+    """A line for several findings: the first parameter of each, largest gain, confidence."""
     joints = sorted({joint for card in group for joint in card["joints"]})
     best = max(group, key=lambda card: card["fell"])
     at = _first_clear([list(card["clear"].values()) for card in group])
@@ -274,7 +273,7 @@ def _together(group: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _first_clear(weights: Sequence[Sequence[float]]) -> int:
-    """The first parameter whose interval leaves zero out on every joint; else the first."""
+    """The first parameter whose interval excludes zero on every joint; else the first."""
     fewest = min(map(len, weights), default=0)
     return next((k for k in range(fewest) if all(own[k] > 1 for own in weights)), 0)
 
@@ -288,13 +287,13 @@ def _step(history: Sequence[dict[str, Any]], finding: Finding) -> int | None:
 
 
 def confidence(finding: Finding) -> float | None:
-    """Probability of the name, where the diagnosis tells it."""
+    """Confidence of a finding, if the diagnosis has it."""
     value = getattr(finding, "confidence", None)
     return None if value is None else float(value)
 
 
 def sure(finding: Finding) -> str:
-    """How sure a finding is, in a few words."""
+    """Short text of the confidence of a finding."""
     share = confidence(finding)
     family = finding.title.partition(", best described by ")
     named = f" that it is {inside(family[0])}" if family[1] else ""
@@ -319,13 +318,13 @@ def sizes(finding: Finding) -> str:
 
 
 def _told(finding: Finding) -> int:
-    """How many parameters one line tells."""
+    """Number of parameters in one line."""
     apart = any(isinstance(row["value"], list) for row in finding.parameters.values())
     return TOLD[min(len(finding.joints), 3) if apart else 1]
 
 
 def _parameters(finding: Finding) -> tuple[list[str], list[float]]:
-    """Parameters in words, and how many halves of its interval each is away from zero."""
+    """Text of parameters, and distance of each from zero in half widths of its interval."""
     parts, weights = [], []
     for name, row in finding.parameters.items():
         if name in ("trajectories", "trajectory"):
@@ -355,12 +354,12 @@ def _parameters(finding: Finding) -> tuple[list[str], list[float]]:
 
 
 def where(joints: Sequence[int], n_joints: int) -> str:
-    """The joints of a finding in words."""
+    """Text of the joints of a finding."""
     return "all joints" if len(joints) == n_joints > 2 else joints_told(joints)
 
 
 def trajectories_told(finding: Finding) -> str:
-    """The trajectories of a finding that only some of them have."""
+    """Text of the trajectories of a finding that acts in some of them only."""
     which = finding.trajectories
     if not which:
         return ""
@@ -368,7 +367,7 @@ def trajectories_told(finding: Finding) -> str:
 
 
 def episodes_told(episodes: Sequence[Any]) -> str:
-    """When a torque is there that comes and goes; empty for one that is always there."""
+    """Times of an intermittent torque; empty for a permanent one."""
     times = [f"from {e.start:.1f} to {e.end:.1f} s of trajectory {e.trajectory}" for e in episodes]
     return listed(times[:3] + (["at other times"] if len(times) > 3 else [])) if times else ""
 
@@ -379,12 +378,12 @@ def _quiet(rows: Sequence[dict[str, Any]]) -> str:
     if not quiet:
         return ""
     if len(quiet) == len(rows):
-        return ""  # the verdict says so
+        return ""  # the verdict contains it
     return f"The error of {joints_told(quiet)} is at the noise level."
 
 
 def _left(diagnosis: Diagnosis, rows: Sequence[dict[str, Any]]) -> str:
-    """One sentence on what the completed model does not explain."""
+    """One sentence on the error that the completed model does not explain."""
     left = sorted(
         (row for row in rows if row["ratios"][1] > FAILS), key=lambda row: -row["ratios"][1]
     )

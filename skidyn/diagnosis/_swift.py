@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A second search in short windows, for what lasts hundredths of a second.
+"""A second search in short windows, for effects that last hundredths of a second.
 
-A link flies across its play within hundredths of a second, and swings on its gear ten or twenty
-times in one; an average over an eighth of a second holds little of that. Slow effects are found in
-the long windows, in which the noise of the derivatives averages out; what moves the link, beside
-them in windows as short as the sampling allows.
+A link crosses its play within hundredths of a second, and oscillates on its gear ten or twenty
+times per second; an average over an eighth of a second contains little of this. Slow effects are
+found in the long windows, in which the noise of the derivatives averages out; then effects that
+move the link are searched in windows as short as the sampling permits.
 
-The noise of the accelerations passes short windows, and looks like a link that swings slower than
-it. It has a column of its own there for every joint, beside which a swing must be more than chance:
-what is left to it is how it turns from following the load to staying behind. Where the noise of the
-positions makes more torque than the torque sensor's own, no swing is looked for in short windows.
+Short windows contain noise of the accelerations, which resembles a link that oscillates below its
+frequency. A separate column of every joint represents this noise, and an oscillation must be
+significant in addition to it: the evidence is its transition from following the load to lagging
+behind it. If the noise of the positions causes more torque than the torque sensor's own noise,
+oscillations are not searched in short windows.
 """
 
 from __future__ import annotations
@@ -31,25 +32,25 @@ from skidyn.evidence import FEWEST_SAMPLES, Problem, with_short_windows
 def look_at_swift(
     problem: Problem, result: SearchResult, kinds: list[str], settings: Settings
 ) -> tuple[Problem, SearchResult]:
-    """Search for swift effects in short windows.
+    """Search for fast effects in short windows.
 
     Parameters
     ----------
     problem : Problem
         Problem of the long windows.
     result : SearchResult
-        What was found there.
+        Findings of the long windows.
     kinds : list of str
-        Kinds of the catalogue that may be named.
+        Kinds of the catalogue to try.
     settings : Settings
         Thresholds of the search.
 
     Returns
     -------
     problem : Problem
-        With short windows if something was found in them, else as given.
+        Problem with short windows if an effect was found in them, else as given.
     result : SearchResult
-        With the findings of both looks.
+        Result with the findings of both searches.
     """
     family = [k for k in kinds if get_effect(k).moves_link]
     clocked = problem.signals.time is not None and problem.robot is not None
@@ -72,7 +73,8 @@ def look_at_swift(
         terms = (*problem.terms, *terms_on_rows(slow), *noise)
         short = with_short_windows(problem, terms, SHORT_WINDOW)
         short.torque = problem.torque - others.ripple
-        # What smoothing leaves is as large in short windows, and tells in as many more of them.
+        # Errors of smoothing are equally large in short windows, and more significant in more
+        # windows.
         more = short.rows.counts.sum() / problem.rows.counts.sum()
         least = more * settings.least_gain
         size = settings.size_share_short
@@ -84,13 +86,13 @@ def look_at_swift(
         fastest = [
             c.term.effect.fastest(c.term.shape) for h in moved.findings for c in h.candidates
         ]
-        # Smoothing weakens what is faster, as if a link swung there.
+        # Smoothing weakens higher frequencies, which resembles an oscillating link.
         if max(fastest, default=0.0) > problem.signals.cutoff:
             return problem, result
-        # A link that swings in the long windows, too, does not fly.
+        # A link that oscillates in the long windows, too, does not cross a play.
         if not now or not before.items() <= now.items():
             return problem, result
-        # What was found before may have been the trace of this.
+        # Earlier findings may have been due to this effect.
         found = terms_on_rows(moved.findings)
         beside = replace(problem, terms=TermSum((*problem.terms, *found)), _cache={})
         room = settings.max_findings - len(moved.findings)

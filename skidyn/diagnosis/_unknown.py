@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is known about something no name fits: its variables, its shape, a formula."""
+"""Description of an unknown effect: its variables, its shape, a formula."""
 
 from __future__ import annotations
 
@@ -22,19 +22,20 @@ CURVE, MAP, FEWEST = 40, 16, 5
 
 @dataclass(frozen=True)
 class UnknownTorque:
-    """A nameless torque on one joint.
+    """An unknown torque on one joint.
 
     Parameters
     ----------
     joint : int
         Joint, counted from 1.
     variables : tuple of str
-        Signals that it depends on, as tested.
+        Signals on which it depends according to the tests.
     tests : tuple of VariableTest
         The test of every signal.
     shape : dict
         ``variables`` (one or two), ``edges`` of the bins of each (SI units), and ``value``,
-        ``low``, ``high``: torque in every bin with its 95 % band, N m or N; NaN where no sample is.
+        ``low``, ``high``: torque in every bin with its 95 % band, N m or N; NaN in bins without
+        samples.
     proposal : Proposal or None
         A short formula for it.
 
@@ -90,16 +91,16 @@ def _plain(value: Any) -> Any:
 def describe_unknowns(
     problem: Problem, terms: Sequence[Term], unknown: Sequence[Term], sigma: Array
 ) -> list[UnknownTorque]:
-    """Variables, shape and formula of every nameless term.
+    """Variables, shape and formula of every unknown term.
 
     Parameters
     ----------
     problem : Problem
-        Rows, folds and torque, ripple taken off.
+        Rows, folds and torque without ripple.
     terms : sequence of Term
         Every effect of the final model.
     unknown : sequence of Term
-        The nameless ones among them.
+        The unknown ones among them.
     sigma : ndarray of shape (n_joints,)
         Noise of one row.
     """
@@ -148,10 +149,10 @@ def _waves(term: Term) -> list[str]:
 
 
 class _Remainder:
-    """What the known terms of a model cannot do in place of some torque on one joint.
+    """Part of a torque on one joint that the known terms of a model cannot represent.
 
-    A nameless torque that is partly friction of a known kind has no definite share of it: only what
-    is left after the known terms have been fitted to it says what is missing (Frisch, Waugh 1933).
+    The share of friction of a known kind in an unknown torque is not determined: only the residual
+    after a fit of the known terms to it shows the missing effect (Frisch, Waugh 1933).
     """
 
     def __init__(self, known: Sequence[Array], sigma: Array, joint: int) -> None:
@@ -161,7 +162,7 @@ class _Remainder:
         self._inverse = np.linalg.pinv(np.asarray(gram), rcond=1e-12, hermitian=True)
 
     def __call__(self, columns: Array) -> Array:
-        """Columns less what the known terms do of them, shape as given."""
+        """Columns minus the part of known terms, shape as given."""
         mimic: Array = self._known @ (self._inverse @ (self._own.T @ columns))
         return columns - mimic
 

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""On which signals a nameless torque depends: a test for each, on folds never trained on.
+"""Signals on which an unknown torque depends: a test for each, on held-out folds.
 
 A flexible learner (random Fourier features, ridge regression; Rahimi, Recht 2007) predicts the
-joint's residual, with the nameless torque put back, from a set of signals. A signal is needed if
-leaving it out makes the error of the held-out folds larger, fold against fold (one-sided paired
-t-test of the logarithm of their ratio); one outside the set is missing if adding it makes them
-smaller. Folds are whole trajectories where there are enough, so autocorrelation within one does
-not count twice.
+joint's residual including the unknown torque from a set of signals. A signal is needed if leaving
+it out makes the error of the held-out folds larger, fold against fold (one-sided paired t-test of
+the logarithm of their ratio); one outside the set is missing if adding it makes them smaller. Folds
+are whole trajectories if there are enough, so that autocorrelation within one does not matter.
 """
 
 from __future__ import annotations
@@ -26,14 +25,14 @@ FEATURES = 120
 #: Lengths over which the learned function varies, in standard deviations of its inputs.
 LENGTHS = (1.0, 3.0)
 RIDGES = 10.0 ** np.arange(-3.0, 4.0)
-#: Chance at which a signal of the set is kept, and at which one outside it is taken in (divided by
-#: the number tried); what it brings must also be at least this share of what is predictable.
+#: P-value below which a signal of the set is kept, and below which another one is added (divided by
+#: the number tried); least gain, as a share of the predictable error.
 KEPT, TAKEN_IN, LEAST_SHARE = 0.05, 0.01, 0.05
 
 
 @dataclass(frozen=True)
 class VariableTest:
-    """Whether a nameless torque depends on a signal.
+    """Whether an unknown torque depends on a signal.
 
     Parameters
     ----------
@@ -117,7 +116,7 @@ def averaged_signals(problem: Problem, joint: int) -> dict[str, Array]:
 
 
 def row_weights(problem: Problem, joint: int) -> Array:
-    """Weight of every row of a joint: what it holds of a constant."""
+    """Weight of every row of a joint: its value for a constant signal."""
     return problem.rows.average(np.ones(problem.signals.n_samples), joint)
 
 
@@ -144,18 +143,18 @@ def depends_on(
     joint : int
         Joint, from 0.
     residual : ndarray of shape (n_rows,)
-        Residual rows of the joint with the nameless torque in them.
+        Residual rows of the joint including the unknown torque.
     hypothesis : sequence of str
-        Signals of the function that was found.
+        Signals of the fitted function.
     columns : ndarray of shape (n_rows, k)
-        Rows of that function, which stand for ``"time"`` where it is periodic in time.
+        Rows of that function, used for ``"time"`` if it is periodic in time.
     without : callable
-        Takes away from rows what the known terms of the model can do.
+        Function that removes from rows the part that known terms of the model can represent.
 
     Returns
     -------
     list of VariableTest
-        The signals found needed first, then the others by their share.
+        The needed signals first, then the others by their share.
     """
     signals = row_signals(problem, joint)
     fold, n_folds = problem.fold[joint], problem.n_folds
@@ -183,7 +182,7 @@ def depends_on(
         share, p = float((reached - better).sum()) / whole, _p_value(reached, better)
         needed = p < TAKEN_IN / max(1, len(outside)) and share > LEAST_SHARE
         tests[name] = VariableTest(name, share, p, needed)
-    # The strongest one tells: another may only stand in for it.
+    # The strongest one is used: others may only be correlated with it.
     best = max((t for t in tests.values() if t.needed), key=lambda t: t.share, default=None)
     if best is not None:
         chosen.append(best.variable)
@@ -200,7 +199,7 @@ def depends_on(
 
 
 def _p_value(worse: Array, better: Array) -> float:
-    """Chance of such errors, fold by fold, if the second were no better than the first."""
+    """P-value of the errors, fold by fold, if the second set were no better than the first."""
     ratio = np.log(np.maximum(worse, 1e-300) / np.maximum(better, 1e-300))
     if np.ptp(ratio) == 0:
         return 1.0
@@ -210,7 +209,7 @@ def _p_value(worse: Array, better: Array) -> float:
 def _held_out_errors(
     tried: Iterable[Array], residual: Array, fold: NDArray[np.int64], n_folds: int
 ) -> Array:
-    """Squared error of every fold when it is left out, (n_folds,), best features and ridge."""
+    """Held-out squared error of every fold, (n_folds,), with the best features and ridge."""
     table = np.concatenate([_ridge_errors(f, residual, fold, n_folds) for f in tried])
     return np.asarray(table[np.argmin(table.sum(1))])
 

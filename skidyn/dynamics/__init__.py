@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Dynamics of kinematic trees: recursion, tape and back ends, without any knowledge of logs."""
+"""Dynamics of kinematic trees: recursion, tape and back ends; independent of logs."""
 
 # For other packages of skidyn; no part of the public interface.
 from skidyn.dynamics._engine import Engine as Engine

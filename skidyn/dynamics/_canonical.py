@@ -1,17 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Frames and inertial parameters in which the inverse dynamics takes the fewest operations.
 
-Torques do not depend on where a body's frame sits. Here every revolute joint turns about the z
+Torques do not depend on the choice of a body's frame. Here every revolute joint turns about the z
 axis of its body, the next joint axis is reached by one turn about x (the convention of modified
 Denavit-Hartenberg parameters, [1]_) and origins lie where the offset to the next body has the
-fewest components. Nothing is rounded: a joint axis that is off by 1e-11 rad stays off by 1e-11
-rad.
+fewest components. Nothing is rounded: a joint axis that is off by 1e-11 rad stays off by 1e-11 rad.
 
-Some mass distributions may sit on either side of a joint without any torque noticing it: those
-that look the same from every joint position and resist no motion of the joint. For a revolute
-joint these are a mass on its axis and the inertia ``Ixx = Iyy`` of a thin rod on it; for a
-prismatic joint every inertia matrix. They are moved to the parent [2]_, which leaves seven
-parameters per revolute and four per prismatic joint.
+Some mass distributions may be on either side of a joint without a change of any torque: those that
+are the same at every joint position and resist no motion of the joint. For a revolute joint these
+are a mass on its axis and the inertia ``Ixx = Iyy`` of a thin rod on it; for a prismatic joint
+every inertia matrix. They are moved to the parent [2]_, which leaves seven parameters per revolute
+and four per prismatic joint.
 
 References
 ----------
@@ -45,7 +44,8 @@ class CanonicalModel:
     base : ndarray of shape (3, 3)
         Orientation of the new base frame in the old one.
     kept, moved : ndarray of shape (n_bodies, 10, 10)
-        What a body keeps of its own parameters, in its new frame, and what it hands to its parent.
+        Maps from a body's parameters to those that remain with it, in its new frame, and to those
+        that are moved to its parent.
     """
 
     tree: KinematicTree
@@ -121,13 +121,13 @@ class _Frames:
         for body in range(tree.n_bodies):
             parent = int(tree.parents[body])
             if tree.prismatic[body]:
-                # A sliding body keeps the orientation of its parent: nothing to rotate.
+                # A sliding body has the orientation of its parent: no rotation.
                 self.turns[body] = (
                     np.eye(3) if parent < 0 else tree.rotations[body].T @ self.turns[parent]
                 )
 
     def _find_main_children(self) -> list[int]:
-        """Child with the most bodies behind it: the one that a frame is fitted to."""
+        """Child with the most bodies behind it, to which the frame is fitted."""
         sizes = [1] * self._tree.n_bodies
         main = [-1] * self._tree.n_bodies
         for body in range(self._tree.n_bodies - 1, -1, -1):
@@ -180,7 +180,7 @@ class _Frames:
 
 
 def _unnoticed(prismatic: bool) -> np.ndarray:
-    """Projection of parameters on those that a joint cannot feel, shape (10, 10)."""
+    """Projection of parameters on those without effect on a joint's torque, shape (10, 10)."""
     projection = np.zeros((10, 10))
     if prismatic:
         projection[range(4, 10), range(4, 10)] = 1.0
@@ -196,7 +196,7 @@ def _transform_matrix(rotation: np.ndarray, translation: np.ndarray) -> np.ndarr
 
 
 def _clean(array: np.ndarray) -> np.ndarray:
-    """Array without the rounding dust around 0, 1 and -1."""
+    """Array without rounding errors near 0, 1 and -1."""
     for exact in (0.0, 1.0, -1.0):
         array = np.where(np.abs(array - exact) < _DUST, exact, array)
     return array
@@ -208,7 +208,7 @@ def _about_z(angle: float) -> np.ndarray:
 
 
 def _turn_z_onto(axis: np.ndarray) -> np.ndarray:
-    """Some rotation whose third column is the axis; exact permutations for unit axes."""
+    """A rotation whose third column is the axis; an exact permutation for a unit axis."""
     k = int(np.argmax(np.abs(axis)))
     first = np.eye(3)[(k + 1) % 3]
     first = first - (first @ axis) * axis

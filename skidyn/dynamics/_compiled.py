@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Run a tape through the system's C compiler, where there is one.
+"""Compile a tape with the C compiler of the system, if there is one.
 
 The text of a tape is one loop body without branches, which compilers turn into vector instructions
 that work on several samples at once and keep most values in registers.
@@ -79,7 +79,7 @@ def compile_library(text: str, flags: tuple[str, ...] = _FLAGS) -> ctypes.CDLL:
     Raises
     ------
     SkidynError
-        There is no C compiler, or it refuses the text.
+        There is no C compiler, or it does not accept the text.
     """
     compiler = find_compiler()
     if compiler is None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Batched rigid-body dynamics of one robot: traced once, kept, and run by one of the back ends."""
+"""Batched rigid-body dynamics of one robot: traced once, cached, run by one of the back ends."""
 
 from __future__ import annotations
 
@@ -29,11 +29,12 @@ from skidyn.dynamics._scalar import ScalarFunction
 from skidyn.dynamics._tape import Scalar
 from skidyn.dynamics._tree import KinematicTree
 
-#: Samples per chunk. Below about a thousand the cost of a ufunc call shows; far above, the rows of
-#: a chunk no longer fit into the second-level cache.
+#: Samples per chunk. Below about a thousand the overhead of ufunc calls dominates; far above, the
+#: rows of a chunk no longer fit into the second-level cache.
 CHUNK = 6144
 
-#: Numbers that the outputs of a chunk may hold (64 MiB): matters from some twenty joints on.
+#: Most numbers in the outputs of a chunk (64 MiB); a bound for robots of some twenty joints or
+#: more.
 LARGEST = 2**23
 
 #: Up to this many samples are run one by one.
@@ -46,7 +47,7 @@ KEPT = 6
 class Engine:
     """Rigid-body functions of one kinematic tree.
 
-    Programs are traced when they are first asked for. Buffers belong to a thread, so that an engine
+    Programs are traced when they are first needed. Buffers belong to a thread, so that an engine
     may be used from several threads at once.
     """
 
@@ -109,7 +110,7 @@ class Engine:
 
     @contextmanager
     def _borrowed(self, chunk: int, dtype: Any, *key: Any) -> Iterator[BoundProgram]:
-        """Program with buffers that nobody else uses meanwhile, kept for the next call."""
+        """Program with buffers that no other thread uses, kept for the next call."""
         free: OrderedDict[tuple[Any, ...], BoundProgram] = self._local.__dict__.setdefault(
             "free", OrderedDict()
         )
@@ -123,7 +124,7 @@ class Engine:
                 free.popitem(last=False)
 
     def _is_small(self, signals: dict[str, np.ndarray], dtype: Any) -> bool:
-        """Whether straight-line Python beats NumPy: few samples of a robot that is not huge."""
+        """Whether straight-line Python is faster than NumPy: few samples, not too many joints."""
         return len(signals["q"]) <= FEW and dtype is np.float64 and self.tree.n_bodies <= 16
 
     def _scalar(self, *key: Any) -> ScalarFunction:
@@ -181,8 +182,8 @@ class Engine:
     ) -> Iterator[tuple[slice, np.ndarray]]:
         """Some columns of the regressor chunk by chunk, followed by ``spare`` rows to be filled.
 
-        With the rows of the caller in the same block of memory as the columns, one product of
-        matrices serves both.
+        With the rows of the caller in the same block of memory as the columns, one matrix product
+        is enough for both.
         """
         key = "regressor_columns", self.gravity_key(), columns, spare
         yield from self.iter_chunks(signals, chunk, *key)
@@ -228,7 +229,7 @@ class Engine:
 
     @cached_property
     def _own_parameters(self) -> np.ndarray:
-        """The robot's parameters in canonical frames, without rounding dust."""
+        """The robot's parameters in canonical frames, without rounding errors near zero."""
         return _without_dust(np.array(self.canonical.parameters(self.parameters)))
 
     def inverse_dynamics(
@@ -240,7 +241,7 @@ class Engine:
         dtype: Any = np.float64,
         backend: str = "numpy",
     ) -> np.ndarray:
-        """Joint torques; signals that are left out vanish."""
+        """Joint torques; omitted signals are zero."""
         if backend == "once":
             return self._at_once(signals, gravity, parameters)
         options = self.gravity_key(gravity), "dq" in signals, "ddq" in signals
@@ -257,7 +258,7 @@ class Engine:
     def _at_once(
         self, signals: dict[str, np.ndarray], gravity: Any, parameters: np.ndarray | None
     ) -> np.ndarray:
-        """Joint torques without a program, for a robot that is asked once or twice."""
+        """Joint torques without a program, for a robot that is evaluated only once or twice."""
         numbers = Numbers(signals)
         own = self.parameters if parameters is None else parameters
         torques = inverse_dynamics(
@@ -297,6 +298,6 @@ class Engine:
 
 
 def _without_dust(parameters: np.ndarray) -> np.ndarray:
-    """Parameters with what is left of cancelled terms set to zero."""
+    """Parameters with the remainders of cancelled terms set to zero."""
     scale = np.abs(parameters).max(initial=0.0)
     return np.where(np.abs(parameters) < 1e-16 * scale, 0.0, parameters)

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Run a recursion on arrays as it is read, without writing it down first.
+"""Run a recursion on arrays directly, without recording it on a tape.
 
-A tape pays when it is run often. For a robot that is asked once, such as one of many variants of a
-description, writing and binding a tape takes several times as long as running it. :class:`Numbers`
-takes the place of a :class:`~skidyn.dynamics._tape.Tape`: its scalars are floats, or arrays of one
-number a sample, and every operation is carried out at once. Products with 0 and 1 are still left
-out.
+A tape is worth its cost if it is run often. For a robot that is evaluated once, such as one of many
+variants of a description, recording and binding a tape takes several times as long as running it.
+:class:`Numbers` takes the place of a :class:`~skidyn.dynamics._tape.Tape`: its scalars are floats,
+or arrays of one number a sample, and every operation is carried out at once. Products with 0 and 1
+are still omitted.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 
 
 class Number:
-    """A float, or an array with one number a sample, that leaves out needless arithmetic."""
+    """A float, or an array with one number per sample, that omits needless arithmetic."""
 
     __slots__ = ("value",)
 
@@ -67,7 +67,7 @@ class Number:
 
 
 class Numbers:
-    """What hands out the numbers of a motion where a tape would hand out symbols.
+    """Source of the numbers of a motion, in place of a tape, which is a source of symbols.
 
     Parameters
     ----------

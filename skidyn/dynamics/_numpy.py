@@ -59,7 +59,7 @@ class BoundProgram:
         self._values: dict[int, np.ndarray] = {}
         self._uniform_calls: list[tuple[Callable[..., Any], tuple[Any, ...]]] = []
         self._calls: list[tuple[Callable[..., Any], tuple[Any, ...]]] = []
-        self._final: list[tuple[int, tuple[int, ...]]] = []  # calls that write an output for good
+        self._final: list[tuple[int, tuple[int, ...]]] = []  # calls that write a final output
         self._reread: list[tuple[int, ...]] = []  # outputs that other calls read
         self._bind(program)
 
@@ -168,7 +168,7 @@ class BoundProgram:
         return size
 
     def run_into(self, out: np.ndarray, signals: dict[str, np.ndarray], rows: slice) -> None:
-        """Write the outputs of a full chunk to memory of their shape, without a copy.
+        """Write the outputs of a full chunk into given memory of their shape, without a copy.
 
         Entries that vanish for every motion are not written.
         """
@@ -206,9 +206,9 @@ class _HalfTangents:
     """Sine and cosine of an angle from one tangent of its half.
 
     With ``t = tan(x / 2)`` and ``w = 2 / (1 + t^2)`` the sine is ``t w`` and the cosine ``w - 1``,
-    both within 4e-16. In float64 NumPy's tangent uses the vector unit of the processor where its
-    sine and cosine do not: five times as fast as the two, and no slower where there is none.
-    float32 has vectorised sines of its own.
+    both within 4e-16. In float64 NumPy's tangent uses the vector unit of the processor, and its
+    sine and cosine do not: the tangent is five times as fast as the two, and not slower without a
+    vector unit. float32 has vectorised sines of its own.
     """
 
     def __init__(self, nodes: Sequence[Node], live: Iterable[int], dtype: np.dtype) -> None:
@@ -225,7 +225,7 @@ class _HalfTangents:
         new_row: Callable[[list[np.ndarray]], np.ndarray],
         free: list[np.ndarray],
     ) -> list[tuple[Callable[..., Any], tuple[Any, ...]]]:
-        """Calls that make t and w of an angle; none when they are there."""
+        """Calls that compute t and w of an angle; none if they are available already."""
         if angle in self._rows:
             return []
         t, w = self._rows[angle] = new_row(free), new_row(free)
@@ -240,7 +240,7 @@ class _HalfTangents:
     def finish(
         self, kind: str, angle: int, row: np.ndarray, free: list[np.ndarray]
     ) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        """The call that makes the sine or cosine; after the last one t and w are free again."""
+        """The call that computes the sine or cosine; after the last one t and w are free again."""
         t, w = self._rows[angle]
         self._left[angle] -= 1
         if not self._left[angle]:
@@ -251,8 +251,8 @@ class _HalfTangents:
 def chunk_size(n_samples: int, limit: int) -> int:
     """Size of equal chunks, at most ``limit``, if possible a multiple of 64.
 
-    Equal, because a chunk that is half empty costs as much as a full one; small calls get small
-    buffers.
+    The chunks are equal because a half-empty chunk costs as much as a full one; small calls get
+    small buffers.
     """
     n_chunks = max(1, math.ceil(n_samples / limit))
     return min(limit, max(64, 64 * math.ceil(n_samples / n_chunks / 64)))
@@ -270,7 +270,7 @@ def evaluate_rows(
     """
     shape = (*bound.outputs.shape[:-1], n_samples)
     if out is None:
-        result = np.zeros(shape, bound.dtype)  # untouched zeros cost no memory traffic
+        result = np.zeros(shape, bound.dtype)  # unwritten zeros cost no memory traffic
     else:
         result = out
         clear_vanishing(out, bound.vanishing, bound.dtype, n_samples)
@@ -297,6 +297,7 @@ def clear_vanishing(
         )
     for key in np.argwhere(vanishing):
         row = out[tuple(key)]
-        # Memory that held a regressor before has its zeros: reading is cheaper than writing.
+        # Memory that held a regressor before has its zeros already: reading is cheaper than
+        # writing.
         if n_samples and row.view(f"u{dtype.itemsize}").max():
             row[...] = 0.0

@@ -11,7 +11,7 @@ are lists of three scalars in the frame of a body; two quantities carry the form
     computed once per body.
 ``(s, v)``
     Unit motion of a joint seen from a body further out: angular part ``s`` and velocity ``v`` of
-    the body's origin. Power of the body's inertial wrench along it is what the joint has to supply;
+    the body's origin. The power of the body's inertial wrench along it is the torque of the joint;
     the regressor carries these axes outward instead of a 6 x 10 matrix of wrenches inward.
 
 Gravity enters as an acceleration ``-g`` of the base.
@@ -35,7 +35,7 @@ import numpy as np
 from skidyn.dynamics._tape import Scalar, Tape
 from skidyn.dynamics._tree import KinematicTree, transform_inertial
 
-#: What is so much smaller than the largest term of a sum does not change it.
+#: Terms below this fraction of the largest term of a sum do not change the sum.
 _BELOW_ROUNDING = 1e-18
 
 Vector = list[Any]  # of three Scalars, or floats
@@ -44,7 +44,7 @@ Matrix = list[Any]  # of three Vectors, the rows
 
 @dataclass(frozen=True)
 class Program:
-    """A tape with its outputs; the key of an output tells where its value goes."""
+    """A tape with its outputs; the key of an output is the position of its value."""
 
     tape: Tape
     outputs: dict[tuple[int, ...], Scalar]
@@ -205,8 +205,8 @@ def _motions(
 ) -> Iterator[_Motion]:
     """Outward recursion: motion of every body, one after the other.
 
-    Handed out at once, so that a user's operations stand next to those they depend on: the fewer
-    values are alive at a time, the more of them stay in the cache.
+    Each motion is yielded at once, so that the caller's operations follow those on which they
+    depend: the fewer values are alive at a time, the more of them stay in the cache.
     """
     motions: list[_Motion] = []
     for joint in joints:
@@ -245,7 +245,7 @@ def _moment_map(motion: _Motion) -> list[Vector]:
 
 
 def _parameters(tape: Tape, body: int, used: np.ndarray | None) -> list[Scalar]:
-    """The ten inertial parameters of a body; those that are not used are zero."""
+    """The ten inertial parameters of a body; unused ones are zero."""
     return [
         tape.input("parameter", 10 * body + k)
         if used is None or used[body, k]
@@ -274,7 +274,7 @@ def trace_inverse_dynamics(
     gravity : sequence of 3 floats
         Gravitational acceleration in the base frame, m/s^2.
     with_velocity, with_acceleration : bool, default=True
-        Without one of them the robot is taken to have none, and its terms vanish.
+        If False, the velocity or acceleration is taken to be zero, and its terms vanish.
     parameters_used : ndarray of shape (n_bodies, 10), bool, default=None
         Parameters that may differ from zero; None means all.
     parameters : ndarray of shape (n_bodies, 10), default=None
@@ -300,12 +300,12 @@ def inverse_dynamics(
     with_velocity: bool = True,
     with_acceleration: bool = True,
 ) -> list[Any]:
-    """The recursive Newton-Euler algorithm [1]_ on whatever numbers a tape hands out.
+    """The recursive Newton-Euler algorithm [1]_ on symbols or numbers.
 
     Parameters
     ----------
     tape : Tape or Numbers
-        Where ``input`` and ``constant`` come from.
+        Provides ``input`` and ``constant``.
     tree : KinematicTree
     gravity : sequence of 3 floats
         Gravitational acceleration in the base frame, m/s^2.
@@ -337,7 +337,7 @@ def inverse_dynamics(
             moment = _add(moment, _scale(value, column))
         forces.append(force)
         moments.append(moment)
-        # A body is done with as soon as all behind it are: its values leave the cache early.
+        # A body is finished as soon as all bodies behind it are: its values leave the cache early.
         done = body
         while done >= 0 and waiting[done] == 0:
             joint, force, moment = joints[done], forces[done], moments[done]
@@ -357,7 +357,7 @@ def trace_torque_regressor(tree: KinematicTree, gravity: Sequence[float]) -> Pro
     """Joint torque per unit of every inertial parameter [2]_.
 
     Outputs are keyed ``(coordinate, 10 * body + parameter)``; those that vanish for every motion
-    are left out.
+    are omitted.
     """
     tape = Tape()
     joints = _joints(tape, tree)
@@ -399,14 +399,14 @@ def _shared_columns(tree: KinematicTree, body: int) -> list[tuple[int, int, np.n
     """Columns of a body that follow from those of its parent.
 
     A mass on the axis of a revolute joint, its first moment along the axis and a thin rod on the
-    axis are felt alike on either side of the joint (see :mod:`skidyn.dynamics._canonical`): by
-    all joints before it, their column is a combination of columns of the parent.
+    axis give the same torques on either side of the joint (see :mod:`skidyn.dynamics._canonical`):
+    for all joints before it, their column is a combination of columns of the parent.
 
     Returns
     -------
     list of (column, partner, coefficients)
-        ``column + partner = coefficients @ columns of the parent``; partner -1 is none. Only where
-        that is cheaper than the column itself.
+        ``column + partner = coefficients @ columns of the parent``; partner -1 means none. Only
+        combinations that are cheaper than the column itself are listed.
     """
     axis = np.abs(tree.axes[body])
     if tree.prismatic[body] or tree.parents[body] < 0 or axis.max() < 1.0:
@@ -415,7 +415,7 @@ def _shared_columns(tree: KinematicTree, body: int) -> list[tuple[int, int, np.n
     inertia = {0: 4, 1: 7, 2: 9}  # positions of Ixx, Iyy, Izz among the parameters
     across = [inertia[i] for i in range(3) if i != k]
     shared = []
-    # An own column takes 5 operations for m, 9 for a first moment, 5 for an inertia.
+    # A separate column takes 5 operations for m, 9 for a first moment, 5 for an inertia.
     for columns, own_cost in (((0,), 5), ((1 + k,), 9), ((across[1], across[0]), 4)):
         unit = np.zeros(10)
         unit[list(columns)] = 1.0
@@ -482,14 +482,15 @@ def _accumulate_row(
     force: Vector,
     torque: Vector,
 ) -> None:
-    """Add what one unit acceleration of a joint asks of every joint between it and the base."""
+    """Add the torques of all joints between a joint and the base due to its unit acceleration."""
     i, mover = joints[body].coordinate, body
     while True:
         joint = joints[mover]
         j = joint.coordinate
         along = _dot(joint.axis, force if joint.prismatic else torque)
         entry = joints[body].multiplier * joint.multiplier * along
-        # A body pair counts in both triangles; on one shared coordinate both fall on the diagonal.
+        # A pair of bodies counts in both triangles; with a shared coordinate both are on the
+        # diagonal.
         keys = [(i, j)] if mover == body else [(i, j), (j, i)]
         for key in keys:
             outputs[key] = outputs[key] + entry if key in outputs else entry

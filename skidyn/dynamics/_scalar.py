@@ -16,7 +16,7 @@ import numpy as np
 from skidyn.dynamics._recursion import Program
 from skidyn.dynamics._source import renumber, statements
 
-#: Depth of expressions; Python's compiler gives up far above.
+#: Depth of expressions; Python's compiler fails far above it.
 NESTED = 8
 
 

@@ -11,7 +11,7 @@ from types import MappingProxyType
 from skidyn.dynamics._recursion import Program
 from skidyn.dynamics._tape import operands
 
-#: How an operation is written; what is not listed is a function of the operation's name.
+#: Text of an operation; one that is not listed is a function of the operation's name.
 PYTHON = {
     "neg": "-{0}",
     "add": "{0} + {1}",
@@ -57,12 +57,12 @@ def statements(
     prefix, suffix : str, default=""
         Written before and after every assignment, such as ``"double "`` and ``";"``.
     language : mapping of str to str, default=PYTHON
-        How operations are written.
+        Text of the operations.
     given : mapping of int to str, default={}
         Expressions of nodes of the tape that are computed elsewhere.
     nested : int, default=0
-        What is used once is written where it is used, up to this depth: faster to interpret,
-        slower to read.
+        Expressions that are used once are written where they are used, up to this depth, which is
+        faster to interpret but harder to read.
 
     Returns
     -------

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Symbolic scalars that record arithmetic on a tape and simplify it as it is written down.
+"""Symbolic scalars that record arithmetic on a tape and simplify it at the same time.
 
 A rigid-body recursion is written once, in ordinary Python arithmetic, and run on these scalars.
-What is left on the tape is the recursion of one particular robot: products with 0 and 1 are gone,
-no expression is computed twice, and what does not reach an output is dropped when the tape is
-read (:meth:`Tape.live`). The back ends (NumPy, torch, Python text, C text) only read tapes.
+The tape then holds the recursion of one particular robot: products with 0 and 1 are removed, no
+expression is computed twice, and operations that do not reach an output are dropped when the tape
+is read (:meth:`Tape.live`). The back ends (NumPy, torch, Python text, C text) only read tapes.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any
 #: except for ``("input", name, index)`` and ``("constant", value)``.
 Node = tuple[Any, ...]
 
-#: Rigid bodies need the first line of each; effects, when a whole model is exported, the others.
+#: Rigid bodies need the first line of each; effects need the others when a whole model is exported.
 UNARY = frozenset({"neg", "sin", "cos", "tanh", "exp", "sqrt", "abs", "sign"})
 BINARY = frozenset({"add", "sub", "mul", "div", "max", "pow"})
 
@@ -49,7 +49,7 @@ class Tape:
         self._index: dict[Node, int] = {}
 
     def record(self, *node: Hashable) -> Scalar:
-        """Scalar of a node; a node recorded before is reused (common subexpressions)."""
+        """Scalar of a node; an existing node is reused (common subexpressions)."""
         index = self._index.get(node)
         if index is None:
             index = self._index[node] = len(self.nodes)
@@ -57,7 +57,7 @@ class Tape:
         return Scalar(self, index)
 
     def input(self, name: str, index: int = 0) -> Scalar:
-        """Scalar that a back end fills in, such as ``("q", 3)``."""
+        """Scalar whose value a back end provides, such as ``("q", 3)``."""
         return self.record("input", name, index)
 
     def constant(self, value: float) -> Scalar:
@@ -67,7 +67,7 @@ class Tape:
     def live(self, outputs: Iterable[Scalar], given: Container[int] = ()) -> list[int]:
         """Indices of all nodes that the outputs need, operands before their users.
 
-        Nodes that are ``given`` by other means are listed, but not what they are computed from.
+        Nodes that are ``given`` by other means are listed, but not their operands.
         """
         needed: set[int] = set()
         stack = [output.index for output in outputs]
@@ -106,14 +106,14 @@ class Scalar:
         return node[1] if node[0] == "constant" else None
 
     def is_zero(self) -> bool:
-        """Whether the scalar is known to vanish."""
+        """Whether the scalar is the constant zero."""
         return self.value == 0.0
 
     def _other(self, other: Scalar | float) -> Scalar:
         return other if isinstance(other, Scalar) else self.tape.constant(other)
 
     def _operand(self) -> Scalar:
-        """The only operand of a negation."""
+        """The operand of a negation."""
         return Scalar(self.tape, self.node[1])
 
     def __neg__(self) -> Scalar:

@@ -57,7 +57,7 @@ def evaluate_torch(program: Program, inputs: dict[str, torch.Tensor]) -> torch.T
         elif node[0] in _ORDERED and isinstance(values[node[1]], float):
             values[index] = _ORDERED[node[0]](values[node[1]], values[node[2]])
         else:
-            # torch's functions take their tensor first; what is left is commutative.
+            # torch's functions take their tensor first; the remaining operations are commutative.
             arguments = [values[i] for i in operands(node)]
             if isinstance(arguments[0], float):
                 arguments.reverse()
@@ -67,7 +67,7 @@ def evaluate_torch(program: Program, inputs: dict[str, torch.Tensor]) -> torch.T
     entries = [zero] * _size(program.shape)
     for position, scalar in zip(flat, program.outputs.values(), strict=True):
         value = values[scalar.index]
-        entries[position] = zero + value  # a constant or a parameter fills the whole batch
+        entries[position] = zero + value  # constants and parameters fill the batch
     return torch.stack(entries, dim=-1).reshape(*reference.shape[:-1], *program.shape)
 
 

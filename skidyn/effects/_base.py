@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What an effect is: a small declarative class, linear in its coefficients."""
+"""Base class of effects: small, declarative, linear in the coefficients."""
 
 from __future__ import annotations
 
@@ -279,7 +279,7 @@ class Effect:
     def torque_columns(
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
-        """Columns in the torque row of every joint that the effect reaches.
+        """Columns in the torque row of every joint on which the effect acts.
 
         Parameters
         ----------
@@ -301,12 +301,12 @@ class Effect:
     def too_small(
         self, intervals: Mapping[str, tuple[float, float, float]], signals: Signals
     ) -> str | None:
-        """Why so little of the effect says nothing about the robot; None where it is a finding.
+        """Reason why an effect of this size is not significant for the robot; None if it is.
 
         Parameters
         ----------
         intervals : mapping of str to (float, float, float)
-            Physical parameters as found, with the ends of their intervals.
+            Identified physical parameters, with the ends of their intervals.
         signals : Signals
             Motion on which they were found.
 
@@ -547,7 +547,7 @@ class Effect:
         }
 
     def check(self) -> None:
-        """Refuse an incomplete declaration.
+        """Raise an error for an incomplete declaration.
 
         Raises
         ------

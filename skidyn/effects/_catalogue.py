@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The catalogue of all effects of the package, and how users write terms."""
+"""The catalogue of all effects of the package, and the notation of terms for users."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def make_terms(specs: Iterable[TermSpec], n_joints: int) -> list[Term]:
 
 
 def _completed(term: Term) -> Term:
-    """A term whose shape was given in part, with the parameters that have one usual value."""
+    """Complete the shape of a term by the parameters that have one usual value."""
     if term.is_open:
         return term
     shapes = (s for s in term.effect.shapes if len(s.grid) == 1 and s.name not in term.shape)
@@ -128,12 +128,12 @@ def _completed(term: Term) -> Term:
 
 
 def _kind_and_joints(spec: Any) -> tuple[str, list[int]]:
-    """Kind and joints of a pair that a user wrote."""
+    """Kind and joints of a pair given by a user."""
     try:
         kind, joints = spec
         if isinstance(kind, str) and not isinstance(joints, str):
             return kind, [index(joint) for joint in joints]
-    except (TypeError, ValueError):  # no pair, or no list of whole numbers
+    except (TypeError, ValueError):  # not a pair, or not a list of whole numbers
         pass
     raise EffectError(
         f"{spec!r} is not an effect; write 'viscous', or ('dahl', [1, 4]) with joints counted from "

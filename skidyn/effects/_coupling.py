@@ -21,7 +21,7 @@ _GAUTIER = "Janot, Vandanjon, Gautier (2014), IEEE TCST 22(1), 132-145 (TX40 wri
 
 
 class _PairEffect(Effect):
-    """Acts through x = x_i + r x_j: the column on joint i, r times it on joint j."""
+    """Acts through x = x_i + r x_j: the column on joint i and r times this column on joint j."""
 
     scope = "pair"
     shapes: ClassVar[tuple[Shape, ...]] = (_RATIO,)
@@ -64,8 +64,8 @@ class CoupledFriction(_PairEffect):
     """Friction of a shaft that turns with the sum of two joint velocities.
 
     The viscous part may grow with another ``power`` of the speed (1 where the shape has none), in
-    units of 1 rad/s or 1 m/s. In a ``differential`` two such shafts turn, one with the sum and one
-    with the difference of the velocities.
+    units of 1 rad/s or 1 m/s. A ``differential`` has two such shafts, one that turns with the sum
+    and one with the difference of the velocities.
     """
 
     kind = "coupled_friction"
@@ -118,11 +118,11 @@ class CoupledInertia(_PairEffect):
 class CouplingSpring(_PairEffect):
     """Spring or hose between two joints.
 
-    One that is not linear has in its shape the coupled coordinate ``x0`` at which it is slack, and
-    ``power`` 3, coordinates in units of 1 rad or 1 m so that the unit of the stiffness stays; or a
-    distance from there beyond which it grows stiff as a hyperbolic sine (``stiffening``), or
-    yields as a hyperbolic tangent (``softening``). A cable or hose that can only pull acts on one
-    ``side`` of ``x0``.
+    The shape of a nonlinear one contains the coupled coordinate ``x0`` at which it is slack, and
+    ``power`` 3, with coordinates in units of 1 rad or 1 m so that the unit of the stiffness is the
+    same; or a distance from ``x0`` beyond which it stiffens as a hyperbolic sine (``stiffening``)
+    or softens as a hyperbolic tangent (``softening``). A cable or hose that can only pull acts on
+    one ``side`` of ``x0``.
     """
 
     kind = "coupling_spring"
@@ -164,7 +164,7 @@ class CouplingSpring(_PairEffect):
         if "x0" not in shape:
             return True
         x = signals.q[:, joints[0]] + shape["ratio"] * signals.q[:, joints[1]]
-        return bool(x.min() < shape["x0"] < x.max())  # where it is slack was seen
+        return bool(x.min() < shape["x0"] < x.max())  # the slack position is within the log
 
     def coupled_columns(
         self, signals: Signals, i: int, j: int, ratio: float, **form: float

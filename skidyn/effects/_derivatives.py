@@ -20,9 +20,9 @@ def smooth_derivatives(
     Parameters
     ----------
     values : ndarray of shape (n_samples,) or (n_samples, n_columns)
-        The signal; zeros are returned where a segment is too short to smooth.
+        The signal; zeros are returned for a segment that is too short to smooth.
     signals : Signals
-        For its segments and clock.
+        Motion, for its segments and time.
     order : int, default=4
         Order of the polynomial. A low order smooths more.
 

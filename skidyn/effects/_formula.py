@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A torque given as a formula of the signals: what the diagnosis proposes where no name fits."""
+"""A torque given as a formula of the signals, as the diagnosis proposes for unknown effects."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from skidyn._signals import Signals
 from skidyn.effects._base import Array, Coefficient, Effect
 from skidyn.effects._term import Term
 
-#: Longest formula and largest exponent: nothing that a formula of friction or a spring needs.
+#: Longest formula and largest exponent; formulas of friction or springs are far below both.
 LONGEST, LARGEST_POWER = 200, 9
 
 _FUNCTIONS: dict[str, Callable[[Any], Any]] = {
@@ -57,7 +57,7 @@ def formula(expression: str, joint: int) -> Term:
     Returns
     -------
     Term
-        To be put among the effects of a model; its coefficient is fitted.
+        Term for the effects of a model; its coefficient is fitted.
 
     Raises
     ------
@@ -95,7 +95,7 @@ class Formula(Effect):
 
 
 def _parse(expression: str) -> ast.expr:
-    """Syntax tree of a formula that holds nothing but the grammar."""
+    """Syntax tree of a formula that contains only elements of the grammar."""
     if not isinstance(expression, str) or len(expression) > LONGEST:
         raise EffectError(f"a formula is a text of at most {LONGEST} characters")
     try:
@@ -132,7 +132,7 @@ def _check(node: ast.expr, text: str) -> None:
 
 
 def _check_power(node: ast.expr, text: str) -> None:
-    """Exponents are small numbers, so that no formula takes forever or overflows."""
+    """Exponents are small numbers, so that no formula takes very long or overflows."""
     number = node.operand if isinstance(node, ast.UnaryOp) else node
     fine = isinstance(number, ast.Constant) and type(number.value) in (int, float)
     if not fine or abs(number.value) > LARGEST_POWER:  # type: ignore[attr-defined]
@@ -158,7 +158,7 @@ def _value(node: ast.expr, signals: Signals, text: str) -> Any:
         (argument,) = node.args
         if node.func.id == "sign" and isinstance(argument, ast.Name):
             name = _SIGNAL.match(argument.id)
-            if name and name[1] == "dq":  # dry friction has its direction blurred near rest
+            if name and name[1] == "dq":  # the direction of dry friction is smooth near rest
                 return signals.sign[:, _joint(name[2], signals, text)]
         return _FUNCTIONS[node.func.id](_value(argument, signals, text))
     if isinstance(node, ast.Constant):

@@ -35,8 +35,8 @@ class Viscous(Effect):
 class Coulomb(Effect):
     """Dry friction of constant size against the motion.
 
-    With ``rounding`` in its shape, in rad/s or m/s, it does not turn at once, but as the hyperbolic
-    tangent of the velocity over it.
+    With ``rounding`` in its shape, in rad/s or m/s, it does not change sign at once, but as the
+    hyperbolic tangent of the velocity divided by this value.
     """
 
     kind = "coulomb"
@@ -90,11 +90,11 @@ class Stribeck(Effect):
 
 
 class AsymmetricFriction(Effect):
-    """The part of friction that has another size in each direction.
+    """The part of friction that differs between the directions of motion.
 
-    It grows with the speed, or with another ``power`` of it (1 where the shape has none); speeds
-    are in units of 1 rad/s or 1 m/s, so that the unit of the coefficient stays. With a ``side`` (1
-    or -1) it is that of one direction of motion alone.
+    It grows with the speed, or with another ``power`` of it (1 if the shape has none); speeds are
+    in units of 1 rad/s or 1 m/s, so that the unit of the coefficient is the same. With a ``side``
+    (1 or -1) it acts only in one direction of motion.
     """
 
     kind = "asymmetric_friction"

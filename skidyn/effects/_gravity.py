@@ -19,8 +19,8 @@ UPRIGHT = 1e-4
 class BaseTilt(Effect):
     """Gravity has horizontal components in the base frame.
 
-    A first joint that is vertical in the description carries no gravity there, so that its own
-    first moments are not identified; on a tilted base they show, as two more coefficients.
+    A first joint that is vertical in the description is not loaded by gravity, so its first moments
+    are not identified; on a tilted base they are identified as two more coefficients.
     """
 
     kind = "base_tilt"
@@ -67,7 +67,7 @@ class BaseTilt(Effect):
 
     @staticmethod
     def _horizontal(gravity: Array) -> list[int]:
-        """The two base axes across gravity (x and y for a robot that stands upright)."""
+        """The two base axes perpendicular to gravity (x and y for an upright robot)."""
         vertical = int(np.argmax(np.abs(gravity)))
         return [axis for axis in range(3) if axis != vertical]
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Pre-sliding friction: bristles that bend before they slip.
 
-Every state depends on the path and not on time, so between two reversals it has a closed form;
-only the reversals are visited one by one.
+Every state depends on the path and not on time, so between two reversals it has a closed form; only
+the reversals are processed one by one.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from skidyn.effects._base import Array, Coefficient, Effect, Shape
 
 @dataclass(frozen=True)
 class Law:
-    """How a state changes along a monotone stroke, of numbers and of arrays.
+    """Change of a state along a monotone stroke, for numbers and arrays.
 
     Attributes
     ----------
     measure : callable
-        Of ways in rad or m: what the change depends on.
+        Function of the distance in rad or m, on which the change depends.
     change : callable
         ``change(start, direction, measure) -> state``.
     """
@@ -39,20 +39,20 @@ class Law:
 
 @dataclass(frozen=True)
 class Strokes:
-    """A path cut where it turns back; what all laws of hysteresis need of it.
+    """A path cut at its reversals, for all laws of hysteresis.
 
     Attributes
     ----------
     rows : ndarray of shape (n_moving,)
-        Samples that have a state; the others, first samples and paths that stand, have none.
+        Samples with a state; first samples and constant paths have none.
     stroke : ndarray of shape (n_moving,)
-        Stroke of each of them.
+        Stroke of each sample.
     way : ndarray of shape (n_moving,), rad or m
-        Way gone since the stroke began.
+        Distance travelled since the stroke began.
     direction : ndarray of shape (n_strokes,)
         1 or -1.
     length : ndarray of shape (n_strokes,), rad or m
-        Way of the whole stroke.
+        Distance of the whole stroke.
     opens : ndarray of shape (n_strokes,) of bool
         Whether a stroke is the first of its segment, which starts without a state.
     """
@@ -77,7 +77,8 @@ def cut_strokes(position: Array, segments: list[slice]) -> Strokes:
         moving = np.flatnonzero(direction)
         if len(moving) == 0:
             continue
-        # At rest a stroke goes on: fill zeros with the direction before them (at the start, after).
+        # At rest a stroke continues: fill zeros with the direction before them (at the start,
+        # after).
         last = np.searchsorted(moving, np.arange(len(direction)), side="right") - 1
         direction = direction[moving[np.maximum(last, 0)]]
         first = np.r_[0, np.flatnonzero(np.diff(direction)) + 1]
@@ -101,7 +102,7 @@ def cut_strokes(position: Array, segments: list[slice]) -> Strokes:
 
 
 def strokes_of(signals: Signals, joint: int) -> Strokes:
-    """Strokes of a joint, from 0, cut once for everything that follows its path."""
+    """Strokes of a joint, from 0, cut once for all states that depend on its path."""
     strokes: Strokes = signals.once(
         ("strokes", joint), lambda: cut_strokes(signals.q[:, joint], signals.segments)
     )
@@ -112,7 +113,7 @@ def _run(strokes: Strokes, n_samples: int, law: Law) -> Array:
     """State of a rate-independent hysteresis along a path, zero at the start of each segment."""
     state = np.zeros(n_samples)
     start, value = [], 0.0
-    # Plain numbers: NumPy's take fifty times as long one by one.
+    # Plain numbers: single operations on NumPy's take fifty times as long.
     for opens, direction, gone in zip(
         strokes.opens.tolist(),
         strokes.direction.tolist(),
@@ -214,13 +215,13 @@ def _stop_law(presliding: float) -> Law:
 class PathMemory(Effect):
     """Base of effects whose state depends on the path of their own joint alone.
 
-    A subclass says how each state changes along a stroke in one direction, and what the columns
-    are for given states. Logs are walked through from reversal to reversal; a simulation advances
-    the same laws step by step.
+    A subclass defines the change of each state along a stroke in one direction, and the columns for
+    given states. Logs are processed from reversal to reversal; a simulation advances the same laws
+    step by step.
     """
 
     def laws(self, **shape: Any) -> tuple[Law, ...]:
-        """How every state changes along a stroke: ``law(start, direction, way) -> state``."""
+        """Change of every state along a stroke: ``law(start, direction, way) -> state``."""
         raise NotImplementedError
 
     def columns_at(
@@ -240,10 +241,9 @@ class PathMemory(Effect):
 
 
 class Dahl(PathMemory):
-    """Friction that builds up over a short way after each reversal.
+    """Friction that builds up over a short distance after each reversal.
 
-    Dahl's exponent i is 1 for ductile materials, which the plain form has, or the ``exponent`` of
-    the shape.
+    Dahl's exponent i is 1 (ductile materials) in the plain form, or the ``exponent`` of the shape.
     """
 
     kind = "dahl"
@@ -311,7 +311,7 @@ class LuGre(PathMemory):
 class MaxwellSlip(PathMemory):
     """Several spring-slider elements in parallel.
 
-    Their ways from rest to slip differ by a factor, 2 or the ``spread`` of the shape.
+    Their distances from rest to slip differ by a factor, 2 or the ``spread`` of the shape.
     """
 
     kind = "maxwell_slip"

@@ -10,7 +10,7 @@ from skidyn.effects._base import Array, Coefficient, Effect
 
 
 class RotorInertia(Effect):
-    """Inertia of the motor's rotor, seen through the gear."""
+    """Inertia of the motor's rotor, reflected through the gear."""
 
     kind = "rotor_inertia"
     drawn_against = "ddq"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Friction that grows with the torque the transmission carries."""
+"""Friction that grows with the transmitted torque."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from skidyn.effects._base import Array, Coefficient, Effect, Shape
 class LoadDependentFriction(Effect):
     """Gear friction that grows with the transmitted torque, or with another ``power`` of it.
 
-    The power is 1 where the shape has none. Another one is of the load over a ``reference`` in N m,
-    1 N m where the shape has none, so that ``mu`` is the share that is lost of a load of this size.
-    One that is ``driving`` acts only while the joint moves its load, and not while the load moves
-    the joint, as the efficiency of many gears does. One that is ``viscous`` grows with the speed,
-    too, in units of 1 rad/s or 1 m/s, so that ``mu`` has no unit. Where the torque of the drive
-    counts, the load has the ``friction`` (N m or N) and the ``damping`` beside it that the drive
-    has to overcome as well. A preloaded gear feels what exceeds a ``threshold``, N m or N; one
-    flank that rubs feels load of one sign (``side``, 1 or -1).
+    The power is 1 if the shape has none. Another power is that of the load divided by a
+    ``reference`` in N m (1 N m if the shape has none), so that ``mu`` is the lost share of a load
+    of this size. With ``driving``, it acts only while the joint moves its load, and not while the
+    load moves the joint, as for the efficiency of many gears. With ``viscous``, it also grows with
+    the speed, in units of 1 rad/s or 1 m/s, so that ``mu`` has no unit. If the torque of the drive
+    counts, the load includes the ``friction`` (N m or N) and the ``damping`` that the drive has to
+    overcome as well. The friction of a preloaded gear depends on the load above a ``threshold``, N
+    m or N; that of a single rubbing flank depends on load of one sign (``side``, 1 or -1).
 
-    The gear transmits what the bodies need at the joint; the torque that accelerates the rotor is
-    spent before it, and is no part of the load.
+    The gear transmits the torque that the bodies need at the joint; the torque that accelerates the
+    rotor acts before the gear and is not part of the load.
     """
 
     kind = "load_dependent_friction"
@@ -59,7 +59,7 @@ class LoadDependentFriction(Effect):
         "Duclusaud et al. (2024), Extended friction models for servo actuators."
     )
 
-    #: The plain form needs no search, although there are others.
+    #: The plain form needs no search, although there are further forms.
     has_shape = False
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:

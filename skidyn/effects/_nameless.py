@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Nameless functions of one or two signals: what the diagnosis tries when no name fits.
+"""Unknown functions of one or two signals, used by the diagnosis if no known effect fits.
 
-They are terms like any other, so a model that adopts one fits, predicts and is stored as usual.
+They are ordinary terms, so a model with one is fitted, used for prediction and stored as usual.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from skidyn.effects._base import Coefficient, Effect, Shape
 #: Share of the samples of a trajectory left out at either end of its range.
 _OUTSIDE = 0.002
 
-#: Trajectories that must reach a value for a function to follow it there.
+#: Number of trajectories that must reach a value for a function to be fitted there.
 _REACHING = 3
 
-#: Share of the range over which the secant is taken that continues a function beyond its range.
+#: Share of the range over which the secant is computed that continues a function beyond it.
 _SECANT = 0.15
 
-#: Difference between the shares of torque and of way from which no coupling stores the energy.
+#: Difference between the ratios of torque and of distance above which a coupling is not elastic.
 _UNEQUAL = 0.2
 
 #: Highest order of a function of one signal.
 _ORDER = 12
 
-#: Pairs of joints, those nearest to each other first, between which a torque is tried.
+#: Number of pairs of joints, nearest first, between which a torque is tried.
 _PAIRS = 28
 
 
@@ -45,14 +45,14 @@ class NamelessEffect(Effect):
 
     nameless = True
     softness = 1e-5
-    #: Whether its signals enter as one number, such as a sum or the way since a reversal, so that
-    #: none of them can be tested by itself.
+    #: Whether its signals are combined to one number, such as a sum or the distance since a
+    #: reversal, so that none of them can be tested alone.
     is_of_one_number: ClassVar[bool] = False
     #: Signals it depends on: ``own`` joint, the ``other`` joint or time.
     depends_on: ClassVar[tuple[str, ...]] = ()
 
     def words(self, shape: Mapping[str, Any]) -> str:
-        """What to call it with some shape, where the signals it depends on do not say it.
+        """Title for some shape, if the names of the signals are not sufficient.
 
         Parameters
         ----------
@@ -79,14 +79,14 @@ class NamelessEffect(Effect):
         return tuple(dict.fromkeys(names))
 
     def denies(self, effect: Effect, shape: Mapping[str, Any]) -> bool:
-        """Whether what was found with some shape cannot be what a known effect does.
+        """Whether a finding with some shape cannot be a known effect.
 
         Parameters
         ----------
         effect : Effect
             Known effect on the same joints.
         shape : mapping
-            Shape parameters that were found.
+            Shape parameters of the finding.
 
         Returns
         -------
@@ -229,7 +229,7 @@ class FunctionOfTwoVelocities(_WithOther):
 
 
 class FunctionOfSignals(NamelessEffect):
-    """A smooth function of any few signals, those that the residual was found to follow.
+    """A smooth function of the few signals on which the residual was found to depend.
 
     Products of Legendre polynomials of positions and accelerations, and of powers of velocities
     with their direction, the lowest orders first.
@@ -278,8 +278,8 @@ class FunctionOfSignals(NamelessEffect):
 def splines(x: Array, low: float, high: float, count: int) -> Array:
     """Cubic B-splines on a range, continued beyond it, shape (n_samples, count).
 
-    Together they add up to a constant, which the model may lack. The recursion is that of Cox and
-    de Boor [1]_, for the four splines that are not zero at a sample.
+    Their sum is a constant, which the model may lack. The recursion is that of Cox and de Boor
+    [1]_, for the four splines that are not zero at a sample.
 
     References
     ----------
@@ -315,7 +315,7 @@ def splines(x: Array, low: float, high: float, count: int) -> Array:
 
 
 def supported_range(signals: Signals, x: Array) -> tuple[float, float]:
-    """Range of a signal that several trajectories cover: elsewhere one of them would decide."""
+    """Range of a signal that several trajectories cover, so that no single one decides."""
     (found,) = supported_ranges(signals, x[:, None])
     return found
 
@@ -396,7 +396,7 @@ class FunctionOfThreeSignals(FunctionOfSignals):
 
 
 class FunctionOfSum(NamelessEffect):
-    """A function of a sum of positions: of how a link is turned about axes that are parallel."""
+    """A function of a sum of positions, such as the angle of a link about parallel axes."""
 
     kind = "function_of_sum"
     title = "Function of a sum of positions"
@@ -445,9 +445,9 @@ def _weighted_sum(signals: Signals, names: Sequence[str], weights: Sequence[floa
 class TorqueBetweenTwoJoints(NamelessEffect):
     """A torque between two joints that depends on a sum of their positions.
 
-    The second joint feels what the first one feels, times ``passed``. Where what lies between them
-    stores energy, as a cable that tightens or links that touch each other, that is the ratio, and
-    so it is where the shape has none; where it loses energy, or is driven, it may be another share.
+    The torque on the second joint is that on the first one times ``passed``. If the connection
+    stores energy, as a cable that tightens or links that touch each other, this is the ratio, which
+    is also used if the shape has none; if the connection loses energy, or is driven, it may differ.
     """
 
     is_of_one_number = True
@@ -489,7 +489,7 @@ class TorqueBetweenTwoJoints(NamelessEffect):
         for ratio, (low, high) in zip(
             ratios.tolist(), supported_ranges(signals, sums), strict=True
         ):
-            # What the sum itself covers, kept in terms that stay when the ratio is refined.
+            # The range of the sum, in terms that do not change when the ratio is refined.
             share = (high - low) / 2 / max(half[0] + abs(ratio) * half[1], 1e-300)
             shift = (low + high) / 2 - (middle[0] + ratio * middle[1])
             shape = {"middle": middle, "half": half, "share": share, "shift": shift}
@@ -501,7 +501,7 @@ class TorqueBetweenTwoJoints(NamelessEffect):
         return float(signals.unit[i] / signals.unit[j])
 
     def denies(self, effect: Effect, shape: Mapping[str, Any]) -> bool:
-        """What couples two joints passes on as much of its torque as of the way."""
+        """A coupling of two joints transmits torque with the same ratio as distance."""
         ratio = shape["ratio"]
         passed = shape.get("passed", ratio)
         return effect.scope == "pair" and abs(passed - ratio) > _UNEQUAL * abs(ratio)
@@ -518,7 +518,7 @@ class TorqueBetweenTwoJoints(NamelessEffect):
 
 
 class ClockPeriodic(NamelessEffect):
-    """A torque periodic in time, of any wave form: a pump, a cam, a controller that cycles."""
+    """A torque periodic in time, of any wave form: a pump, a cam, a cyclic controller."""
 
     kind = "clock_periodic"
     drawn_against = "time"
@@ -530,7 +530,7 @@ class ClockPeriodic(NamelessEffect):
     search = "clock"
     #: Waves per period: a square wave has the odd ones.
     harmonics: ClassVar[tuple[int, ...]] = (1, 2, 3, 5)
-    #: Highest frequency in Hz that averaged rows show; waves above it are left out.
+    #: Highest frequency in Hz that averaged rows contain; higher waves are left out.
     highest: ClassVar[float] = 8.0
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
@@ -545,7 +545,7 @@ class ClockPeriodic(NamelessEffect):
 
 
 class Vibration(NamelessEffect):
-    """A wave in time that is faster than any motion: a fan, mains hum, a loose part."""
+    """A wave in time that is faster than the motion: a fan, mains hum, a loose part."""
 
     kind = "vibration"
     drawn_against = "time"

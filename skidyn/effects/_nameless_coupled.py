@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Nameless torques that another joint, or something that swings on the link, brings about."""
+"""Unknown torques caused by another joint, or by an oscillating mass on the link."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class FrictionOverOtherLoad(NamelessEffect):
 
 
 class Crosstalk(NamelessEffect):
-    """A share of another joint's torque, as a sensor shows whose bridge or cable picks it up."""
+    """A share of another joint's torque, as by crosstalk of a sensor's bridge or cable."""
 
     kind = "crosstalk"
     drawn_against = "load"
@@ -63,9 +63,9 @@ class Crosstalk(NamelessEffect):
 
 
 class GyroscopicCouple(NamelessEffect):
-    """A torque of one joint for the speed of another, and its reaction: something spins [1]_.
+    """A torque of one joint due to the speed of another, and its reaction, by a spinning mass [1]_.
 
-    It takes no energy: what it does on one joint, it takes back on the other.
+    It uses no energy: the power on one joint is the opposite of that on the other.
 
     References
     ----------
@@ -95,7 +95,7 @@ class GyroscopicCouple(NamelessEffect):
 
 
 class SwingingLoad(NamelessEffect):
-    """Something on the link that swings by itself: liquid in a tank, a hose, a loose battery [1]_.
+    """An oscillating mass on the link: liquid in a tank, a hose, a loose battery [1]_.
 
     References
     ----------
@@ -118,13 +118,13 @@ class SwingingLoad(NamelessEffect):
     is_of_one_number = True
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        from scipy.signal import lfilter  # not paid for by who only checks a log
+        from scipy.signal import lfilter  # slow to import, and not needed to check a log
 
         omega, damping = 2 * np.pi * shape["frequency"], shape["damping"]
         columns = np.zeros((signals.n_samples, 2))
         for rows, step in zip(signals.segments, signals.steps, strict=True):
             if rows.stop - rows.start < 7 or omega * step > 1:
-                continue  # it swings faster than the log shows
+                continue  # it oscillates faster than the log can show
             for k, top in enumerate(((0.0, 0.0, -(omega**2)), (0.0, -omega, 0.0))):
                 b, a = second_order_filter(top, omega, damping, 1 / step)
                 columns[rows, k] = lfilter(b, a, signals.ddq[rows, joint])

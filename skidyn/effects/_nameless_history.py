@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Nameless torques that follow history or the place of the tool."""
+"""Unknown torques that depend on history or on the position of the tool."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from skidyn.effects._nameless import (
 )
 from skidyn.effects._tool import tool_jacobian, tool_position
 
-#: Ways since the last reversal, rad or tenths of m, over which a torque may fade.
+#: Distances since the last reversal, rad or tenths of m, over which a torque may fade.
 _WAYS = (0.01, 0.03, 0.1, 0.3)
-#: Plays, as shares of the range of a position, and splines of a function of what lags.
+#: Widths of play, as shares of the range of a position, and number of splines of the function.
 _PLAYS, _LAGGING = (0.03, 0.06, 0.1, 0.15, 0.22, 0.33, 0.5), 16
 #: Times in s over which a torque may relax.
 _RELAXATION = (0.1, 0.3, 1.0, 3.0)
-#: Recordings at least over which a torque may drift.
+#: Least number of recordings for a torque that drifts.
 _DRIFTING = 5
-#: Moments that are tried.
+#: Number of moments that are tried.
 _MOMENTS = 32
 #: Times since the start of a recording over which a torque may fade, as shares of its length.
 _FADING = (0.05, 0.15, 0.5)
 
 
-#: Places at which a force is tried, and its widths as shares of the reach of the motion.
+#: Number of places at which a force is tried, and its widths as shares of the extent of the motion.
 _PLACES, _WIDTHS = 24, (0.08, 0.16, 0.3)
 
 
@@ -80,13 +80,13 @@ class FunctionOfTime(NamelessEffect):
         return [{"low": start, "high": end}] if end > start else []
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        # Beyond the log nobody knows how it drifts: it stays.
+        # Beyond the log the drift is unknown: the torque stays constant.
         share = np.clip((signals.clock - shape["low"]) / (shape["high"] - shape["low"]), 0.0, 1.0)
         return legvander(2 * share - 1, len(self.coefficients) - 1)
 
 
 class SuddenOffset(NamelessEffect):
-    """Torque with an onset at some moment and stays, as after a collision or a slip."""
+    """A torque that sets in at some moment and stays, as after a collision or a slip."""
 
     kind = "sudden_offset"
     drawn_against = "time"
@@ -111,7 +111,7 @@ class SuddenOffset(NamelessEffect):
         return f"Torque with an onset at {shape['moment']:.6g} s"
 
     def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
-        # a recording's length: moments between recordings are all alike
+        # a recording's length: moments between recordings are equivalent
         return float(np.median([np.ptp(signals.clock[rows]) for rows in signals.segments]))
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
@@ -119,7 +119,7 @@ class SuddenOffset(NamelessEffect):
 
 
 class FrictionSinceReversal(NamelessEffect):
-    """Friction that fades or grows with the way since the joint turned back."""
+    """Friction that fades or grows with the distance since the last reversal of the joint."""
 
     is_of_one_number = True
     kind = "friction_since_reversal"
@@ -130,14 +130,14 @@ class FrictionSinceReversal(NamelessEffect):
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         q, unit = signals.q[:, joint], signals.unit[joint]
-        # A Dahl state falls short of its direction by just the exponential of the way since then.
+        # The difference of a Dahl state from its direction is the exponential of that distance.
         return np.column_stack(
             [signals.sign[:, joint] - dahl_state(q, signals.segments, way * unit) for way in _WAYS]
         )
 
 
 class FunctionOfWaySinceReversal(NamelessEffect):
-    """A torque that fades or grows with the way since the joint turned back."""
+    """A torque that fades or grows with the distance since the last reversal of the joint."""
 
     is_of_one_number = True
     kind = "function_of_way_since_reversal"
@@ -155,10 +155,10 @@ class FunctionOfWaySinceReversal(NamelessEffect):
 
 
 class FunctionOfLaggingPosition(NamelessEffect):
-    """A torque that snaps over: a function of the position that lags behind by some play.
+    """A torque with play: a function of a position that lags behind by some play.
 
-    Whatever switches at one angle on the way there and at another one on the way back, as a latch,
-    a magnet or a hose that flips over, is a function of the output of a play [1]_.
+    A torque that switches at different angles in the two directions, as by a latch, a magnet or a
+    hose that flips over, is a function of the output of a play operator [1]_.
 
     References
     ----------
@@ -172,7 +172,7 @@ class FunctionOfLaggingPosition(NamelessEffect):
     coefficients = unnamed_coefficients(_LAGGING)
     depends_on = ("q_own",)
     softness = 2e-3
-    #: What lags, and its plays as shares of its range.
+    #: The signal that lags, and the widths of play as shares of its range.
     signal: ClassVar[str] = "q"
     plays: ClassVar[tuple[float, ...]] = _PLAYS
 
@@ -187,7 +187,7 @@ class FunctionOfLaggingPosition(NamelessEffect):
 
 
 class FunctionOfLaggingVelocity(FunctionOfLaggingPosition):
-    """A torque that switches at one speed on the way up and at another one on the way down."""
+    """A torque that switches at one speed while it increases and at another while it decreases."""
 
     kind = "function_of_lagging_velocity"
     drawn_against = "dq"
@@ -198,7 +198,7 @@ class FunctionOfLaggingVelocity(FunctionOfLaggingPosition):
 
 
 class RelaxingSpring(NamelessEffect):
-    """A torque that follows the position and fades when it rests: rubber, hoses, grease [1]_.
+    """A torque that depends on the position and relaxes at rest: rubber, hoses, grease [1]_.
 
     References
     ----------
@@ -220,8 +220,8 @@ class RelaxingSpring(NamelessEffect):
 
 
 def _followed(x: Array, signals: Signals, time_constant: float) -> Array:
-    """What follows a signal with a time constant, from its value at the start of each segment."""
-    from scipy.signal import lfilter  # not paid for by who only checks a log
+    """First-order lag of a signal, from its value at the start of each segment."""
+    from scipy.signal import lfilter  # not needed to check a log
 
     y = np.array(x)
     for rows, step in zip(signals.segments, signals.steps, strict=True):
@@ -249,12 +249,12 @@ class _AtTool(NamelessEffect):
         return [] if signals.robot is None else self.tried(signals, tool_position(signals))
 
     def tried(self, signals: Signals, position: Array) -> list[dict[str, Any]]:
-        """Shapes for a motion whose tool was at these places, (n_samples, 3)."""
+        """Shapes for a motion with these positions of the tool, (n_samples, 3)."""
         raise NotImplementedError
 
 
 class DragOnTool(_AtTool):
-    """A drag of the tool that depends on its height: a bath that it dips into, air, brushes."""
+    """A drag on the tool that depends on its height: a bath, air, brushes."""
 
     kind = "drag_on_tool"
     drawn_against = "dq"
@@ -279,7 +279,7 @@ class DragOnTool(_AtTool):
 
 
 class ForceOverToolPosition(_AtTool):
-    """A force on the tool that depends on where the tool is: a field, a hose, a cloth."""
+    """A force on the tool that depends on its position: a field, a hose, a cloth."""
 
     kind = "force_over_tool_position"
     title = "Force that depends on the position of the tool"

@@ -15,8 +15,8 @@ from skidyn.effects._base import Array, Coefficient, Effect, Shape
 class PositionDependentFriction(Effect):
     """Dry friction whose level changes along the joint's travel.
 
-    It follows a wave, a wave and that of twice its number (``overtone``), or is higher (lower) at
-    one spot ``place`` of some ``width`` by a dry part ``dFc`` and a viscous part ``dFv``.
+    It varies as a wave, as a wave with its second harmonic (``overtone``), or is higher or lower at
+    one ``place`` of some ``width`` by a dry part ``dFc`` and a viscous part ``dFv``.
     """
 
     kind = "position_dependent_friction"
@@ -31,7 +31,7 @@ class PositionDependentFriction(Effect):
         Shape("place", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
         Shape("width", "rad", (), 1e-3, 10.0),
     )
-    #: Where a spot is looked for, and its width, as shares of the travel.
+    #: Places that are tried, and widths, as shares of the travel.
     spots = tuple({"place": k / 8, "width": w} for w in (0.06, 0.15) for k in range(1, 8))
     forms = ({"overtone": 1.0}, *spots)
     simplicity = 22
@@ -47,7 +47,7 @@ class PositionDependentFriction(Effect):
             {"place": low + span * form["place"], "width": span * form["width"]}
             for form in self.spots
         ]
-        # one wave and two over the travel: friction that rises and falls in no regular way
+        # one wave and two over the travel: friction that varies irregularly
         own = (2 * np.pi / span, 4 * np.pi / span) if span > 0 else ()
         rich = [{"n": n, "overtone": 1.0} for n in (*waves, *own)]
         return [*({"n": n} for n in waves), *rich, *spots]
@@ -95,8 +95,8 @@ class TorqueRipple(Effect):
     formula = r"A\sin(N q - \varphi)"
     coefficients = (Coefficient("a", "N m"), Coefficient("b", "N m"))
     shapes = (Shape("N", "1/rad", (), 8.0, 420.0, spacing="linear", scales=False),)
-    # Averaging over windows of time would remove a fast ripple, so it is looked for in the
-    # residual at the full rate, as a line in its spectrum over joint angle.
+    # Averaging over windows of time would remove a fast ripple, so it is searched in the residual
+    # at the full rate, as a line in its spectrum over joint angle.
     search = "spectrum"
     simplicity = 20
     rivals = ("position_dependent_friction",)

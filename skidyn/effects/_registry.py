@@ -10,7 +10,7 @@ _EFFECTS: dict[str, Effect] = {}
 
 
 def list_effects() -> list[str]:
-    """Kinds of the catalogue, without the nameless functions that stand for ``unknown``.
+    """Kinds of the catalogue, without the functions for ``unknown`` effects.
 
     Returns
     -------
@@ -37,12 +37,12 @@ def get_effect(kind: str) -> Effect:
     Returns
     -------
     Effect
-        The instance of the catalogue.
+        The instance in the catalogue.
 
     Raises
     ------
     EffectError
-        No such kind.
+        The kind does not exist.
 
     Examples
     --------
@@ -57,7 +57,7 @@ def get_effect(kind: str) -> Effect:
 
 
 def nameless_kinds() -> list[str]:
-    """Nameless functions that the diagnosis tries when no name fits."""
+    """Functions for unknown effects, which the diagnosis tries if no known effect fits."""
     return [kind for kind, e in _EFFECTS.items() if e.nameless and e.search != "given"]
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Digital filters of what swings: springs with masses, liquids in tanks."""
+"""Digital filters of oscillating systems: springs with masses, liquids in tanks."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ def second_order_filter(
 ) -> tuple[Array, Array]:
     r"""Filter of :math:`(b_2 s^2 + b_1 s + b_0) / (s^2 + 2\zeta\omega s + \omega^2)` for samples.
 
-    By Tustin's substitution of :math:`s`, as :func:`scipy.signal.bilinear` does for any order, at a
-    hundredth of its time: it is asked for every shape and every segment of a log.
+    By Tustin's substitution of :math:`s`, as :func:`scipy.signal.bilinear` does for any order, in a
+    hundredth of its time; it is needed for every shape and every segment of a log.
 
     Parameters
     ----------
     top : sequence of 3 floats
         ``b_2``, ``b_1`` and ``b_0``.
     omega : float, rad/s
-        Of the undamped swing.
+        Angular frequency of the undamped oscillation.
     damping : float
         Damping ratio.
     rate : float, Hz
@@ -32,7 +32,7 @@ def second_order_filter(
     Returns
     -------
     b, a : ndarray of shape (3,)
-        As :func:`scipy.signal.lfilter` takes them.
+        Arguments of :func:`scipy.signal.lfilter`.
     """
     k = 2 * rate
 

@@ -16,8 +16,8 @@ from skidyn.effects._derivatives import smooth_derivatives
 class TorqueGain(Effect):
     """The logged torque is too large or too small by a factor.
 
-    With a ``sign`` in its shape it is so for positive (1) or negative torque (-1) alone, as where
-    one half of a bridge or of an amplifier is off.
+    With a ``sign`` in its shape this holds only for positive (1) or negative torque (-1), as for a
+    fault in one half of a bridge or of an amplifier.
     """
 
     kind = "torque_gain"
@@ -51,7 +51,7 @@ class TimeDelay(Effect):
     drawn_against = "ddq"
     title = "Time delay of the torque"
     formula = r"-d\,\dot\tau_\mathrm{model}"
-    # Beyond it the first-order expansion of a delay has nothing to do with a delay.
+    # Beyond it the first-order expansion of a delay is no longer valid.
     coefficients = (Coefficient("delay", "s", limit=0.1),)
     needs = ("model_torque", "time")
     is_slow = True
@@ -61,7 +61,7 @@ class TimeDelay(Effect):
     reference = "Ljung (1999), System Identification, chapter 14."
 
     def sites(self, signals: Signals) -> list[tuple[int, ...]]:
-        # One bus delays all joints alike; a single slow sensor delays its own joint.
+        # A bus delays all joints equally; a single slow sensor delays its own joint.
         together = [tuple(range(signals.n_joints))] if signals.n_joints > 1 else []
         return together + super().sites(signals)
 
@@ -82,21 +82,20 @@ class TimeDelay(Effect):
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
         assert signals.model_torque is not None
-        # Dry friction jumps at a reversal: its derivative is a spike that only the reversal rows
-        # see. What lags visibly is the smooth part.
+        # Dry friction jumps at a reversal: its derivative is a spike that affects only the rows of
+        # reversals. The lag is visible in the smooth part.
         smooth = (
             signals.smooth_torque if signals.smooth_torque is not None else signals.model_torque
         )
-        # Its acceleration is noisy, and a derivative of it would be noise on single samples.
+        # The acceleration is noisy, and its derivative would be noise on single samples.
         return {j: -smooth_derivatives(smooth[:, [j]], signals, order=2)[1] for j in joints}
 
 
 class Saturation(Effect):
     """The logged or delivered torque is cut off at a limit.
 
-    With ``rounding`` in its shape the torque bends towards the limit before it: by the hyperbolic
-    tangent if that is 1. With a ``side`` it is cut off for positive (1) or negative torque (-1)
-    alone.
+    With ``rounding`` in its shape the torque approaches the limit smoothly, as a hyperbolic tangent
+    if ``rounding`` is 1. With a ``side`` only positive (1) or negative torque (-1) is cut off.
     """
 
     kind = "saturation"
@@ -105,7 +104,7 @@ class Saturation(Effect):
     formula = r"-c\,\mathrm{sign}(\tau)\max(0,\,|\tau| - L)"
     coefficients = (Coefficient("share", "1", sign=1, is_share=True),)
     shapes = (Shape("limit", "N m", (0.97, 0.93, 0.88, 0.8, 0.7, 0.6), 1e-9, np.inf, scales=False),)
-    #: A rounded limit is seen long before it is reached.
+    #: A rounded limit has an effect far below it.
     forms = ({"rounding": 1.0}, {"side": 1.0}, {"side": -1.0})
     needs = ("model_torque",)
     simplicity = 15

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Torque that depends on the joint's own position, or on nothing at all."""
+"""Torque that depends on the joint's own position, or is constant."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import numpy as np
 from skidyn._signals import Signals
 from skidyn.effects._base import Array, Coefficient, Effect, Shape
 
-#: Shares of the samples between which a contact is one: with more it is a spring.
+#: Smallest and largest share of samples in contact; with more samples it is a spring.
 FEWEST_TOUCHING, MOST_TOUCHING = 0.001, 0.6
-#: A piece over a smaller share of the travel is a step of the torque and no spring; a spring whose
-#: rest is nearer to an end of the travel than this share of it is a stop.
+#: A piece over a smaller share of the travel is a step of the torque and not a spring; a spring
+#: whose rest position is closer to an end of the travel than this share is a stop.
 NARROW, ONE_SIDED = 0.1, 0.15
 
 
@@ -66,13 +66,13 @@ class Spring(Effect):
 class NonlinearSpring(Effect):
     """Spring that stiffens or softens: a power of position, or pieces of different stiffness.
 
-    The plain form is a cubic about the middle of the travel. One with a ``power`` in its shape has
-    another than the third power of the distance from ``rest``, in units of 1 rad or 1 m, so that
-    units stay; one with a ``scale``, in rad or m, its third power times the hyperbolic sine of the
-    distance over it, as rubber stiffens. A spring of pieces has ``low`` and ``high`` in its shape,
-    the positions between which its stiffness is ``k1``; below it is ``k2`` and above ``k3``, all
-    in N m/rad. Springs with two rates, with slack, or that yield beyond some torque are of this
-    form.
+    The plain form is a cubic about the middle of the travel. With a ``power`` in its shape it is
+    this power, instead of the third, of the distance from ``rest``, in units of 1 rad or 1 m, so
+    that units are the same; with a ``scale``, in rad or m, it is the third power times the
+    hyperbolic sine of the distance divided by ``scale``, as rubber stiffens. A piecewise linear
+    spring has ``low`` and ``high`` in its shape, the positions between which its stiffness is
+    ``k1``; below, it is ``k2``, and above, ``k3``, all in N m/rad. Springs with two rates, with
+    slack, or that yield beyond some torque have this form.
     """
 
     kind = "nonlinear_spring"
@@ -91,7 +91,7 @@ class NonlinearSpring(Effect):
         Shape("power", "", (), 2.0, 6.0, scales=False),
         Shape("scale", "rad", (), 0.05, 2.0),
     )
-    #: Where the search starts: positions as quantiles, powers, scales in units of the joint.
+    #: Initial values of the search: positions as quantiles, powers, scales in units of the joint.
     forms = (
         {"low": 0.2, "high": 0.8},
         {"low": 0.4, "high": 0.6},
@@ -186,12 +186,12 @@ class GravityCompensator(Effect):
 class EndStop(Effect):
     """One-sided elastic contact beyond a position: bumper, hose, cable pulled tight.
 
-    A soft bumper stiffens: then the torque grows with another ``power`` of the way (1 where the
-    shape has none), in units of 1 rad or 1 m, so that the unit of the stiffness stays. One that
-    loses energy resists more on the way in: the torque is larger by the factor ``1 + damping``
+    A soft bumper stiffens: then the torque grows with another ``power`` of the deflection (1 if the
+    shape has none), in units of 1 rad or 1 m, so that the unit of the stiffness is the same. A
+    contact that loses energy has a larger torque during approach, by the factor ``1 + damping``
     times the speed of the approach (Hunt, Crossley 1975, J. Applied Mechanics 42(2)), and never
-    pulls. With ``q_low`` in the shape there is one at either end, the second below that position
-    and as stiff as the first.
+    pulls. With ``q_low`` in the shape there is a contact at either end, the second below that
+    position and as stiff as the first.
     """
 
     kind = "end_stop"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A term: an effect on certain joints with its shape; and sums of terms, parts of a model."""
+"""Terms (effects on certain joints with their shapes) and sums of terms."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from skidyn._signals import Array, Signals
 from skidyn.effects._base import Coefficient, Effect
 from skidyn.effects._registry import get_effect
 
-#: Joints of the motion on which terms are tried, more than any robot here has.
+#: Number of joints of the motion on which terms are tried; larger than that of any robot here.
 _JOINTS = 32
 
 
@@ -34,7 +34,7 @@ class Term:
     joints : tuple of int
         Joints, counted from 1; all joints for an effect of the whole robot.
     shape : mapping of str to object
-        Values of the shape parameters; empty where the effect has none.
+        Values of the shape parameters; empty if the effect has none.
 
     Examples
     --------
@@ -201,7 +201,7 @@ class Term:
         Parameters
         ----------
         signals : Signals
-            Motion, with the torque of the model where the effect needs it.
+            Motion, with the torque of the model if the effect needs it.
 
         Returns
         -------
@@ -271,7 +271,7 @@ class TermSum(tuple[Term, ...]):
         return np.concatenate([np.zeros(0), *(term.signs for term in self)])
 
     def slices(self, start: int = 0) -> Iterator[tuple[Term, slice]]:
-        """Every term with its place among the coefficients.
+        """Every term with the slice of its coefficients.
 
         Parameters
         ----------
@@ -293,7 +293,7 @@ def _short(value: Any) -> str:
 
 
 def _trial(term: Term, dq: Array, trajectory: NDArray[np.int64]) -> Signals:
-    """Motion on which a term is tried without robot and clock: all other signals are drawn."""
+    """Motion on which a term is tried without robot and time; all other signals are random."""
     rng = np.random.default_rng(0)
     shape = (len(dq), max(_JOINTS, *term.joints))
     q, ddq, load, torque, temperature = rng.normal(size=(5, *shape))
@@ -310,16 +310,16 @@ def _trial(term: Term, dq: Array, trajectory: NDArray[np.int64]) -> Signals:
 
 
 def _columns(term: Term, signals: Signals) -> Array | None:
-    """Columns of a trial, None where the effect cannot be tried on it."""
+    """Columns of a trial, None if the effect cannot be evaluated on it."""
     try:
         return np.concatenate(list(term.torque_columns(signals).values()), axis=1)
-    except Exception:  # an effect of a user may raise anything where the robot is missing
+    except Exception:  # an effect of a user may raise any exception if the robot is missing
         return None
 
 
 @lru_cache(maxsize=512)
 def _is_dry(effect: Effect, term: Term) -> bool:
-    # Every sample is a trajectory of its own: no state can remember the one before. The other
+    # Every sample is a separate trajectory, so no state depends on the sample before. The other
     # signals have to be the same in both directions.
     speeds = np.array([-1.0, -0.01, 0.01, 1.0])
     signals = _trial(term, speeds, np.arange(4))

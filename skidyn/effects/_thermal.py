@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Friction and offsets that follow a temperature, or time where none is logged."""
+"""Friction and offsets that depend on a temperature, or on time if none is logged."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ REFERENCE_TEMPERATURE = 30.0
 _BITTENCOURT = "Bittencourt, Wernholt, Sander-Tavallaey, Brogardh (2010), IROS, 4548-4554."
 
 
-#: Recordings, spread over a log, from which on friction may be another one.
+#: Number of recordings, spread over a log, from which friction may have changed.
 _CHANGES = 16
-#: Temperature range over which what follows the temperature levels off, K.
+#: Temperature ranges over which the dependence on temperature levels off, K.
 _LEVELLING = ({"levels_over": 6.0}, {"levels_over": 15.0})
 
 
 def _warmth(signals: Signals, joint: int, levels_over: float = np.inf) -> Array:
-    """Warmth above the reference in K; what levels off has its slope there."""
+    """Temperature above the reference in K; a saturating function has its slope there."""
     assert signals.temperature is not None
     warm = signals.temperature[:, joint] - REFERENCE_TEMPERATURE
     return -levels_over * np.expm1(-warm / levels_over) if np.isfinite(levels_over) else warm
@@ -38,8 +38,8 @@ def _constant_temperature(signals: Signals, joint: int) -> str | None:
 class TemperatureFriction(Effect):
     """Viscous and Coulomb friction that change with a logged temperature.
 
-    As grease does, it may level off exponentially ``levels_over`` some K (Bittencourt, Axelsson
-    2014, IEEE/ASME TMECH 19(5)).
+    As with grease, it may level off exponentially over a range ``levels_over`` in K (Bittencourt,
+    Axelsson 2014, IEEE/ASME TMECH 19(5)).
     """
 
     kind = "temperature_friction"
@@ -97,12 +97,12 @@ class TemperatureOffset(Effect):
 
 
 class FrictionDrift(Effect):
-    """Friction that changes slowly over the log where no temperature is logged.
+    """Friction that changes slowly over the log if no temperature is logged.
 
     A gear warms up quickly at first and then ever more slowly: friction is a parabola of a warm-up
     that approaches its end with a time constant. The first two coefficients are the change from the
-    start of the log to its end. Friction that changed at once, as after a repair or when a seal
-    slips, has the time ``since`` when it did in its shape.
+    start of the log to its end. For friction that changed at once, as after a repair or when a seal
+    slips, the shape contains the time ``since`` which it has changed.
     """
 
     kind = "friction_drift"
@@ -149,7 +149,7 @@ class FrictionDrift(Effect):
             later = (signals.clock >= shape["since"]).astype(float)
             return np.column_stack([later * dq, later * sign, 0 * dq, 0 * dq])
         since, time_constant = signals.clock - shape["t0"], shape["time_constant"]
-        # Before the log began, as it changed at its start.
+        # Before the log began, it has the value of its start.
         risen = np.where(
             since > 0, -np.expm1(-since.clip(0) / time_constant), since / time_constant
         )

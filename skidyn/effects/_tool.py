@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the tool carries or touches, in all or in some of the trajectories."""
+"""Loads and contacts of the tool, in all or in some of the trajectories."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from skidyn.effects._springs import FEWEST_TOUCHING, MOST_TOUCHING
 
 
 def tool_position(signals: Signals) -> Array:
-    """Place of the tool, (n_samples, 3), computed once for all shapes."""
+    """Position of the tool, (n_samples, 3), computed once for all shapes."""
     robot = signals.robot
     assert robot is not None
     position: Array = signals.once("tool", lambda: robot.forward_kinematics(signals.q)[0])
@@ -41,14 +41,14 @@ def _turning_jacobian(signals: Signals) -> Array:
     return jacobian
 
 
-#: Distance of a centre of mass from its link, in m, beyond which the motion does not tell the mass.
+#: Distance of a centre of mass from its link, in m, beyond which the mass is not determined.
 FARTHEST = 5.0
 
 
 class _ToolEffect(Effect):
     scope = "robot"
     needs = ("robot",)
-    #: The trajectories that carry it are found by a split of the per-trajectory estimates.
+    #: The trajectories with the payload are found by a split of the per-trajectory estimates.
     search = "trajectories"
 
     def not_shown(self, signals: Signals, joint: int) -> str | None:
@@ -71,7 +71,7 @@ class Payload(_ToolEffect):
         Coefficient("mcz", "kg m"),
         *(Coefficient(name, "kg m^2") for name in ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")),
     )
-    # The inertia of a payload shows in the sum of many trajectories only.
+    # The inertia of a payload is determined only by many trajectories together.
     leading = 4
     grows = True
     simplicity = 27
@@ -99,7 +99,7 @@ class Payload(_ToolEffect):
     ) -> dict[str, Any]:
         mass, moment = float(coefficients[0]), [float(v) for v in coefficients[1:4]]
         if max(map(abs, moment)) > FARTHEST * abs(mass):
-            # Fewer joints than it takes to weigh it, as on a single pendulum.
+            # Too few joints to determine its mass, as on a single pendulum.
             return {f"first_moment_{a}": v for a, v in zip("xyz", moment, strict=True)}
         place = {f"com_{a}": v / mass if mass else 0.0 for a, v in zip("xyz", moment, strict=True)}
         return {"mass": mass, **place}
@@ -112,7 +112,7 @@ class Payload(_ToolEffect):
 class ExternalWrench(_ToolEffect):
     """A constant force on the tool: a hose, a spring balancer, a hand that pulls.
 
-    Where it does not act at the origin of the tool, its moment about that is constant, too.
+    If it does not act at the origin of the tool, its moment about the origin is constant, too.
     """
 
     kind = "external_wrench"
@@ -123,7 +123,7 @@ class ExternalWrench(_ToolEffect):
         *(Coefficient(f"f{axis}", "N") for axis in "xyz"),
         *(Coefficient(f"m{axis}", "N m") for axis in "xyz"),
     )
-    # One trajectory tells a force, and a moment only if it turns the tool about all axes.
+    # One trajectory determines a force, and a moment only if it turns the tool about all axes.
     leading = 3
     simplicity = 28
     rivals = ("payload", "environment_contact")
@@ -148,7 +148,7 @@ class ExternalWrench(_ToolEffect):
 
 #: Power of the depth with which the force between round bodies grows (Hertz 1882).
 _HERTZ = 1.5
-#: Directions, azimuth and elevation in rad, in which planes are looked for that face no axis: walls
+#: Directions (azimuth and elevation in rad) of planes that are tried in addition to the axes: walls
 #: and tilted tables.
 _OBLIQUE = (
     *((np.pi * (k + 0.5) / 2, 0.0) for k in range(4)),
@@ -159,12 +159,12 @@ _OBLIQUE = (
 class EnvironmentContact(Effect):
     """A soft plane that the tool presses into.
 
-    Its normal is an axis of the base, or points to ``azimuth`` and ``elevation``, where the plane
-    lies at ``z0`` beside the place ``x``, ``y``, ``z``. What is pressed between round bodies
-    stiffens: then the force grows with another ``power`` of the depth (1 where the shape has none),
-    in units of 1 m, so that the unit of the stiffness stays. What loses energy resists more on the
-    way in: the force is larger by the factor ``1 + damping`` times the speed of the approach (Hunt,
-    Crossley 1975, J. Applied Mechanics 42(2)), and never pulls.
+    Its normal is an axis of the base, or has the direction ``azimuth`` and ``elevation``; then the
+    plane is at ``z0`` relative to the point ``x``, ``y``, ``z``. A contact of round bodies
+    stiffens: then the force grows with another ``power`` of the depth (1 if the shape has none), in
+    units of 1 m, so that the unit of the stiffness is the same. A contact that loses energy has a
+    larger force during approach, by the factor ``1 + damping`` times the speed of the approach
+    (Hunt, Crossley 1975, J. Applied Mechanics 42(2)), and never pulls.
     """
 
     kind = "environment_contact"

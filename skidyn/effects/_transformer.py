@@ -44,9 +44,9 @@ class FrictionTransformer(LogTransformer):
     columns_ : Columns
         Meaning of the columns of X.
     n_features_in_ : int
-        Columns of X.
+        Number of columns of X.
     feature_names_in_ : ndarray of str
-        Their names, where X has names.
+        Names of the columns, if X has names.
 
     See Also
     --------
@@ -90,7 +90,7 @@ class FrictionTransformer(LogTransformer):
         named = [*names]
         for i, term in enumerate(self.terms_):
             own = [f"{term.kind}_{c.name}_{term.joints[0]}" for c in term.coefficients]
-            # The same kind twice on a joint differs in its shape parameters alone.
+            # Two terms of one kind on a joint differ only in their shape parameters.
             named += [f"{name}_{i}" if name in named else name for name in own]
         return named
 
@@ -126,7 +126,7 @@ class FrictionTransformer(LogTransformer):
 
 
 def _with_further_columns(keys: Keys) -> Columns:
-    """Columns by position of a table that is wider than the motion of its joints."""
+    """Columns by position for a table with more columns than the motion of its joints."""
     own = keys.features
     if len(own) < 2:
         raise ColumnError(
@@ -147,7 +147,7 @@ def _with_further_columns(keys: Keys) -> Columns:
 
 
 def _refuse(term: Term, columns: Columns) -> None:
-    """Refuse an effect that the motion of one joint does not determine."""
+    """Raise an error for an effect that depends on more than the motion of one joint."""
     effect = term.effect
     beyond = [need for need in effect.needs if need not in ("temperature", "time")]
     if effect.scope != "joint" or beyond:

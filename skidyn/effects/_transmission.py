@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What lies between motor and link: the logged position is the motor's."""
+"""Effects between motor and link; the logged position is the motor's."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ def _swing(
 ) -> tuple[Array, Array, Array]:
     """Wind-up of a spring-mass under a load, times the stiffness, and its time derivatives.
 
-    The link swings on its spring: far below the resonance the wind-up follows the load, near it the
-    wind-up is larger and late, and above it the link stays behind. The derivatives come from the
-    same filter: what is differentiated afterwards has to be smoothed, which takes away most of a
-    swing of ten times a second.
+    The link oscillates on its spring: far below the resonance the wind-up is proportional to the
+    load, near it the wind-up is larger and delayed, and above it the link does not follow. The
+    derivatives come from the same filter, because a later differentiation would need smoothing,
+    which removes most of an oscillation at 10 Hz.
 
     Parameters
     ----------
     load : ndarray of shape (n_samples,), N m or N
-        Torque of the rigid body if nothing gave way.
+        Torque of the rigid body without compliance.
     signals : Signals
         For its segments and clock.
     resonance : float, Hz
-        With the motor held.
+        Resonance with a fixed motor.
     damping : float
         Damping ratio.
 
@@ -50,7 +50,7 @@ def _swing(
         if rows.stop - rows.start < 7:
             continue
         rate = 1.0 / step
-        # The swing of a link faster than the sampling cannot be seen; it follows at once.
+        # An oscillation faster than the sampling cannot be seen; the link follows at once.
         filters = _swing_filters(min(omega, rate), damping, rate)
         for move, (b, a, settled) in zip(moves, filters, strict=True):
             move[rows] = lfilter(b, a, load[rows], zi=settled * load[rows.start])[0]
@@ -59,7 +59,7 @@ def _swing(
 
 @lru_cache(maxsize=256)
 def _swing_filters(omega: float, damping: float, rate: float) -> list[tuple[Array, Array, Array]]:
-    """Digital filters of a spring-mass for its way, speed and acceleration, settled at first."""
+    """Digital filters of a spring-mass for displacement, speed and acceleration, from rest."""
     from scipy.signal import lfilter_zi
 
     square = omega**2
@@ -71,16 +71,16 @@ def _swing_filters(omega: float, damping: float, rate: float) -> list[tuple[Arra
 #: Frequency, Hz, above which accelerations are taken as noise, and fewest samples of a recording
 #: that can be split there.
 _FAST, _FEWEST = 4.0, 20
-#: Step of the difference quotients: they err by about this share, and round by a thousandth of it.
+#: Step of the difference quotients; about their relative error, with a thousandth due to rounding.
 _STEP = 1e-6
 
 
 def _slope(signals: Signals, joint: int, by: str) -> Array:
     """Change of all torques per change of a joint's position, velocity or acceleration.
 
-    Shapes only change how the link moves, so that they share these slopes. They are kept for the
-    joint that was asked for last: shapes of one joint follow each other, and all joints together
-    would take many times the memory of the log.
+    Shapes only change the motion of the link, so they share these slopes. They are cached for the
+    last joint: shapes of one joint are evaluated in succession, and all joints together would take
+    many times the memory of the log.
 
     Parameters
     ----------
@@ -89,12 +89,12 @@ def _slope(signals: Signals, joint: int, by: str) -> Array:
     joint : int
         Joint, from 0.
     by : {"position", "velocity", "acceleration"}
-        What is changed.
+        Quantity that is changed.
 
     Returns
     -------
     ndarray of shape (n_samples, n_joints)
-        N m/rad, N m s/rad or kg m^2, or what takes their place where joints slide.
+        N m/rad, N m s/rad or kg m^2, or the corresponding units for sliders.
     """
     kept: dict[tuple[int, str], Array] = signals.once("torque slopes", dict)
     if (joint, by) not in kept:
@@ -125,9 +125,9 @@ def _differentiate_torque(signals: Signals, joint: int, by: str) -> Array:
 
 
 def _link_inertia(signals: Signals, joint: int) -> Array:
-    """Inertia that the free link presents to its own joint, kg m^2 or kg."""
+    """Inertia of the free link at its own joint, kg m^2 or kg."""
     inertia = _slope(signals, joint, "acceleration")[:, joint]
-    # Identified parameters need not be consistent; an inertia that vanishes would fly at once.
+    # Identified parameters need not be consistent; a link without inertia would move away at once.
     inertia = np.maximum(inertia, 0.05 * np.abs(np.median(inertia)))
     return np.asarray(np.maximum(inertia, np.finfo(float).tiny))
 
@@ -136,7 +136,7 @@ class _LinkSideEffect(Effect):
     """The link is displaced from the logged position by ``-c s(load)``.
 
     To first order the torque of all joints changes by the directional derivative of inverse
-    dynamics along that displacement, which is what the columns hold.
+    dynamics along that displacement, which is the column.
     """
 
     needs = ("robot", "load", "time")
@@ -165,11 +165,11 @@ class _LinkSideEffect(Effect):
 
 
 class AccelerationNoise(NamelessEffect):
-    """What the noise of a position puts into the torques through its second derivative.
+    """Torques due to the noise of a position in its second derivative.
 
-    Not an effect of the robot. It stands beside what moves a link where averages are so short that
-    this noise passes them: far above its resonance a link stays behind as if the acceleration were
-    not its own, which is just what noise of the acceleration looks like.
+    It is not an effect of the robot. It is fitted together with effects that move a link if
+    averages are so short that they contain this noise: far above its resonance a link does not
+    follow the acceleration, which has the same form as noise of the acceleration.
     """
 
     kind = "acceleration_noise"
@@ -190,7 +190,7 @@ class AccelerationNoise(NamelessEffect):
 
 
 def _fast_part(values: Array, signals: Signals) -> Array:
-    """What changes faster than any robot moves on purpose, without a shift of its phase."""
+    """Part of a signal faster than any commanded motion, without a phase shift."""
     from scipy.signal import butter, sosfiltfilt
 
     fast = np.zeros_like(values)
@@ -218,7 +218,7 @@ class JointElasticity(_LinkSideEffect):
             100.0,
             scales=False,
         ),
-        # A light swing follows the noise of the accelerations at its resonance.
+        # An oscillation of low inertia follows the noise of the accelerations at its resonance.
         Shape("damping", "1", (0.2,), 0.005, 0.5, scales=False),
     )
     follows_acceleration = True
@@ -239,7 +239,7 @@ class JointElasticity(_LinkSideEffect):
         return {**shape, "inertia": inertia, "share": share}
 
     def least(self, shape: Mapping[str, Any]) -> float:
-        # Resonance and inertia say how compliant a joint is that swings by itself.
+        # Resonance and inertia determine the compliance of a joint that oscillates freely.
         if "inertia" not in shape:
             return 0.0
         return float(shape["share"] / (shape["inertia"] * (2 * np.pi * shape["resonance"]) ** 2))
@@ -259,14 +259,14 @@ class JointElasticity(_LinkSideEffect):
 
 
 class Backlash(_LinkSideEffect):
-    """Play between motor and link: the link flies across when its load changes sign."""
+    """Play between motor and link: the link crosses the gap when its load changes sign."""
 
     kind = "backlash"
     title = "Backlash"
     drawn_against = "load"
     formula = r"\tau(q - g\,x) - \tau(q),\quad m\,\ddot x = \tau_\mathrm{load}/g,\ |x| \le 1/2"
     coefficients = (Coefficient("share", "1", sign=1, is_share=True),)
-    # The time of a flight, and with it everything, changes with the root of the gap.
+    # The time of a crossing, and with it the whole column, changes with the root of the gap.
     shapes = (Shape("gap", "rad", (0.002, 0.003, 0.0045, 0.006, 0.009, 0.013, 0.02), 2e-4, 0.2),)
     simplicity = 18
     rivals = ("joint_elasticity", "dahl")
@@ -293,13 +293,13 @@ def _flight(acceleration: Array, step: float, half: float, chunk: int = 64) -> A
     Parameters
     ----------
     acceleration : ndarray of shape (n_samples,), rad/s^2 or m/s^2
-        Of the link if nothing held it.
+        Acceleration of the link without contact.
     step : float, s
         Time step.
     half : float, rad or m
         Half the gap.
     chunk : int, default=64
-        Samples integrated at a time while the link flies.
+        Samples integrated at a time while the link crosses the gap.
 
     Returns
     -------
@@ -311,7 +311,7 @@ def _flight(acceleration: Array, step: float, half: float, chunk: int = 64) -> A
     changes = np.flatnonzero(np.diff(np.sign(acceleration))) + 1
     k = 0
     while k < n:
-        # On a flank until the push turns away from it.
+        # On a flank until the acceleration points away from it.
         later = changes[np.searchsorted(changes, k) :]
         leaving = later[acceleration[later] * side < 0]
         start = k if acceleration[k] * side < 0 else (int(leaving[0]) if len(leaving) else n)
@@ -326,7 +326,7 @@ def _flight(acceleration: Array, step: float, half: float, chunk: int = 64) -> A
             position[k : k + end] = path[:end]
             if len(hits):
                 k, side = k + end, float(np.sign(path[end]))
-                # At least one sample on the flank, or the flight would never end.
+                # At least one sample on the flank, or the crossing would never end.
                 position[k] = side * half
                 k += 1
                 break

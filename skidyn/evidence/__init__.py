@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Evidence: what identification and diagnosis need from a log, averaged once into few rows."""
+"""Evidence: a log averaged once into few rows, for identification and diagnosis."""
 
 from skidyn.evidence._evidence import Evidence
 from skidyn.evidence._from_motion import evidence_from_motion

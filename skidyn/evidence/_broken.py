@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Broken samples: values that leap away from their neighbours and back.
+"""Broken samples: values that jump away from their neighbours and back.
 
-A dropped packet, a bus error or a reset register leaves one to three samples far off. They are
-found by the distance to a running median (Hampel 1974, JASA 69), which a step of the torque at a
-reversal does not raise, and are left out of the rows with a word to the user.
+A dropped packet, a bus error or a reset register leaves one to three samples with wrong values.
+They are found by their distance from a running median (Hampel 1974, JASA 69), which a step of the
+torque at a reversal does not increase. They are left out of the rows, and the user is informed.
 """
 
 from __future__ import annotations
@@ -22,25 +22,25 @@ WIDTH = 7
 FAR, TAILS = 3.0, (0.02, 0.98)
 #: and than this share of the range of the signal itself.
 TORQUE_SHARE, POSITION_SHARE = 0.25, 0.05
-#: and than so many steps of a coarse sensor, of which one at rest shows one or two.
+#: and than this many steps of a coarse sensor; at rest such a sensor changes by one or two steps.
 STEPS = 5.0
 
 
 def leaps(
     values: Array, signals: Signals, share: float, turns: NDArray[np.bool_] | None = None
 ) -> NDArray[np.bool_]:
-    """Samples that leap away from their neighbours and back.
+    """Samples that jump away from their neighbours and back.
 
     Parameters
     ----------
     values : ndarray of shape (n_samples, n_joints)
         Torque or position.
     signals : Signals
-        Motion, which tells where trajectories and gaps are.
+        Motion, with the borders of trajectories and the gaps.
     share : float
-        Least size of a leap as a share of the range of the signal in its trajectory.
+        Least size of a jump as a share of the range of the signal in its trajectory.
     turns : ndarray of shape (n_samples, n_joints) of bool, optional
-        Where the signal may well leap by as much as its range: at reversals.
+        Samples at which the signal may jump by its full range, as at reversals.
 
     Returns
     -------
@@ -52,7 +52,7 @@ def leaps(
         if rows.stop - rows.start >= 2 * WIDTH:
             block = values[rows]
             away[rows] = block - _running_median(block)
-            # At either end a step has no other side to be told from a leap.
+            # At either end of a trajectory a step cannot be distinguished from a jump and back.
             for end in (rows.start, rows.stop - WIDTH // 2):
                 least[end : end + WIDTH // 2] = 1.0
     broken = np.zeros(values.shape, dtype=bool)
@@ -61,7 +61,7 @@ def leaps(
         own = signals.trajectory == name
         bottom, top = np.quantile(values[own], TAILS, axis=0)
         distance = np.abs(away[own])
-        # Strictly above: a signal that rests has no range and no leaps.
+        # Strictly above: a constant signal has no range and no jumps.
         far = distance > least[own] * (top - bottom)
         if not far.any():
             continue
@@ -72,7 +72,7 @@ def leaps(
 
 
 def _running_median(values: Array) -> Array:
-    """Median of the samples around each, columns by themselves, reflected at either end."""
+    """Running median of each column, reflected at either end."""
     middle = WIDTH // 2
     result = np.empty_like(values)
     for k, column in enumerate(values.T):
@@ -88,7 +88,7 @@ def _smallest_change(values: Array) -> Array:
 
 
 def reversals(signals: Signals) -> NDArray[np.bool_]:
-    """Samples near a change of direction, at which dry friction may leap and leap back.
+    """Samples near a change of direction, at which dry friction may jump and jump back.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def reversals(signals: Signals) -> NDArray[np.bool_]:
 
 
 def without_broken(motion: Signals, logged: Signals, torque: Array) -> Signals:
-    """Trust no sample whose torque is broken, nor those that a broken position reaches.
+    """Mark as invalid the samples with broken torque and those that a broken position affects.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def without_broken(motion: Signals, logged: Signals, torque: Array) -> Signals:
 
 
 def _broken(signals: Signals, torque: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Broken samples of torque and of positions, looked for once in the same signals."""
+    """Broken samples of torque and of positions, found once for the same signals."""
 
     def find() -> NDArray[np.bool_]:
         return leaps(torque, signals, TORQUE_SHARE, reversals(signals))
@@ -136,7 +136,7 @@ def _broken(signals: Signals, torque: Array) -> tuple[NDArray[np.bool_], NDArray
 
 
 def without_broken_positions(signals: Signals) -> Signals:
-    """Signals with lines through their neighbours in the place of broken positions.
+    """Signals with broken positions replaced by linear interpolation.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def without_broken_positions(signals: Signals) -> Signals:
     Returns
     -------
     Signals
-        The same object where no position is broken.
+        The same object if no position is broken.
     """
     broken = signals.once("broken positions", lambda: leaps(signals.q, signals, POSITION_SHARE))
     if not broken.any():
@@ -162,7 +162,7 @@ def without_broken_positions(signals: Signals) -> Signals:
 
 
 def broken_notes(signals: Signals, torque: Array, joint_names: tuple[str, ...]) -> list[str]:
-    """What is to be said of broken samples.
+    """Messages about broken samples.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Evidence: all that a linear model needs from a log, in a small triangle per trajectory and joint.
+"""Evidence: a log reduced to one small triangular factor per trajectory and joint.
 
 For the columns A and the torque y of a trajectory, the triangular factor R of [A | y] holds the
-same least-squares problem as all its rows. Factors of two recordings are merged by factorising
-them stacked, exactly and in any order; a trajectory is left out by not using its factor.
+same least-squares problem as all its rows. Factors of two recordings are merged by factorising the
+stacked factors, exactly and in any order; a trajectory is left out by not using its factor.
 
 References
 ----------
@@ -25,9 +25,9 @@ from skidyn.effects import Term, TermSum
 from skidyn.evidence._problem import Problem
 from skidyn.robots import Robot
 
-#: Trajectory and joint (from 0) that a factor belongs to.
+#: Trajectory and joint (from 0) of a factor.
 Key = tuple[int, int]
-#: Columns weaker than this, relative to the strongest direction, are left at zero.
+#: Coefficients of columns weaker than this, relative to the strongest direction, stay at zero.
 RANK_TOLERANCE = 1e-10
 
 
@@ -42,7 +42,7 @@ class Evidence:
     factors : mapping of (int, int) to ndarray of shape (n_columns + 1, n_columns + 1)
         Upper triangular factor of each trajectory and joint (from 0).
     counts : mapping of (int, int) to float
-        Rows behind each factor; less than a row where older evidence was weighed down.
+        Number of rows of each factor; smaller where older evidence has a lower weight.
 
     Examples
     --------
@@ -78,7 +78,7 @@ class Evidence:
         Raises
         ------
         SkidynError
-            Rows of the wrong width.
+            Rows have the wrong width.
         """
         for key, block in rows.items():
             if block.shape[1] != len(columns) + 1:
@@ -141,7 +141,7 @@ class Evidence:
         return Evidence(self.columns, factors, counts)
 
     def scaled(self, weight: float) -> Evidence:
-        """The same evidence as if every row counted less.
+        """The same evidence with a lower weight of every row.
 
         Parameters
         ----------
@@ -190,7 +190,7 @@ class Evidence:
         by : int
             Added to every number.
         groups : int, optional
-            Numbers are then taken modulo this; what becomes equal is merged.
+            Numbers are then taken modulo this, and factors with equal numbers are merged.
 
         Returns
         -------
@@ -205,7 +205,7 @@ class Evidence:
         return result
 
     def select(self, columns: Sequence[str]) -> Evidence:
-        """Evidence of a smaller model.
+        """Evidence of a model with fewer columns.
 
         Parameters
         ----------
@@ -242,7 +242,7 @@ class Evidence:
         return self.only(t for t in self.trajectories if t != trajectory)
 
     def stacked(self, noise: Mapping[int, float] | None = None) -> Array:
-        """All factors on top of each other, joints weighted by their noise.
+        """Stack all factors, with joints weighted by their noise.
 
         Parameters
         ----------
@@ -252,7 +252,7 @@ class Evidence:
         Returns
         -------
         ndarray of shape (n_factors * (n_columns + 1), n_columns + 1)
-            Has the same normal equations as all weighted rows.
+            Matrix with the same normal equations as all weighted rows.
         """
         parts = [
             factor / (1.0 if noise is None else noise[key[1]])
@@ -275,12 +275,12 @@ class Evidence:
         Returns
         -------
         ndarray of shape (n_columns,)
-            One for every column, zero for those that are left out.
+            One coefficient for every column, zero for omitted ones.
 
         Raises
         ------
         SkidynError
-            A column that is not there, or no evidence at all.
+            A column does not exist, or there is no evidence.
         """
         if not self.factors:
             raise SkidynError("no evidence: every trajectory was left out")
@@ -377,7 +377,7 @@ def column_names(
     robot : Robot or None
         Robot, if its rigid body is part of the model.
     rigid_index : sequence of int
-        Which of its parameters have a column.
+        Indices of its parameters that have a column.
     terms : iterable of Term
         Effects.
 

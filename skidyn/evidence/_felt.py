@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What every joint feels of a model: its columns without those that vanish on the joint's rows.
+"""Columns of a model that act on each joint, without those that vanish on the joint's rows.
 
-A joint feels the bodies beyond it and its own effects. In a chain of many joints that is a small
-part of the model's columns; the rest are zeros, which products need not add up.
+The torque of a joint depends on the bodies beyond it and on its own effects. In a chain of many
+joints these are a small part of the model's columns; the others are zeros, which products can omit.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Felt:
-    """Columns of a model that a joint feels.
+    """Columns of a model that act on a joint.
 
     Attributes
     ----------
     places : ndarray of shape (k,) of int
-        Which of the model's columns these are, in their order.
+        Indices of these columns among the model's, ascending.
     rows : ndarray of shape (n_rows_j, k)
         Their averaged rows.
     """
@@ -36,12 +36,12 @@ class Felt:
     rows: Array
 
     def with_columns(self, start: int, block: Array) -> Felt:
-        """With further columns of the model, from a place on.
+        """Add further columns of the model, from a given index on.
 
         Parameters
         ----------
         start : int
-            Place of the first one.
+            Index of the first one.
         block : ndarray of shape (n_rows_j, k)
             Their rows.
         """
@@ -52,7 +52,7 @@ class Felt:
 def felt_columns(
     problem: Problem, blocks: Iterable[dict[int, Array]], sigma: Array | None = None
 ) -> tuple[list[Felt], int]:
-    """Columns of the rigid body and of some blocks side by side, as far as each joint feels them.
+    """Columns of the rigid body and of some blocks that act on each joint, side by side.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def gram_of(felt: Sequence[Felt], width: int) -> Array:
 
 
 def products_with(felt: Sequence[Felt], blocks: dict[int, Array], width: int) -> Array:
-    """Products of a model's columns with others, summed over the joints that these reach.
+    """Products of a model's columns with others, summed over the joints on which these act.
 
     Parameters
     ----------

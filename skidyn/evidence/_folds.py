@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Folds left out: products of every fold, their sums without one, their solutions, the jackknife.
 
-A least-squares problem needs of its rows only the products of their columns. They add up over
-folds, so a fold is left out by subtraction, without another pass over the rows.
+A least-squares problem depends on its rows only through the products of their columns. These are
+sums over folds, so a fold is left out by subtraction, without another pass over the rows.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def column_sizes(gram: Array) -> Array:
 
 
 def fold_slices(fold: NDArray[np.int64], n_folds: int) -> Iterator[slice]:
-    """The rows of every fold, where the rows are sorted by it."""
+    """Rows of every fold, if the rows are sorted by fold."""
     edges = np.searchsorted(fold, np.arange(n_folds + 1)).tolist()
     for start, stop in zip(edges[:-1], edges[1:], strict=True):
         yield slice(start, stop)
@@ -97,7 +97,7 @@ def fold_products(
     target : sequence of ndarray
         Averaged torque y.
     instruments : sequence of ndarray of shape (n_rows_j, n_coefficients), optional
-        What stands left in the products; the columns themselves by default.
+        Left factors Z of the products; the columns themselves by default.
 
     Returns
     -------
@@ -141,10 +141,10 @@ def left_out_coefficients(
     instruments : sequence of ndarray of shape (n_rows_j, n_coefficients), optional
         Instruments of the columns; the columns themselves by default.
     soft : sequence of (slice, float), default=()
-        Coefficients that are drawn to zero where no row says what they are, see
-        :func:`soft_prior`.
+        Coefficients that are drawn to zero where no row determines them, see :func:`soft_prior`.
     kept : callable, optional
-        From the products of every fold, those coefficients that :func:`solve_left_out` keeps.
+        Function of the products of every fold that returns the coefficients that
+        :func:`solve_left_out` keeps.
 
     Returns
     -------
@@ -160,7 +160,7 @@ def left_out_coefficients(
 def soft_prior(gram: Array, soft: Sequence[tuple[slice, float]]) -> tuple[Array, Array]:
     """Left and right side that draw coefficients of flexible functions to zero.
 
-    Where a fold that is left out reaches alone, they would be arbitrary.
+    They would be arbitrary where only the fold that is left out determines them.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def soft_prior(gram: Array, soft: Sequence[tuple[slice, float]]) -> tuple[Array,
     Returns
     -------
     (ndarray of shape (p, p), ndarray of shape (p,))
-        As :func:`solve_left_out` takes them.
+        Arguments of :func:`solve_left_out`.
     """
     size, pull = np.diag(gram), np.zeros(len(gram))
     for own, share in soft:
@@ -199,7 +199,7 @@ def solve_left_out(
     cross : ndarray of shape (n_folds, n_coefficients)
         Right sides.
     prior : (ndarray of shape (n_coefficients, n_coefficients), ndarray), optional
-        Left and right side that are added to all: a quadratic pull.
+        Left and right side that are added to all, as a quadratic prior.
     symmetric : bool, default=True
         Whether the left sides are symmetric.
     ridge : float, default=1e-9
@@ -236,7 +236,7 @@ def solve_left_out(
 def kept_pull(grams: Array, kept: NDArray[np.bool_]) -> Array:
     """Weights by which coefficients are drawn to those of all folds, (n_folds, n_coefficients).
 
-    As much as all rows know of them by themselves.
+    The weight is the information of all rows about each coefficient alone.
 
     Parameters
     ----------
@@ -268,7 +268,7 @@ def left_out_errors(grams: Array, ridge: float = 10 * RIDGE) -> Array:
 
 
 def without_each(parts: Sequence[Array]) -> Iterator[Array]:
-    """All parts but one on top of each other, each left out in turn."""
+    """Stacks of all parts but one, each part left out in turn."""
     for k in range(len(parts)):
         yield np.vstack([*parts[:k], *parts[k + 1 :]])
 
@@ -323,7 +323,7 @@ def nearest_folds(
     Returns
     -------
     ndarray of shape (n,) of int
-        0 in a trajectory without any averaged row, which any fold leaves out.
+        0 for a trajectory without averaged rows, which is in no fold.
     """
     number, clock = signals.trajectory[rows], signals.clock[rows]
     found = np.zeros(len(rows), dtype=np.int64)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Evidence of a motion in memory, every sample a row, without ever holding the regressor."""
+"""Evidence of a motion in memory, every sample a row, without storing the regressor."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ def evidence_from_motion(
     trajectory: Any = None,
     method: Method = "auto",
 ) -> Evidence:
-    """Evidence of positions, velocities, accelerations and torques as they are.
+    """Evidence of positions, velocities, accelerations and torques, without filtering.
 
-    The quickest way from arrays to parameters: nothing is filtered, every sample is a row of weight
-    one, and the regressor is used chunk by chunk where it is made.
+    The fastest way from arrays to parameters: nothing is filtered, every sample is a row of weight
+    one, and the regressor is computed and used chunk by chunk.
 
     Parameters
     ----------
@@ -54,8 +54,8 @@ def evidence_from_motion(
     effects : iterable of str, (str, joints) or Term, default=("viscous", "coulomb")
         Effects beside the rigid body. Their shape parameters must be given.
     trajectory : array-like of shape (n_samples,) of int, optional
-        Trajectory of every sample; one for all by default. Standard errors need several: where
-        there is one long recording, number its blocks.
+        Trajectory of every sample; one for all by default. Standard errors need several; number the
+        blocks of a single long recording.
     method : {"auto", "gram", "qr"}, default="auto"
         ``"gram"`` forms Gram matrices, ``"qr"`` triangular factors chunk by chunk [1]_ in twice the
         time. ``"auto"`` takes the first unless the columns are so nearly dependent that digits
@@ -64,17 +64,17 @@ def evidence_from_motion(
     Returns
     -------
     Evidence
-        Of the base parameters' corrections to the URDF, then of the effects.
+        Evidence of the base parameters' corrections to the URDF, then of the effects.
 
     Raises
     ------
     SkidynError
-        Arrays that do not fit together or are not finite, or an effect that needs a fit of the
-        model first.
+        Arrays have inconsistent shapes or values that are not finite, or an effect needs a fit of
+        the model first.
 
     See Also
     --------
-    skidyn.evidence.evidence_from_parquet : From files, with parallel filtering.
+    skidyn.evidence.evidence_from_parquet : Evidence from files, with parallel filtering.
     skidyn.identification.regressor_from_evidence : The fitted model.
 
     References
@@ -117,7 +117,7 @@ def evidence_of_rows(
     Parameters
     ----------
     signals : Signals
-        Motion as it is to be used; states of hysteresis run along its trajectories.
+        Motion; states of hysteresis are computed along its trajectories.
     torque : ndarray of shape (n_samples, n_joints), N m or N
         Measured torque.
     robot : Robot
@@ -125,11 +125,11 @@ def evidence_of_rows(
     terms : sequence of Term
         Effects with their shape parameters.
     group : ndarray of shape (n_samples,) of int
-        Number under which the factors of a sample are kept, in the place of its trajectory.
+        Number of the factor to which a sample belongs, in place of its trajectory.
     method : {"auto", "gram", "qr"}, default="auto"
         Gram matrices or triangular factors.
     weight : ndarray of shape (n_samples,), optional
-        Weight of every sample, 0 or more: that of 2 counts like two samples.
+        Weight of every sample, 0 or more; a sample of weight 2 counts as two.
 
     Returns
     -------
@@ -147,7 +147,7 @@ def evidence_of_rows(
     if not factors:
         factors = _accumulate(robot, layout, signals, torque, group, _add_triangle, root)
     widened = {key: layout.widen(factor, key[1]) for key, factor in factors.items()}
-    # The torque of the URDF's rigid body is a combination of the columns: it is taken off here.
+    # The torque of the URDF's rigid body is a combination of the columns: it is subtracted here.
     nominal = np.zeros(len(layout.names) + 1)
     nominal[: len(base.index)] = -base.values(robot.inertial_parameters)
     nominal[-1] = 1.0
@@ -189,7 +189,7 @@ def sample_blocks(
 
 
 def renumbered(evidence: Evidence, number: NDArray[np.int64]) -> Evidence:
-    """The same evidence under other numbers, ``number[k]`` for k; what becomes equal is merged."""
+    """The same evidence with ``number[k]`` for k; factors with equal numbers are merged."""
     parts: dict[Key, list[Array]] = {}
     counts: dict[Key, float] = {}
     for (old, joint), factor in evidence.factors.items():
@@ -212,7 +212,8 @@ def _checked(
                 f"{name} has shape {array.shape}; expected (n_samples, {robot.n_joints}) with the "
                 "same number of samples in all, at least one"
             )
-        # A sum is finite unless a term is not, or it overflows, which no measurement does.
+        # A sum is finite unless a term is not, or it overflows, which does not occur in
+        # measurements.
         if not np.isfinite(array.sum()):
             row, joint = np.argwhere(~np.isfinite(array))[0]
             raise SkidynError(f"{name} of joint {joint + 1} is not finite in row {row}")
@@ -241,7 +242,7 @@ def _counts(
 
 @dataclass
 class _Layout:
-    """Which columns the torque of every joint depends on, and where they go.
+    """Columns on which the torque of every joint depends, and their positions.
 
     Attributes
     ----------
@@ -252,7 +253,7 @@ class _Layout:
     first : list of int
         Per joint, the first rigid-body column that does not vanish.
     effects : list of list of (int, ndarray of shape (n_samples,))
-        Per joint, the effects' columns that reach it: their number among all and their values.
+        Per joint, the effects' columns that act on it: their index among all and their values.
     """
 
     columns: tuple[int, ...]
@@ -280,11 +281,11 @@ class _Layout:
 
     @property
     def spare(self) -> int:
-        """Rows beside those of the rigid body: the effects of a joint, and its torque."""
+        """Rows other than those of the rigid body: the effects of a joint, and its torque."""
         return max(len(own) for own in self.effects) + 1
 
     def place(self, joint: int) -> list[int]:
-        """Where the columns of a joint, and its torque, are among all."""
+        """Indices of the columns of a joint, and of its torque, among all."""
         own = [number for number, _ in self.effects[joint]]
         return [*range(self.first[joint], len(self.columns)), *own, len(self.names)]
 
@@ -293,7 +294,7 @@ class _Layout:
         size = len(self.names) + 1
         wide = np.zeros((size, size))
         place = self.place(joint)
-        # The place of the columns rises, so that the factor stays triangular.
+        # The indices of the columns are ascending, so that the factor stays triangular.
         wide[np.ix_(place[: len(factor)], place)] = factor
         return wide
 
@@ -310,7 +311,7 @@ def _accumulate(
     update: Update,
     root: Array | None,
 ) -> dict[Key, Array]:
-    """What ``update`` makes of the rows of every group and joint, part after part."""
+    """Apply ``update`` to the rows of every group and joint, part after part."""
     found: dict[Key, Array] = {}
     n_rigid = len(layout.columns)
     arrays = {"q": signals.q, "dq": signals.dq, "ddq": signals.ddq}
@@ -323,7 +324,7 @@ def _accumulate(
                 slab[n_rigid + k] = values[rows]
             end = n_rigid + len(own) + 1
             slab[end - 1] = torque[rows, j]
-            # Not in place: what is constant in the block is written only once.
+            # Not in place: constant parts of the block are written only once.
             own_rows = slab[first:end] if root is None else slab[first:end] * root[rows]
             for name, part in parts:
                 found[name, j] = update(found.get((name, j)), own_rows[:, part])
@@ -382,7 +383,7 @@ def _condition(grams: dict[Key, Array], layout: _Layout) -> float:
             total[np.ix_(place, place)] += own / own[-1, -1]
     columns = total[:width, :width]
     size = np.sqrt(np.diag(columns))
-    # A column that never moves is no combination of others; it says nothing and does no harm.
+    # A column of zeros is no combination of others; it has no information and does no harm.
     used = size > 0
     scaled = columns[np.ix_(used, used)] / size[used, None] / size[used]
     values = np.linalg.eigvalsh(scaled) if used.any() else np.ones(1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Position, velocity and acceleration from logged positions, smoothed alike and without delay."""
+"""Position, velocity and acceleration from logged positions, smoothed equally, without delay."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ import numpy as np
 from skidyn._local_polynomial import local_polynomial
 from skidyn._signals import Array, Signals
 
-#: Order of the local polynomial. Of accelerations of 6 Hz sampled at 100 Hz a quartic of the same
-#: noise takes 0.7 %, which looks like an elastic joint where the torque is precise; this one 0.1 %.
+#: Order of the local polynomial. Of accelerations of 6 Hz sampled at 100 Hz, a quartic of the same
+#: noise loses 0.7 %, which looks like an elastic joint if the torque is precise; this order loses
+#: 0.1 %.
 ORDER = 6
 #: Highest cut-off in Hz, and the largest share of the sampling rate.
 HIGHEST_CUTOFF, CUTOFF_SHARE = 27.0, 0.24
@@ -40,7 +41,7 @@ def smooth_motion(signals: Signals, cutoff: float | None = None) -> Signals:
         own = signals.take(rows).rate
         own = own if abs(own - rate) > EVEN_STEPS * rate else rate  # recordings of several rates
         width, _ = _half_width(own, cutoff)
-        # Scattered samples are many for their median step, or few for the time they span.
+        # Irregular samples are too many for their median step, or too few for the time they span.
         steps = round(float(np.ptp(signals.clock[rows])) * own)
         if min(rows.stop - rows.start, steps + 1) <= 2 * width + 1:
             valid[rows] = False  # too short to smooth; kept as logged, and not used
@@ -65,7 +66,7 @@ def _half_width(rate: float, cutoff: float | None) -> tuple[int, float]:
 def _local_polynomial(time: Array, q: Array, rate: float, half: int) -> list[Array]:
     """Smoothed position and its two derivatives at the given times."""
     step = 1.0 / rate
-    # Times that are equal or step back cannot be interpolated over; they belong to data checks.
+    # Times that are equal or decrease cannot be interpolated; data checks report them.
     even = np.ptp(np.diff(time)) < EVEN_STEPS * step or np.any(np.diff(time) <= 0)
     grid = time if even else np.arange(time[0], time[-1] + step / 2, step)
     if even:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Trajectories of a Parquet file, one after the other, without ever decoding the whole file."""
+"""Trajectories of a Parquet file, one after another, without decoding the whole file."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from skidyn._optional import import_optional
 from skidyn._signals import Array, Signals, signals_from
 from skidyn.robots import Robot
 
-#: Rows that are decoded at once.
+#: Number of rows that are decoded at once.
 BATCH_ROWS = 65_536
-#: How the user says which column holds which signal; see :func:`skidyn.logs.read_log`.
+#: Mapping of signals to columns by the user; see :func:`skidyn.logs.read_log`.
 ColumnMap = Mapping[str, str | int | Sequence[str | int]]
 
 
 @dataclass(frozen=True)
 class _Layout:
-    """Columns of the file that are read, in the order of ``names``, and what they mean."""
+    """Columns of the file that are read, in the order of ``names``, with their meaning."""
 
     names: list[str]
     columns: Columns
@@ -43,7 +43,7 @@ def read_trajectories(
     path : Path
         File.
     robot : Robot
-        Its joints give the order of the columns.
+        Robot, whose joints give the order of the columns.
     columns : mapping, optional
         As in :func:`skidyn.logs.read_log`.
     max_rows : int
@@ -52,8 +52,7 @@ def read_trajectories(
     Yields
     ------
     signals : Signals
-        Motion, as trajectory 0; velocity and acceleration are placeholders where the file has
-        none.
+        Motion, as trajectory 0; velocity and acceleration are placeholders if the file has none.
     torque : ndarray of shape (n_samples, n_joints), N m or N
         Torque.
 
@@ -127,7 +126,7 @@ def trajectory_lengths(path: Path, robot: Robot, columns: ColumnMap | None = Non
 
 @contextmanager
 def _decoder_errors(path: Path) -> Iterator[None]:
-    """Tell in which file the decoder failed; it raises whatever the bytes lead it to."""
+    """Name the file in which the decoder failed; the decoder may raise any exception."""
     try:
         yield
     except (LogError, GeneratorExit):
@@ -137,12 +136,12 @@ def _decoder_errors(path: Path) -> Iterator[None]:
 
 
 def _decoded(path: Path, parquet: Any, robot: Robot, columns: ColumnMap | None) -> Iterator[Any]:
-    """The layout, then tables of ``BATCH_ROWS`` rows and fewer."""
+    """The layout, then tables of at most ``BATCH_ROWS`` rows."""
     row = 0
     with _decoder_errors(path), parquet.ParquetFile(path) as file:
         layout = _layout(file.schema_arrow.names, robot, columns, path)
         yield layout
-        # Threads of its own would compete with the other workers of a machine.
+        # Threads of the decoder would compete with the other workers of a machine.
         for batch in file.iter_batches(BATCH_ROWS, columns=layout.names, use_threads=False):
             table = np.empty((batch.num_rows, len(layout.names)))
             for k, name in enumerate(layout.names):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The regression problem behind a diagnosis: rows, folds, the model so far and its fit."""
+"""The regression problem of a diagnosis: rows, folds, the present model and its fit."""
 
 from __future__ import annotations
 
@@ -35,14 +35,15 @@ from skidyn.robots import Robot, base_parameter_index, with_whole_turns
 
 #: Columns of the rigid body weaker than this (relative, after pivoting) are dependent on others.
 RANK_TOLERANCE = 2e-6
-#: Folds: whole trajectories where there are more than this many, else blocks of them.
+#: Folds are whole trajectories if there are more than this many, else blocks of them.
 FEW_TRAJECTORIES, FEWEST_BLOCKS, MOST_FOLDS = 6, 8, 20
-#: Combinations of columns that are smaller than the root of this, of their parts, may be open.
+#: Combinations of columns smaller than the root of this, relative to their parts, may be
+#: undetermined.
 LARGEST_RIDGE = 1e-6
-#: Samples of a window from which a smooth function can be told: more are passed over at first.
+#: Samples per window that are enough for a smooth function; at first, others are omitted.
 ENOUGH_SAMPLES = 16
-#: Share of the smoother's half width that is left out around rest and reversals, and the samples
-#: left out where a model of hysteresis says what happens between the two.
+#: Share of the smoother's half width that is left out around rest and reversals, and number of
+#: samples left out where a model of hysteresis describes the motion between the two.
 MARGIN, SHORT_MARGIN = 0.75, 1
 
 
@@ -80,15 +81,15 @@ class Problem:
     Attributes
     ----------
     robot : Robot or None
-        Its rigid body is part of the model when ``rigid_body`` is True.
+        Robot, whose rigid body is part of the model if ``rigid_body`` is True.
     signals : Signals
         Smoothed motion with the load and model torque of the current fit.
     torque : ndarray of shape (n_samples, n_joints)
-        Measured torque less what is not fitted: the rigid body with the parameters of the URDF, or
-        the prediction of a given regressor. Identified parameters are corrections to the URDF's,
-        so that what the data leaves open stays as in the URDF.
+        Measured torque minus the part that is not fitted: the rigid body with the parameters of the
+        URDF, or the prediction of a given regressor. Identified parameters are corrections to the
+        URDF's, so that parameters that the data does not determine keep the values of the URDF.
     terms : TermSum
-        Effects that the user's model has already.
+        Effects that the user's model contains already.
     rows : Rows
         Averaging windows.
     fold : list of ndarray
@@ -100,7 +101,7 @@ class Problem:
     rigid_body : bool
         Whether rigid-body parameters are identified together with the effects.
     logged : Signals or None
-        Motion as it was logged.
+        Logged motion.
     """
 
     robot: Robot | None
@@ -129,16 +130,16 @@ class Problem:
         return [self.rows.average(self.torque[:, j], j) for j in range(self.n_joints)]
 
     def term_rows(self, term: Term) -> dict[int, Array]:
-        """Averaged columns of a term, per joint it reaches."""
+        """Averaged columns of a term, per joint on which it acts."""
         if term not in self._cache:
             self._cache[term] = self._averaged(term, self._step(term))
         return self._cache[term]
 
     def screening_rows(self, term: Term) -> dict[int, Array]:
-        """As :meth:`term_rows`; of a nameless function from no more samples than tell.
+        """As :meth:`term_rows`, but of an unknown function from only as many samples as needed.
 
         A window of a log at 1 kHz holds 125 samples. A function as smooth as these has the same
-        mean over every seventh. What jumps, or swings, does not.
+        mean over every seventh sample; one that jumps or oscillates does not.
         """
         step = self._skipped(term)
         if step <= self._step(term) or term in self._cache:
@@ -146,16 +147,16 @@ class Problem:
         return self._averaged(term, step)
 
     def keep(self, terms: Iterable[Term]) -> None:
-        """Forget the averaged columns of all terms but some."""
+        """Remove the averaged columns of all terms but some from the cache."""
         wanted = set(terms)
         self._cache = {term: rows for term, rows in self._cache.items() if term in wanted}
 
     def _step(self, term: Term) -> int:
-        """Samples of which one is enough for a term: fine waves have to be seen at all of them."""
+        """Number of samples of which one is enough for a term; fine waves need all samples."""
         return 1 if term.effect.search == "spectrum" else self.rows.step
 
     def _skipped(self, term: Term) -> int:
-        """Every how manieth sample tells enough of a term at first."""
+        """Step between samples that is small enough for a term at first."""
         if self.signals.time is None or not term.effect.nameless:
             return 1
         return int(self.signals.rate * WINDOW / ENOUGH_SAMPLES)
@@ -171,7 +172,7 @@ class Problem:
         return self.sampled(self.rows.step)[0]
 
     def sampled(self, step: int) -> tuple[Signals, list[csr_matrix]]:
-        """The signals at one of ``step`` samples, and the weights of the rows there, by joint."""
+        """The signals at one of every ``step`` samples, and the weights of the rows, by joint."""
         if step < 2:
             return self.signals, self.rows.weights
         _, few = self.signals.once(("thinned", step), lambda: self.signals.thinned(step))
@@ -188,12 +189,12 @@ class Problem:
         Parameters
         ----------
         terms : sequence of Term
-            What neighbours share, such as what kinds with the same needs ask for a joint, is
-            computed once.
+            Terms; quantities shared by neighbours, such as inputs that several kinds need for a
+            joint, are computed once.
         screening : bool, default=False
-            Those of :meth:`screening_rows` instead of :meth:`term_rows`.
+            Return the rows of :meth:`screening_rows` instead of :meth:`term_rows`.
         text : str, default=""
-            What is being done, to be reported with the share of it that is done.
+            Description of the task for progress reports.
 
         Returns
         -------
@@ -228,7 +229,7 @@ class Problem:
         return [(own, term.effect.softness) for term, own in places if term.effect.softness]
 
     def with_base_columns(self) -> Problem:
-        """The same problem with the columns of all base parameters, also of those left open."""
+        """The same problem with the columns of all base parameters, also undetermined ones."""
         if not self.rigid_body or self.robot is None:
             return self
         base = base_parameter_index(self.robot)
@@ -246,7 +247,7 @@ class Problem:
         sigma : ndarray of shape (n_joints,), optional
             Noise of one row of every joint; found from a fit of each joint by itself if None.
         passes : int, default=1
-            Times the noise is estimated anew from the residual and the fit repeated.
+            Number of times that the noise is estimated from the residual and the fit repeated.
         """
         terms = TermSum(terms)
         design = self.design([self.term_rows(t) for t in terms])
@@ -262,8 +263,9 @@ class Problem:
     def own_noise(self, terms: Iterable[Term]) -> Array:
         """Noise of one row of every joint, each fitted by itself, (n_joints,).
 
-        What a joint lacks makes its residual in the fit of all joints large, so that the fit
-        attends to it less and the residual grows: by itself it is as small as the model allows.
+        An effect missing on a joint makes its residual in the fit of all joints large, which lowers
+        the weight of the joint, so that the residual grows further. In a fit of the joint alone the
+        residual is as small as the model permits.
 
         Parameters
         ----------
@@ -293,7 +295,7 @@ class Problem:
         return nearest_folds(self.signals, rows, trajectory, time, self.fold[joint])
 
     def fit_own(self, passes: int = 3) -> Fit:
-        """Fit of the model as given, whose load and torque its own terms and others then know.
+        """Fit of the given model, whose load and torque are then available to all terms.
 
         Parameters
         ----------
@@ -301,7 +303,7 @@ class Problem:
             As in :meth:`fit`.
         """
         free = [t for t in self.terms if not t.effect.follows_fit]
-        if len(free) < len(self.terms):  # the others begin with the load of a model without them
+        if len(free) < len(self.terms):  # the others start with the load of a model without them
             self.set_fit(self.fit(free, passes=passes))
         fit = self.fit(self.terms, passes=passes)
         self.set_fit(fit)
@@ -315,7 +317,7 @@ class Problem:
         return self.robot.inertial_parameters + correction
 
     def correction(self, coefficients: Array) -> Array:
-        """Change of the rigid-body parameters that coefficients stand for, (n_bodies, 10)."""
+        """Change of the rigid-body parameters that coefficients represent, (n_bodies, 10)."""
         assert self.robot is not None
         change = np.zeros(10 * self.robot.n_bodies)
         change[self.rigid_index] = coefficients[: len(self.rigid_index)]
@@ -354,9 +356,9 @@ class Problem:
         return torque
 
     def set_fit(self, fit: Fit) -> None:
-        """Hand the load and the model torque of a fit to the effects that need them."""
+        """Set the load and the model torque of a fit for the effects that need them."""
         load = self.rigid_torque(fit)
-        # What a sensor does to the torque acts on the torque before the sensor.
+        # An effect of the torque sensor acts on the torque before the sensor.
         dry, smooth = np.zeros_like(self.torque), np.zeros_like(self.torque)
         for term, own in fit.terms.slices(len(self.rigid_index)):
             if not term.effect.sees_model:
@@ -408,12 +410,12 @@ def make_problem(
     terms : iterable of Term
         Effects of the user's model.
     smooth : bool, default=True
-        Derive velocity and acceleration from the positions; False takes the given ones.
+        Derive velocity and acceleration from the positions; if False, use the given ones.
     subtract_urdf : bool, default=True
-        Take the torque of the URDF's rigid body off; False where ``torque`` is a residual already.
+        Subtract the torque of the URDF's rigid body; False if ``torque`` is a residual already.
     reversals : sequence of int, default=()
-        Joints, from 0, of which the rows reach up to the reversals. Only a model that says what
-        friction does there, one of the family ``"hysteresis"``, can be held to them.
+        Joints, from 0, whose rows reach up to the reversals. Only a model that describes friction
+        there, one of the family ``"hysteresis"``, can be tested on them.
     weight : ndarray of shape (n_samples,), optional
         Weight of every sample; those of weight 0 enter no row.
     """
@@ -458,7 +460,7 @@ def with_reversals(problem: Problem, terms: Iterable[Term], joints: Sequence[int
 
 
 def with_short_windows(problem: Problem, terms: Iterable[Term], window: float) -> Problem:
-    """The same problem with rows that are averages over less time, for a model with other terms.
+    """The same problem with rows averaged over shorter windows, for a model with other terms.
 
     Parameters
     ----------
@@ -492,7 +494,7 @@ def _with_rows(problem: Problem, terms: Iterable[Term], rows_and_folds: _RowsAnd
 
 
 def read_motion(signals: Signals, smooth: bool, torque: Array) -> Signals:
-    """Motion as the rows see it, smoothed or as logged, without broken samples."""
+    """Motion as used by the rows, smoothed or as logged, without broken samples."""
     if signals.time is None:
         return signals
     motion = without_broken(smooth_motion(signals), signals, torque)
@@ -528,7 +530,7 @@ def _rows_and_folds(
     window: float = WINDOW,
 ) -> _RowsAndFolds:
     """Averaging windows and the folds they fall into."""
-    # A slow log has wider windows, which reach further over a border; samples reach over none.
+    # A slow log has wider windows, which extend further over a border; single samples do not.
     clock = signals.time is not None
     guard = max(WINDOW_GUARD, _half_window(signals.rate)) if clock else 0.0
     rows = motion_rows(signals, reversals, window)
@@ -536,7 +538,7 @@ def _rows_and_folds(
 
 
 def regressor_rows(problem: Problem, index: NDArray[np.int64] | None = None) -> list[Array]:
-    """Averaged columns of the torque regressor, chunk by chunk; some of them if told which."""
+    """Averaged columns of the torque regressor, chunk by chunk; only the given ones if any."""
     assert problem.robot is not None
     robot = with_whole_turns(problem.robot)
     index = np.arange(10 * robot.n_bodies) if index is None else index
@@ -620,20 +622,20 @@ def _folds(rows: Rows, guard: float) -> tuple[Rows, list[NDArray[np.int64]], int
 WINDOW_GUARD = 1 / 16
 
 
-#: Directions weaker than this, relative to the strongest one, are rounding.
+#: Directions weaker than this, relative to the strongest one, are due to rounding.
 RANK = 1e-7
 
 
-#: Rows for each direction of the columns of a joint from which its residual says what its noise is.
+#: Rows for each direction of the columns of a joint from which its residual determines its noise.
 ROWS_A_DIRECTION = 2.0
 
 
 def own_noise(design: Array, target: Array, count: float, rows: float | None = None) -> float:
-    """Residual of a joint fitted by itself, which never hides what other joints spoil.
+    """Residual of a joint fitted alone, so that errors of other joints have no influence.
 
-    The rows may be a triangular factor; ``rows`` says how many there really are, ``count`` (the
-    same by default) by how many the squared residual is divided. Where there are too few rows to
-    tell noise from what columns can do, the whole torque is its bound.
+    The rows may be a triangular factor; ``rows`` is their true number, and ``count``, by default the
+    same, that by which the squared residual is divided. With too few rows to determine the noise, the
+    torque itself is its bound.
     """
     rows = count if rows is None else rows
     if not count:
@@ -659,12 +661,12 @@ def _weighted(terms: TermSum, design: list[Array], target: list[Array], sigma: A
     size = np.linalg.norm(a, axis=0)
     size[size == 0] = 1.0
     unit = a / size
-    # No column alone carries more than there is to explain. What the data leaves open, such as the
-    # share of a rotor in an inertia, is shared out as the smallest corrections that do it, and the
-    # loads of the joints, which depend on that, stay those of a robot.
+    # No single column explains more than the whole torque. Undetermined quantities, such as the
+    # share of a rotor in an inertia, are set by the smallest corrections, so that the loads of the
+    # joints, which depend on them, stay realistic.
     ridge = max(RIDGE, 1 / max(float(y @ y), 1 / LARGEST_RIDGE))
     normal = Normal(unit.T @ unit, unit.T @ y, np.ones(len(size)), ridge)
-    # One refinement step recovers the accuracy that forming the Gram matrix costs.
+    # One refinement step recovers the accuracy lost by forming the Gram matrix.
     scaled = normal.solution + normal.solve(unit.T @ (y - a @ (normal.solution / size)))
     coefficients = scaled / size
     residual = [t - block @ coefficients for block, t in zip(design, target, strict=True)]

@@ -3,9 +3,9 @@
 
 Each row is a Hann-weighted sum over a window of time, scaled to unit noise gain. The same weights
 act on the torque and on every regressor column (parallel filtering: Gautier 1997, ICRA), so the
-linear model still holds exactly. Only valid samples enter: sticking and reversals, which do not
-define sliding friction, are left out without smearing them into their neighbours. With windows
-half overlapping the rows are nearly independent, and there are few of them.
+linear model still holds exactly. Only valid samples are used: sticking and reversals, which do not
+define sliding friction, are left out and do not affect their neighbours. With windows half
+overlapping the rows are nearly independent, and there are few of them.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from scipy.sparse import csr_matrix
 
 from skidyn._signals import Array, Signals
 
-#: Width of a window in s; wide enough for a few samples where the log is slow.
+#: Width of a window in s; wider if the log is slow, to hold a few samples.
 WINDOW = 1 / 8
 FEWEST_SAMPLES = 6
 #: A window counts if at least this share of its weight falls on valid samples.
 LEAST_WEIGHT = 0.35
 #: Columns of a log that is faster than this, in Hz, are computed at one of every few samples: as
-#: many in a window as of a slow log, and at least one in this time, in s. Motion is smoothed to
-#: 27 Hz, so that more would tell the same.
+#: many per window as for a slow log, and at least one in this time, in s. Motion is smoothed to 27
+#: Hz, so more samples would give no more information.
 FAST, LONGEST_STEP = 600.0, 0.01
 #: Below this velocity (in units of ``Signals.unit`` per s) a joint counts as resting.
 REST = 0.01
@@ -48,9 +48,9 @@ class Rows:
     quarter : list of ndarray of shape (n_rows_j,)
         0 to 3: interleaved eighths of each segment, for folds within trajectories.
     sliding : ndarray of shape (n_samples, n_joints) of bool
-        Samples that enter.
+        Samples that are used.
     step : int, default=1
-        Columns are computed at one of so many samples, and interpolated between these.
+        Columns are computed at one of this many samples, and interpolated between them.
     """
 
     weights: list[csr_matrix]
@@ -72,16 +72,16 @@ class Rows:
 
     @cached_property
     def spans(self) -> tuple[NDArray[np.intp], Array, Array]:
-        """Where the rows of all joints, one joint after the other, lie in their trajectories.
+        """Positions of the rows of all joints, one joint after another, in their trajectories.
 
         Returns
         -------
         place : ndarray of shape (n_rows,)
-            Which of the sorted trajectories a row belongs to.
+            Index of the row's trajectory among the sorted trajectories.
         length : ndarray of shape (n_trajectories,), s
-            Time from the first to the last row, of whatever joint.
+            Time from the first to the last row of any joint.
         share : ndarray of shape (n_rows,)
-            Share of it that has passed at a row.
+            Share of this time that has passed at a row.
         """
         trajectory, time = np.concatenate(self.trajectory), np.concatenate(self.time)
         names, place = np.unique(trajectory, return_inverse=True)
@@ -108,7 +108,7 @@ class Rows:
         Parameters
         ----------
         between : csr_matrix of shape (n_samples, n)
-            What gives values at every sample from those at some of them, of
+            Matrix that interpolates values at every sample from those at some, of
             :func:`interpolation`.
 
         Returns
@@ -151,14 +151,14 @@ class Rows:
 
 @dataclass(frozen=True)
 class RowsInTime:
-    """Weights of a joint's rows in the order of time: those of a stretch of samples lie together.
+    """Weights of a joint's rows in the order of time, so that those of an interval are adjacent.
 
     Attributes
     ----------
     order : ndarray of shape (n_rows,) of int
         The rows in the order of their first samples.
     first, last : ndarray of shape (n_rows,) of int
-        Samples between which each of them lies.
+        First and last sample of each row.
     weights : csr_matrix of shape (n_rows, n_samples)
         Sorted alike.
     """
@@ -177,7 +177,7 @@ class RowsInTime:
         return cls(order, first[order], last[order], weights[order])
 
     def within(self, samples: slice) -> tuple[NDArray[np.int64], csr_matrix]:
-        """Rows that hold some of the samples in a stretch, and their weights on these."""
+        """Rows with samples in an interval, and their weights on these."""
         start = int(np.searchsorted(self.last, samples.start))
         stop = int(np.searchsorted(self.first, samples.stop))
         return self.order[start:stop], self.weights[start:stop, samples]
@@ -191,7 +191,7 @@ def _scaled(weights: csr_matrix, factor: Array) -> csr_matrix:
 
 def averaged(weights: csr_matrix, values: Array) -> Array:
     """Rows from values at every sample, shape (n_samples,) or (n_samples, k)."""
-    if values.ndim == 2 and values.shape[1] == 1:  # products with one vector are quicker
+    if values.ndim == 2 and values.shape[1] == 1:  # products with one vector are faster
         return np.asarray(weights @ values[:, 0])[:, None]
     return np.asarray(weights @ values)
 
@@ -218,7 +218,7 @@ def every_sample(signals: Signals) -> Rows:
 def sliding_samples(
     signals: Signals, valid: NDArray[np.bool_], margin: int | Sequence[int]
 ) -> NDArray[np.bool_]:
-    """Samples at which a joint slides: neither at rest nor near a reversal.
+    """Samples at which a joint slides, neither at rest nor near a reversal.
 
     Parameters
     ----------
@@ -252,11 +252,11 @@ def column_step(signals: Signals, window: float, margin: int) -> int:
     Parameters
     ----------
     signals : Signals
-        For its clock; the slowest recording counts where there are several rates.
+        Motion with time; with several rates, the slowest recording counts.
     window : float, s
         Width of the averaging windows.
     margin : int
-        Samples that are left out beside a reversal: nothing is interpolated over one.
+        Number of samples left out next to a reversal; columns are not interpolated across one.
 
     Returns
     -------
@@ -282,13 +282,13 @@ def interpolation(segments: Sequence[slice], few: Sequence[slice], step: int) ->
     few : sequence of slice
         Of the samples that are kept, for each of these segments that keeps some.
     step : int
-        How many samples one stands for.
+        Number of samples per kept sample.
 
     Returns
     -------
     csr_matrix of shape (n_samples, n)
-        Each sample from the four kept ones of its segment that are nearest, or from the nearest
-        one where a segment keeps fewer.
+        Each sample is interpolated from the four nearest kept ones of its segment, or equal to the
+        nearest one if the segment keeps fewer.
     """
     kept = [rows for rows in segments if rows.stop - rows.start > step // 2]
     values, columns, n_samples = [], [], segments[-1].stop if segments else 0
@@ -316,7 +316,7 @@ def interpolation(segments: Sequence[slice], few: Sequence[slice], step: int) ->
 
 
 def widened(mask: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
-    """A mask along its first axis with so many more samples on each side of all that it holds."""
+    """A mask extended along its first axis by some samples on each side."""
     total = np.zeros((len(mask) + 1, *mask.shape[1:]), dtype=np.int64)
     np.cumsum(mask, axis=0, out=total[1:])
     place = np.arange(len(mask))
@@ -327,14 +327,14 @@ def widened(mask: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
 def window_rows(
     signals: Signals, use: NDArray[np.bool_], window: float = WINDOW, step: int = 1
 ) -> Rows:
-    """Averaging windows over the samples that may enter.
+    """Averaging windows over the samples that may be used.
 
     Parameters
     ----------
     signals : Signals
         Motion.
     use : ndarray of shape (n_samples, n_joints) of bool
-        Samples that may enter.
+        Samples that may be used.
     window : float, s, default=1/8
         Width of the window; widened to hold six samples of each trajectory.
     step : int, default=1
@@ -388,7 +388,7 @@ Entries = tuple[NDArray[np.int64], NDArray[np.int64], Array, int]
 
 
 def _weigh(span: _Windows, use: NDArray[np.bool_]) -> tuple[Entries, NDArray[np.bool_]]:
-    """Weights on the samples in use, scaled to unit noise gain, and which windows are kept."""
+    """Weights of the samples in use, scaled to unit noise gain, and a mask of the kept windows."""
     n = len(span.middle)
     kept = use[span.sample]
     row, sample, weight = span.row[kept], span.sample[kept], span.weight[kept]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shape parameters: a walk from the grid to the values that explain most, the model refitted."""
+"""Shape parameters: search from the grid for the values that explain most, with refitting."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ FIRST_STEP, SHRINK, ROUNDS = 0.5, 2.2, 7
 FIRST_SHARE = 0.06
 #: Trials of a simplex for each parameter at most, and its size in first steps when it stops.
 MOST_TRIALS, CLOSE = 40, 0.01
-#: Squared error, in units of the noise, that it must take away: less says nothing of the values.
+#: Squared error, in units of the noise, that a term must remove; less does not determine values.
 LEAST_FURTHER = 4.0
 
 
@@ -74,9 +74,9 @@ def best_on_grid(problem: Problem, kind: str, joints: tuple[int, ...], gain: Gai
 
 
 def refine_term(problem: Problem, term: Term, gain: Gain) -> Term:
-    """Walk along one shape parameter after the other with shrinking steps.
+    """Search along one shape parameter after another with decreasing steps.
 
-    Parameters that can do for each other lie in a narrow valley, along which a simplex goes on
+    Parameters with similar effects lie in a narrow valley, along which a simplex search continues
     (Nelder, Mead 1965, The Computer Journal 7(4)).
 
     Parameters
@@ -84,9 +84,9 @@ def refine_term(problem: Problem, term: Term, gain: Gain) -> Term:
     problem : Problem
         Rows.
     term : Term
-        Where to start.
+        Term to start from.
     gain : Gain
-        Of the model without this term.
+        Gain function of the model without this term.
     """
     effect = term.effect
     shapes = [s for s in effect.shapes if s.name in term.shape]
@@ -131,7 +131,7 @@ def _by_simplex(
     values: Sequence[float],
     gain_of: Callable[[Sequence[float]], float],
 ) -> list[float]:
-    """Values from which no simplex goes further, beginning with smaller steps than a walk."""
+    """Values that no simplex search improves; its first steps are smaller than the search's."""
 
     def at(steps: Array) -> list[float]:
         moved = zip(shapes, ranges, values, steps.tolist(), strict=True)
@@ -140,7 +140,7 @@ def _by_simplex(
             for shape, (_, _, step), v, x in moved
         ]
 
-    from scipy.optimize import minimize  # not paid for by who only checks a log
+    from scipy.optimize import minimize  # slow to import, and not needed to check a log
 
     first = np.vstack([np.zeros(len(shapes)), np.eye(len(shapes)) / SHRINK])
     found = minimize(

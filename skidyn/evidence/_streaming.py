@@ -22,11 +22,11 @@ from skidyn.evidence._problem import Problem, hysteresis_joints, motion_rows, re
 from skidyn.robots import Robot, base_parameter_index
 
 PathLike = str | os.PathLike[str]
-#: More tasks balance the load and lose less with a worker; fewer cost less to hand out.
+#: More tasks balance the load and lose less work with a worker; fewer have less overhead.
 TASKS_PER_THREAD = 8
 
 
-#: A file, and which of its trajectories, counted from 0, are left out.
+#: A file, and the trajectories in it, counted from 0, that are left out.
 Source = tuple[Path, frozenset[int]]
 
 
@@ -41,7 +41,7 @@ class Options:
 
 @dataclass(frozen=True)
 class _Part:
-    """Evidence of some files and how many trajectories it holds."""
+    """Evidence of some files and its number of trajectories."""
 
     evidence: Evidence
     trajectories: int
@@ -58,34 +58,35 @@ def evidence_from_parquet(
     n_jobs: int | None = None,
     client: Any = None,
 ) -> Evidence:
-    """Evidence of Parquet files, without ever holding more than one trajectory in memory.
+    """Evidence of Parquet files, with at most one trajectory in memory.
 
     Parameters
     ----------
     paths : path or iterable of path
-        Files, or a folder of ``*.parquet``, with position and torque of every joint and, where
-        they are known, ``time`` (s), ``trajectory``, velocity, acceleration and temperature, in SI
-        units, under any of the names that :func:`skidyn.logs.read_log` knows. Consecutive rows
-        of one trajectory number are one trajectory; none reaches over the end of a file.
+        Files, or a folder of ``*.parquet``, with position and torque of every joint and, if known,
+        ``time`` (s), ``trajectory``, velocity, acceleration and temperature, in SI units, under any
+        of the names that :func:`skidyn.logs.read_log` accepts. Consecutive rows with one trajectory
+        number are one trajectory; a trajectory ends with its file.
     robot : Robot
         Robot.
     effects : iterable of str, (str, joints) or Term, default=("viscous", "coulomb")
         Effects beside the rigid body. Their shape parameters must be given.
     columns : mapping, optional
-        Which column holds which signal where the names do not tell, as in
-        :func:`skidyn.logs.read_log`: ``{"tau": "load_{joint}"}``.
+        Columns of signals with other names, as in :func:`skidyn.logs.read_log`: ``{"tau":
+        "load_{joint}"}``.
     groups : int or None, default=20
-        Trajectories are numbered in the order of files and rows, whatever their numbers in the
+        Trajectories are numbered in the order of files and rows, regardless of their numbers in the
         files. The factor of trajectory ``k`` is merged into that of group ``k % groups``, so that
-        memory does not grow with the number of trajectories; None keeps one factor for each.
+        memory does not grow with the number of trajectories; with None there is one factor for
+        each.
     max_rows : int, default=2_000_000
-        Longest trajectory that is read; protects memory from damaged or hostile files.
+        Longest trajectory that is read, in rows; protects memory from damaged or malicious files.
     n_jobs : int, optional
         Processes that share the files, as in scikit-learn; one by default, -1 for all cores.
     client : distributed.Client, optional
-        Cluster that does the work: a few tasks for each of its threads, and a tree that merges
-        them. Files must be readable by the workers. A worker that dies loses its tasks, not the
-        result.
+        Cluster on which to compute: a few tasks for each of its threads, and a tree that merges
+        them. Files must be readable by the workers. If a worker fails, its tasks are computed
+        again.
 
     Returns
     -------
@@ -95,9 +96,9 @@ def evidence_from_parquet(
     Raises
     ------
     LogError
-        No file, a missing column, a value that is not finite, or a trajectory that is too long.
+        There is no file, a column is missing, a value is not finite, or a trajectory is too long.
     SkidynError
-        An effect that needs a fit of the model first.
+        An effect needs a fit of the model first.
 
     References
     ----------
@@ -137,7 +138,7 @@ def evidence_of_sources(
     Parameters
     ----------
     sources : sequence of (Path, frozenset of int)
-        Files, and which of their trajectories, from 0, are left out and not numbered.
+        Files, and their trajectories, from 0, that are left out and not numbered.
     robot : Robot
         Robot.
     terms : sequence of Term
@@ -210,17 +211,17 @@ def evidence_of_signals(
         rigid_body=rigid_body,
         rigid_rows=[np.zeros((n, 0)) for n in rows.counts],
     )
-    # All trajectories have the same columns, also those that move few joints.
+    # All trajectories have the same columns, also those in which few joints move.
     return Evidence.from_problem(problem.with_base_columns(), terms)
 
 
 def linear_terms(effects: Iterable[Any], n_joints: int) -> list[Term]:
-    """Terms whose columns are known before any fit.
+    """Terms whose columns can be computed before any fit.
 
     Raises
     ------
     SkidynError
-        An effect with open shape parameters, or one that sees the torque of the model.
+        An effect has open shape parameters, or depends on the torque of the model.
     """
     terms = make_terms(effects, n_joints)
     for term in terms:
@@ -239,12 +240,12 @@ def linear_terms(effects: Iterable[Any], n_joints: int) -> list[Term]:
 
 
 def parquet_files(paths: PathLike | Iterable[PathLike]) -> list[Path]:
-    """Files that the user named, those of a folder in the order of their names.
+    """Files given by the user; those of a folder in the order of their names.
 
     Raises
     ------
     LogError
-        None, or one that is not there.
+        There are no files, or a file does not exist.
     """
     if isinstance(paths, (str, os.PathLike)):
         folder = Path(paths)
@@ -282,7 +283,7 @@ def _joined(one: _Part, other: _Part, groups: int | None) -> _Part:
 
 
 def _chunks(files: Sequence[Source], n: int) -> list[list[Source]]:
-    """At most n lists of neighbouring files, of equal length but for one file."""
+    """At most n lists of neighbouring files; their lengths differ by at most one."""
     edges = np.linspace(0, len(files), min(n, len(files)) + 1).round().astype(int)
     return [list(files[a:b]) for a, b in zip(edges[:-1], edges[1:], strict=True)]
 
@@ -292,8 +293,8 @@ def _on_cluster(
 ) -> _Part:
     threads = sum(client.nthreads().values())
     chunks = _chunks(files, TASKS_PER_THREAD * threads if threads else len(files))
-    # Bytes, so that a worker unpacks the robot and compiles its equations once and not for each
-    # task. A result on the cluster would do the same, but is lost with the worker that holds it.
+    # Bytes, so that a worker unpacks the robot and compiles its equations only once. A result on
+    # the cluster would serve as well, but is lost if its worker fails.
     known = pickle.dumps((robot, terms, options))
     parts = [client.submit(_task, chunk, known, pure=False) for chunk in chunks]
     join = partial(_joined, groups=options.groups)

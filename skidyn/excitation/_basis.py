@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Functions of time that a motion is a sum of; all of them start and end at rest at zero."""
+"""Functions of time whose weighted sum is a motion; all start and end at rest at zero."""
 
 from __future__ import annotations
 

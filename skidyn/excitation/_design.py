@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Optimal excitation: the motion within the robot's limits that tells most about its parameters."""
+"""Optimal excitation: the most informative motion within the robot's limits."""
 
 from __future__ import annotations
 
@@ -27,22 +27,23 @@ if TYPE_CHECKING:
 #: Middle pose, and weights of the basis.
 Motion = tuple[Array, Array]
 
-#: Samples at which a candidate's torques are judged, and rates in Hz at which its kinematic limits
-#: are kept meanwhile and all limits at the end.
+#: Number of samples at which a candidate's torques are judged; rates in Hz at which kinematic
+#: limits are checked during the search, and all limits at its end.
 JUDGED_SAMPLES, DRAFT_RATE, CHECK_RATE = 250, 100.0, 500.0
-#: Random starts, how many of the best are followed, and for how many steps for each penalty.
+#: Number of random starts, of the best ones that are improved, and of steps for each penalty.
 STARTS, FOLLOWED, ITERATIONS = 40, 2, 100
 #: Share of each limit that is used, so that a tracking error does not break it.
 MARGIN = 0.95
-#: Norm that stands for the maximum where a slope is needed.
+#: Order of the norm that replaces the maximum where a gradient is needed.
 NORM = 60.0
-#: Weights of broken torque and workspace limits, in turn; length in m that counts as one.
+#: Successive weights of exceeded torque and workspace limits; unit of length, m.
 PENALTIES, LENGTH = (1e3, 1e5), 0.05
-#: Share of the strokes below which a motion is given up.
+#: Share of the strokes below which a motion is rejected.
 SMALLEST = 0.025
 #: Share of the determinant in the criterion of the condition number.
 SIZE = 0.1
-#: Added to the normalised information matrix: what no motion shows must not dominate.
+#: Added to the normalised information matrix, so that directions that no motion excites do not
+#: dominate.
 RIDGE = 1e-9
 
 
@@ -64,16 +65,16 @@ def design_excitation(
 ) -> Excitation:
     """Design a motion from which base parameters and effects can be identified.
 
-    Every joint follows a Fourier series that quintics blend from and to rest, or quintics between
-    points. Positions, velocities and accelerations keep their limits by construction, those of
-    torque and workspace by a penalty and, in the end, by smaller strokes. The result is checked at
-    500 Hz.
+    Every joint follows a Fourier series that is blended from and to rest by quintic polynomials, or
+    quintic polynomials between points. Limits of position, velocity and acceleration are kept by
+    construction, those of torque and workspace by a penalty and finally by smaller strokes. The
+    result is checked at 500 Hz.
 
     Parameters
     ----------
     model : Robot or RBDRegressor
-        Robot with its limits. A fitted model of it brings its torque, friction included, for the
-        torque limits, its noise as the weights of the joints, and its effects.
+        Robot with its limits. A fitted model also provides the torque, friction included, for the
+        torque limits, the noise as the weights of the joints, and the effects.
     duration : float, s, default=20
         Length of the motion.
     motion : {"fourier", "quintic"}, default="fourier"
@@ -91,13 +92,13 @@ def design_excitation(
         regressor with columns of equal length (and a small share of the determinant, so that the
         motion stays large).
     effects : iterable, default=None
-        Effects that are to be identified too, as for :class:`~skidyn.identification.RBDRegressor`.
-        None: those of a fitted model, else viscous and Coulomb friction.
+        Effects to be identified as well, as for :class:`~skidyn.identification.RBDRegressor`. If
+        None, those of a fitted model, else viscous and Coulomb friction.
     limits : MotionLimits, optional
         Limits; those of the URDF by default.
     recorded : DataFrame, Excitation or list of them, default=()
-        Recordings already made, as :func:`~skidyn.logs.read_log` returns them, or motions
-        already designed: the new one adds to what they tell. They count by their length in s.
+        Recordings already made, as :func:`~skidyn.logs.read_log` returns them, or motions already
+        designed; the new one is chosen to complement them. They count by their length in s.
     iterations : int, default=100
         Steps of the descent from each of the two best of 40 random motions, for each of two
         penalties.
@@ -107,13 +108,13 @@ def design_excitation(
     Returns
     -------
     Excitation
-        Within every limit.
+        A motion within every limit.
 
     Raises
     ------
     SkidynError
-        Limits are inconsistent, an effect has a memory, or no motion however small keeps the torque
-        and workspace limits.
+        Limits are inconsistent, an effect has a memory, or even the smallest motion exceeds the
+        torque or workspace limits.
 
     References
     ----------
@@ -161,11 +162,11 @@ def _condition(matrix: Array) -> float:
 
 @dataclass(frozen=True)
 class _Search:
-    """Descent over unbounded numbers: for each joint its middle, its share of room, its weights."""
+    """Descent over unbounded numbers: for each joint its middle, share of the range, weights."""
 
     model: Model
     limits: MotionLimits
-    draft: torch.Tensor  # the basis at even times, for kinematic limits
+    draft: torch.Tensor  # the basis at equal steps of time, for kinematic limits
     judged: torch.Tensor  # the same at fewer times, for torques and information
     duration: float
     before: torch.Tensor
@@ -195,14 +196,14 @@ class _Search:
             *(model, limits, draft, judged, basis.duration, torch.from_numpy(before)),
             *(torch.ones(len(before), dtype=torch.float64), criterion, starts),
         )
-        # Columns in units of what a random motion shows of them, so that one ridge fits all.
+        # Columns are scaled by their size in a random motion, so that one ridge suits all.
         with torch.no_grad():
             shown = [search.information(*search.states(torch.from_numpy(x))) for x in starts[:5]]
         size = torch.stack(shown).mean(0).diagonal().sqrt()
         return replace(search, scale=torch.where(size > 0, size, torch.ones_like(size)))
 
     def ranked(self, iterations: int) -> tuple[list[Motion], list[Motion]]:
-        """Middle and weights of the motions that were descended to, and of the starts by worth."""
+        """Middle and weights of the improved motions, and of the starts, sorted by their loss."""
         import torch
 
         starts = sorted(self.starts, key=self._worth)
@@ -217,7 +218,7 @@ class _Search:
             return [motion(x) for x in found], [motion(x) for x in starts]
 
     def _worth(self, x: Array) -> float:
-        """Loss under the last penalty: what breaks a limit has to shrink in the end."""
+        """Loss under the last penalty, because strokes that exceed a limit are reduced later."""
         import torch
 
         with torch.no_grad():
@@ -249,13 +250,13 @@ class _Search:
         return x
 
     def _is_bound(self) -> bool:
-        """Whether there are limits that are kept by a penalty."""
+        """Whether there are limits that a penalty enforces."""
         return self.limits.workspace is not None or bool(np.isfinite(self.limits.torque).any())
 
     def motion(self, x: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """Middle pose within the middle of the range, and weights within the kinematic limits.
 
-        A descent sees a little less room than there is, and smooth walls.
+        The descent uses slightly narrower limits, and approaches them smoothly.
         """
         import torch
 
@@ -286,12 +287,12 @@ class _Search:
         return self.model.information_torch(q, dq, ddq, self.duration) + self.before
 
     def loss(self, x: torch.Tensor, penalty: float) -> torch.Tensor:
-        """What is minimised."""
+        """Function to be minimised."""
         states = self.states(x)
         return self.score(self.information(*states)) + penalty * self._violation(*states)
 
     def score(self, information: torch.Tensor) -> torch.Tensor:
-        """The criterion, the less the better."""
+        """The criterion; smaller is better."""
         import torch
 
         matrix = information / self.scale[:, None] / self.scale
@@ -300,12 +301,12 @@ class _Search:
             size = matrix.diagonal().clamp_min(RIDGE).sqrt()
             values = torch.linalg.eigvalsh(matrix / size[:, None] / size)
             ratio = 0.5 * (values[-1].log() - values[0].clamp_min(1e-14).log())
-            # It is blind to the size of a motion, which a small share of the other is not.
+            # It does not depend on the size of a motion; a small share of the determinant does.
             score = ratio + SIZE * score / len(matrix)
         return score
 
     def _violation(self, q: torch.Tensor, dq: torch.Tensor, ddq: torch.Tensor) -> torch.Tensor:
-        """How far torque and workspace limits are broken: mean squares, zero where they hold."""
+        """Excess over torque and workspace limits: mean squares, zero where the limits are kept."""
         import torch
 
         from skidyn.dynamics import evaluate_torch as run
@@ -322,7 +323,7 @@ class _Search:
         return total
 
     def _clearance(self, position: torch.Tensor) -> torch.Tensor:
-        """Clearance in the workspace with its slope, by differences of a function that is given."""
+        """Clearance in the workspace with its slope, by differences of the given function."""
         import torch
 
         here = position.detach().numpy()
@@ -336,8 +337,8 @@ class _Search:
 def _high_norm(values: torch.Tensor) -> torch.Tensor:
     """Norm of each column that is little above its largest value.
 
-    The best motion touches its limits at many times at once: the slope of the maximum itself, which
-    knows only one of them, leads a descent astray.
+    The best motion reaches its limits at many times at once. The slope of the maximum itself
+    depends on only one of them and would mislead a descent.
     """
     largest = values.detach().amax(0)
     return largest * ((values / largest).clamp_min(0.0) ** NORM).sum(0) ** (1.0 / NORM)
@@ -348,7 +349,7 @@ def _pose(robot: Robot) -> Any:
 
 
 def _full(excitation: Excitation, limits: MotionLimits) -> Excitation:
-    """Strokes smaller by what the sparser times of the search did not see."""
+    """Strokes scaled to the limits at all times, since the search checks fewer times."""
     _, q, dq, ddq = excitation.sample(CHECK_RATE)
     low, high = limits.position.T - excitation.middle
     away = q - excitation.middle
@@ -368,10 +369,10 @@ def _full(excitation: Excitation, limits: MotionLimits) -> Excitation:
 def _best_within(
     model: Model, basis: FourierBasis | QuinticBasis, search: _Search, iterations: int
 ) -> Excitation:
-    """The best motion that keeps every limit, with smaller strokes where need be.
+    """The best motion that keeps every limit, with smaller strokes if necessary.
 
-    Smaller strokes cost one motion much more than another, so that motions are compared with them;
-    of random starts, the first will do.
+    Smaller strokes reduce the quality of some motions much more than of others, so motions are
+    compared with their final strokes; of random starts, the first that keeps the limits is used.
     """
     import torch
 
@@ -430,6 +431,6 @@ def broken_limits(model: Model, excitation: Excitation, limits: MotionLimits) ->
 
 
 def _teller(done: float, step: float) -> Callable[[Array], None]:
-    """What tells after each step of a descent which share of the design is done."""
+    """Callback that reports the progress of the design after each step of a descent."""
     steps = count(1)
     return lambda x: tell("Designing the motion", done + next(steps) * step)

@@ -24,19 +24,20 @@ class Excitation:
     Parameters
     ----------
     robot : Robot
-        Robot it is made for.
+        Robot for which the motion is designed.
     basis : callable
-        Functions of time that the motion is a sum of.
+        Functions of time whose weighted sum is the motion.
     middle : ndarray of shape (n_joints,), rad or m
         Pose at start and end.
     weights : ndarray of shape (n_joints, n_functions)
         Weights of the functions, rad or m.
     condition_number : float
-        Of the base regressor, columns scaled to equal length; recordings already made included.
+        Condition number of the base regressor with columns scaled to equal length; recordings
+        already made are included.
     log_determinant : float
-        Of the information matrix of base parameters and effects, recordings included: torques in
-        units of the noise of a fitted model, else of the effort limits of the URDF; per second of
-        recording.
+        Logarithm of the determinant of the information matrix of base parameters and effects,
+        recordings included, per second of recording. Torques are in units of the noise of a fitted
+        model, else of the effort limits of the URDF.
 
     Examples
     --------
@@ -61,7 +62,7 @@ class Excitation:
         return self.basis.duration
 
     def sample(self, rate: float) -> tuple[Array, Array, Array, Array]:
-        """The motion at even times.
+        """Sample the motion at equal steps of time.
 
         Parameters
         ----------
@@ -76,12 +77,12 @@ class Excitation:
             Position, velocity and acceleration, SI units.
         """
         time = np.arange(0.0, self.duration - 1e-6 / rate, 1 / rate)
-        time = np.append(time, self.duration)  # the motion ends at rest, whatever the rate
+        time = np.append(time, self.duration)  # the motion ends at rest at any rate
         q, dq, ddq = self.basis(time) @ self.weights.T
         return time, q + self.middle, dq, ddq
 
     def to_frame(self, rate: float) -> pd.DataFrame:
-        """Table of the motion.
+        """Sample the motion as a table.
 
         Parameters
         ----------
@@ -103,10 +104,10 @@ class Excitation:
         return table
 
     def to_csv(self, path: str | Path, rate: float = 100.0) -> None:
-        """Write the motion as CSV, in one step.
+        """Write the motion to a CSV file.
 
-        With the measured torques as columns ``tau1 ..`` it is a log that
-        :func:`~skidyn.logs.read_log` reads.
+        With the measured torques added as columns ``tau1 ..`` it is a log for
+        :func:`~skidyn.logs.read_log`.
 
         Parameters
         ----------

@@ -23,7 +23,8 @@ from skidyn.robots import Instant, Robot, SymbolicRobot, base_parameter_index, r
 if TYPE_CHECKING:
     import torch
 
-#: Samples that are evaluated at a time, and rate in Hz of designed motions that count as recorded.
+#: Number of samples evaluated at a time, and rate in Hz at which designed motions count as
+#: recorded.
 _CHUNK, _RATE = 2048, 100.0
 
 
@@ -38,7 +39,7 @@ class Model:
     columns : Program
         Regressor of base parameters and effects, shape (n_joints, n_columns).
     torque : Program
-        Torque that has to stay within the limits, shape (n_joints,).
+        Torque, which has to stay within the limits, shape (n_joints,).
     noise : ndarray of shape (n_joints,)
         Unit of each joint's torque, N m or N.
     """
@@ -51,7 +52,8 @@ class Model:
     def information(self, q: Array, dq: Array, ddq: Array, seconds: float) -> Array:
         """Information of a motion of given length, per second of recording.
 
-        Noise of torques repeats from sample to sample, so that time counts and not samples.
+        Noise of torques is correlated between samples, so the length of time counts and not the
+        number of samples.
         """
         total = np.zeros(2 * (self.columns.shape[1],))
         for start in range(0, len(q), _CHUNK):
@@ -81,7 +83,7 @@ def evaluate(program: Program, q: Array, dq: Array, ddq: Array) -> Array:
 
 
 def make_model(model: Robot | RBDRegressor, effects: Iterable[Any] | None) -> Model:
-    """Regressor, torque and noise of a robot or a fitted model of one."""
+    """Regressor, torque and noise of a robot or of a fitted model."""
     check_model(model)
     if isinstance(model, Robot):
         robot = model

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a motion may reach, and whether it does."""
+"""Limits of a motion."""
 
 from __future__ import annotations
 
@@ -13,29 +13,30 @@ from skidyn._exceptions import SkidynError
 from skidyn._signals import Array
 from skidyn.robots import Robot
 
-#: Where the last body may be, in the base frame: a box, or the clearance in m of positions (m).
+#: Permitted positions of the last body in the base frame: a box, or a function that returns the
+#: clearance in m of positions (m).
 Workspace = Callable[[Array], Any] | Sequence[Sequence[float]]
 
 
 @dataclass(frozen=True)
 class MotionLimits:
-    """What a motion may reach.
+    """Limits of a motion.
 
     Parameters
     ----------
     position : array of shape (n_joints, 2), rad or m, optional
-        Lowest and highest position; those of the URDF by default, and +-pi where it has none.
+        Lowest and highest position; by default those of the URDF, or +-pi where it has none.
     velocity : array of shape (n_joints,), rad/s or m/s, optional
-        Those of the URDF by default, and 2 where it has none.
+        Largest velocity; by default that of the URDF, or 2 where it has none.
     acceleration : array of shape (n_joints,), rad/s^2 or m/s^2, optional
-        Four times the velocity per second by default.
+        Largest acceleration; by default four times the largest velocity per second.
     torque : array of shape (n_joints,), N m or N, optional
-        On the torque of the model: with friction if a fitted model is given, the rigid bodies of
-        the description if a robot is given. That of the URDF by default.
+        Largest torque of the model: with friction if a fitted model is given, else of the rigid
+        bodies of the description. By default that of the URDF.
     workspace : box of shape (3, 2) in m, or callable, optional
-        Where the origin of the last body may be, in the base frame: a box, or a function of
-        positions of shape (n_samples, 3) that returns the clearance of each in m, negative where it
-        is forbidden.
+        Permitted positions of the origin of the last body in the base frame: a box, or a function
+        of positions of shape (n_samples, 3) that returns the clearance of each in m, negative where
+        it is forbidden.
 
     Examples
     --------
@@ -50,7 +51,7 @@ class MotionLimits:
     workspace: Workspace | None = None
 
     def resolved(self, robot: Robot) -> MotionLimits:
-        """Every limit as an array, from the URDF where none is given.
+        """Complete the limits: every limit as an array, from the URDF where none is given.
 
         Parameters
         ----------
@@ -60,12 +61,12 @@ class MotionLimits:
         Returns
         -------
         MotionLimits
-            With arrays in place of None, except for the workspace.
+            Limits with arrays in place of None, except for the workspace.
 
         Raises
         ------
         SkidynError
-            A limit has the wrong shape or leaves no room.
+            A limit has the wrong shape or permits no motion.
         """
         n = robot.n_joints
         free = np.isfinite(robot.position_limits)
@@ -109,12 +110,12 @@ class MotionLimits:
         Returns
         -------
         ndarray of shape (n_samples,), m
-            Infinite where no workspace is given.
+            Infinite if no workspace is given.
 
         Raises
         ------
         SkidynError
-            The workspace function returns something else than one clearance for each position.
+            The workspace function does not return one clearance for each position.
         """
         if self.workspace is None:
             return np.full(len(position), np.inf)

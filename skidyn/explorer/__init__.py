@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The loop by hand: compare, click where it fails, see what would help, tick it, undo, save."""
+"""Interactive search for missing effects: compare, rank and add effects, undo, save."""
 
 from skidyn.explorer._server import serve
 from skidyn.explorer._session import RankedEffect, Session

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Effects that averaged rows in whole folds cannot judge: a ripple, and what a recording carries.
+"""Effects that cannot be judged on averaged rows in folds: ripples and loads of a recording.
 
-A torque ripple is faster than the windows over which rows are averaged: it is fitted to samples. A
-payload or a force at the tool in some recordings is unknown to a fit that left these recordings
-out: it is judged on interleaved quarters of every recording, as in a diagnosis.
+A torque ripple is faster than the windows over which rows are averaged, so it is fitted to samples.
+A payload or a force at the tool in some recordings cannot be known to a fit that left these
+recordings out, so it is judged on interleaved quarters of every recording, as in a diagnosis.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ from skidyn.evidence import Problem, solve_left_out
 #: Chance above which a line of the spectrum is noise.
 CHANCE = 1e-3
 QUARTERS = 4
-#: Share of the squared error of its joints that a load has to take to be offered.
+#: Share of the squared error of its joints that a load has to remove to be offered.
 LEAST = 0.02
 
 
 @dataclass(frozen=True)
 class Offer:
-    """An effect with the share of each joint's squared error that it takes.
+    """An effect with the share of each joint's squared error that it removes.
 
     Attributes
     ----------
     candidate : Candidate
-        What would be added.
+        Effect that could be added.
     drop : ndarray of shape (n_joints,)
-        Share of the squared error, of samples for a ripple, of averaged rows else.
+        Share of the squared error of samples for a ripple, otherwise of averaged rows.
     """
 
     candidate: Candidate
@@ -49,11 +49,11 @@ class Ripple:
     Attributes
     ----------
     torque : ndarray of shape (n_samples,)
-        Of the fit that left the sample's fold out, N m.
+        Torque of the fit that left the sample's fold out, N m.
     left_out : ndarray of shape (n_folds, 2)
-        Coefficients without each fold, N m.
+        Coefficients of the fits without each fold, N m.
     whole : ndarray of shape (2,)
-        Of all folds, N m.
+        Coefficients of the fit to all folds, N m.
     """
 
     torque: Array
@@ -71,7 +71,7 @@ def fit_ripple(problem: Problem, term: Term, residual: Array, fold: NDArray[np.i
     term : Term
         Ripple of one joint.
     residual : ndarray of shape (n_samples, n_joints), N m
-        What the model leaves.
+        Residual of the model.
     fold : ndarray of shape (n_samples,)
         Fold of every sample.
     """
@@ -86,14 +86,14 @@ def fit_ripple(problem: Problem, term: Term, residual: Array, fold: NDArray[np.i
 
 
 def ripples(problem: Problem, residual: Array, fold: NDArray[np.int64]) -> list[Offer]:
-    """The strongest ripple of every joint that stands out of the noise.
+    """The strongest ripple of every joint if it is significant.
 
     Parameters
     ----------
     problem : Problem
         Motion.
     residual : ndarray of shape (n_samples, n_joints), N m
-        What the model leaves, held out.
+        Held-out residual of the model.
     fold : ndarray of shape (n_samples,)
         Fold of every sample.
     """
@@ -116,7 +116,7 @@ def ripples(problem: Problem, residual: Array, fold: NDArray[np.int64]) -> list[
 def loads(
     problem: Problem, blocks: Sequence[dict[int, Array]], sigma: Array, target: Sequence[Array]
 ) -> list[Offer]:
-    """A payload or a force at the tool in the recordings that show it most.
+    """A payload or a force at the tool in the recordings in which it is largest.
 
     Parameters
     ----------
@@ -125,14 +125,14 @@ def loads(
     blocks : sequence of dict
         Columns of the model beside the rigid body.
     sigma : ndarray of shape (n_joints,)
-        Noise of one row.
+        Noise of one row of each joint.
     target : sequence of ndarray
         Averaged torque.
 
     Returns
     -------
     list of Offer
-        Judged on interleaved quarters of every recording.
+        Effects, judged on interleaved quarters of every recording.
     """
     design = problem.design(blocks)
     offers = []
@@ -143,7 +143,7 @@ def loads(
         before = _quarters(problem, design, sigma, target)
         wider = [np.hstack([a, rows[j]]) if j in rows else a for j, a in enumerate(design)]
         if any(a.shape[1] != wider[0].shape[1] for a in wider):
-            continue  # a joint that the tool does not reach
+            continue  # the joint does not move the tool
         after = _quarters(problem, wider, sigma, target)
         offers.append(Offer(split.candidate, 1 - after / np.maximum(before, 1e-300)))
     return [offer for offer in offers if offer.drop.max() >= LEAST]

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Held-out error of one joint, row by row, with each candidate effect beside the refitted model.
 
-A candidate changes the rigid body beside it, so its rows alone do not say what it will do. As in
-the search of a diagnosis the model's columns are swept out of the candidate's (block elimination),
-fold by fold. Here the residual itself is kept, for one joint: its sums over the whole log or over a
-clicked stretch of time are exactly what the fit with the candidate leaves there.
+A candidate changes the estimate of the rigid body, so its effect on the error cannot be found from
+its own columns alone. As in the search of a diagnosis, the model's columns are eliminated from the
+candidate's (block elimination), fold by fold. Here the residual of one joint is kept as well: its
+sums over the whole log or over a selected interval of time are exactly those of the fit with the
+candidate.
 """
 
 from __future__ import annotations
@@ -30,9 +31,9 @@ class HeldOutRows:
     Attributes
     ----------
     residual : ndarray of shape (n_rows,)
-        Of the model as it is, N m or N.
+        Residual of the present model, N m or N.
     index : ndarray of shape (n_candidates,)
-        Candidates that reach the joint and whose coefficients physics allows.
+        Candidates that act on the joint and have physically possible coefficients.
     then : ndarray of shape (n_rows, n_candidates)
         Square of the residual of the model with each of them added, (N m)^2 or N^2.
     """
@@ -42,7 +43,7 @@ class HeldOutRows:
     then: Array
 
     def drops(self, rows: NDArray[np.bool_] | slice = slice(None)) -> Array:
-        """Share of the squared error in some rows that each candidate takes away."""
+        """Share of the squared error in some rows that each candidate removes."""
         before = float(np.sum(self.residual[rows] ** 2))
         left: Array = self.then[rows].sum(0) / max(before, 1e-300)
         return 1 - left
@@ -65,7 +66,8 @@ class FoldedModel:
     whole : object
         Fit to all.
     own : ndarray of shape (p,) of bool
-        Coefficients that one recording alone can tell: they are not held out with it.
+        Coefficients that can be identified from a single recording only, and are not held out with
+        it.
     """
 
     blocks: list[Block]
@@ -77,14 +79,14 @@ class FoldedModel:
 
 
 class Ranking:
-    """What every candidate would do to the held-out error of a joint.
+    """Held-out error of a joint with each candidate.
 
     Parameters
     ----------
     problem : Problem
         Rows and folds.
     candidates : sequence of Candidate
-        What might be added.
+        Effects that could be added.
     target : sequence of ndarray
         Averaged torque of every joint.
     """
@@ -127,7 +129,7 @@ class Ranking:
         sigma : ndarray of shape (n_joints,)
             Noise of one row of every joint.
         own : ndarray of shape (p,) of bool, optional
-            Coefficients that one recording alone can tell; none by default.
+            Coefficients that can be identified from a single recording only; none by default.
         """
         design = self.problem.design(blocks)
         weight = 1 / np.asarray(sigma) ** 2
@@ -159,7 +161,7 @@ class Ranking:
         Parameters
         ----------
         model : FoldedModel
-            The model as it is.
+            The present model.
         joint : int
             Joint, counted from 0.
         """
@@ -188,7 +190,7 @@ class Ranking:
         return np.concatenate([none, *(self._columns[i] for i in index)])
 
     def _by_width(self, index: NDArray[np.int64]) -> Iterator[tuple[int, NDArray[np.int64]]]:
-        """Where candidates with the same number of columns stand in ``index``."""
+        """Positions in ``index`` of candidates with the same number of columns."""
         members: dict[int, list[int]] = defaultdict(list)
         for at, i in enumerate(index):
             members[self.candidates[int(i)].width].append(at)
@@ -241,7 +243,7 @@ class Ranking:
         fold: int | None,
         weight: Array,
     ) -> tuple[list[Array], Array]:
-        """Coefficients of every candidate, and how it changes those of the model beside it."""
+        """Coefficients of every candidate, and the change of the model's coefficients by it."""
         swept = fit.solve(cross)
         slope = target - cross.T @ fit.solution
         change = np.empty((len(cross), len(index)))
@@ -262,7 +264,7 @@ class Ranking:
         return gains, change
 
     def _explained(self, joint: int, rows: slice, gain: list[Array]) -> Array:
-        """What each candidate explains of some rows of a joint by itself."""
+        """Part of some rows of a joint that each candidate alone explains."""
         block = self._blocks[joint][rows]
         scaled = block * np.concatenate([np.zeros(0), *gain])
         starts = np.cumsum([0, *(len(g) for g in gain)])[:-1]

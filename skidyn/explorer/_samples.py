@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Held-out residual of every sample, quickly again and again for models that grow by a term."""
+"""Held-out residual of every sample, computed quickly for models that grow term by term."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from skidyn._signals import Array
 from skidyn.effects import Term, TermSum
 from skidyn.evidence import Problem
 
-#: Samples for which the rigid body is worked out at once.
+#: Number of samples for which the rigid body is computed at once.
 MOST = 8192
 
 
@@ -33,16 +33,17 @@ class Samples:
         self._columns: dict[Term, dict[int, Array]] = {}
 
     def residual(self, terms: Sequence[Term], coefficients: Sequence[Array], whole: Array) -> Array:
-        """Held-out residual, as that of a diagnosis.
+        """Held-out residual, as in a diagnosis.
 
         Parameters
         ----------
         terms : sequence of Term
             Every effect of the model.
         coefficients : sequence of ndarray of shape (n_coefficients,)
-            Of the fit without each fold: rigid body, then terms.
+            Coefficients of the fit without each fold: rigid body, then terms.
         whole : ndarray of shape (n_coefficients,)
-            Of the fit to all folds: what one recording alone can tell is not held out with it.
+            Coefficients of the fit to all folds, for those that can be identified from a single
+            recording only and are not held out with it.
 
         Returns
         -------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The script that does without a browser what was clicked."""
+"""Python script that repeats the clicks without a browser."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a session shows of its model: sizes and certainty of what was added, curves, residuals."""
+"""Results that a session shows: parameters and confidence of added effects, curves, residuals."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from skidyn.explorer._state import State, is_fine
 from skidyn.explorer._sure import sure_told
 from skidyn.report import rows_with_peaks
 
-#: Parameters of an addition that are told, and half the width of a 95 % interval.
+#: Number of parameters of an addition that are shown, and half the width of a 95 % interval.
 TOLD, NORMAL = 3, 1.96
 #: Points of a curve.
 POINTS = 1500
 
 
 class Seen(State):
-    """Numbers and curves of the model as given and as it is now."""
+    """Numbers and curves of the given and of the present model."""
 
     def sizes(self) -> list[str]:
-        """What was added in numbers: parameters with half their 95 % intervals, step by step.
+        """Parameters of every addition with half their 95 % intervals.
 
         Returns
         -------
@@ -51,13 +51,13 @@ class Seen(State):
         ]
 
     def sure(self) -> list[str]:
-        """How sure the name of every addition is.
+        """Confidence that every added effect is the right one.
 
         Returns
         -------
         list of str
-            Such as ``"confidence 90%"``: as in a diagnosis, from what the best other effect
-            would have taken instead, and from what is left on its joints now.
+            Such as ``"confidence 90%"``: as in a diagnosis, from the error that the best other
+            effect would have removed instead, and from the error that remains on its joints.
         """
         residual, rows = self._steps[-1].residual, self.problem.rows
         everywhere = range(self.problem.n_joints)
@@ -79,7 +79,7 @@ class Seen(State):
         return told
 
     def curves(self, joint: int, trajectory: int) -> dict[str, list[float | None]]:
-        """Measured torque, and the model as given and as it is now, held out.
+        """Measured torque, and held-out torque of the given and of the present model.
 
         Parameters
         ----------

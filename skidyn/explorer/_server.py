@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The explorer's local page: an address on this machine only, and a random token to use it."""
+"""The explorer's local page: reachable only from this machine, with a random token."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ from skidyn.explorer._session import Session
 from skidyn.identification import RBDRegressor
 from skidyn.simulation import Controller
 
-#: What saving writes, into the folder chosen at the start.
+#: Files that are saved in the folder chosen at the start.
 SAVED = ("model.skops", "explored.py", "report.html")
 HOST = "127.0.0.1"
-#: Longest question of the page, bytes; its own have some hundred.
+#: Longest request, bytes; those of the page itself have some hundred bytes.
 LONGEST_BODY = 2**16
 
 
 class Explorer:
-    """Answers of the page, one at a time; the report and its progress beside them.
+    """Answer requests of the page one at a time; the report is made in a separate thread.
 
     Parameters
     ----------
@@ -71,13 +71,13 @@ class Explorer:
         self._told: dict[str, Any] = {"text": "", "share": None}
 
     def answer(self, question: str, words: dict[str, Any]) -> dict[str, Any]:
-        """Answer a question of the page.
+        """Answer a request of the page.
 
         Parameters
         ----------
         question : {"state", "curves", "ranked", "add", "refine", "undo", "remove", "sizes", \
                 "save", "report", "progress"}
-            What is asked.
+            Kind of request.
         words : dict
             Its arguments.
 
@@ -134,7 +134,7 @@ class Explorer:
         return {"effects": [asdict(e) for e in effects], "span": span}
 
     def _add(self, kind: str, joint: int, trajectory: int) -> dict[str, Any]:
-        """First answer, at once: the shape is that of the grid until the page asks to refine."""
+        """Add an effect with the shape of the grid, at once; refinement is a later request."""
         self.session.check_place(int(joint), int(trajectory))
         self.session.add(str(kind), int(joint), refined=False)
         return self._changed(joint, trajectory)
@@ -182,7 +182,7 @@ class Explorer:
         return {"saved": [str(file) for file in files]}
 
     def _report(self) -> dict[str, Any]:
-        """Report on the model saved last; it says what is missing still."""
+        """Make a report on the model saved last, with the effects that are still missing."""
         from skidyn.diagnosis import diagnose
         from skidyn.report import summarize, write_html
 
@@ -196,12 +196,12 @@ class Explorer:
         self._told = {"text": text, "share": share}
 
     def _progress(self) -> dict[str, Any]:
-        """How far the report is."""
+        """Progress of the report."""
         return self._told
 
 
 def page() -> str:
-    """The page with everything it needs inside.
+    """The page as one file.
 
     Returns
     -------
@@ -218,9 +218,10 @@ def page() -> str:
 
 
 class _Worker:
-    """A thread that answers one question after the other, and ends with the process.
+    """A thread that answers requests one after another, and ends with the process.
 
-    Those of concurrent.futures are waited for: after Ctrl-C, until a report is done.
+    Threads of concurrent.futures delay the end of the process: after Ctrl-C, until a report is
+    done.
     """
 
     def __init__(self, name: str) -> None:
@@ -230,7 +231,7 @@ class _Worker:
         threading.Thread(target=self._run, name=name, daemon=True).start()
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Call a function when those before it are done."""
+        """Call a function after all earlier ones."""
         future: Future[Any] = Future()
         self._tasks.put((future, function, arguments))
         return future
@@ -241,7 +242,7 @@ class _Worker:
             if future.set_running_or_notify_cancel():
                 try:
                     future.set_result(function(*arguments))
-                except BaseException as error:  # the one who asked hears of it
+                except BaseException as error:  # passed on to the caller
                     future.set_exception(error)
 
 
@@ -255,7 +256,7 @@ def make_app(explorer: Explorer, port: int) -> Any:
     Parameters
     ----------
     explorer : Explorer
-        What answers.
+        Object that answers the requests.
     port : int
         Port of this machine; requests for any other host are refused.
     """
@@ -265,9 +266,9 @@ def make_app(explorer: Explorer, port: int) -> Any:
     from starlette.responses import FileResponse, HTMLResponse, JSONResponse, Response
     from starlette.routing import Route
 
-    # one thread: one answer at a time, and the rigid body's buffers, kept per thread, stay warm
+    # one thread: one answer at a time, and the rigid body's buffers, kept per thread, are reused
     worker = _Worker("skidyn-explore")
-    # the report takes long, and the loop goes on meanwhile
+    # the report takes long, and the page can be used meanwhile
     beside = {"report": _Worker("skidyn-report"), "progress": _Worker("skidyn-progress")}
     hosts = {f"{HOST}:{port}", f"localhost:{port}"}
     headers = {
@@ -304,19 +305,19 @@ def make_app(explorer: Explorer, port: int) -> Any:
             content = await asyncio.wrap_future(thread.submit(explorer.answer, question, words))
             return JSONResponse(content, headers=headers)
         except (LookupError, OSError, TypeError, ValueError, OverflowError) as error:
-            told = str(error).encode("utf-8", "backslashreplace").decode()  # halves of letters
+            told = str(error).encode("utf-8", "backslashreplace").decode()  # lone surrogates
             return JSONResponse({"error": told}, 400, headers=headers)
         except RecursionError:
             return JSONResponse({"error": "the request is nested too deeply"}, 400, headers=headers)
 
     async def saved(request: Request) -> Response:
-        """A file that was saved, by one of its fixed names."""
+        """A saved file, by one of the fixed names."""
         name = request.path_params["name"]
         if refused(request, request.query_params.get("token")):
             return HTMLResponse("Open the address that skidyn explore printed.", 403)
         if name not in SAVED or not (explorer.folder / name).is_file():
             return HTMLResponse("There is no such file.", 404)
-        # a report draws itself and loads nothing; it brings its own policy
+        # a report loads nothing from elsewhere and contains its own policy
         return FileResponse(explorer.folder / name, headers={"Cache-Control": "no-store"})
 
     routes = [
@@ -379,7 +380,7 @@ def serve(
     listener.bind((HOST, port))
     port = listener.getsockname()[1]
     app = make_app(explorer, port)
-    # a report that is running is given up: files are written whole or not at all
+    # a report that is being made is abandoned: files are written completely or not at all
     config = uvicorn.Config(
         app, log_level="critical", access_log=False, timeout_graceful_shutdown=1
     )

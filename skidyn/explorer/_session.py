@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a person does in the explorer, without a browser: ask for a ranking, add, take back."""
+"""The functions of the explorer without a browser: rank, add and remove effects."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from skidyn.explorer._sure import margin
 from skidyn.identification import RBDRegressor
 from skidyn.simulation import Controller
 
-#: Effects in a ranking.
+#: Number of effects in a ranking.
 RANKED = 8
-#: A click stands for this long, s, and for at least so many averaged rows.
+#: A click selects an interval of this length, s, with at least this many averaged rows.
 STRETCH, LEAST_ROWS = 1.0, 8
-#: An effect that takes less of the squared error of samples, held out, is not listed.
+#: An effect that removes a smaller share of the held-out squared error of samples is not listed.
 LEAST_DROP = 0.02
 
 
@@ -37,19 +37,19 @@ class RankedEffect:
     kind : str
         Kind of the catalogue.
     title, formula : str
-        For people.
+        Text for display.
     joints : tuple of int
-        Joints it acts on, counted from 1.
+        Joints on which it acts, counted from 1.
     drop : float
-        Share of the squared held-out residual of the joint asked about that it takes away, the rest
-        of the model fitted beside it. The residual is averaged over the windows of the fit, which
-        takes most of the noise away.
+        Share of the squared held-out residual of the chosen joint that it removes when the whole
+        model is fitted again. The residual is averaged over the windows of the fit, which removes
+        most of the noise.
     drop_here : float
-        The same in the chosen stretch of time; as ``drop`` where none is chosen.
+        The same in the chosen interval of time; equal to ``drop`` if none is chosen.
     trajectories : tuple of int, default=()
-        Recordings that have it, of a payload or a force at the tool; empty for all. Such an effect
-        is judged on interleaved quarters of the recordings, a torque ripple on single samples; the
-        drop of both is that of the whole log.
+        Recordings in which it acts, for a payload or a force at the tool; empty for all. Such an
+        effect is judged on interleaved quarters of the recordings, a torque ripple on single
+        samples; the drop of both is that of the whole log.
 
     Examples
     --------
@@ -97,7 +97,7 @@ class Session(Seen):
     """
 
     def stretch(self, joint: int, trajectory: int, time: float) -> tuple[float, float]:
-        """The second around a moment, longer where a joint slides too little in it.
+        """The second around a moment, or a longer interval if the joint slides too little in it.
 
         Parameters
         ----------
@@ -137,22 +137,22 @@ class Session(Seen):
     ) -> list[RankedEffect]:
         """Effects that lower the held-out error of a joint, the largest drop first.
 
-        Every number is measured: the model is fitted with the effect to the other folds, and its
-        residual compared with that of the model as it is.
+        Every number is computed from the log: the model is fitted with the effect to the other
+        folds, and its residual is compared with that of the present model.
 
         Parameters
         ----------
         joint : int
             Joint, counted from 1.
         trajectory : int, optional
-            With ``span``: where the model fails.
+            Trajectory in which the model fails, together with ``span``.
         span : tuple of float, s, optional
-            Stretch of time within the trajectory; the ranking is by the drop there.
+            Interval of time within the trajectory; the ranking is by the drop there.
 
         Returns
         -------
         list of RankedEffect
-            The best candidate of every kind; of equal ones the simpler first.
+            The best candidate of every kind; of equal ones, the simpler is first.
         """
         j = self._joint(joint)
         found = self._held_out(j)
@@ -202,8 +202,8 @@ class Session(Seen):
         joint : int
             Joint, counted from 1.
         refined : bool, default=True
-            Search the shape parameters, beginning at the grid; False leaves that to
-            :meth:`refine`, which is for a page that shows the first answer at once.
+            Search the shape parameters, beginning at the grid. If False, :meth:`refine` has to be
+            called for it; a page can then show a first answer at once.
 
         Returns
         -------
@@ -252,19 +252,19 @@ class Session(Seen):
         return self.history[-1]
 
     def undo(self) -> dict[str, Any]:
-        """Take the last addition back.
+        """Undo the last addition.
 
         Returns
         -------
         dict
-            The step before.
+            The entry of the step before.
         """
         if len(self._steps) > 1:
             self._steps.pop()
         return self.history[-1]
 
     def remove(self, step: int) -> dict[str, Any]:
-        """Take one addition back, whatever was added after it.
+        """Remove one addition and keep the later ones.
 
         Parameters
         ----------
@@ -274,7 +274,7 @@ class Session(Seen):
         Returns
         -------
         dict
-            The last entry of :attr:`history`, all later additions fitted again.
+            The last entry of :attr:`history`; all later additions are fitted again.
 
         Raises
         ------
@@ -294,12 +294,12 @@ class Session(Seen):
         return self.history[-1]
 
     def fitted_model(self) -> RBDRegressor:
-        """The model with everything added, fitted to the whole log.
+        """The model with all additions, fitted to the whole log.
 
         Returns
         -------
         RBDRegressor
-            A fitted copy; the model of the session stays as it is.
+            A fitted copy; the model of the session is not changed.
         """
         terms = [t for step in self.added for t in step]
         return self.model.with_effects(terms).fit(*self.data)
@@ -313,7 +313,7 @@ class Session(Seen):
         reading: Mapping[str, Any] | None = None,
         controller: Controller | None = None,
     ) -> str:
-        """Python that does the same without a browser.
+        """Python script that does the same without a browser.
 
         Parameters
         ----------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The model of a session step by step: what was added, its fit, and what is asked of both."""
+"""The model of a session step by step: additions, fits and quantities derived from them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from skidyn.robots import Robot
 
 @dataclass
 class Step:
-    """The model after one click, with what was worked out about it."""
+    """The model after one click, with quantities computed from it."""
 
     terms: tuple[Term, ...]
     model: FoldedModel
@@ -46,7 +46,7 @@ def is_fine(term: Term) -> bool:
 
 
 class State:
-    """The problem of a log, and the steps from the model as given to that of now."""
+    """The problem of a log, and the steps from the given to the present model."""
 
     def __init__(self, model: RBDRegressor, X: Any, tau: Any) -> None:
         self.model, self.data = model, (X, tau)
@@ -68,40 +68,40 @@ class State:
 
     @property
     def added(self) -> list[tuple[Term, ...]]:
-        """What was added, step by step."""
+        """Additions, step by step."""
         return [step.terms for step in self._steps[1:]]
 
     @property
     def history(self) -> list[dict[str, Any]]:
-        """Held-out error of every joint (``rmse``, N m or N) as given and after every step.
+        """Held-out error of every joint (``rmse``, N m or N), at first and after every step.
 
         It is that of :func:`skidyn.diagnosis.diagnose` (``rmse_before``): sliding samples, each
         under a fit that left its fold out.
 
-        ``added`` is the kind that was added, ``joints`` where it acts and ``joint`` the joint for
-        which it was added, counted from 1.
+        ``added`` is the kind of the added effect, ``joints`` are the joints on which it acts, and
+        ``joint`` is the joint for which it was added, counted from 1.
         """
         return [step.entry for step in self._steps]
 
     @cached_property
     def noise(self) -> Array:
-        """Noise of torque and position sensors, N m or N, as a diagnosis takes it."""
+        """Noise of torque and position sensors, N m or N, as in a diagnosis."""
         return noise_level(self.problem, self._steps[0].residual)
 
     @property
     def worst(self) -> int:
-        """Joint whose held-out error as given is largest over its noise, counted from 1."""
+        """Joint with the largest ratio of held-out error to noise in the given model, from 1."""
         error = np.array(self.history[0]["rmse"])
         return int(np.argmax(error / np.maximum(self.noise, 1e-9 * np.abs(self.torque).max()))) + 1
 
     @property
     def refinable(self) -> bool:
-        """Whether the last addition still has the shape of the grid, and :meth:`refine` is due."""
+        """Whether the last addition still has the shape of the grid, for :meth:`refine`."""
         return self._steps[-1].coarse is not None
 
     @property
     def terms(self) -> list[Term]:
-        """Effects of the model as it is now."""
+        """Effects of the present model."""
         return [*self.problem.terms, *(t for step in self.added for t in step)]
 
     @property
@@ -110,7 +110,7 @@ class State:
         return [int(k) for k in np.unique(self.problem.signals.trajectory)]
 
     def _offers(self, joint: int) -> list[Offer]:
-        """Ripples and loads that would take something of a joint's error; worked out once."""
+        """Ripples and loads that would reduce a joint's error; computed once."""
         step = self._steps[-1]
         if step.offers is None:
             blocks = [self.problem.term_rows(t) for t in self.terms if not is_fine(t)]
@@ -133,7 +133,7 @@ class State:
         return any((t.kind, t.places) == candidate.site for t in self.terms)
 
     def _of_samples(self, joint: int, found: HeldOutRows) -> float:
-        """What the whole residual of averaged rows makes up of the squared error of samples."""
+        """Share of the residual of averaged rows in the squared error of samples."""
         weight = np.asarray(self.problem.rows.weights[joint].sum(axis=1)).ravel()
         mean = float(np.mean((found.residual / weight) ** 2))
         return float(min(mean / max(self.history[-1]["rmse"][joint] ** 2, 1e-300), 1.0))
@@ -176,7 +176,7 @@ class State:
         return Step(new, model, self._ranking.noise(model), residual, entry, ripples=fitted)
 
     def _of_recordings(self, terms: Sequence[Term]) -> NDArray[np.bool_]:
-        """Coefficients that one recording alone can tell, and that are not held out with it."""
+        """Coefficients that only one recording can identify, which are not held out with it."""
         rigid = len(self.problem.rigid_index)
         own = np.zeros(rigid + TermSum(terms).width, dtype=bool)
         for term, place in TermSum(terms).slices(rigid):

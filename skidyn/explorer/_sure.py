@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How sure the name of an added effect is, from what else was offered for the same joint."""
+"""Confidence in an added effect, from the other effects ranked for the same joint."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from skidyn.diagnosis import confidence
 if TYPE_CHECKING:
     from skidyn.explorer._session import RankedEffect
 
-#: A rival takes nearly as much where it falls short of the gain by less than this share.
+#: A rival removes nearly as much error if its gain is smaller by less than this share.
 NEAR = 0.1
 
 
 @dataclass(frozen=True)
 class Margin:
-    """By how much the best other effect falls short of an added one.
+    """Difference between the gains of an added effect and the best other effect.
 
     Parameters
     ----------
     share : float
-        Share of the gain; below zero where the other one takes more.
+        Share of the gain; negative if the other effect removes more error.
     rival : str, default=""
-        Title of the other one.
+        Title of the other effect.
     """
 
     share: float = 1.0
@@ -36,12 +36,12 @@ class Margin:
 
 
 def margin(kind: str, ranked: Sequence[RankedEffect]) -> Margin:
-    """Margin of an effect among those that were ranked beside it.
+    """Margin of an effect among those that were ranked with it.
 
     Parameters
     ----------
     kind : str
-        Effect that is added.
+        Kind of the added effect.
     ranked : sequence of RankedEffect
         Effects that would have helped the same joint, before it was added.
     """
@@ -61,14 +61,14 @@ def sure_told(
     removed: float,
     whole_recordings: bool,
 ) -> str:
-    """How sure a name is in a few words.
+    """Confidence in an added effect, in a few words.
 
     Parameters
     ----------
     margin : Margin
-        Over the best other effect.
+        Margin over the best other effect.
     inflation, removed, whole_recordings
-        As :func:`skidyn.diagnosis.confidence` takes them.
+        Arguments of :func:`skidyn.diagnosis.confidence`.
 
     Examples
     --------

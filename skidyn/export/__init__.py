@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Export of models as functions and robot descriptions, and of their errors for log viewers."""
+"""Export of models as functions and robot descriptions, and of torques for log viewers."""
 
 from skidyn.export._bam import BamModel, read_bam, write_bam
 from skidyn.export._bam_fit import fit_bam

@@ -26,7 +26,7 @@ _M5 = (
     *("friction_stribeck", *_DIRECTIONAL),
     *(f"{name}_stribeck" for name in _DIRECTIONAL),
 )
-#: Parameters of friction of every model beside ``friction_base`` and ``friction_viscous``.
+#: Friction parameters of every model other than ``friction_base`` and ``friction_viscous``.
 BAM_MODELS: dict[str, tuple[str, ...]] = {
     "m1": (),
     "m2": ("friction_stribeck", *_SPEED),
@@ -35,7 +35,7 @@ BAM_MODELS: dict[str, tuple[str, ...]] = {
     "m5": (*_M5, *_SPEED),
     "m6": (*_M5, "load_friction_motor_quad", "load_friction_external_quad", *_SPEED),
 }
-#: Parameters of friction of all models.
+#: Friction parameters of all models.
 ALWAYS = ("friction_base", "friction_viscous")
 #: Size of a file beyond which it is refused, bytes.
 _LARGEST = 2**20
@@ -50,7 +50,7 @@ class BamModel:
     .. math:: K_v|\dot q| + K_c + |K_m\tau_m - K_e\tau_e|
        + e^{-|\dot q/\dot q_s|^\alpha}(K_{cs} + |K_{ms}\tau_m - K_{es}\tau_e| + Q)
 
-    with the torque :math:`\tau_m` of the motor and :math:`\tau_e` of everything outside (gravity,
+    with the torque :math:`\tau_m` of the motor and the external torque :math:`\tau_e` (gravity,
     contacts). m1 has the first two terms, m2 adds :math:`K_{cs}`, m3 and m4 have one coefficient
     for both torques, m5 one for each, and m6 adds Q, which is quadratic in the smaller torque where
     the two have opposite signs.
@@ -62,8 +62,8 @@ class BamModel:
     actuator : str
         Name of the servo in BAM, such as ``"xl330"``, on which its control law depends.
     parameters : mapping of str to float
-        By BAM's names, SI units: those of friction, ``armature`` (kg m^2), ``kt`` (N m/A), ``R``
-        (ohm) and others of the motor.
+        Parameters by BAM's names, SI units: those of friction, ``armature`` (kg m^2), ``kt`` (N
+        m/A), ``R`` (ohm) and others of the motor.
 
     Raises
     ------
@@ -107,10 +107,10 @@ class BamModel:
         motor_torque : array-like, N m
             Torque of the motor.
         external_torque : array-like, N m
-            Torque of gravity and of all else from outside on the joint; at rest without friction it
-            is minus that of the motor.
+            Torque of gravity and contacts on the joint; at rest without friction it is minus that
+            of the motor.
         dq : array-like, rad/s
-            Velocity; at rest friction may be anything up to its size, and 0 is given.
+            Velocity; at rest friction may have any value up to its maximum, and 0 is returned.
 
         Returns
         -------
@@ -126,14 +126,14 @@ class BamModel:
 
 
 def friction_parameters(name: str) -> tuple[str, ...]:
-    """Parameters of the friction of a model, which is refused if BAM has none of this name."""
+    """Friction parameters of a model; raises an error if BAM has no model of this name."""
     if name not in BAM_MODELS:
         raise SkidynError(f"name is {name!r}; BAM has the models {', '.join(BAM_MODELS)}")
     return *ALWAYS, *BAM_MODELS[name]
 
 
 def motor_constants(motor: Mapping[str, float] | None) -> dict[str, float]:
-    """Numbers by name, as they go into a file beside those of friction."""
+    """Numbers by name for a file, other than those of friction."""
     given = {} if motor is None else motor
     if not isinstance(given, Mapping) or not all(
         isinstance(v, int | float) and not isinstance(v, bool) for v in given.values()
@@ -143,7 +143,7 @@ def motor_constants(motor: Mapping[str, float] | None) -> dict[str, float]:
 
 
 def checked_actuator(actuator: str | None) -> str:
-    """The servo, which has to be named: BAM's law of control depends on it."""
+    """Name of the servo, which is required because BAM's control law depends on it."""
     if not isinstance(actuator, str):
         given = "missing" if actuator is None else repr(actuator)
         raise SkidynError(f"actuator is {given}: the name of the servo in BAM, such as 'xl330'")
@@ -156,7 +156,7 @@ def friction_budget(
     """Largest torque of friction, N m."""
 
     def load(suffix: str) -> Any:
-        """What friction gets from the torques that meet in the gear."""
+        """Contribution of the torques in the gear to friction."""
         if f"load_friction_motor{suffix}" in BAM_MODELS[name]:
             own = values[f"load_friction_motor{suffix}"] * motor
             return np.abs(values[f"load_friction_external{suffix}"] * outside - own)
@@ -180,7 +180,7 @@ def friction_budget(
 
 
 def read_bam(path: str | os.PathLike[str]) -> BamModel:
-    """Read the parameters of a servo that BAM has written.
+    """Read the parameters of a servo from a file of BAM.
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ def read_bam(path: str | os.PathLike[str]) -> BamModel:
     Returns
     -------
     BamModel
-        With all numbers of the file.
+        Model with all numbers of the file.
 
     Raises
     ------
@@ -289,7 +289,7 @@ def write_bam(
 
 
 def joint_place(robot: Any, joint: str | int | None) -> int:
-    """Place of a rotary joint in arrays, by its name or its number from 1."""
+    """Index of a rotary joint in arrays, by its name or its number from 1."""
     names = list(robot.joint_names)
     if joint is None and len(names) == 1:
         joint = 1
@@ -306,7 +306,7 @@ def joint_place(robot: Any, joint: str | int | None) -> int:
 def _of_joint(
     model: RBDRegressor, joint: str | int | None, actuator: str, motor: Mapping[str, float]
 ) -> tuple[BamModel, tuple[str, ...]]:
-    """What BAM's m1 or m2 holds of a joint, and names of the joint's other effects."""
+    """Parameters of a joint in BAM's m1 or m2, and names of the joint's other effects."""
     check_model(model)
     if not isinstance(model, RBDRegressor):
         raise SkidynError("BAM's format holds friction; give a fitted RBDRegressor or a BamModel")

@@ -24,11 +24,11 @@ from skidyn.export._bam import (
 )
 from skidyn.robots import Robot
 
-#: Velocity (rad/s) below which friction may be anything up to its size.
+#: Velocity (rad/s) below which friction may have any value up to its maximum.
 _RESTS = 0.03
-#: Rows that moving samples are thinned to: far more than there are parameters.
+#: Number of rows to which moving samples are thinned; far more than parameters.
 _ROWS = 20_000
-#: Where the velocity of Stribeck's friction is searched from, and its limits, rad/s.
+#: Initial values of the Stribeck velocity, and its limits, rad/s.
 _SPEEDS, _SLOWEST, _FASTEST = (0.1, 0.5, 2.0), 0.01, 20.0
 #: Limits of the exponent.
 _EXPONENT = (0.4, 10.0)
@@ -47,8 +47,8 @@ def fit_bam(
     """Fit one of BAM's models of friction, and the armature, to torque of a motor.
 
     The bodies of the robot are assumed to be known, as for BAM's pendulum; the remaining torque of
-    the motor is due to armature and friction. Least squares over the samples that move, from
-    several starts; friction is not negative.
+    the motor is due to armature and friction. Least squares over the moving samples, from several
+    starts; friction is not negative.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def fit_bam(
     Returns
     -------
     BamModel
-        To be written by :func:`write_bam`.
+        Model that :func:`write_bam` can write.
 
     Raises
     ------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What URDF and MJCF writers share: what of a model they hold, central inertias, numbers."""
+"""Common parts of the URDF and MJCF writers: supported effects, central inertias, numbers."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def central_inertia(parameters: np.ndarray, body: str) -> CentralInertia | None:
     Raises
     ------
     SkidynError
-        No real body has these parameters, so that neither format can hold them.
+        The parameters are physically impossible, so neither format can represent them.
     """
     mass, moment, inertia = inertial_parts(parameters)
     if not np.any(parameters):
@@ -64,18 +64,18 @@ def about_origin(mass: float, center: np.ndarray, central: np.ndarray) -> np.nda
 
 @dataclass(frozen=True)
 class Description:
-    """What of a model a description of bodies and joints holds.
+    """Parts of a model that a description of bodies and joints can represent.
 
     Attributes
     ----------
     robot : Robot
         The robot.
     parameters : ndarray of shape (n_bodies, 10)
-        Inertial parameters, with a payload that is always there as part of the last body.
+        Inertial parameters, with a permanent payload as part of the last body.
     joints : dict of str to ndarray of shape (n_joints, n_coefficients)
-        Coefficients of the kinds that the format has fields for.
+        Coefficients of the kinds for which the format has fields.
     left : list of Term
-        Effects that the format has no field for.
+        Effects for which the format has no fields.
     """
 
     robot: Robot
@@ -85,7 +85,7 @@ class Description:
 
 
 def described(model: RBDRegressor | Robot, kinds: tuple[str, ...]) -> Description:
-    """Sort the effects of a model into those that a format has a field for and the others."""
+    """Split the effects of a model into those for which a format has a field and the others."""
     check_model(model)
     robot = model if isinstance(model, Robot) else model.robot_
     sizes = {kind: len(get_effect(kind).coefficients) for kind in kinds}
@@ -123,5 +123,5 @@ def mujoco_attributes(own: Description) -> dict[str, np.ndarray]:
 
 
 def numbers(values: Any) -> str:
-    """Numbers as text that reads back to the same doubles."""
+    """Numbers as text from which the same doubles are read."""
     return " ".join(repr(float(value) + 0.0) for value in np.ravel(values))

@@ -43,7 +43,7 @@ def c_source(model: RBDRegressor | Robot, *, name: str = "skidyn_inverse_dynamic
     -------
     str
         C99 text; compile with ``-lm``. Effects that are not a function of q, dq and ddq are left out;
-        a comment at the top names them.
+        a comment at the top lists them.
 
     Raises
     ------
@@ -63,7 +63,7 @@ def c_source(model: RBDRegressor | Robot, *, name: str = "skidyn_inverse_dynamic
 def write_c(
     model: RBDRegressor | Robot, path: PathLike, *, name: str = "skidyn_inverse_dynamics"
 ) -> tuple[str, ...]:
-    """Write the text of :func:`c_source`; what it does not hold goes to ``<path>.skidyn.json``.
+    """Write the text of :func:`c_source`, and omitted effects to ``<path>.skidyn.json``.
 
     Parameters
     ----------
@@ -114,5 +114,5 @@ def function_text(static: StaticModel, name: str) -> str:
 
 
 def printable(text: str) -> str:
-    """Text that cannot end a comment, whatever a URDF calls its joints."""
+    """Text that cannot end a comment, for any names of joints."""
     return re.sub(r"[^\w ,;.\-]", "_", text)

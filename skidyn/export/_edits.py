@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Small changes of an XML file that leave every other byte as it is."""
+"""Small changes of an XML file without a change of any other byte."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LARGEST = 64 * 2**20
 
 @dataclass
 class Element:
-    """An element and where it stands in the file, in bytes.
+    """An element and its position in the file, in bytes.
 
     Attributes
     ----------
@@ -27,7 +27,7 @@ class Element:
     attributes : dict of str to str
         As written.
     start, head, end : int
-        Where the start tag begins, where it ends, and where the whole element ends.
+        Begin and end of the start tag, and end of the whole element.
     children : list of Element
         In order.
     """
@@ -51,7 +51,7 @@ class Element:
 
 
 class Edits:
-    """A file, its elements, and what is to be changed in it."""
+    """A file, its elements, and the changes to be made."""
 
     def __init__(self, source: str | os.PathLike[str]) -> None:
         self.path = Path(source)
@@ -94,7 +94,7 @@ class Edits:
         return match.end()
 
     def set_attributes(self, element: Element, values: dict[str, str]) -> None:
-        """Change attributes of an element, or add them behind those it has."""
+        """Change attributes of an element, or add them after existing ones."""
         head = self.data[element.start : element.head]
         added = b""
         for name, value in values.items():
@@ -111,11 +111,11 @@ class Edits:
             self._changes.append((at, at, added))
 
     def replace(self, element: Element, text: str) -> None:
-        """Put another text in the place of an element."""
+        """Replace an element by a text."""
         self._changes.append((element.start, element.end, text.encode()))
 
     def insert_first(self, element: Element, text: str) -> None:
-        """Put a child before all others, on a line of its own with their indentation."""
+        """Insert a child before all others, on a separate line with their indentation."""
         head = self.data[element.start : element.head]
         indent = self._indentation(element)
         first = element.children[0] if element.children else None

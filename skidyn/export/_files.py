@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Files of an exported model, and beside each what it does not hold."""
+"""Files of an exported model, each with a side-car for omitted effects."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ SCHEMA = "skidyn.not_held/1"
 def write_files(
     path: PathLike, content: str | bytes, model: RBDRegressor | Robot, left: Sequence[Term]
 ) -> tuple[str, ...]:
-    """Write a file, each in one step, and ``<path>.skidyn.json`` with what it does not hold.
+    """Write a file and ``<path>.skidyn.json`` with the omitted effects, each in one step.
 
     Returns
     -------
     tuple of str
-        Names of what the file does not hold. If it holds everything there is no side-car, and one
-        of an earlier export is removed.
+        Names of the omitted effects. If there are none, there is no side-car, and one of an earlier
+        export is removed.
     """
     beside = Path(f"{os.fspath(path)}.skidyn.json")
-    writable(beside)  # neither without the other
+    writable(beside)  # both or neither
     write_bytes(path, content.encode() if isinstance(content, str) else content)
     if isinstance(model, Robot) or not left:
         beside.unlink(missing_ok=True)

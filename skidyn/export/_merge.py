@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Identified numbers in a user's own URDF or MJCF, the rest of the file byte for byte."""
+"""Identified numbers in a user's own URDF or MJCF, with all other bytes unchanged."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from skidyn.export._files import PathLike, write_files
 from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
 
-#: Poses at which the kinematics of two descriptions are compared, and what may differ (m, rad).
+#: Number of poses at which the kinematics are compared, and permitted differences (m, rad).
 _POSES, _ALIKE = 7, 1e-5
-#: Relative change of a number below which it is left as it is written.
+#: Relative change of a number below which its text is not changed.
 _SAME = 1e-12
 
 
@@ -155,11 +155,10 @@ def merge_mjcf(
     """Write the identified numbers into a copy of the user's own MJCF.
 
     Changed are, for the joints of the model's robot, found by name: ``damping``, ``frictionloss``,
-    ``armature``, ``stiffness`` and ``springref``, where the file says something else; and the
-    ``<inertial>`` of the bodies that they move. Actuators, sensors, geoms, defaults, comments and
-    every other byte are unchanged. Frames of bodies may differ from those of the URDF; that the
-    joints turn about the same axes is checked at several poses. Needs MuJoCo (``pip install
-    skidyn[mujoco]``).
+    ``armature``, ``stiffness`` and ``springref``, if their values differ; and the ``<inertial>`` of
+    the bodies that they move. Actuators, sensors, geoms, defaults, comments and every other byte
+    are unchanged. Frames of bodies may differ from those of the URDF; the axes of the joints are
+    compared at several poses. Needs MuJoCo (``pip install skidyn[mujoco]``).
 
     Parameters
     ----------
@@ -240,8 +239,8 @@ def merge_mjcf(
     for body, name in enumerate(robot.body_joints):
         index = mujoco.mj_name2id(world, mujoco.mjtObj.mjOBJ_JOINT, name)
         carrier = int(world.jnt_bodyid[index])
-        # The body's own share is what is left of the identified parameters without the bodies that
-        # are welded to it; those keep theirs.
+        # The body's own share is the identified parameters minus those of the bodies that are
+        # welded to it, which are not changed.
         rotation, translation = frames[body]
         moved = transform_inertial(own.parameters[body], rotation, translation)
         rest = _welded(mujoco, world, carrier)
@@ -258,7 +257,7 @@ def merge_mjcf(
 
 
 def _joints_in_bodies(root: Element) -> tuple[dict[str, Element], dict[str, Element]]:
-    """Elements of the named joints, and of the bodies that hold them, by name of the joint."""
+    """Elements of the named joints, and of the bodies with these joints, by name of the joint."""
     joints, bodies = {}, {}
     world = [element for element in root.children if element.tag == "worldbody"]
     for element in (e for w in world for e in w.walk()):
@@ -356,7 +355,7 @@ def _mjcf_text(parameters: np.ndarray, name: str) -> str:
 
 
 def _check_loads(mujoco: Any, data: bytes, source: Path) -> None:
-    """Let MuJoCo read what would be written, beside the source, whose files it may name."""
+    """Test the result with MuJoCo in the folder of the source, to which it may refer."""
     with tempfile.NamedTemporaryFile(suffix=".xml", dir=source.parent) as trial:
         trial.write(data)
         trial.flush()

@@ -29,8 +29,8 @@ def write_mjcf(model: RBDRegressor | Robot, path: PathLike) -> tuple[str, ...]:
 
     Viscous and Coulomb friction become ``damping`` and ``frictionloss``, rotor inertia
     ``armature``, a spring ``stiffness`` and ``springref``; links fixed to a body become sites,
-    joints that mimic another are tied to it by an equality constraint. Other effects are written to
-    ``<path>.skidyn.json``.
+    joints that mimic another are coupled to it by an equality constraint. Other effects are written
+    to ``<path>.skidyn.json``.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def write_mjcf(model: RBDRegressor | Robot, path: PathLike) -> tuple[str, ...]:
     robot, values = own.robot, own.parameters
     dynamics = mujoco_attributes(own)
     root = ElementTree.Element("mujoco", model=robot.name)
-    # Angles as they are, inertias as they are: nothing is to be derived from shapes or rounded.
+    # Angles and inertias are used unchanged: nothing is derived from shapes or rounded.
     ElementTree.SubElement(root, "compiler", angle="radian", inertiafromgeom="false")
     ElementTree.SubElement(root, "option", gravity=numbers(robot.gravity))
     world = ElementTree.SubElement(root, "worldbody")
@@ -130,7 +130,7 @@ def _add_body(
 def _add_sites(
     world: ElementTree.Element, elements: list[ElementTree.Element], robot: Robot
 ) -> None:
-    """Frames of the links that are fixed to something."""
+    """Frames of the fixed links."""
     for name, placement in robot.links.items():
         if name not in robot.body_names:
             carrier = elements[placement.body] if placement.body >= 0 else world

@@ -17,13 +17,14 @@ from skidyn.effects import Term
 from skidyn.identification import RBDRegressor
 from skidyn.robots import Instant, Robot, SymbolicRobot, symbols
 
-#: Samples at which what was written down is compared with the model, and what may differ, relative.
+#: Number of samples at which the program is compared with the model, and permitted relative
+#: difference.
 _SAMPLES, _ROUNDING = 64, 1e-9
 
 
 @dataclass(frozen=True)
 class StaticModel:
-    """What of a model is a function of q, dq and ddq, and what is not.
+    """Parts of a model that are a function of q, dq and ddq, and the other parts.
 
     Attributes
     ----------
@@ -44,30 +45,30 @@ class StaticModel:
 
     @property
     def title(self) -> str:
-        """What the model holds, in words."""
+        """Description of the included effects."""
         kinds = dict.fromkeys(term.kind for term in self.held)
         return ", ".join(["rigid bodies", *(kind.replace("_", " ") for kind in kinds)])
 
 
 def static_model(model: RBDRegressor | Robot) -> StaticModel:
-    """Write down the part of a model that is a function of q, dq and ddq.
+    """Record the part of a model that is a function of q, dq and ddq.
 
-    The model's own code is run on symbols, so that an effect needs no second description, one that
-    users registered included. Each effect is then compared with itself on random numbers.
+    The model's own code is run on symbols, so effects, including those registered by users, need no
+    second definition. Each effect is then compared with its own columns on random numbers.
     """
     if isinstance(model, Robot):
         return StaticModel(model, _fixed(model, model.inertial_parameters), [], [])
     check_model(model)
     held = [term for term in model.effect_terms_ if is_static(model, term)]
     if not _agrees(model, held, traced(model, held)):
-        # Another effect sees the torque of the bodies without the payload.
+        # Another effect depends on the torque of the bodies without the payload.
         held = [term for term in held if not is_carried(term)]
     left = [term for term in model.effect_terms_ if term not in held]
     return StaticModel(model.robot_, traced(model, held), held, left)
 
 
 def check_model(model: Any) -> None:
-    """Refuse what is neither a robot nor a fitted model of one."""
+    """Raise an error for anything other than a robot or a fitted model."""
     if isinstance(model, Robot):
         return
     if not isinstance(model, RBDRegressor):
@@ -96,7 +97,7 @@ def _with_terms(model: RBDRegressor, terms: Sequence[Term]) -> RBDRegressor:
 
 
 def is_carried(term: Term) -> bool:
-    """Whether a term is a payload that is always there."""
+    """Whether a term is a permanent payload."""
     return term.kind == "payload" and term.shape.get("trajectories") is None
 
 
@@ -117,12 +118,12 @@ def traced(model: RBDRegressor, terms: Sequence[Term]) -> Program:
 
 
 def is_static(model: RBDRegressor, term: Term) -> bool:
-    """Whether an effect can be written down, and then gives the torque that it gives."""
+    """Whether an effect can be recorded with the same torque."""
     if {"trajectory", "trajectories"} & {k for k, v in term.shape.items() if v is not None}:
-        return False  # belongs to some of the recordings
+        return False  # acts in some of the recordings only
     try:
         program = traced(model, [term])
-    except Exception:  # whatever an effect says to symbols: it cannot be written down
+    except Exception:  # any error of an effect given symbols: it cannot be recorded
         return False
     return _agrees(model, [term], program)
 
@@ -142,7 +143,7 @@ def _agrees(model: RBDRegressor, terms: Sequence[Term], program: Program) -> boo
 def random_signals(robot: Robot) -> Signals:
     rng = np.random.default_rng(0)
     q, dq, ddq = rng.normal(size=(3, _SAMPLES, robot.n_joints))
-    dq[::8] *= 1e-3  # where the direction of motion is blurred
+    dq[::8] *= 1e-3  # where the sign of the velocity is smooth
     return Signals(
         q,
         dq,

@@ -50,7 +50,7 @@ def to_onnx(model: RBDRegressor | Robot) -> onnx.ModelProto:
     onnx.ModelProto
         Inputs ``q``, ``dq``, ``ddq`` and output ``tau`` of shape (n_samples, n_joints), float64, in
         rad, rad/s, rad/s^2 and N m (m and N for sliding joints); any number of samples. Its
-        metadata holds ``joints`` and, as ``not_held``, the effects that are not in it.
+        metadata contains ``joints`` and, as ``not_held``, the omitted effects.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def to_onnx(model: RBDRegressor | Robot) -> onnx.ModelProto:
 
 
 def write_onnx(model: RBDRegressor | Robot, path: PathLike) -> tuple[str, ...]:
-    """Write the graph of :func:`to_onnx`; what it lacks goes to ``<path>.skidyn.json``.
+    """Write the graph of :func:`to_onnx`, and omitted effects to ``<path>.skidyn.json``.
 
     Parameters
     ----------

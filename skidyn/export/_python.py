@@ -50,8 +50,8 @@ def python_source(model: RBDRegressor | Robot, *, name: str = "inverse_dynamics"
     Returns
     -------
     str
-        Text of the module. Its first line names the effects that are left out, since they are not
-        a function of q, dq and ddq.
+        Text of the module. Its first line lists the omitted effects, which are not a function of q,
+        dq and ddq.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def python_source(model: RBDRegressor | Robot, *, name: str = "inverse_dynamics"
 def write_python(
     model: RBDRegressor | Robot, path: PathLike, *, name: str = "inverse_dynamics"
 ) -> tuple[str, ...]:
-    """Write the text of :func:`python_source`; what it lacks goes to ``<path>.skidyn.json``.
+    """Write the text of :func:`python_source`, and omitted effects to ``<path>.skidyn.json``.
 
     Parameters
     ----------

@@ -23,7 +23,7 @@ from skidyn.export._model import StaticModel, is_carried, random_signals, static
 from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
 
-#: What may differ from the model on random numbers, relative.
+#: Permitted relative difference from the model on random numbers.
 _ROUNDING = 1e-9
 
 _PACKAGE = """\
@@ -250,7 +250,7 @@ def write_ros2(model: RBDRegressor | Robot, path: PathLike, *, package: str) -> 
 
 
 def _halves(model: RBDRegressor | Robot) -> tuple[StaticModel, StaticModel]:
-    """The model as two functions: what is linear in acceleration, and friction of velocity."""
+    """The model as two functions: one linear in acceleration, and friction of velocity."""
     if isinstance(model, Robot):
         static = static_model(model)
         tape = copy.deepcopy(static.program.tape)
@@ -288,7 +288,7 @@ def _alike(a: Array, b: Array) -> bool:
 
 
 def _is_friction(model: RBDRegressor, term: Term) -> bool:
-    """Whether a term depends on the velocity, and on nothing else."""
+    """Whether a term depends on the velocity only."""
     if term.effect.follows_fit or is_carried(term):
         return False
     signals = random_signals(model.robot_)
@@ -300,7 +300,7 @@ def _is_friction(model: RBDRegressor, term: Term) -> bool:
 
 
 def _is_of_bodies(model: RBDRegressor, term: Term) -> bool:
-    """Whether the torque is still an inertia of the pose times the acceleration, and the rest."""
+    """Whether the torque is a pose-dependent inertia times the acceleration plus the rest."""
     signals = random_signals(model.robot_)
     zero, n = 0 * signals.q, signals.n_joints
     rest = _torque(model, [term], dq=zero, ddq=zero)
@@ -347,7 +347,7 @@ def _parameters(model: RBDRegressor | Robot, robot: Robot, held: Sequence[Term])
 
 
 def _add_coefficients(values: dict[str, dict[str, Any]], model: RBDRegressor, term: Term) -> None:
-    """A term's numbers in the place of its joint; a second of its kind gets a number."""
+    """A term's numbers at the index of its joint; a second term of a kind gets a number."""
     (j,), number = term.places, 1
     names = [c.name for c in term.coefficients]
     own = dict(zip(names, model.effect_coefficients_[term], strict=True))

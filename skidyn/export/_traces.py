@@ -61,9 +61,9 @@ def write_traces(
     y, y_pred : array-like of shape (n_samples, n_joints)
         Measured and predicted torque, N m (N if prismatic); the residual is ``y - y_pred``.
     robot : Robot
-        Robot; its joints name the traces.
+        Robot, whose joint names are used for the traces.
     rate : float, Hz, optional
-        Sampling rate where X has no time.
+        Sampling rate if X has no time.
 
     Returns
     -------
@@ -105,8 +105,8 @@ def write_traces(
 
 
 def _clock(signals: Signals) -> Array:
-    """Time in s that never goes back: trajectories that overlap are moved behind one another."""
-    clock, end = np.array(signals.time, dtype=float), -np.inf  # of a log that has its time
+    """Time in s that never decreases: overlapping trajectories are shifted to follow each other."""
+    clock, end = np.array(signals.time, dtype=float), -np.inf  # of a log with time
     for name in dict.fromkeys(signals.trajectory.tolist()):
         here = signals.trajectory == name
         if clock[here].min() <= end:

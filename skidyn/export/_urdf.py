@@ -16,9 +16,9 @@ from skidyn.robots import Robot
 def write_urdf(model: RBDRegressor | Robot, path: PathLike) -> tuple[str, ...]:
     """Write a URDF with the identified inertial parameters and friction.
 
-    Links that are fixed to a moving body stay as frames without mass; their mass is in the body.
-    Pictures and collision shapes are not written. A URDF holds viscous and Coulomb friction
-    (``<dynamics damping friction>``); what it cannot hold goes to ``<path>.skidyn.json``.
+    Links that are fixed to a moving body become frames without mass; their mass is in the body.
+    Visual and collision shapes are not written. A URDF can represent viscous and Coulomb friction
+    (``<dynamics damping friction>``); other effects are written to ``<path>.skidyn.json``.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def write_urdf(model: RBDRegressor | Robot, path: PathLike) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        Names of the effects that the URDF does not hold; empty if it holds everything.
+        Names of the effects that the URDF cannot represent; empty if there are none.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def _add_joint(
     j, name = int(tree.coordinates[body]), robot.body_joints[body]
     follows = name != robot.joint_names[j]
     kind = robot.joint_types[j]
-    if follows:  # limits of a joint that follows are those of its leader
+    if follows:  # the limits of a mimic joint are those of its leader
         kind = "prismatic" if tree.prismatic[body] else "continuous"
     joint = ElementTree.SubElement(root, "joint", name=name, type=kind)
     parent = int(tree.parents[body])
@@ -144,7 +144,7 @@ def _rpy_from_rotation(rotation: np.ndarray) -> tuple[float, float, float]:
     """Fixed-axis roll, pitch and yaw in rad."""
     pitch = np.arctan2(-rotation[2, 0], np.hypot(rotation[0, 0], rotation[1, 0]))
     if np.hypot(rotation[0, 0], rotation[1, 0]) < 1e-12:
-        # Pitch is +-90 degrees: only the difference or sum of the other two counts.
+        # Pitch is +-90 degrees: only the difference or sum of the other two matters.
         return float(np.arctan2(-rotation[1, 2], rotation[1, 1])), float(pitch), 0.0
     roll = np.arctan2(rotation[2, 1], rotation[2, 2])
     yaw = np.arctan2(rotation[1, 0], rotation[0, 0])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Identified numbers as a layer of text over a user's own USD stage."""
+"""Identified numbers as a text layer over a user's own USD stage."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from skidyn.export._files import PathLike, write_files
 from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
 
-#: What frames of the stage may differ from those of the robot, m and rad: USD has single precision.
+#: Permitted difference of the frames, m and rad: USD has single precision.
 _ALIKE = 1e-4
 _JOINTS = {"PhysicsRevoluteJoint": "revolute", "PhysicsPrismaticJoint": "prismatic"}
 
@@ -34,8 +34,9 @@ def merge_usd(
     UsdPhysics. Friction and rotor inertia, for which UsdPhysics has no attributes, are written to
     those of PhysX (``physxJointAxis:angular:armature``, ``staticFrictionEffort``,
     ``dynamicFrictionEffort``, ``viscousFrictionCoefficient``) and of MuJoCo (``mjc:armature``,
-    ``mjc:damping``, ``mjc:frictionloss``). Gains of drives stay. Joints and bodies are found by
-    name; that frames and axes are those of the robot is checked. Needs ``pip install skidyn[usd]``.
+    ``mjc:damping``, ``mjc:frictionloss``). Gains of drives are unchanged. Joints and bodies are
+    found by name; their frames and axes are compared with those of the robot. Needs ``pip install
+    skidyn[usd]``.
 
     Parameters
     ----------
@@ -102,7 +103,7 @@ def merge_usd(
 
 
 class _Pxr:
-    """The modules of USD, or how to install them."""
+    """The modules of USD, or an error with the command to install them."""
 
     def __getattr__(self, name: str) -> Any:
         return import_optional(f"pxr.{name}", extra="usd")
@@ -146,7 +147,7 @@ def _write_joint(
         ("armature", armature),
         ("staticFrictionEffort", dry),
         ("dynamicFrictionEffort", dry),
-        # per degree, in which USD has its angles
+        # per degree, the unit of angles in USD
         ("viscousFrictionCoefficient", viscous if slides else np.deg2rad(viscous)),
     ):
         name = f"physxJointAxis:{axis}:{key}"
@@ -195,7 +196,7 @@ def _checked_carrier(robot: Robot, body: int, joint: Any, unit: _Units, stage: A
         )
     turn = base[0] @ moved[0].T
     shift = base[1] - turn @ moved[1]
-    # What carries the joint may be a link that is fixed to the body before.
+    # The parent of the joint may be a link that is fixed to the previous body.
     parent = ends[0][0].name if ends[0] else ""
     placement = robot.links.get(parent)
     if placement is not None and placement.body == tree.parents[body]:
@@ -214,7 +215,7 @@ def _checked_carrier(robot: Robot, body: int, joint: Any, unit: _Units, stage: A
 
 
 def _frame(joint: Any, end: int, metre: float) -> tuple[np.ndarray, np.ndarray]:
-    """Frame of a joint in one of its bodies: rotation and place in m."""
+    """Frame of a joint in one of its bodies: rotation and position in m."""
     place = joint.GetAttribute(f"physics:localPos{end}").Get() or (0.0, 0.0, 0.0)
     turn = joint.GetAttribute(f"physics:localRot{end}").Get()
     rotation = np.eye(3)
@@ -224,7 +225,7 @@ def _frame(joint: Any, end: int, metre: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _fixed_to(robot: Robot, body: int, carrier: Any, unit: _Units, pxr: _Pxr) -> np.ndarray:
-    """Parameters of bodies of the stage that are fixed to a body, and keep their own."""
+    """Parameters of bodies of the stage that are fixed to a body; they are not changed."""
     total = np.zeros(10)
     for name, placement in robot.links.items():
         if placement.body != body or name == robot.body_names[body]:
@@ -237,7 +238,7 @@ def _fixed_to(robot: Robot, body: int, carrier: Any, unit: _Units, pxr: _Pxr) ->
 
 
 def _stated_mass(prim: Any, unit: _Units, pxr: _Pxr) -> np.ndarray:
-    """The ten parameters that a prim states, in its frame; zeros if it states none."""
+    """The ten parameters of a prim in its frame; zeros if it has none."""
     api = pxr.UsdPhysics.MassAPI(prim)
     mass = api.GetMassAttr().Get() if prim.HasAPI(pxr.UsdPhysics.MassAPI) else 0.0
     if not mass:
@@ -254,7 +255,7 @@ def _stated_mass(prim: Any, unit: _Units, pxr: _Pxr) -> np.ndarray:
 
 
 def _copy_metadata(over: Any, stage: Any, pxr: _Pxr) -> None:
-    """Units and the rest that a stage takes from its first layer alone."""
+    """Units and other metadata that a stage reads only from its first layer."""
     pxr.UsdGeom.SetStageMetersPerUnit(over, pxr.UsdGeom.GetStageMetersPerUnit(stage))
     kilograms = pxr.UsdPhysics.GetStageKilogramsPerUnit(stage)
     pxr.UsdPhysics.SetStageKilogramsPerUnit(over, kilograms)

@@ -16,7 +16,7 @@ from skidyn._signals import Array
 from skidyn.evidence import Evidence
 from skidyn.identification import weighted_solution
 
-#: Fewer robots do not tell how much robots of the type differ.
+#: Least number of robots to estimate the usual differences between robots of the type.
 FEWEST_ROBOTS = 8
 #: Median absolute deviation of a normal variable, as a share of its standard deviation.
 MAD_OF_NORMAL = float(stats.norm.ppf(0.75))
@@ -60,7 +60,7 @@ class FleetComparison:
     q_value: Array
 
     def table(self, false_discovery_rate: float = 0.05) -> list[dict[str, Any]]:
-        """Robots that deviate, the clearest first.
+        """Robots that deviate, the largest score first.
 
         Parameters
         ----------
@@ -100,7 +100,7 @@ def compare_fleet(
     Parameters
     ----------
     evidence : mapping of str to Evidence
-        Of every robot, with equal columns.
+        Evidence of every robot, with equal columns.
     columns : sequence of str, optional
         Coefficients that may deviate; by default those of the effects. The others are common.
 
@@ -175,7 +175,7 @@ def merge(parts: Sequence[Evidence]) -> Evidence:
     Parameters
     ----------
     parts : sequence of Evidence
-        With equal columns.
+        Evidence with equal columns.
 
     Returns
     -------
@@ -200,12 +200,12 @@ def merge(parts: Sequence[Evidence]) -> Evidence:
 
 
 def effect_columns(evidence: Evidence, columns: Sequence[str] | None) -> list[str]:
-    """Columns that may deviate: those asked for, else those of the effects.
+    """Columns that may deviate: the requested ones, else those of the effects.
 
     Raises
     ------
     SkidynError
-        An unknown column, or none at all.
+        A column is unknown, or there are none.
     """
     if columns is None:
         columns = [name for name in evidence.columns if "[" in name]
@@ -221,12 +221,12 @@ def effect_columns(evidence: Evidence, columns: Sequence[str] | None) -> list[st
 def deviation(
     evidence: Evidence, coefficients: Array, noise: Mapping[int, float], index: Sequence[int]
 ) -> tuple[Array, Array]:
-    """Deviation of some coefficients with all others as given, and its standard error.
+    """Deviation of some coefficients with all others fixed, and its standard error.
 
     Parameters
     ----------
     evidence : Evidence
-        Of one robot, or one trajectory of it.
+        Evidence of one robot, or of one of its trajectories.
     coefficients : ndarray of shape (n_columns,)
         Common coefficients.
     noise : mapping of int to float

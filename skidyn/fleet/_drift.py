@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Drift of one robot over time: which coefficient left its band, and when."""
+"""Drift of one robot over time: coefficients that left their bands, and when."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class DriftReport:
         return [alarm for _, alarm in sorted(found, key=lambda item: item[0])]
 
     def messages(self) -> list[str]:
-        """The alarms in words.
+        """Sentences for the alarms.
 
         Returns
         -------
@@ -158,7 +158,7 @@ def monitor_drift(
     previous, low, high = centre, np.full_like(value, -np.inf), np.full_like(value, np.inf)
     for k in range(n_watched):
         row = reference + k
-        # A trajectory that does not excite a coefficient says nothing about it.
+        # A trajectory that does not excite a coefficient has no information about it.
         new = np.where(np.isnan(value[row]), previous, value[row])
         previous = average[row] = NEWEST * new + (1 - NEWEST) * previous
         memory = (1 - NEWEST) ** (k + 1)

@@ -39,10 +39,9 @@ def forecast_table(
     Returns
     -------
     table : Bunch
-        ``X`` of shape (n_rows, 1 + n_signals): number of the segment, then the sample before (so
-        that ``trajectory=0`` for the estimators); ``y`` of shape (n_rows, n_signals): the sample;
-        ``rows``: which rows of `signal` they are. The first row of a segment has no past and is
-        left out.
+        ``X`` of shape (n_rows, 1 + n_signals): number of the segment, then the previous sample (so
+        that the estimators have ``trajectory=0``); ``y`` of shape (n_rows, n_signals): the sample;
+        ``rows``: their rows in `signal`. The first row of a segment has no past and is left out.
 
     Examples
     --------
@@ -70,7 +69,7 @@ class _Forecaster(MultiOutputMixin, RegressorMixin, BaseEstimator):
         return fitted_keys(self)
 
     def _past(self, X: Array) -> Array:
-        """Sample before each row, one column per output."""
+        """Previous sample of each row, one column per output."""
         return X[:, list(self._keys().features)]
 
     def _check(self, X: Any, y: Any) -> tuple[Array, Array]:
@@ -100,9 +99,9 @@ class PersistenceRegressor(_Forecaster):
     Attributes
     ----------
     n_features_in_ : int
-        Columns of X.
+        Number of columns of X.
     feature_names_in_ : ndarray of str
-        Their names, where X has names.
+        Names of the columns, if X has names.
 
     Examples
     --------
@@ -136,7 +135,7 @@ class PersistenceRegressor(_Forecaster):
         return self
 
     def predict(self, X: Any) -> Array:
-        """Return the samples before.
+        """Return the previous samples.
 
         Parameters
         ----------
@@ -172,9 +171,9 @@ class AutoregressiveRegressor(_Forecaster):
     intercept_ : ndarray of shape (n_outputs,)
         Constants.
     n_features_in_ : int
-        Columns of X.
+        Number of columns of X.
     feature_names_in_ : ndarray of str
-        Their names, where X has names.
+        Names of the columns, if X has names.
 
     Examples
     --------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Motion of a model from its torque: implicit steps with set-valued friction, many at once."""
+"""Motion of a model from its torque: implicit steps with set-valued friction, vectorised."""
 
 # For other packages of skidyn; no part of the public interface.
 from skidyn.forward._controller import Controller as Controller, fit_controller as fit_controller

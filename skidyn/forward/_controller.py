@@ -29,14 +29,14 @@ class Controller:
     limit : float or array-like of shape (n_joints,), default=inf
         Largest torque of the drive, N m (N): a current limit.
     delay : float, default=0.0
-        Delay of the reference at the controller, s.
+        Delay with which the reference reaches the controller, s.
     deadband : float or array-like of shape (n_joints,), default=0.0
         Position error, rad (m), within which the controller output is zero.
     offset : float or array-like of shape (n_joints,), default=0.0
         Constant torque, N m (N).
     follows_velocity : bool, default=True
-        Whether the velocity of the reference is fed forward; False is damping of the velocity
-        itself, as in position servos.
+        Whether the velocity of the reference is fed forward; if False, the velocity itself is
+        damped, as in position servos.
 
     Examples
     --------
@@ -54,7 +54,7 @@ class Controller:
     follows_velocity: bool = True
 
     def checked(self, n_joints: int) -> Controller:
-        """The same with one number for each joint.
+        """Controller with one number for each joint.
 
         Parameters
         ----------
@@ -64,7 +64,7 @@ class Controller:
         Returns
         -------
         Controller
-            Its gains are arrays of shape (n_joints,).
+            Controller whose gains are arrays of shape (n_joints,).
 
         Raises
         ------
@@ -91,7 +91,7 @@ class Controller:
         q, dq : ndarray of shape (n_samples, n_joints)
             Position (rad, m) and velocity.
         q_ref, dq_ref : ndarray of shape (n_samples, n_joints)
-            Those of the reference, as it has reached the controller.
+            Position and velocity of the reference as received by the controller.
 
         Returns
         -------
@@ -124,7 +124,8 @@ def fit_controller(log: Any, torque: Any, *, follows_velocity: bool | None = Non
     Returns
     -------
     Controller
-        Negative gains are set to 0; they only occur in logs without their effect.
+        Negative gains are set to 0; they occur only if the log does not show the effect of the
+        gain.
 
     Raises
     ------

@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""One joint alone in its servo loop, many sets of parameters at once.
+r"""One joint in its servo loop, for many sets of parameters at once.
 
-A position servo keeps its joint so near to the logged motion that the other joints may be taken as
-logged. What is left is one equation for the motor, and a second one for the link where the gear
-gives way or has play:
+A position servo keeps its joint so close to the logged motion that the logged motion can be used
+for the other joints. This leaves one equation for the motor, and a second one for the link if the
+gear is compliant or has play:
 
 .. math:: J \dot v = \mathrm{servo}(q, v) - F_v v + \tau_0 - f - T, \qquad
           (M - J) \dot w = T - b(t)
 
 with the torque :math:`T` of the gear, the inertia :math:`M` and the torque :math:`b` that the link
-needs beside its own acceleration, both along the logged motion, and dry friction :math:`f` that
-holds where it can. Steps are trapezoidal; dry friction is implicit.
+needs in addition to that of its acceleration, both along the logged motion, and dry friction
+:math:`f`, which keeps the joint at rest where it can. Steps are trapezoidal; dry friction is
+implicit.
 """
 
 from __future__ import annotations
@@ -28,14 +29,15 @@ from skidyn.forward._run import Task
 
 #: Longest step, s.
 STEP = 5e-3
-#: Share of the largest torque above which the servo may be at its limit: it steers no longer, and
-#: the joint is put back on the log there. The start and what follows do not count so long, in s.
+#: Share of the largest torque above which the servo may be at its limit: it no longer controls the
+#: joint, which is reset to the log there. The errors of this many seconds after the start or a
+#: reset do not count.
 AT_LIMIT, SETTLING = 0.97, 0.25
-#: Least share of the inertia that a link keeps beside its motor.
+#: Least share of the inertia that belongs to the link and not to its motor.
 LEAST_LINK = 0.05
-#: Damping ratio of a gear that has none of its own.
+#: Damping ratio of a gear without damping of its own.
 USUAL_DAMPING = 0.05
-#: What divides must not be zero.
+#: Added to divisors, which must not be zero.
 TINY = 1e-12
 #: Error, rad or m, above which a motion counts as lost.
 LOST = 1.0
@@ -57,7 +59,7 @@ class JointLoop:
     valid : ndarray of shape (n_samples, n_pieces) of bool
         Samples whose error counts.
     inertia : ndarray of shape (n_samples, n_pieces)
-        Of everything that turns with the joint, kg m^2 or kg.
+        Inertia of everything that moves with the joint, kg m^2 or kg.
     """
 
     q: Array
@@ -84,12 +86,12 @@ class JointLoop:
         Parameters
         ----------
         task : Task
-            Pieces of a log that a controller drives.
+            Pieces of a log with a controller.
         joint : int
             Joint, from 0.
         inertia, bias, load : ndarray of shape (n_log,)
-            Inertia of motor and link, torque beside the one that this inertia needs, and torque of
-            the rigid body.
+            Inertia of motor and link, torque in addition to that of this inertia, and torque of the
+            rigid body.
         """
         controller, windows, signals = task.controller, task.windows, task.signals
         assert controller is not None and task.reference is not None and task.rate is not None
@@ -100,7 +102,7 @@ class JointLoop:
                  ("stiffness", "damping", "limit", "deadband", "offset")]  # fmt: skip
         stiffness, damping, limit, deadband, offset = gains
         q, dq = signals.q[:, joint], signals.dq[:, joint]
-        # The limit is told from the log, with the command as it has reached the servo.
+        # The limit is found from the log, with the command as received by the servo.
         arrived = wanted.copy()
         for own in signals.segments:
             clock = signals.clock[own]
@@ -141,7 +143,7 @@ class JointLoop:
         )
 
     def only(self, pieces: NDArray[np.int64]) -> JointLoop:
-        """The same with some of the pieces."""
+        """Loop with some of the pieces."""
         tables: dict[str, Any] = {
             k: v[:, pieces] for k, v in vars(self).items() if isinstance(v, np.ndarray)
         }
@@ -165,12 +167,12 @@ class JointLoop:
         ----------
         parameters : dict of str to ndarray of shape (n_models,)
             ``viscous``, ``coulomb``, ``offset`` in N m and s/rad (N, m); ``inertia`` and
-            ``weight``, by which share inertia and torque of the link are larger than given. Of
-            effects: ``dF`` and ``vs`` (Stribeck), ``mu`` (load), ``dFc`` (direction), ``square``
+            ``weight``, by which inertia and torque of the link are larger than given, as a share.
+            Of effects: ``dF`` and ``vs`` (Stribeck), ``mu`` (load), ``dFc`` (direction), ``square``
             (viscous friction that grows with the speed), ``presliding`` (stiffness of a Dahl
             model), ``late`` (s); ``compliance`` and ``damping`` (ratio) of the gear, ``gap`` (half
             of its play), with ``motor``, the share of the inertia that is the motor's. Of the
-            servo: ``deadband`` (rad, m) beside the given one.
+            servo: ``deadband`` (rad, m) in addition to the given one.
 
         Returns
         -------
@@ -189,7 +191,7 @@ class JointLoop:
         return np.asarray(self._run({k: np.array([v]) for k, v in parameters.items()})[1][0])
 
     def _run(self, parameters: Mapping[str, Array]) -> tuple[Array, Array]:
-        """Positions of the motor, and how far the link is behind it; empty without a gear."""
+        """Positions of the motor, and lag of the link behind it; empty without a gear."""
         given = {k: np.asarray(v, dtype=float)[:, None] for k, v in parameters.items()}
         n_models = len(next(iter(given.values())))
         p = {k: given.get(k, np.zeros((n_models, 1))) for k in _ALL}
@@ -251,7 +253,8 @@ class JointLoop:
                     mass = mass + h * half * p["presliding"] * np.maximum(yields, 0.0)
                 else:
                     dry = h * dry_of.level(i, v, r1 - q)
-                # The servo at the end of the step, without its damping and what moves until then.
+                # The servo at the end of the step, without its damping and without the motion until
+                # then.
                 error = r1 - q - half * v
                 pull = push + half * (servo_of.torque(error) + self.damping * d1)
                 stiffer = half * (self.damping + half * servo_of.slope(error))
@@ -274,7 +277,7 @@ class JointLoop:
 
     @staticmethod
     def _at(values: Array, i: int, share: float) -> Array:
-        """Values at a share of the way from sample i to the next."""
+        """Values interpolated between sample i and the next."""
         return np.asarray((1 - share) * values[i] + share * values[i + 1])
 
 
@@ -288,7 +291,7 @@ class _Dry:
         self.loaded = bool(p["mu"].any())
 
     def level(self, i: int, v: Array, ahead: Array) -> Array:
-        """At a sample; at rest its direction is that in which the servo pulls."""
+        """Level at a sample; at rest its direction is that of the servo's torque."""
         level = self.p["coulomb"]
         if self.loaded:
             level = level + self.p["mu"] * self.load[i]
@@ -313,7 +316,7 @@ class _Servo:
         return self.gain * error
 
     def slope(self, error: Array) -> Any:
-        """How the torque falls when the joint moves on."""
+        """Decrease of the torque per unit of motion of the joint."""
         return self.gain * (np.abs(error) >= self.band) if self.any_band else self.gain
 
 
@@ -330,13 +333,13 @@ class _Gear:
         self.y, self.w = np.zeros(shape), np.zeros(shape)
 
     def hang(self, i: int, q: Array, v: Array, where: Any) -> None:
-        """Let the link hang on its gear under the load of a sample."""
+        """Set the link in static equilibrium on its gear under the load of a sample."""
         load = self.weight * self.loop.bias[i]
         y = q - load / self.spring - np.sign(load) * self.gap
         self.y, self.w = np.where(where, y, self.y), np.where(where, v, self.w)
 
     def push(self, half: Array, q: Array, v: Array, m: Array, bias: Array) -> tuple[Array, Array]:
-        """Impulse and mass of the motor by itself and by the gear, the link eliminated."""
+        """Impulse and mass of the motor alone and with the gear, the link eliminated."""
         link = np.maximum(m - self.motor, LEAST_LINK * m)
         twist, rate = q - self.y, v - self.w
         ahead = twist + 2 * half * rate
@@ -351,18 +354,18 @@ class _Gear:
         return push, self.motor + half * self.stiff * (1 - half * self.stiff / self.heavy)
 
     def move(self, half: Array, new: Array) -> None:
-        """Move the link along with the motor's new velocity."""
+        """Move the link according to the motor's new velocity."""
         moved = (self.way_on + half * self.stiff * new) / self.heavy
         self.y, self.w = self.y + half * (self.w + moved), moved
 
 
 def _held(push: Array, dry: Array) -> Array:
-    """What is left of an impulse that dry friction takes away, or holds."""
+    """Remainder of an impulse after dry friction; zero where friction holds the joint."""
     return np.asarray(np.sign(push) * np.maximum(np.abs(push) - dry, 0.0))
 
 
 class _Command:
-    """Command and its velocity between samples, as they reach the servo."""
+    """Command and its velocity between samples, as received by the servo."""
 
     def __init__(self, loop: JointLoop, late: Array) -> None:
         self.loop = loop
@@ -389,7 +392,7 @@ class _Command:
             self.command, self.rate = loop.command[:, None], loop.rate[:, None]
 
     def at(self, i: int, share: float) -> tuple[Array, Array]:
-        """At a share of the way from sample i to the next."""
+        """Command and its velocity interpolated between sample i and the next."""
         wanted, rate = self.command, self.rate
         return (
             wanted[i] + share * (wanted[i + 1] - wanted[i]),

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A fitted model as a simulator needs it: the direction of dry friction is an input.
+"""A fitted model for simulation: the direction of dry friction is an input.
 
 The model's own code is run on symbols, with the direction of motion of every joint and the states
-of hysteresis as inputs beside q, dq and ddq. Whatever the direction multiplies is dry friction,
-whoever wrote the effect; no list of kinds is kept here.
+of hysteresis as inputs in addition to q, dq and ddq. Everything that the direction multiplies is
+dry friction, also in effects of users; so no list of kinds is needed here.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from skidyn.dynamics import BoundProgram, Program, Tape
 from skidyn.effects import Law, PathMemory, Term, TermSum
 from skidyn.robots import Instant, SymbolicRobot, Symbols, filled, replay, symbols
 
-#: Relative difference between rows that are evaluated together and one by one, which tells an
-#: effect with a memory from one without.
+#: Relative difference between rows that are evaluated together and one by one above which an effect
+#: has a memory.
 _ALIKE = 1e-9
 
 
@@ -42,7 +42,7 @@ class _Moment(Instant):
 
 @dataclass(frozen=True)
 class _Rows(Signals):
-    """Samples that have nothing to do with each other, with a given direction of motion."""
+    """Independent samples with a given direction of motion."""
 
     direction: Any = None
 
@@ -62,16 +62,16 @@ class Memory:
 
 @dataclass(frozen=True)
 class Spring:
-    """What lies between motor and link of a joint.
+    """Elastic element between motor and link of a joint.
 
     Attributes
     ----------
     joint : int
         Joint, from 0.
     stiffness : float, N m/rad
-        Of the gear, or of the flanks of a gap.
+        Stiffness of the gear, or of the flanks of a gap.
     damping : float, N m s/rad
-        In parallel.
+        Damping in parallel.
     gap : float, rad
         Play between the flanks; 0 for none.
     """
@@ -84,14 +84,14 @@ class Spring:
 
 @dataclass
 class Conditions:
-    """What the log says about a sample beside its motion, one row each; None where it does not."""
+    """Logged conditions of each sample other than its motion, one row each; None if not logged."""
 
     trajectory: NDArray[Any]
     time: Array
     temperature: Array | None = None
 
     def repeated(self, times: int) -> Conditions:
-        """Every row several times, the whole block after the whole block."""
+        """Several copies of all rows, one block after another."""
         temperature = None if self.temperature is None else np.tile(self.temperature, (times, 1))
         return Conditions(np.tile(self.trajectory, times), np.tile(self.time, times), temperature)
 
@@ -107,13 +107,13 @@ class ForwardModel:
     memories : list of Memory
         States of hysteresis.
     springs : list of Spring
-        Joints whose link has a coordinate of its own.
+        Springs of the joints whose link has a separate coordinate.
     delay : ndarray of shape (n_joints,), s
-        By which the logged torque is late.
+        Delay of the logged torque.
     outside : list of Term
-        Effects that are evaluated on numbers, because they ask for recording, time or temperature.
+        Effects that are evaluated on numbers because they depend on recording, time or temperature.
     free : bool
-        Whether inertial parameters and coefficients are inputs too, for many models at once.
+        Whether inertial parameters and coefficients are also inputs, for many models at once.
     """
 
     model: Any
@@ -158,7 +158,7 @@ class ForwardModel:
             return False
         try:
             self._traced([term])
-        except Exception:  # whatever an effect says to symbols: it cannot be written down
+        except Exception:  # any error of an effect given symbols: it cannot be recorded on a tape
             return False
         return True
 
@@ -185,7 +185,7 @@ class ForwardModel:
         return bool(np.abs(together[order] - alone).max() <= _ALIKE * scale)
 
     def _traced(self, terms: Sequence[Term]) -> Program:
-        """Torques (row 0) and those of the rigid body (row 1) on a tape."""
+        """Torques of the model (row 0) and of its rigid body (row 1) on a tape."""
         tape, n, model = Tape(), self.n, copy.copy(self.model)
         states: dict[Term, Any] = {}
         memories: list[Memory] = []
@@ -282,7 +282,7 @@ class ForwardModel:
         terms: Sequence[Term],
     ) -> Array:
         model = self.model
-        # Motion that has run away stays lost; an effect may refuse to look at it.
+        # Motion that has diverged stays lost; an effect may raise an error for it.
         lost = np.asarray(~np.isfinite(np.column_stack([q, dq, ddq, direction])).all(axis=1))
         if lost.any():
             q, dq, ddq, direction = (
@@ -329,7 +329,7 @@ class ForwardModel:
         parameters : ndarray of shape (n_models, n_bodies, 10)
             Inertial parameters.
         coefficients : ndarray of shape (n_models, n_coefficients)
-            Of the effects in :attr:`inside`, in this order.
+            Coefficients of the effects in :attr:`inside`, in this order.
         """
         canonical = self.model.robot_._engine.canonical
         phi = np.array([np.concatenate(canonical.parameters(p)) for p in parameters])
@@ -337,7 +337,7 @@ class ForwardModel:
 
 
 class _StateRobot(SymbolicRobot):
-    """The symbolic robot; with free parameters those of the model are inputs of the tape."""
+    """The symbolic robot; free parameters are inputs of the tape."""
 
     def __init__(self, robot: Any, tape: Tape, free: bool, model: Any) -> None:
         super().__init__(robot, tape)
@@ -367,8 +367,8 @@ def _model_torque(model: Any, moment: _Moment) -> Any:
         return model._torque(moment)
     plain = copy.copy(model)
     plain.effect_terms_ = [t for t in kept if t not in moment.states]
-    # Hysteresis is friction: it comes before what a sensor makes of the torque, so the model's
-    # own order is kept by adding it to the columns of the terms that are left.
+    # Hysteresis is friction and acts before the torque sensor, so it is added to the columns of the
+    # remaining terms, which keeps the model's own order.
     torque = plain._torque(moment)
     gain = {t.places[0]: plain.effect_coefficients_[t][0] for t in kept if t.kind == "torque_gain"}
     for term, states in moment.states.items():
@@ -402,8 +402,8 @@ def _loose(forward: ForwardModel, term: Term) -> None:
             f"{term} has the gap {gap:.3g}; only a positive one "
             "can be simulated. Fit with consistent=True, or without the effect"
         )
-    # The flanks give way by a hundredth of the gap under the weight of the arm, and swallow the
-    # blow, as those of the effect's own formula do.
+    # The flanks deform by a hundredth of the gap under the weight of the arm, and absorb the
+    # impact, as in the effect's own formula.
     robot = forward.model.robot_
     inertia = abs(float(robot.mass_matrix(np.zeros((1, robot.n_joints)))[0, joint, joint]))
     rest = abs(float(robot.gravity_torque(np.zeros((1, robot.n_joints)))[0, joint]))

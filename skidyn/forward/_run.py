@@ -28,7 +28,7 @@ STEP = 2e-3
 
 @dataclass(frozen=True)
 class Task:
-    """What is to be simulated.
+    """A simulation to be run.
 
     Attributes
     ----------
@@ -37,11 +37,11 @@ class Task:
     windows : Windows
         The pieces.
     torque : ndarray of shape (n_samples, n_joints) or None
-        What drives the model without a controller.
+        Torque that drives the model without a controller.
     controller : Controller or None
-        What drives it with one.
+        Controller that drives the model.
     reference, rate : ndarray of shape (n_samples, n_joints) or None
-        Its reference and the velocity of this.
+        Reference of the controller and its velocity.
     """
 
     signals: Signals
@@ -71,7 +71,7 @@ def read_task(
 
 
 def commanded(signals: Signals, windows: Windows, controller: Controller, reference: Array) -> Task:
-    """Pieces of a log that a controller drives along its reference."""
+    """Pieces of a log in which a controller follows its reference."""
     assert signals.time is not None
     rate = np.zeros_like(reference)
     for rows in signals.segments:
@@ -134,7 +134,7 @@ def run(
 ) -> tuple[Array, Array]:
     """Positions and velocities of the motors, shape (n_rows, n_samples, n_joints).
 
-    With ``theta`` every piece is simulated once for each model, models first.
+    With ``theta`` every piece is simulated once for each model; models are the first axis.
     """
     n, windows = forward.n, task.windows
     models = 1 if theta is None else len(theta[0])
@@ -175,11 +175,11 @@ def run(
 
 
 def _start(forward: ForwardModel, signals: Signals, first: Rows, stepper: Stepper) -> State:
-    """The logged state; links hang where their springs carry them."""
+    """The logged state, with links in static equilibrium on their springs."""
     q, dq = signals.q[first], signals.dq[first]
     memory = forward.starting_states(signals)[first]
     direction = np.sign(dq)
-    # At rest the direction is that in which friction holds: found by the first step.
+    # At rest the direction is that in which friction holds; the first step finds it.
     direction[np.abs(dq) < 1e-6 * forward.unit] = 0.0
     for spring in forward.springs:
         ddq = signals.ddq[first]
@@ -220,7 +220,7 @@ def _drive(forward: ForwardModel, task: Task, rows: Rows, time: Array) -> Any:
         assert task.torque is not None
         if not forward.delay.any():
             return between(task.torque, moment)
-        # The logged torque is late: what acts now is logged later.
+        # The logged torque is delayed: the torque that acts now is logged later.
         late = [moment + delay for delay in forward.delay]
         return np.column_stack(
             [between(task.torque[:, [j]], at)[:, 0] for j, at in enumerate(late)]
@@ -238,7 +238,7 @@ def _drive(forward: ForwardModel, task: Task, rows: Rows, time: Array) -> Any:
 
 
 def _check_inertia(stepper: Stepper, state: State) -> None:
-    """Refuse a model whose inertia is not positive definite: it would run away at once."""
+    """Refuse a model whose inertia is not positive definite: its motion would diverge at once."""
     n, rows = stepper.n, len(state.q)
     shape = (n + 1, rows, n)
     ddq = np.zeros(shape)

@@ -8,7 +8,7 @@ damping are stable at any step. In each stage the velocity ``v`` and the directi
 .. math:: f(q(v), v, \ddot q(v), s) = \tau, \qquad s_j \in \mathrm{Sgn}(v_j),
 
 so that a joint is at rest where dry friction can hold it, and stays there [2]_. Stages in which a
-joint stops, starts or turns are taken by the implicit Euler method, which does not ring.
+joint stops, starts or turns are computed with the implicit Euler method, which does not oscillate.
 
 References
 ----------
@@ -30,12 +30,12 @@ from skidyn._signals import Array
 from skidyn.forward._model import Conditions, ForwardModel
 
 GAMMA = 1.0 - np.sqrt(0.5)
-#: Newton steps and exchanges of sticking and sliding joints at most, and the change of velocity,
+#: Most Newton steps and most exchanges of sticking and sliding joints, and the change of velocity,
 #: relative to a moderate one, that ends them.
 ITERATIONS, EXCHANGES, SMALL = 8, 25, 1e-10
-#: Change of velocity by which derivatives are taken, relative to a moderate velocity.
+#: Step of velocity for numerical derivatives, relative to a moderate velocity.
 DIFFERENCE = 1e-5
-#: Velocity (rad/s) beyond which a trajectory is given up.
+#: Velocity (rad/s) beyond which the simulation of a trajectory ends.
 LOST = 1e4
 
 #: Torque of the drive at times (n_rows,), or at times, q and dq of the motors.
@@ -45,7 +45,7 @@ Drive = Callable[[Array, Array, Array], Array]
 
 @dataclass
 class State:
-    """Where the rows are: motors first, then the links that have coordinates of their own.
+    """State of the rows: motors first, then the links that have separate coordinates.
 
     Attributes
     ----------
@@ -102,7 +102,7 @@ class Stepper:
         fixed: Array | None,
         time: Array,
     ) -> Array:
-        """Torque that is missing; motion of shape (n_blocks, n_rows, size)."""
+        """Torque by which the equations fail; motion of shape (n_blocks, n_rows, size)."""
         n, forward = self.n, self.forward
         memory = self._memory(q, old)
         total, rigid = forward.torque(
@@ -111,7 +111,7 @@ class Stepper:
         drive = self.drive(time, q[..., :n], v[..., :n]) if fixed is None else fixed
         if not forward.springs:
             return np.asarray(total - drive)
-        # Springs: what the motors feel of the rigid body is the torque of the spring.
+        # Springs: the torque of the spring replaces that of the rigid body at the motor.
         motor = total - rigid
         link = [x[..., :n].copy() for x in (q, v, a)]
         for k, spring in enumerate(forward.springs):
@@ -134,7 +134,7 @@ class Stepper:
         return result
 
     def _memory(self, q: Array, old: State) -> Array:
-        """States of hysteresis after a straight way from the old positions."""
+        """States of hysteresis after a straight path from the old positions."""
         memories = self.forward.memories
         states = np.empty((*q.shape[:2], len(memories)))
         for k, memory in enumerate(memories):
@@ -154,10 +154,11 @@ class Stepper:
         slope = level = None
         steps = self._steps
         for iteration in range(ITERATIONS):
-            # The derivatives are taken anew where those of the iteration before do not suffice.
+            # The derivatives are computed again where those of the previous iteration do not
+            # suffice.
             fresh = slope is None or iteration > 2
             if fresh:
-                # Blocks: as it is; every velocity a little larger; the direction turned up.
+                # Blocks: unchanged; each velocity a little larger; directions larger by 1.
                 trial = v + steps
                 direction = np.empty((size + 2, rows, n))
                 direction[:-1] = s
@@ -206,7 +207,7 @@ def _inclusion(here: Array, slope: Array, level: Array, v: Array, s: Array) -> t
     n = level.shape[1]
     own_v, own_here = (v, here) if size == n else (v[:, :n], here[:, :n])
     dry = level > 1e-12 * (1.0 + np.abs(own_here))
-    # Without dry friction the direction says where it would act, and nothing depends on it.
+    # Without dry friction nothing depends on the direction.
     s = np.where(dry, s, np.sign(own_v))
     stuck = dry & (np.abs(s) < 1.0)
     side = np.where(s >= 0, 1.0, -1.0)
@@ -247,9 +248,9 @@ def _inclusion(here: Array, slope: Array, level: Array, v: Array, s: Array) -> t
 
 
 def _solved(matrix: Array, right: Array) -> Array:
-    if matrix.shape[1] == 1:  # a single axis: LAPACK would take longer to call than to compute
+    if matrix.shape[1] == 1:  # a single axis: the call of LAPACK takes longer than its computation
         return right / matrix[:, 0]
-    # Rows that have run away would spoil the solution of all others.
+    # Rows that have diverged would spoil the solution of all others.
     with np.errstate(all="ignore"):
         determinant = np.linalg.det(matrix)
     gone = ~(np.isfinite(determinant) & (determinant != 0.0) & np.isfinite(right).all(axis=1))

@@ -24,9 +24,9 @@ class Windows:
     rows : ndarray of shape (n_windows, n_samples) of int
         Rows of the log.
     valid : ndarray of shape (n_windows, n_samples) of bool
-        Which of them are the piece's own.
+        Whether a row belongs to the piece, and is not a repetition.
     time : ndarray of shape (n_windows, n_samples), s
-        Their time; it goes on where a piece has ended.
+        Their time; it continues after the end of a piece.
     """
 
     rows: NDArray[np.int64]
@@ -48,7 +48,7 @@ def make_windows(signals: Signals, horizon: float | None) -> Windows:
         Motion with time.
     horizon : float, s, or None
         Length of a piece; None for the whole of every continuous stretch. A remainder shorter than
-        half of it is left out where its stretch has a whole piece.
+        half of it is left out if its stretch has a whole piece.
 
     Raises
     ------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How much of a learned part to keep, judged on recordings that it has not seen."""
+"""Weight of a learned part, from recordings that it has not seen."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from skidyn.evidence import jackknife
 
 Array = NDArray[np.float64]
 
-#: Keeps ratios finite.
+#: Added to divisors, to keep ratios finite.
 TINY = np.finfo(np.float64).tiny
 
 
 def learned_weights(
     residual: Array, learned: Array, unit: NDArray[Any], alpha: float
 ) -> tuple[Array, Array, Array]:
-    """Weight of the learned part for each joint; zero where its gain may be chance.
+    """Weight of the learned part for each joint; zero if its gain is not significant.
 
     The least-squares factor of the cross-fitted learned part has a standard error over units
-    (recordings), from the jackknife. The weight is the factor less one standard error, between 0
-    and 1: a learned part of little worth comes in small. Nothing comes in unless residual and
-    learned part agree beyond chance, by a one-sided t-test over units of their products: of their
-    mean correlation over all joints, which sees small gains on many joints, or of a joint alone
-    after Holm's correction. The smaller of the two p-values counts, doubled. Under noise the
-    products are zero in the mean, so that the level is kept.
+    (recordings), from the jackknife. The weight is the factor minus one standard error, between 0
+    and 1: a learned part of little benefit has a small weight. The weight is zero unless residual
+    and learned part agree significantly, by a one-sided t-test over units of their products: of
+    their mean correlation over all joints, which detects small gains on many joints, or of a joint
+    alone after Holm's correction. The smaller of the two p-values counts, doubled. For noise the
+    mean of the products is zero, so the level is kept.
 
     Parameters
     ----------
@@ -42,8 +42,8 @@ def learned_weights(
     Returns
     -------
     weight, gain, p_value : ndarray of shape (n_joints,)
-        The gain is the relative fall of the RMSE on units whose weight the others gave. The p-value
-        is 1 where the weight would be zero.
+        The gain is the relative reduction of the RMSE on units, with the weight found from the
+        other units. The p-value is 1 if the weight would be zero.
 
     References
     ----------
@@ -74,7 +74,7 @@ def learned_weights(
 
 
 def _cautious_factor(products: Array, squares: Array) -> Array:
-    """Least-squares factor from the sums of each unit, less its standard error, in 0 to 1."""
+    """Least-squares factor from the sums of each unit minus its standard error, in 0 to 1."""
     without = (products.sum(axis=0) - products) / np.maximum(squares.sum(axis=0) - squares, TINY)
     error = jackknife(without)
     factor = products.sum(axis=0) / np.maximum(squares.sum(axis=0), TINY)

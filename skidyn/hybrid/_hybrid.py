@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Physics plus a learner, which is left out where it does not help."""
+"""Physics plus a learner, which is used only if it helps."""
 
 from __future__ import annotations
 
@@ -95,9 +95,9 @@ class HybridRegressor(
         Distance from the training samples that counts as outside, in standard deviations per
         feature (root mean square).
     n_features_in_ : int
-        Columns of X.
+        Number of columns of X.
     feature_names_in_ : ndarray of str
-        Their names, where X has names.
+        Names of the columns, if X has names.
 
     Notes
     -----
@@ -244,7 +244,7 @@ class HybridRegressor(
         return folds
 
     def _own_joints(self) -> OwnJointRegressor:
-        # columns may be named after the joints that the physics knows
+        # columns may be named after the joints of the physics
         names = getattr(getattr(self.physics, "robot", None), "joint_names", None)
         return OwnJointRegressor(joint_names=names, trajectory=self.trajectory, time=self.time)
 
@@ -322,7 +322,7 @@ class HybridRegressor(
 
 
 def _like(X: Any, array: Array) -> Any:
-    """X as the user gave it where it has names, otherwise the checked array."""
+    """X as given if it has column names, otherwise the checked array."""
     return array if column_names(X) is None else X
 
 
@@ -355,11 +355,12 @@ def _honest_residuals(
     folds: list[Any],
     progress: FitProgress,
 ) -> Array:
-    """For every fold the residual of all rows by physics that saw neither it nor their own fold.
+    """For every fold, residuals of all rows by physics fitted without it and without their fold.
 
-    Physics that saw a fold leaves a residual elsewhere that holds the fold's own deviation with the
-    opposite sign; a learner of it looks worse on the fold than it is. Physics fitted without two
-    folds serves both. Where no rows are left without two folds, the physics saw the rows' own.
+    If physics is fitted to a fold, its residual elsewhere contains the fold's own deviation with
+    the opposite sign, so a learner of this residual seems worse on the fold than it is. Physics
+    fitted without two folds serves for both. If no rows are left without two folds, the fit
+    includes the fold of the rows.
     """
 
     def fitted(rows: NDArray[Any]) -> Any:

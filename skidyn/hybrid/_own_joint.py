@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One regressor per joint, which sees that joint's own signals."""
+"""One regressor per joint on that joint's own signals."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ class OwnJointRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, Ba
     presliding : sequence of float, rad (m for prismatic joints), default=(0.003, 0.01, 0.05, 0.2)
         Distances over which the states build up. They restart in each segment.
     joint_names : sequence of str, default=None
-        Names of the joints for columns named ``q_<joint>``; ``q1, q2, ..`` or columns by position
-        need none.
+        Names of the joints for columns named ``q_<joint>``; not needed for ``q1, q2, ..`` or
+        columns by position.
     n_jobs : int, default=None
         Joints fitted at the same time.
     trajectory, time : int, str or None, default="auto"
@@ -59,9 +59,9 @@ class OwnJointRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, Ba
     estimators_ : list of estimators
         One per joint.
     n_features_in_ : int
-        Columns of X.
+        Number of columns of X.
     feature_names_in_ : ndarray of str
-        Their names, where X has names.
+        Names of the columns, if X has names.
 
     References
     ----------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How far a sample is from the training samples."""
+"""Distance of samples from the training samples."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from scipy.spatial.distance import cdist
 
 Array = NDArray[np.float64]
 
-#: Training samples that stand for all.
+#: Number of training samples that represent all.
 REFERENCES = 500
-#: Held-out samples of the training log that count as inside.
+#: Share of held-out samples of the training log that count as inside.
 INSIDE = 0.99
-#: Rows compared with the references at once.
+#: Number of rows compared with the references at once.
 CHUNK = 4096
 
 
@@ -37,7 +37,7 @@ def distances(features: Array, scale: Array, reference: Array) -> Array:
 
 
 class TrainingRange:
-    """Region around the training samples, and how a learned part fades out beyond it.
+    """Region around the training samples, beyond which a learned part fades out.
 
     Attributes
     ----------

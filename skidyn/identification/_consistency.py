@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Physical consistency: every body has a mass distribution that can exist.
+"""Physical consistency: every body has a possible mass distribution.
 
 A body's ten parameters are consistent when its pseudo-inertia, a symmetric 4x4 matrix, is positive
-definite. Least squares under this condition is convex, with one optimum. Every point on the way to
-it is a set of bodies that can exist, so that the answer is one, whatever the data.
+definite. Least squares under this condition is convex, with one optimum. Every iterate is a set of
+physically possible bodies, so the result is one as well, for any data.
 
 References
 ----------
@@ -29,7 +29,7 @@ from skidyn.identification._log_det import (
 
 #: Least second moment of mass of a body about its centre, relative to its largest moment.
 THICKNESS = 1e-9
-#: Torque below this share of the torque of the bodies to start from counts as zero.
+#: Torque below this share of the torque of the initial bodies counts as zero.
 ZERO = 1e-12
 #: Start of coefficients that must not be negative, in units in which the torque has unit size.
 ABOVE_ZERO = 1e-3
@@ -106,8 +106,8 @@ def make_consistent(
 
     Notes
     -----
-    The problem is convex and has one optimum. A step of the interior-point method costs a QR
-    decomposition with ``10 * n_bodies + n_coefficients`` columns; some 20 are taken.
+    The problem is convex and has one optimum. A step of the interior-point method takes a QR
+    decomposition with ``10 * n_bodies + n_coefficients`` columns; some 20 steps are needed.
 
     References
     ----------
@@ -131,7 +131,7 @@ def make_consistent(
     linear = body_constraints(known, names, signs)
     n = bodies.size
     # In units in which target and columns of coefficients have unit size.
-    # Zero torque has no size: a share of that of the bodies to start from takes its place.
+    # Zero torque has no size: a share of the torque of the initial bodies is used instead.
     own = [target, ZERO * (factor[:, :n] @ bodies.ravel())]
     size = max(float(np.linalg.norm(t)) for t in own) / np.sqrt(max(len(target), 1)) or 1.0
     scale = np.ones(factor.shape[1])
@@ -147,10 +147,10 @@ def make_consistent(
 
 
 def _thickened(parameters: Array) -> Array:
-    """Bodies that are flat but for rounding, with a trace of moment of inertia about their centre.
+    """Add a small moment of inertia about the centre to bodies that are flat up to rounding.
 
-    Mass, centre of mass and symmetry stay, so that nothing that is known is lost; the trace
-    outlives the digits that a URDF is written with, and is far below what torque shows.
+    Mass, centre of mass and symmetry are unchanged, so known constraints still hold. The added
+    moment is larger than the rounding of numbers in a URDF, and far too small to affect the torque.
     """
     values = np.linalg.eigvalsh(pseudo_inertia(parameters))
     flat = values[:, 0] < THICKNESS * values[:, -1]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is known about bodies beside the log: masses, centres of mass, symmetry, total mass."""
+"""Prior knowledge of bodies: masses, centres of mass, symmetry, total mass."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from skidyn.identification._log_det import (
 
 #: Positions of parameters that are odd under a mirror at x = 0, y = 0, z = 0.
 _ODD = {"x": (1, 5, 6), "y": (2, 5, 8), "z": (3, 6, 8)}
-#: Share of a range by which the start keeps away from its borders.
+#: Share of a range by which the start is inside its limits.
 INSIDE = 0.05
 
 
@@ -74,7 +74,7 @@ class BodyConstraints:
 
 
 def body_constraints(known: BodyConstraints, names: Sequence[str], signs: Array) -> Linear:
-    """The knowledge as limits and equations of parameters and coefficients.
+    """Constraints as inequalities and equations of parameters and coefficients.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def body_constraints(known: BodyConstraints, names: Sequence[str], signs: Array)
     Raises
     ------
     ValueError
-        An unknown body, or limits that contradict themselves.
+        A body is unknown, or limits are contradictory.
     """
     n = 10 * len(names)
     width = n + len(signs)
@@ -115,7 +115,7 @@ def body_constraints(known: BodyConstraints, names: Sequence[str], signs: Array)
 
 
 def start_bodies(known: BodyConstraints, names: Sequence[str], nominal: Array) -> Array:
-    """Bodies near the nominal ones that keep everything that is known, strictly.
+    """Bodies near the nominal ones that satisfy all constraints strictly.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def start_bodies(known: BodyConstraints, names: Sequence[str], nominal: Array) -
     Raises
     ------
     ValueError
-        The knowledge contradicts itself.
+        The constraints are contradictory.
     """
     bodies = existing_bodies(nominal)
     for name, axes in known.symmetry.items():
@@ -177,7 +177,7 @@ def _centres(
 def _inside_box(
     name: str, known: BodyConstraints, body: Array, low: Sequence[float], high: Sequence[float]
 ) -> Array:
-    """Centre of mass of a body, moved into its box."""
+    """Centre of mass of a body, moved into its permitted box."""
     box_low, box_high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
     room = np.where(np.isfinite(box_high - box_low), INSIDE * (box_high - box_low), 1e-3)
     centre = np.clip(body[1:4] / body[0], box_low + room, box_high - room)
@@ -193,7 +193,7 @@ def _inside_box(
 
 
 def _moved(body: Array, centre: Array) -> Array:
-    """A body carried to another centre of mass without turning it."""
+    """A body moved to another centre of mass without rotation."""
     matrix = pseudo_inertia(body[None])[0]
     mass, first = matrix[3, 3], matrix[:3, 3].copy()
     matrix[:3, :3] += mass * np.outer(centre, centre) - np.outer(first, first) / mass
@@ -202,7 +202,7 @@ def _moved(body: Array, centre: Array) -> Array:
 
 
 def _masses(known: BodyConstraints, names: Sequence[str], nominal: Array) -> Array:
-    """Masses inside their ranges, with the total that is known."""
+    """Masses inside their ranges, with the known total."""
     low, high = np.zeros(len(names)), np.full(len(names), np.inf)
     for name, (least, most) in known.mass.items():
         low[_body(name, names)], high[_body(name, names)] = max(0.0, least), most

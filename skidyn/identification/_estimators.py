@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The estimators of RBDRegressor. A new one is a function here and a line in :data:`ESTIMATORS`.
+"""The estimators of RBDRegressor; a new one needs a function and a line in :data:`ESTIMATORS`.
 
 An estimator is a function of a :class:`~skidyn.identification._regression.Regression` and of the
-strength of the prior (None: to be found), and returns a
+strength of the prior (None if it is to be found), and returns a
 :class:`~skidyn.identification._regression.Solution`.
 """
 
@@ -27,18 +27,18 @@ HUBER, DEGREES, REWEIGHTINGS = 1.345, 4.0, 15
 
 @dataclass(frozen=True)
 class Estimator:
-    """How coefficients are found from a regression.
+    """An estimator of coefficients.
 
     Attributes
     ----------
     solve : callable
         ``solve(regression, prior_std)`` returns a Solution.
     rows : bool
-        Whether single rows are looked at, so that evidence is not enough.
+        Whether single rows are needed, so that evidence is not enough.
     whole : bool
-        Whether base parameters that the data leaves open are estimated too, from a prior.
+        Whether base parameters that the data does not determine are estimated too, from a prior.
     simulates : bool
-        Whether the solution is refined until the simulated motion is that of the log.
+        Whether the solution is refined to fit the simulated motion to the log.
     """
 
     solve: Callable[[Regression, float | None], Solution]
@@ -60,7 +60,7 @@ def weighted(regression: Regression, prior_std: float | None = None) -> Solution
 
 
 def ordinary(regression: Regression, prior_std: float | None = None) -> Solution:
-    """Least squares in which every row of every joint counts the same."""
+    """Least squares with equal weights for all rows of all joints."""
     equal = np.ones(len(regression.design))
     coefficients = regression.solve(equal)
     return Solution(coefficients, regression.left_out(equal), regression.noise(coefficients))
@@ -70,7 +70,7 @@ def robust(regression: Regression, prior_std: float | None = None) -> Solution:
     """Student's t distribution of the rows' errors, started from Huber's estimate.
 
     Huber's problem is convex and finds the majority of the rows from any start; Student's weights
-    then take broken rows out almost wholly. Scales are median absolute deviations per joint.
+    then remove broken rows almost completely. Scales are median absolute deviations per joint.
     """
     coefficients = weighted(regression).coefficients
     for weigh in (_huber, _student):
@@ -108,7 +108,7 @@ ESTIMATORS: dict[str, Estimator] = {
 
 
 def find_estimator(name: str) -> Estimator:
-    """The estimator of a name.
+    """The estimator with a name.
 
     Raises
     ------

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whether a model that was fitted to every sample shall take the place of one of averaged rows.
+"""Choice between a model fitted to every sample and one fitted to averaged rows.
 
-Rows that are averaged over short windows of motion hold little noise, and no samples at rest and
-around reversals, of which the friction of sliding says nothing. A prediction is asked for
-everywhere, however, and where friction is not quite what the model says, other coefficients leave
-the least error over all samples. Least squares over samples has one weakness: noise in the
-accelerations draws inertias towards zero. The errors of averages over short windows, in which such
-noise is small, show it: they grow clearly.
+Rows averaged over short windows of motion contain little noise, and no samples at rest and around
+reversals, which sliding friction does not describe. A prediction is needed for all samples,
+however, and if friction differs from the model, other coefficients have the least error over all
+samples. Least squares over samples has one weakness: noise in the accelerations biases inertias
+towards zero. The errors of averages over short windows, in which such noise is small, then grow
+clearly.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ LEAST_GAIN, MOST_LOSS = 0.005, 0.02
 
 
 def may_take_samples(terms: Iterable[Term]) -> bool:
-    """Whether nothing in the model describes rest and reversals or needs neighbours in time."""
+    """Whether no effect describes rest and reversals or needs neighbours in time."""
     return all(
         term.effect.family != "hysteresis" and "time" not in term.effect.needs and term.is_pointwise
         for term in terms
@@ -37,7 +37,7 @@ def predicts_better(samples: PredictionBands, averaged: PredictionBands) -> bool
     Parameters
     ----------
     samples, averaged : PredictionBands
-        Of a model fitted to every sample, and of one fitted to averaged rows.
+        Bands of a model fitted to every sample, and of one fitted to averaged rows.
     """
     gain, of_averages = np.log(averaged.rmse / samples.rmse).mean(axis=1)
     return bool(gain > LEAST_GAIN and of_averages > -MOST_LOSS)

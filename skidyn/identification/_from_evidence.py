@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A fitted regressor from evidence alone, for data that never was in memory at once."""
+"""A fitted regressor from evidence alone, for data that does not fit into memory."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from skidyn.identification._regression import Regression, Solution
 from skidyn.identification._weak_directions import keep_weak_directions
 from skidyn.robots import Robot, find_base_parameters
 
-#: Times the noise of the joints is estimated anew and the fit repeated.
+#: Number of times that the noise of the joints is estimated and the fit repeated.
 PASSES = 3
 
 
@@ -44,9 +44,8 @@ def regressor_from_evidence(
         Require physically consistent bodies (positive definite pseudo-inertia), coefficients with
         admissible signs, and further constraints on the bodies.
     feature_names : sequence of str, optional
-        Columns of the tables that will be predicted; by default
-        ``time, trajectory, q1..qn, dq1..dqn``. Accelerations that are not among them are derived
-        from the positions.
+        Columns of the tables for prediction; by default ``time, trajectory, q1..qn, dq1..dqn``.
+        Accelerations that are not among them are derived from the positions.
 
     Returns
     -------
@@ -57,7 +56,7 @@ def regressor_from_evidence(
     Raises
     ------
     SkidynError
-        Evidence of other columns than those of the robot and the effects.
+        The evidence has other columns than those of the robot and the effects.
 
     References
     ----------
@@ -94,7 +93,7 @@ def regressor_from_evidence(
     model.columns_ = model._resolve(len(names))
     model.evidence_ = evidence
     model.n_parts_ = 0
-    model.recordings_ = []  # evidence holds no motion to know recordings by
+    model.recordings_ = []  # evidence contains no motion by which recordings could be recognised
     spread = np.array([noise.get(j, np.nan) for j in range(robot.n_joints)])
     every = Regression.from_evidence(evidence, robot, terms, whole=True)
     solution = Solution(coefficients, _left_out(evidence, noise), spread)
@@ -126,7 +125,7 @@ def weighted_solution(evidence: Evidence) -> tuple[Array, dict[int, float]]:
 
 
 def _left_out(evidence: Evidence, noise: dict[int, float]) -> Array:
-    """Coefficients without one trajectory each; none where there is only one."""
+    """Coefficients without one trajectory each; empty if there is only one."""
     groups = evidence.trajectories
     left = [evidence.without(k).solve(noise=noise) for k in groups if len(groups) > 1]
     return np.array(left).reshape(-1, len(evidence.columns))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which coefficients of a model a log determines, and which it leaves open.
+"""Identifiability: the coefficients that a log determines.
 
 References
 ----------
@@ -19,17 +19,17 @@ from scipy.linalg import solve_triangular
 
 from skidyn._signals import Array
 
-#: Condition index from which a combination counts as open, and share of a coefficient's variance
-#: that a combination must cause to be named with it (Belsley et al.).
+#: Condition index from which a combination counts as undetermined, and least share of a
+#: coefficient's variance due to a combination for it to be listed there (Belsley et al.).
 OPEN, INVOLVED = 100.0, 0.5
-#: Condition index beyond which rounding decides.
+#: Condition index beyond which rounding dominates.
 NOTHING = 1e8
-#: Coefficients named in one combination at most.
+#: Most coefficients that are listed in one combination.
 MOST_NAMED = 4
 
 
 def condition_number(rows: Array) -> float:
-    """Condition number of columns scaled to equal length; infinite where one says nothing.
+    """Condition number of columns scaled to equal length; infinite if one is zero.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def condition_number(rows: Array) -> float:
 
 
 def open_combinations(rows: Array, names: Sequence[str]) -> list[dict[str, Any]]:
-    """Combinations of coefficients that the rows hardly show, the most hidden first.
+    """Combinations of coefficients that the rows hardly determine, the worst first.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def open_combinations(rows: Array, names: Sequence[str]) -> list[dict[str, Any]]
     ]
     if not shown:
         return found
-    # A square factor: every column gets a direction, also where there are fewer rows.
+    # A square factor: every column gets a direction, also with fewer rows.
     padded = np.vstack([rows[:, shown] / size[shown], np.zeros((len(shown), len(shown)))])
     _, values, right = np.linalg.svd(padded, full_matrices=False)
     index = values[0] / np.maximum(values, values[0] / NOTHING)
@@ -84,10 +84,11 @@ def open_combinations(rows: Array, names: Sequence[str]) -> list[dict[str, Any]]
     for i in np.argsort(-index):
         if index[i] < OPEN:
             break
-        # Where rounding decides, shares mean nothing: the direction itself tells who is in it.
+        # If rounding dominates, shares have no meaning: the coefficients are those of the
+        # direction.
         lost = index[i] >= NOTHING
         involved = np.abs(right[i]) > 0.1 * np.abs(right[i]).max() if lost else share[i] > INVOLVED
-        # Equal entries keep the order of the columns, whatever rounding says.
+        # Equal entries keep the order of the columns, independent of rounding.
         order = np.argsort(-np.round(np.abs(right[i]) / np.abs(right[i]).max(), 6), kind="stable")
         chosen = [k for k in order if involved[k] or k in order[:2]]
         factors = right[i] / size[shown]
@@ -179,13 +180,13 @@ def essential_parameters(
 
 
 def _least_squares(rows: Array, count: float) -> tuple[Array, Array, float]:
-    """Coefficients, their standard errors for white noise, and the sum of squares that is left."""
+    """Coefficients, their standard errors for white noise, and the residual sum of squares."""
     p = rows.shape[1] - 1
     size = np.linalg.norm(rows[:, :p], axis=0)
     scaled = np.column_stack([rows[:, :p] / size, rows[:, -1]])
     factor: Array = np.asarray(np.linalg.qr(scaled, mode="r"))
     triangle, right = factor[:p, :p].copy(), factor[:p, -1]
-    # A direction without information gets a standard error beyond all others, and goes first.
+    # A direction without information gets the largest standard error, and is dropped first.
     weak = np.abs(np.diag(triangle)) < 1.0 / NOTHING
     triangle[weak, weak] = 1.0 / NOTHING
     squares = float(np.sum(factor[p:, -1] ** 2))

@@ -3,7 +3,7 @@
 
 Noise in positions enters velocities, accelerations and so every column; least squares then is
 biased toward zero, however long the log. Instruments are the same columns along a motion whose
-errors have nothing to do with those of the log: the reference of the controller, a closed-loop
+errors are independent of those of the log: the reference of the controller, a closed-loop
 simulation of the model (IDIM-IV), or another run of the same motion.
 
 References
@@ -41,7 +41,7 @@ _MOTION = re.compile(r"d{0,2}q(\d+$|_)")
 
 
 def instrumental(regression: Regression, prior_std: float | None = None) -> Solution:
-    """Instrumental-variable estimate, with the test whether it was needed."""
+    """Instrumental-variable estimate, with a test of the bias of least squares."""
     if regression.instruments is None:
         raise ValueError(
             "estimator='instrumental' needs fit(X, y, instruments=...): a table like X of a "
@@ -68,7 +68,7 @@ def instrument_rows(problem: Problem, fit: Fit, signals: Signals, smooth: bool) 
     problem : Problem
         Rows of the log.
     fit : Fit
-        Terms, and the model whose torque some of them see.
+        Terms, and the model whose torque some of them need.
     signals : Signals
         The motion of the instruments.
     smooth : bool
@@ -81,7 +81,7 @@ def instrument_rows(problem: Problem, fit: Fit, signals: Signals, smooth: bool) 
     Raises
     ------
     ValueError
-        The motion has not the rows of the log.
+        The motion does not have the rows of the log.
     """
     own = problem.signals
     same = signals.n_samples == own.n_samples
@@ -99,16 +99,16 @@ def instrument_rows(problem: Problem, fit: Fit, signals: Signals, smooth: bool) 
 
 
 def durbin_wu_hausman(difference: Array, left_out: Array) -> dict[str, Array]:
-    """Whether instrumental variables and least squares differ by more than chance.
+    """Test whether instrumental variables and least squares differ significantly.
 
-    Where the columns are free of noise that also sits in the residual, both are consistent and
-    differ by chance only. How much chance can do is read from the differences without one fold
-    each, which are valid under autocorrelation inside a fold.
+    If the noise of the columns is independent of the residual, both are consistent and differ only
+    by chance. The standard error is computed from the differences without one fold each, which is
+    valid under autocorrelation inside a fold.
 
     Parameters
     ----------
     difference : ndarray of shape (n_coefficients,)
-        Instrumental-variable estimate less least squares.
+        Instrumental-variable estimate minus least squares.
     left_out : ndarray of shape (n_folds, n_coefficients)
         The same without one fold each.
 

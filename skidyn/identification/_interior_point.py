@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Least squares over bodies that can exist, by a primal-dual interior-point method.
+"""Least squares over physically possible bodies, by a primal-dual interior-point method.
 
-Every body has, beside its pseudo-inertia P, a dual matrix Z; both stay positive definite and
-``P Z`` is driven to a multiple ``mu`` of the identity, ``mu`` to zero. In the scaling of Nesterov
-and Todd, in which P and Z are the same diagonal matrix, each step is ordinary least squares.
+Every body has a pseudo-inertia P and a dual matrix Z; both stay positive definite and ``P Z`` is
+driven to a multiple ``mu`` of the identity, ``mu`` to zero. In the scaling of Nesterov and Todd, in
+which P and Z are the same diagonal matrix, each step is ordinary least squares.
 
 References
 ----------
@@ -30,17 +30,17 @@ from skidyn.identification._log_det import (
     taken_inside,
 )
 
-#: Steps at most; some 20 are taken.
+#: Most steps; some 20 are needed.
 MOST_STEPS = 80
 #: Gap to the optimum at which the steps end, for targets of unit size per row.
 GAP = 1e-11
-#: Pull toward the nominal bodies, in units of the data, where the data says nothing.
+#: Weight of the nominal bodies, in units of the data, for directions without data.
 PULL = 1e-5
-#: Share of the way to the border of what exists that one step may go.
+#: Share of the distance to the border of the possible bodies that one step may take.
 TOWARD_BORDER = 0.95
 #: Least share of the present gap that a step aims at.
 LEAST_CENTRING = 1e-4
-#: Steps shorter than this end the search; full steps after which a minimum is settled.
+#: Steps shorter than this end the search; number of full steps after which it has converged.
 SHORTEST, SETTLED = 1e-8, 4
 
 
@@ -63,7 +63,7 @@ class _Point:
 
     @property
     def exists(self) -> bool:
-        """Whether rounding has left P and Z positive definite; else nothing is to be gained."""
+        """Whether P and Z are still positive definite after rounding; else the search ends."""
         try:
             np.linalg.cholesky(np.concatenate([self.bodies, self.duals]))
         except np.linalg.LinAlgError:
@@ -94,23 +94,23 @@ class _Direction:
 def solve_interior_point(
     factor: Array, target: Array, start: Array, nominal: Array, linear: Linear
 ) -> Array:
-    """Least squares over bodies that can exist.
+    """Least squares over physically possible bodies.
 
     Parameters
     ----------
     factor, target : ndarray of shape (k, n), (k,)
         Columns and torque, of unit size.
     start : ndarray of shape (n,)
-        Bodies and coefficients that strictly keep everything that is known.
+        Bodies and coefficients that satisfy all constraints strictly.
     nominal : ndarray of shape (n_bodies, 10)
-        Bodies toward which open directions are pulled.
+        Bodies toward which undetermined directions are drawn.
     linear : Linear
         Limits and equations.
 
     Returns
     -------
     ndarray of shape (n,)
-        Strictly inside all limits.
+        Solution strictly inside all limits.
     """
     n, p = nominal.size, len(start)
     whole, _ = local_units(nominal, nominal)
@@ -152,7 +152,7 @@ def minimise_with_divergence(
     """
     n, p = nominal.size, len(start)
     held = np.diag(np.r_[np.zeros(n), np.full(p - n, PULL)])
-    # The divergence is a linear cost, the trace, and the barrier that the method itself keeps.
+    # The divergence is a linear cost, the trace, and the barrier of the method itself.
     cost = np.zeros(p)
     inverse = np.linalg.inv(pseudo_inertia(nominal))
     cost[:n] = weight * np.einsum("nij,aji->na", inverse, BASIS).ravel()
@@ -169,7 +169,7 @@ def minimise_with_divergence(
 
 
 def _start(data: _Data, start: Array, nominal: Array, linear: Linear, least: float) -> _Point:
-    """Duals large enough to answer the gradient: else the steps crawl along the border."""
+    """Duals large enough for the gradient; else the steps along the border would be very short."""
     n = nominal.size
     bodies = pseudo_inertia(start[:n].reshape(-1, 10))
     slack = linear.b - linear.C @ start
@@ -203,7 +203,7 @@ def _step(point: _Point, data: _Data, linear: Linear, least: float) -> tuple[_Po
     sums = (scaled[:, :, None] + scaled[:, None]) / 2
 
     def direction(mu: float, second: Array, third: Array) -> _Direction:
-        # What the products P Z and slack times multiplier shall become, less what they are.
+        # Target values of the products P Z and of slack times multiplier, minus the present ones.
         lacking = (mu * np.eye(4) - _diagonal(scaled**2) - second) / sums
         answer = _diagonal(scaled) + lacking
         wanted_multipliers = (mu - third) / point.slack
@@ -220,7 +220,7 @@ def _step(point: _Point, data: _Data, linear: Linear, least: float) -> tuple[_Po
         return _Direction(step, change, lacking - change, ds, dm)
 
     def reach(d: _Direction) -> float:
-        """Longest step that stays inside."""
+        """Longest step inside the limits."""
         root = 1 / np.sqrt(scaled)
         rates = [
             np.linalg.eigvalsh(root[:, :, None] * m * root[:, None]) for m in (d.change, d.answer)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How far bodies are from given ones: the log-det divergence of their pseudo-inertias.
+"""Distance of bodies from given ones: the log-det divergence of their pseudo-inertias.
 
 The divergence ``D(P, P0) = trace(P0^-1 P) - log det(P0^-1 P) - 4`` of the 4x4 pseudo-inertias is
-convex, grows beyond all bounds where a body ceases to exist, and does not depend on units or
+convex, grows without bound at the limit of the possible bodies, and does not depend on units or
 frames. Near the given bodies it is half the squared relative change ``trace((P0^-1 (P - P0))^2)``.
 
 References
@@ -19,9 +19,9 @@ import numpy as np
 
 from skidyn._signals import Array
 
-#: Share of the start that takes a solution off the border of what exists, where it lies on it.
+#: Share of the start that is added to a solution on the border of the possible bodies.
 LEAST_SHARE = 1e-9
-#: A body whose least eigenvalue is a smaller share of its largest has no mass distribution.
+#: Least ratio of the smallest to the largest eigenvalue of a body with a mass distribution.
 FLAT = 1e-9
 
 
@@ -83,7 +83,7 @@ BASIS, SYMMETRIC = pseudo_inertia(np.eye(10)), _symmetric_basis()
 
 
 def existing_bodies(parameters: Array) -> Array:
-    """The given bodies; small spheres where a body cannot exist (a link without mass).
+    """The given bodies, with small spheres for impossible ones (a link without mass).
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def existing_bodies(parameters: Array) -> Array:
     masses = matrices[:, 3, 3]
     largest = float(masses.max(initial=0.0)) or 1.0
     size = np.trace(matrices[:, :3, :3], axis1=1, axis2=2)[masses > 1e-3 * largest]
-    # Length in which masses and moments are alike, so that units do not matter.
+    # Length for which masses and moments have similar size, so that units do not matter.
     length = np.sqrt(max(float((size / masses[masses > 1e-3 * largest]).max(initial=0.0)), 0.0))
     length = length or 0.3
     unit = np.array([length, length, length, 1.0])
@@ -115,7 +115,7 @@ def existing_bodies(parameters: Array) -> Array:
 
 
 def divergence(parameters: Array, nominal: Array) -> float:
-    """Log-det divergence of bodies from nominal ones; infinite where a body cannot exist.
+    """Log-det divergence of bodies from nominal ones; infinite for an impossible body.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ def local_units(parameters: Array, nominal: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Linear:
-    """Linear knowledge about parameters and coefficients: ``C x <= b`` and ``E x = e``.
+    """Linear constraints on parameters and coefficients: ``C x <= b`` and ``E x = e``.
 
     Attributes
     ----------
@@ -176,19 +176,19 @@ class Linear:
 
     @classmethod
     def none(cls, n: int) -> Linear:
-        """No knowledge about n unknowns."""
+        """No constraints on n unknowns."""
         return cls(np.zeros((0, n)), np.zeros(0), np.zeros((0, n)), np.zeros(0))
 
 
 def taken_inside(x: Array, start: Array, n: int, linear: Linear) -> Array:
-    """The point nearest to x, toward the start, that keeps all limits beyond rounding.
+    """The point nearest to x, in the direction of the start, strictly inside all limits.
 
     Parameters
     ----------
     x : ndarray of shape (n_unknowns,)
-        Parameters, possibly on the border of what exists, then coefficients.
+        Parameters, possibly on the border of the possible bodies, then coefficients.
     start : ndarray of shape (n_unknowns,)
-        Well inside.
+        Point far inside the limits.
     n : int
         Number of parameters.
     linear : Linear

@@ -29,12 +29,12 @@ def model_table(
     stated : mapping of str to (float, float)
         Value and standard error of every coefficient by its name.
     noise : ndarray of shape (n_joints,), N m or N
-        Standard deviation of what the fit leaves.
+        Standard deviation of the residual.
 
     Returns
     -------
     str
-        Every text is escaped.
+        HTML in which every text is escaped.
     """
     rows = []
     for j, name in enumerate(robot.joint_names):

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The output error estimator: coefficients for which the simulated motion is that of the log.
+"""The output-error estimator: coefficients that fit the simulated motion to the log.
 
-Least squares of the torque sees the motion as exact and errs by what is wrong with it; here the
-torque drives the model, or commands do through a controller, and the motion is what is compared
-[1]_. Gauss-Newton steps from the
-least-squares solution; the sensitivities are differences of models that are simulated together,
-in the same steps and with the same exchanges of sticking and sliding.
+Least squares of the torque treats the motion as exact and is biased by its errors. Here the model
+is driven by the torque, or by commands through a controller, and the motions are compared [1]_.
+Gauss-Newton steps start from the least-squares solution; the sensitivities are differences of
+models that are simulated together, with the same steps and the same exchanges of sticking and
+sliding.
 
 References
 ----------
@@ -30,13 +30,13 @@ from skidyn.forward import Controller, ForwardModel, Task, commanded, make_windo
 from skidyn.identification._regression import Regression, Solution
 from skidyn.robots import find_base_parameters
 
-#: Step of the simulation, s; logs that are faster are thinned, their torque averaged.
+#: Step of the simulation, s; faster logs are thinned, with averaged torque.
 STEP = 5e-3
-#: Gauss-Newton steps at most, and the relative fall of the error that ends them.
+#: Most Gauss-Newton steps, and the relative decrease of the error that ends them.
 ROUNDS, SMALL = 12, 1e-3
 #: Damping of a step, as shares of the curvature; all are tried at once.
 DAMPING = (0.0, 1e-2, 1e-1, 1.0, 10.0)
-#: Directions that hardly move the motion, relative to the best seen one, stay as they are.
+#: Directions with less influence on the motion, relative to the largest, are not changed.
 WEAK = 1e-3
 
 
@@ -50,7 +50,7 @@ def refine_by_simulation(
     controller: Controller | None = None,
     reference: Array | None = None,
 ) -> Solution:
-    """Coefficients that simulate best, from those of a fitted model.
+    """Coefficients with the least error of the simulated motion, from those of a fitted model.
 
     Parameters
     ----------
@@ -67,14 +67,14 @@ def refine_by_simulation(
     horizon : float, s, or None
         Length of the pieces; None for whole trajectories.
     controller : Controller, optional
-        Drives the models toward the reference in place of the torque.
+        Controller that drives the models toward the reference in place of the torque.
     reference : ndarray of shape (n_samples, n_joints), rad or m, optional
         Commanded positions.
 
     Raises
     ------
     SkidynError
-        No time, or a model that cannot be simulated.
+        There is no time, or the model cannot be simulated.
     """
     if signals.time is None:
         raise SkidynError("estimator='output_error' simulates and needs the column 'time' (s) in X")
@@ -89,7 +89,7 @@ def refine_by_simulation(
     error = _OutputError.of(model, regression, solution, task)
     theta = np.zeros(len(error.free))
     residual = error.residuals(theta[None])[0]
-    # Every joint counts by the size of its errors at the start.
+    # Joints are weighted by the size of their errors at the start.
     size = np.sqrt(np.mean(residual**2, axis=(0, 1), keepdims=True)) + 1e-12
     cost = float(np.mean((residual / size) ** 2))
     for round_ in range(ROUNDS):
@@ -109,13 +109,13 @@ def refine_by_simulation(
     left = error.left_out(theta, slopes, (error.residuals(theta[None])[0] / size))
     coefficients = error.coefficients(theta)
     others = solution.left_out - solution.coefficients
-    spread = coefficients + others  # what no simulation changes keeps its own spread
+    spread = coefficients + others  # others keep their spread
     spread[:, error.free] = left
     return replace(solution, coefficients=coefficients, left_out=spread, parameters=None)
 
 
 def _as_stored(model: Any, regression: Regression, solution: Solution) -> Solution:
-    """The solution moved to the bodies that the model holds, which can exist and so can move."""
+    """The solution moved to the bodies of the model, which are possible and can be simulated."""
     base = find_base_parameters(model.robot_)
     where = np.searchsorted(base.index, regression.rigid_index)
     coefficients = model.coef_.copy()
@@ -204,11 +204,11 @@ class _OutputError:
         signals, windows = self.task.signals, self.task.windows
         logged = np.concatenate([signals.q[windows.rows], signals.dq[windows.rows]], axis=2)
         motion = np.concatenate([q, dq], axis=2).reshape(len(thetas), *logged.shape)
-        if self.derived:  # velocities that were derived from the positions say nothing more
+        if self.derived:  # velocities derived from the positions contain no further information
             n = self.forward.n
             motion, logged = motion[..., :n], logged[..., :n]
         error = motion - logged
-        # A motion that runs away is as wrong as can be, but has to stay a number.
+        # A motion that diverges has a very large error, which has to stay finite.
         bound = 10.0 * (np.ptp(logged, axis=(0, 1)) + 1e-9)
         error = np.clip(np.where(np.isfinite(error), error, bound), -bound, bound)
         return np.asarray(error * windows.valid[..., None])
@@ -235,7 +235,7 @@ class _OutputError:
 
 
 def _folds(signals: Signals, n_folds: int) -> NDArray[np.int64]:
-    """Fold of every sample: whole trajectories, or stretches of few of them."""
+    """Fold of every sample: whole trajectories, or intervals of few of them."""
     names, label = np.unique(signals.trajectory, return_inverse=True)
     if len(names) >= n_folds:
         return np.asarray(label * n_folds // len(names))
@@ -248,7 +248,7 @@ def _folds(signals: Signals, n_folds: int) -> NDArray[np.int64]:
 
 
 def _thinned(signals: Signals, torque: Array) -> tuple[Signals, Array, NDArray[np.int64]]:
-    """Samples some :data:`STEP` apart; the torque is averaged over what lies between them."""
+    """Samples about :data:`STEP` apart; the torque is averaged between them."""
     rows, smooth = [], torque.copy()
     for own in signals.segments:
         step = float(np.median(np.diff(signals.clock[own]))) if own.stop - own.start > 1 else STEP

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a fitted RBDRegressor predicts: torque, its bands, and the parts that it is made of."""
+"""Predictions of a fitted RBDRegressor: torque, its bands and its parts."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class Prediction(Reading):
     def predict(self, X: Any, return_std: bool = False) -> Any:
         """Torque of the model.
 
-        Effects of single recordings (an offset of one run, a payload in some) act in those
-        recordings, which are known again by their motion, and in no other.
+        Effects of single recordings (an offset of one run, a payload in some) act only in those
+        recordings, which are recognised by their motion.
 
         Parameters
         ----------
@@ -33,14 +33,14 @@ class Prediction(Reading):
             Motion. Effects with memory run along each trajectory.
         return_std : bool, default=False
             Also return the standard deviation of a measured torque from the prediction: errors of
-            left-out folds, and what the spread of the coefficients makes of this motion.
+            left-out folds, and the effect of the spread of the coefficients on this motion.
 
         Returns
         -------
         torque : ndarray of shape (n_samples, n_joints) or (n_samples,), N m or N
             Predicted torque.
         std : ndarray of the same shape, N m or N
-            If asked for.
+            Only with ``return_std=True``.
         """
         signals, back = self._motion(X)
         torque = self._shaped_like_y(self._torque(signals)[back])
@@ -49,14 +49,14 @@ class Prediction(Reading):
         return torque, self._shaped_like_y(find_bands(self).std(self, signals)[back])
 
     def predict_interval(self, X: Any, level: float = 0.95) -> tuple[Array, Array]:
-        """Band around the prediction that holds a share of the measured torques.
+        """Band around the prediction that contains a share of the measured torques.
 
         Parameters
         ----------
         X : DataFrame or array of shape (n_samples, n_features)
             Motion.
         level : float, default=0.95
-            Share of the samples, of motion and rest each, that lies in the band.
+            Share of the samples, for motion and rest separately, in the band.
 
         Returns
         -------
@@ -86,10 +86,10 @@ class Prediction(Reading):
         return torque
 
     def _effects(self, signals: Signals, torque: Array) -> Iterator[tuple[Term, dict[int, Array]]]:
-        """Columns of every effect, each seeing the torque of those before it.
+        """Columns of every effect, each computed with the torque of the effects before it.
 
-        Effects on the transmission see the rigid body's torque, given as ``torque``; those on the
-        sensor come last and see the model's. The torque of each is added to ``torque`` on the way.
+        Effects on the transmission use the rigid body's torque, given as ``torque``; those of the
+        sensor come last and use the model's. The torque of each is added to ``torque``.
         """
         order = sorted(self.effect_terms_, key=lambda term: term.effect.needs_fit)
         on_sensor = any(term.effect.sees_model for term in order)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Estimators that trust the bodies of the URDF to some degree.
+"""Estimators that are regularised toward the bodies of the URDF.
 
-Both measure how far bodies are from those of the URDF by their pseudo-inertias, so that units and
-frames do not matter: ridge by the squared relative change, the quadratic part of the log-det
-divergence; the entropic estimator by the divergence itself, under which no body ceases to exist.
+Both measure the distance of bodies from those of the URDF by their pseudo-inertias, so that units
+and frames do not matter: ridge by the squared relative change, the quadratic part of the log-det
+divergence; the entropic estimator by the divergence itself, under which all bodies remain possible.
 
 References
 ----------
@@ -27,7 +27,7 @@ from skidyn.robots import find_base_parameters
 
 #: Relative uncertainties of the URDF that are tried.
 CANDIDATES = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
-#: Noise below which a joint counts as this noisy: relative to the noisiest, and in N m.
+#: Least noise of a joint: relative to that of the noisiest, and in N m.
 LEAST_NOISE, LEAST_TORQUE = 1e-7, 1e-9
 
 
@@ -98,7 +98,7 @@ def _whole(regression: Regression) -> _Whole:
     regrouping = base.regrouping if regression.n_rigid else np.zeros((0, nominal.size))
     joined = block_diag(regrouping, np.eye(p - regression.n_rigid))
     noise = weighted(regression).noise
-    # Without any noise the prior would not be heard, nor the numbers be finite.
+    # Without noise the prior would have no influence, and numbers would not be finite.
     noise = np.maximum(noise, LEAST_NOISE * noise.max() + LEAST_TORQUE)
     grams, cross = regression.products(noise)
     units, _ = local_units(nominal, nominal)
@@ -120,9 +120,9 @@ def _whole(regression: Regression) -> _Whole:
 
 
 def _from_existing(regression: Regression) -> tuple[Regression, Array]:
-    """The regression in changes from bodies that exist, and the change that these are themselves.
+    """The regression in changes from possible bodies, and the change of these from the URDF.
 
-    Coefficients are changes from the URDF, some of whose bodies may not exist.
+    Coefficients are changes from the URDF, some of whose bodies may be impossible.
     """
     parameters = regression.robot.inertial_parameters
     moved = np.zeros(regression.design[0].shape[1])
@@ -144,7 +144,7 @@ def _rows(regression: Regression, whole: _Whole) -> tuple[Array, Array]:
 
 
 def _chosen(whole: _Whole) -> float:
-    """Uncertainty of the URDF under which folds that were left out are predicted best."""
+    """Uncertainty of the URDF with which left-out folds are predicted best."""
     if len(whole.grams) < 2:
         return 1.0
     errors = []

@@ -48,7 +48,7 @@ from skidyn.identification._uncertainty import PredictionBands
 from skidyn.identification._weak_directions import keep_weak_directions
 from skidyn.robots import Robot, find_base_parameters
 
-#: Groups of trajectories whose evidence partial_fit keeps apart, for standard errors.
+#: Number of groups of trajectories whose evidence partial_fit keeps separate, for standard errors.
 GROUPS = 20
 
 
@@ -91,12 +91,12 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
         admissible signs, and further constraints on the bodies.
     horizon : float or None, default=1.0
         Seconds that ``"output_error"`` simulates from each measured state; None for whole
-        trajectories, which only a log without drift allows.
+        trajectories, which is possible only without drift.
     forgetting : float, default=1.0
         Weight of all earlier rows at each call of ``partial_fit``; 1 keeps their weight.
     smooth : bool or None, default=None
         Derive velocity and acceleration from the positions by a zero-phase smoother. None does so
-        where X has no accelerations. Needs time.
+        if X has no accelerations. Requires time.
     trajectory, time : int, str or None, default="auto"
         Key columns of X; ``"auto"`` takes the columns of these names.
 
@@ -105,7 +105,7 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
     coef_ : ndarray of shape (n_coefficients,)
         Base parameters, then the effects' coefficients.
     coef_names_ : list of str
-        Their names.
+        Names of the coefficients.
     coef_std_ : ndarray of shape (n_coefficients,)
         Standard errors by the jackknife over trajectories (or blocks of time), which are valid
         under autocorrelation within a trajectory; for directions that the data does not determine,
@@ -144,7 +144,7 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
     n_features_in_ : int
         Number of columns of X.
     feature_names_in_ : ndarray of str
-        Column names of X where it has them.
+        Names of the columns, if X has names.
 
     See Also
     --------
@@ -160,9 +160,9 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
     with a prior use it instead.
 
     With a time column, torque and all regressor columns are averaged over the same short windows
-    (parallel filtering), without samples at rest and around reversals. Where X holds accelerations
-    and left-out folds are predicted better that way, every sample is a row instead, unless noise in
-    the accelerations would bias the coefficients. Joints are weighted by their noise, iterated.
+    (parallel filtering), without samples at rest and around reversals. If X has accelerations and
+    left-out folds are predicted better that way, every sample is a row instead, unless noise in the
+    accelerations would bias the coefficients. Joints are weighted by their noise, iterated.
 
     References
     ----------
@@ -177,7 +177,7 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
     True
     """
 
-    # With metadata routing on, weights that reach this model are for its fit.
+    # With metadata routing enabled, weights passed to this model are for its fit.
     __metadata_request__fit = {"sample_weight": True}
     __metadata_request__score = {"sample_weight": True}
 
@@ -222,7 +222,7 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
         return state
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Restore what ``__getstate__`` gave."""
+        """Restore the state of ``__getstate__``."""
         state = dict(state)
         if "effect_coefficients_" in state:
             columns, factors, counts = state["evidence_"]
@@ -314,7 +314,7 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
         kept = np.searchsorted(whole.rigid_index, problem.rigid_index)
         shown = every if whole is problem else Regression.from_problem(problem, fit, others)
         if weight is not None:
-            # Rows have the weight 1 in the mean; the samples have another.
+            # Rows have a mean weight of 1; the samples have another.
             mean = float(weight[weight > 0].mean())
             every, shown = every.copied(mean), shown.copied(mean)
         solution = self._solve(method, every, shown, kept)
@@ -345,7 +345,7 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
     def _problem(
         self, signals: Signals, torque: Array, terms: Sequence[Term], weight: Array | None
     ) -> Problem:
-        """Averaged rows; every sample a row where the log has too few of them."""
+        """Averaged rows; every sample is a row if the log has too few of them."""
 
         def made(signals: Signals, smooth: bool) -> Problem:
             return make_problem(
@@ -376,7 +376,7 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
     def _solve(
         self, method: Estimator, every: Regression, shown: Regression, kept: NDArray[np.int64]
     ) -> Solution:
-        """Coefficients of all base parameters, by the data or, where it is silent, by the URDF."""
+        """Coefficients of all base parameters, from the data or, if undetermined, from the URDF."""
         if method.whole:
             return method.solve(every, self.prior_std)
         solution = method.solve(shown, self.prior_std)
@@ -392,7 +392,7 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
         method: Estimator,
         weight: Array | None = None,
     ) -> RBDRegressor:
-        """Every sample is a row: their evidence says all that the rows do."""
+        """Every sample is a row: their evidence contains all information of the rows."""
         block, owner, fold = sample_blocks(signals.trajectory)
         parts = evidence_of_rows(signals, torque, self.robot_, terms, block, weight=weight)
         folds = renumbered(parts, fold)
@@ -417,15 +417,16 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
         """Add a part of the data, and identify the model from all parts so far.
 
         Only the evidence is kept, not the data: memory does not grow. The order of the parts does
-        not matter, and the result is that of ``fit`` on all of them, where these are trajectories
-        that are whole in one part and more than six, or data without time (``fit`` leaves out rows
-        at the borders of the blocks of time into which it cuts few trajectories, and may take every
-        sample as a row, which parts after it then do as well).
+        not matter, and the result is that of ``fit`` on all of them if there are more than six
+        trajectories, each within one part, or if the data has no time. (``fit`` leaves out rows at
+        the borders of the blocks of time into which it cuts few trajectories, and may use every
+        sample as a row, as later parts then do as well.)
 
         Parameters
         ----------
         X : DataFrame or array of shape (n_samples, n_features)
-            Motion, following the X contract. Without a column of trajectories each part is one.
+            Motion, following the X contract. Without a column of trajectories each part is one
+            trajectory.
         y : array-like of shape (n_samples, n_joints) or (n_samples,) for one joint
             Torque, N m or N.
 
@@ -439,12 +440,12 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
         ColumnError
             X does not follow the contract, or y has the wrong number of joints.
         SkidynError
-            An effect with open shape parameters, or one whose columns depend on the fitted model.
-            After a ``fit`` its shape parameters are kept.
+            An effect has open shape parameters, or its columns depend on the fitted model. After a
+            ``fit`` its shape parameters are kept.
         ValueError
             A parameter has no meaning.
         AttributeError
-            The estimator, such as the robust one, looks at single rows, which are not kept.
+            The estimator, such as the robust one, needs single rows, which are not kept.
         """
         self._method()
         first = not hasattr(self, "evidence_")
@@ -471,7 +472,7 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
         if not first:
             part = self.evidence_.scaled(self.forgetting) + part
         self._store_evidence(part.shifted(0, GROUPS), terms)
-        # Evidence holds no single samples, from whose errors bands are made.
+        # Evidence contains no single samples, whose errors are needed for bands.
         self.__dict__.pop("bands_", None)
         return self
 
@@ -493,7 +494,7 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
         return type(self)(**parameters)
 
     def _method(self) -> Estimator:
-        """The estimator; parameters without a meaning are refused."""
+        """The estimator; raises an error for parameters without effect."""
         if self.parameters not in ("identified", "nominal"):
             raise ValueError(f"parameters={self.parameters!r}; expected 'identified' or 'nominal'")
         if not isinstance(self.consistent, bool | np.bool_ | BodyConstraints):
@@ -560,7 +561,7 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
         rows = self._weighted_rows()[:, :-1]
         shown = np.arange(rows.shape[1])
         if self.parameters == "identified" and not find_estimator(self.estimator).whole:
-            # What the data does not show at all is as in the URDF, and not estimated.
+            # Directions that the data does not excite at all are as in the URDF, and not estimated.
             n_base = len(base.index)
             shown = np.r_[independent_columns(rows[:, :n_base]), shown[n_base:]]
         self.condition_number_ = condition_number(rows[:, shown])

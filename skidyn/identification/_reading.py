@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How an RBDRegressor reads X and y: columns, order of the rows, derivatives."""
+"""Reading of X and y for an RBDRegressor: columns, order of the rows, derivatives."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Reading:
         if signals.time is not None and np.any(np.diff(order) != 1):
             _warn_of_leakage()
             if not has_one_motion(signals.trajectory, signals.time):
-                # Recordings that nothing tells apart: no row has a neighbour.
+                # Recordings that cannot be separated: no row has a neighbour.
                 signals = self._without_clock(signals)
         if not first and named_recordings(self.effect_terms_):
             signals = recognise(signals, self.recordings_)
@@ -64,7 +64,7 @@ class Reading:
         return signals, torque, order
 
     def _doubt_trajectories(self, numbers: NDArray[Any], column: int) -> None:
-        """Warn where the column of trajectories looks like another signal."""
+        """Warn if the column of trajectories looks like another signal."""
         fractions = np.any(numbers != np.round(numbers))
         alone = len(numbers) > 2 and len(np.unique(numbers)) == len(numbers)
         if fractions or alone:
@@ -103,7 +103,7 @@ class Reading:
         return signals.with_(ddq=_differences(signals))
 
     def _motion(self, X: Any) -> tuple[Signals, NDArray[np.intp]]:
-        """Motion in the order of time, and where the rows of X are in it."""
+        """Motion in the order of time, and the positions of the rows of X in it."""
         check_is_fitted(self)
         X = validate_data(self, X, reset=False, dtype=np.float64)
         order = self._order(X)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Recordings are recognised by their motion, so that an effect stays with its recording.
 
-An effect of single recordings (an offset of one run, a payload in some) names them by number. In
-another log the same numbers are other recordings. A model therefore stores the positions of the
-recordings that its effects name, as one number a row, and knows them again under any number.
+An effect of single recordings (an offset of one run, a payload in some) refers to them by number.
+In another log the same numbers are other recordings. A model therefore stores the positions of the
+recordings of its effects, as one number per row, and recognises them under any number.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from numpy.typing import NDArray
 from skidyn._signals import Array, Signals
 from skidyn.effects import Term
 
-#: Places to which positions are rounded (rad or m), so that a file may have passed between.
+#: Decimal places to which positions are rounded (rad or m), to allow for storage in a file.
 PLACES = 5
-#: A recording is known again if this share of its different rows is.
+#: A recording is recognised if this share of its different rows is.
 KNOWN = 0.5
 
-#: Number and rows of every recording that is remembered.
+#: Number and rows of every stored recording.
 Recordings = list[tuple[int, NDArray[np.uint64]]]
 
 
 def named_recordings(terms: Iterable[Term]) -> set[int]:
-    """Trajectories that terms name in their shape."""
+    """Trajectories in the shapes of terms."""
     named: set[int] = set()
     for term in terms:
         named |= set(term.trajectories or ())
@@ -34,7 +34,7 @@ def named_recordings(terms: Iterable[Term]) -> set[int]:
 
 
 def remember(signals: Signals, terms: Iterable[Term]) -> Recordings:
-    """What identifies the recordings that terms name.
+    """Fingerprints of the recordings in the shapes of terms.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def remember(signals: Signals, terms: Iterable[Term]) -> Recordings:
 
 
 def recognise(signals: Signals, recordings: Recordings) -> Signals:
-    """The same signals with recordings under the numbers that the model knows them by.
+    """The same signals with the recording numbers of the model.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def recognise(signals: Signals, recordings: Recordings) -> Signals:
     Returns
     -------
     Signals
-        Recordings that are not known have numbers that no effect names.
+        Signals in which other recordings have numbers that no effect uses.
     """
     labels = np.unique(signals.trajectory)
     unknown = min([0, *(k for k, _ in recordings), *labels.tolist()]) - 1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The linear regression behind an identification, as estimators see it."""
+"""The linear regression of an identification, as passed to estimators."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from skidyn.evidence import (
 )
 from skidyn.robots import Robot, find_base_parameters
 
-#: Times the noise of the joints is estimated anew and the fit repeated.
+#: Number of times that the noise of the joints is estimated and the fit repeated.
 PASSES = 4
 
 
@@ -34,15 +34,15 @@ PASSES = 4
 class Regression:
     """Rows ``design @ coefficients = target`` of every joint, sorted by fold.
 
-    The rows are those of a log, or the triangular factors of its trajectories, which say the same
-    to every estimator that does not look at single rows.
+    The rows are those of a log, or the triangular factors of its trajectories, which are equivalent
+    for every estimator that does not need single rows.
 
     Attributes
     ----------
     robot : Robot
         The robot.
     rigid_index : ndarray of shape (n_rigid,)
-        Columns of the torque regressor that stand first; their coefficients are corrections to the
+        Columns of the torque regressor that come first; their coefficients are corrections to the
         parameters of the URDF.
     terms : tuple of Term
         Effects, whose columns follow.
@@ -51,16 +51,16 @@ class Regression:
     target : list of ndarray of shape (n_rows_j,)
         Torque beyond the rigid body of the URDF, N m or N.
     counts : ndarray of shape (n_joints,)
-        Rows of the log behind those of every joint.
+        Number of rows of the log for every joint.
     fold : list of ndarray of shape (n_rows_j,)
         Fold of every row.
     n_folds : int
         Number of folds.
     fit : Fit or None
-        The weighted fit that found effects' shapes and loads, where there was one and nothing draws
-        its coefficients.
+        The weighted fit that found the effects' shapes and loads, if there was one and its
+        coefficients have no prior.
     instruments : list of ndarray of shape (n_rows_j, n_coefficients) or None
-        The same columns along a motion whose errors have nothing to do with those of the log.
+        The same columns along a motion whose errors are independent of those of the log.
     """
 
     robot: Robot
@@ -98,18 +98,18 @@ class Regression:
     def from_evidence(
         cls, evidence: Evidence, robot: Robot, terms: Sequence[Term], *, whole: bool
     ) -> Regression:
-        """Triangular factors in the place of rows; a trajectory is a fold.
+        """Triangular factors in place of rows; a trajectory is a fold.
 
         Parameters
         ----------
         evidence : Evidence
-            Of all base parameters, or of none, and of the effects.
+            Evidence of all base parameters or none, and of the effects.
         robot : Robot
             The robot.
         terms : sequence of Term
             Effects of the evidence.
         whole : bool
-            Keep also the base parameters that the data leaves open.
+            Also keep the base parameters that the data does not determine.
         """
         base = find_base_parameters(robot).index
         names = tuple(robot.parameter_names[i] for i in base)
@@ -149,7 +149,7 @@ class Regression:
         return regression._drawn()
 
     def _drawn(self) -> Regression:
-        """With rows in every fold that draw the coefficients of flexible functions to zero."""
+        """Add rows in every fold that draw the coefficients of flexible functions to zero."""
         places = TermSum(self.terms).slices(self.n_rigid)
         flexible = [(own, term) for term, own in places if term.effect.drawn]
         if not flexible:
@@ -182,7 +182,7 @@ class Regression:
         return np.array([own_noise(a, y, n) for a, y, n in blocks])
 
     def residual(self, coefficients: Array) -> list[Array]:
-        """Rows of what a model leaves, per joint."""
+        """Residual rows of a model, per joint."""
         return [y - a @ coefficients for a, y in zip(self.design, self.target, strict=True)]
 
     def noise(self, coefficients: Array) -> Array:
@@ -235,7 +235,7 @@ class Regression:
 
 @dataclass(frozen=True)
 class Solution:
-    """What an estimator found.
+    """Result of an estimator.
 
     Attributes
     ----------
@@ -246,13 +246,13 @@ class Solution:
     noise : ndarray of shape (n_joints,)
         Noise of one row of every joint, N m or N.
     parameters : ndarray of shape (n_bodies, 10) or None
-        Inertial parameters where the estimator says more than the base parameters.
+        Inertial parameters, if the estimator determines more than the base parameters.
     prior : ndarray of shape (k, 10 n_bodies + n_effect_coefficients) or None
         Square root of the prior's curvature in all parameters.
     attributes : dict
-        What else the fitted model shall hold.
+        Further attributes of the fitted model.
     open : ndarray of shape (k, n_coefficients) or None
-        Changes of the coefficients, one standard deviation each, that the data leaves open.
+        Undetermined changes of the coefficients, one standard deviation each.
     """
 
     coefficients: Array
@@ -265,7 +265,7 @@ class Solution:
 
     @property
     def std(self) -> Array:
-        """Standard errors by the jackknife and what is open; NaN with fewer than two folds."""
+        """Standard errors by the jackknife and of open changes; NaN with fewer than two folds."""
         spread = jackknife(self.left_out)
         return spread if self.open is None else np.hypot(spread, np.linalg.norm(self.open, axis=0))
 

@@ -27,7 +27,7 @@ LEAST_NOISE = 1e-7
 
 
 class Results:
-    """Answers from the coefficients and the evidence of a fitted model."""
+    """Results from the coefficients and the evidence of a fitted model."""
 
     robot_: Robot
     evidence_: Evidence
@@ -42,7 +42,7 @@ class Results:
     estimator: str
 
     def _html_repr(self) -> str:
-        """As scikit-learn draws it in a notebook; below that, of a fitted model, its numbers."""
+        """Scikit-learn's diagram for a notebook, followed by the numbers of a fitted model."""
         drawn = str(estimator_html_repr(self))
         if not hasattr(self, "coef_std_"):
             return drawn
@@ -53,7 +53,7 @@ class Results:
         return self._html_repr()
 
     def _repr_mimebundle_(self, **kwargs: Any) -> dict[str, str]:
-        # scikit-learn 1.6 does not ask for `_html_repr`
+        # scikit-learn 1.6 does not use `_html_repr`
         bundle: dict[str, str] = super()._repr_mimebundle_(**kwargs)  # type: ignore[misc]
         return bundle | {"text/html": self._html_repr()} if "text/html" in bundle else bundle
 
@@ -78,7 +78,7 @@ class Results:
         ]
 
     def open_combinations(self) -> list[dict[str, Any]]:
-        """What the data leaves open, in plain words.
+        """Combinations of coefficients that the data does not determine.
 
         Singular vectors of the weighted columns, scaled to equal length, that belong to a condition
         index of 100 or more, and the coefficients most of whose variance each of them causes. A
@@ -87,8 +87,8 @@ class Results:
         Returns
         -------
         list of dict
-            ``combination`` (dict of name to factor: the direction that is hidden),
-            ``condition_index`` (infinite where nothing of it shows) and ``sentence``.
+            ``combination`` (dict of name to factor: the undetermined direction),
+            ``condition_index`` (infinite without any information) and ``sentence``.
 
         References
         ----------
@@ -101,22 +101,22 @@ class Results:
         """The coefficients that the data determines well, the others dropped in turn.
 
         As long as the largest relative standard error is more than ``ratio`` times the smallest,
-        its coefficient is set to zero and the rest estimated anew, unless the error grows too much.
-        Standard errors here take rows as independent; those of ``coef_std_`` do not.
+        its coefficient is set to zero and the others are estimated again, unless the error grows
+        too much. Standard errors here treat rows as independent; those of ``coef_std_`` do not.
 
         Parameters
         ----------
         ratio : float, default=20.0
-            Largest over smallest relative standard error that is let be; 10 to 30 is usual.
+            Largest permitted ratio of relative standard errors; 10 to 30 is usual.
         growth : float, default=0.02
-            Share by which the root mean square residual may grow in all.
+            Share by which the root mean square residual may grow in total.
 
         Returns
         -------
         dict
             ``parameters`` (list of dict with ``name``, ``value``, ``std``, ``relative_std``),
-            ``eliminated`` (list of str, in the order in which they went) and ``error_ratio`` (root
-            mean square residual of the rows without them, relative to that with all).
+            ``eliminated`` (list of str, in the order of elimination) and ``error_ratio`` (root mean
+            square residual of the rows without them, relative to that with all).
 
         References
         ----------
@@ -128,7 +128,8 @@ class Results:
         rows = self._weighted_rows()
         names = list(self.evidence_.columns)
         if self.parameters == "identified":
-            # Of the parameters themselves, where the evidence is of corrections to the URDF.
+            # Standard errors relative to the parameters; the evidence is of corrections to the
+            # URDF.
             base = find_base_parameters(self.robot_)
             n = len(base.index)
             rows[:, -1] += rows[:, :n] @ base.values(self.robot_.inertial_parameters)
@@ -142,7 +143,7 @@ class Results:
         return np.asarray(np.linalg.qr(rows, mode="r"))
 
     def durbin_wu_hausman(self) -> list[dict[str, Any]]:
-        """Whether least squares would have been biased by noise in the motion.
+        """Test whether noise in the motion would bias least squares.
 
         Compares the instrumental-variable estimate with least squares, coefficient by coefficient
         (Durbin-Wu-Hausman). A small ``p_value`` means that least squares is biased; with many
@@ -151,7 +152,7 @@ class Results:
         Returns
         -------
         list of dict
-            ``name``, ``difference`` (instrumental variables less least squares), ``std`` and
+            ``name``, ``difference`` (instrumental variables minus least squares), ``std`` and
             ``p_value``.
 
         Raises
@@ -171,9 +172,9 @@ class Results:
     def _consistent(
         self, parameters: Array, effects: Array, solution: Solution
     ) -> tuple[Array, Array]:
-        """Bodies that can exist and coefficients of the right sign, closest in the data's eyes."""
+        """Possible bodies and coefficients of the right sign with the least change of the fit."""
         known = self.consistent if isinstance(self.consistent, BodyConstraints) else None
-        # A joint without any noise would leave the others without any weight.
+        # A joint without noise would leave the others without weight.
         largest = float(solution.noise.max())
         noise = np.maximum(solution.noise / largest, LEAST_NOISE)
         rows = self.evidence_.stacked(dict(enumerate(noise)))[:, :-1]

@@ -13,7 +13,7 @@ ROUNDS = 3
 
 
 def find_terms(problem: Problem) -> Fit:
-    """Weights, loads and shape parameters in turn, from simple to whole."""
+    """Weights, loads and shape parameters in turn, from simple models to the full one."""
     given = list(problem.terms)
     early = [t for t in given if not t.effect.needs_fit and not to_search(t)]
     fit = problem.fit(early, passes=2)
@@ -28,7 +28,7 @@ def find_terms(problem: Problem) -> Fit:
 
 
 def _shaped(problem: Problem, terms: Sequence[Term], fit: Fit) -> list[Term]:
-    """Terms with the shape parameters that were left open found and refined."""
+    """Terms with their open shape parameters found and refined."""
     shaped = list(terms)
     open_ = [i for i, t in enumerate(terms) if t in fit.terms or not to_search(t)]
     for i, term in enumerate(terms):
@@ -43,5 +43,5 @@ def _shaped(problem: Problem, terms: Sequence[Term], fit: Fit) -> list[Term]:
 
 
 def to_search(term: Term) -> bool:
-    """Whether shape parameters of a term were left open and are found on a grid."""
+    """Whether a term has open shape parameters that are found on a grid."""
     return term.is_open and term.effect.search == "grid"

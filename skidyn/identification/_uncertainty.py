@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How far off a fitted model may be: bootstrapped coefficients, and bands around predictions."""
+"""Uncertainty of a fitted model: bootstrapped coefficients, and bands around predictions."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def bootstrap_coefficients(
         part = factor[:, keep] / model.noise_std_[joint]
         grams[names.index(name)] += part.T @ part
     whole, draws = _solved(grams, n_draws, check_random_state(random_state))
-    # Few clusters scatter less than their population does.
+    # Few clusters have a smaller spread than their population.
     spread = (draws - whole) * np.sqrt(len(names) / (len(names) - 1))
     return np.asarray(model.coef_ + spread[:, _positions(model, keep[:-1])])
 
@@ -118,7 +118,7 @@ def _solved(grams: Array, n_draws: int, rng: np.random.RandomState) -> tuple[Arr
 
 
 def _positions(model: RBDRegressor, kept: NDArray[np.int64]) -> list[int]:
-    """Where the coefficients of a model are among the columns of its evidence that are kept."""
+    """Positions of the coefficients of a model among the kept columns of its evidence."""
     from skidyn.robots import find_base_parameters
 
     base = find_base_parameters(model.robot_)
@@ -131,7 +131,7 @@ def _positions(model: RBDRegressor, kept: NDArray[np.int64]) -> list[int]:
 
 @dataclass(frozen=True)
 class PredictionBands:
-    """What the errors of left-out folds say about errors to come.
+    """Prediction bands from the errors of left-out folds.
 
     An error is measured in units of its scale: the root of the sum of the squared left-out error of
     the joint, at rest or moving, and the variance of the prediction by the spread of the
@@ -145,8 +145,8 @@ class PredictionBands:
     terms : tuple of Term
         Effects, whose coefficients follow.
     spread : ndarray of shape (n_rows, n_coefficients)
-        Its Gram matrix is the covariance of the coefficients: by the jackknife, and what the data
-        leaves open.
+        Its Gram matrix is the covariance of the coefficients: by the jackknife, and of undetermined
+        directions.
     scale : ndarray of shape (2, n_joints)
         Root mean square left-out error at rest and moving, N m or N.
     ratios : ndarray of shape (2, n_joints, n_levels)
@@ -183,7 +183,7 @@ class PredictionBands:
         Parameters
         ----------
         model : RBDRegressor
-            Whose coefficients are stored already.
+            Model whose coefficients are stored already.
         signals : Signals
             Motion, smoothed.
         torque : ndarray of shape (n_samples, n_joints), N m or N
@@ -250,7 +250,7 @@ def find_bands(model: Prediction) -> PredictionBands:
     Raises
     ------
     SkidynError
-        There are none: the model was made from evidence, which holds no single samples.
+        There are none: the model was made from evidence, which contains no single samples.
     """
     if not hasattr(model, "bands_"):
         raise SkidynError(
@@ -261,7 +261,7 @@ def find_bands(model: Prediction) -> PredictionBands:
 
 
 def _with_load(model: Prediction, terms: Iterable[Term], signals: Signals) -> Signals:
-    """Signals with the torques of the model, if some of the effects look at them."""
+    """Signals with the torques of the model, if some of the effects need them."""
     if not any(term.effect.needs_fit for term in terms):
         return signals
     total = model._torque(signals)
@@ -336,7 +336,7 @@ def _distribution(error: Array, width: Array, moving: NDArray[np.bool_]) -> tupl
         for kind in (0, 1):
             here = moving[:, j] == bool(kind)
             if here.sum() < FEWEST_SAMPLES:
-                here[:] = True  # too few of this kind: those of both
+                here[:] = True  # too few of this kind: use both
             e, w = error[here, j], width[here, j]
             scale[kind, j] = np.sqrt(np.mean(e**2)) + 1e-100
             ratios[kind, j] = np.quantile(np.abs(e) / np.hypot(w, scale[kind, j]), LEVELS)

@@ -1,20 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the data hardly shows stays as in the URDF.
+"""Directions that the data hardly determines are kept as in the URDF.
 
-Least squares gives every direction of the inertial parameters whatever fits the noise best. Where
-a motion hardly excites a direction, that is a number without bound, which cancels on the rows of
-the fit and nowhere else. Here every direction is weighed by how well the data knows it, compared
-with how well the URDF does.
+Least squares sets every direction of the inertial parameters to fit the noise best. If a motion
+hardly excites a direction, its value may be arbitrarily large; its effects cancel on the rows of
+the fit only. Here every direction is weighted by the precision of the data relative to that of the
+URDF.
 
 Directions are those in which both are independent: with ``S`` the information of the data about the
-base parameters beside the effects, and ``C`` the spread of the base parameters when all bodies
-change relatively by 1, the eigenvectors of ``S`` with respect to ``C^-1``. An eigenvalue ``l`` says
-that the data knows the direction to ``1/sqrt(l)``, relatively. How far the URDF is off, ``t``, and
-how much more than white noise the rows scatter, ``f``, maximise the likelihood of the least-squares
-coordinates ``z ~ N(0, t^2 + f / l)`` times weak priors (empirical Bayes). With ``x = l t^2 / f`` a
-direction keeps the share ``x^3 / (1 + x^3)`` of its distance from the URDF. The third power draws
-the line sharply: what the data knows ten times better than the URDF changes by one part in a
-million.
+base parameters with the effects eliminated, and ``C`` the covariance of the base parameters for
+relative changes of all bodies by 1, they are the eigenvectors of ``S`` with respect to ``C^-1``.
+For an eigenvalue ``l`` the relative standard error of the data is ``1/sqrt(l)``. The relative error
+of the URDF, ``t``, and the excess of the rows' scatter over white noise, ``f``, maximise the
+likelihood of the least-squares coordinates ``z ~ N(0, t^2 + f / l)`` times weak priors (empirical
+Bayes). With ``x = l t^2 / f`` a direction keeps the share ``x^3 / (1 + x^3)`` of its distance from
+the URDF. With the third power the transition is sharp: a direction that the data determines ten
+times better than the URDF changes by one part in a million.
 
 References
 ----------
@@ -38,20 +38,20 @@ from skidyn.identification._log_det import existing_bodies, local_units
 from skidyn.identification._regression import Regression, Solution
 from skidyn.robots import Robot, find_base_parameters
 
-#: Power that draws the line between what the data knows and what it does not.
+#: Power of the transition between directions from the data and from the URDF.
 POWER = 3
-#: The bodies of a URDF are trusted to between 10 % and a factor of 1,000, and rows scatter by up to
-#: 1,000 times the white noise.
+#: Ranges: relative error of the bodies of a URDF between 10 % and a factor of 1,000, and scatter of
+#: rows up to 1,000 times the white noise.
 LEAST_SPREAD, MOST_SPREAD, MOST_EXCESS = 0.1, 1e3, 1e6
-#: Noise of a joint counts as this share of the largest torque at least.
+#: Least noise of a joint, as a share of the largest torque.
 LEAST_NOISE = 1e-9
-#: Share of the largest eigenvalue below which rounding decides.
+#: Share of the largest eigenvalue below which rounding dominates.
 ROUNDING = 1e-13
-#: Share of it below which least squares does not resolve a direction, so that its coordinate says
-#: nothing about scatter.
+#: Share of it below which least squares does not resolve a direction, so that its coordinate has no
+#: information about scatter.
 RESOLVED = 1e-8
-#: How far URDFs are off and how much more than white noise rows scatter, usually, and the factors
-#: by which both differ from robot to robot.
+#: Usual relative error of URDFs and usual excess of the rows' scatter over white noise, and the
+#: factors by which both differ between robots.
 USUAL, FACTOR = (0.3, 1.0), (3.0, 10.0)
 #: Largest pull on a direction relative to its information; keeps the left-out sums finite.
 MOST_PULL = 1e12
@@ -60,18 +60,18 @@ MOST_PULL = 1e12
 def keep_weak_directions(
     solution: Solution, kept: NDArray[np.int64], whole: Regression, trusted: bool = True
 ) -> Solution:
-    """A solution whose weak directions are those of the URDF.
+    """Replace the weak directions of a solution by those of the URDF.
 
     Parameters
     ----------
     solution : Solution
-        Of an estimator without a prior.
+        Solution of an estimator without a prior.
     kept : ndarray of shape (n_rigid_kept,)
-        Which of the rigid-body columns of ``whole`` the solution has coefficients of.
+        Indices of the rigid-body columns of ``whole`` with coefficients in the solution.
     whole : Regression
-        With the columns of all base parameters, rows weighted as the estimator weighted them.
+        Regression with the columns of all base parameters, with the row weights of the estimator.
     trusted : bool, default=True
-        Whether the URDF is weighed against the data; else it holds only what the data leaves open.
+        Whether the URDF is weighted against the data; else it sets only undetermined directions.
 
     Returns
     -------
@@ -87,12 +87,12 @@ def keep_weak_directions(
     left = np.zeros((len(solution.left_out), p))
     left[:, place] = solution.left_out
 
-    # Without any noise the numbers would not be finite.
+    # Without noise the numbers would not be finite.
     torque = [np.sqrt(np.mean(y**2)) if len(y) else 1.0 for y in whole.target]
     noise = np.maximum(solution.noise, LEAST_NOISE * max(torque) or 1.0)
     grams, cross = whole.products(noise)
     total = grams.sum(0)
-    # Effects are refitted beside the rigid body.
+    # Effects are fitted again together with the rigid body.
     size = np.sqrt(np.diag(total)[n:])
     size[size == 0] = 1.0
     inner = total[n:, n:] / size[:, None] / size
@@ -109,9 +109,10 @@ def keep_weak_directions(
     known = values * spread**2 / excess
     share = known**POWER / (1 + known**POWER)
     if whole.instruments is not None or not trusted:
-        # Instruments undo a bias that the information does not tell of: only what is open is held.
+        # Instruments remove a bias that the information does not contain: only open directions are
+        # kept.
         share = (values > 0).astype(float)
-    if not trusted and len(kept) == n:  # nothing is open, however little the URDF leaves to a body
+    if not trusted and len(kept) == n:  # all directions are determined
         share = np.ones(n)
     moved = directions @ ((share - 1) * z)
     coefficients[:n] += moved
@@ -149,7 +150,7 @@ def _prior_root(robot: Robot) -> Array:
 
 
 def _spreads(z: Array, values: Array) -> tuple[float, float]:
-    """How far the URDF is off, and excess of the rows' scatter, both most likely."""
+    """Most likely relative error of the URDF and excess of the rows' scatter."""
     seen = values > RESOLVED * max(values.max(initial=0.0), 1e-300)
     if not seen.any():
         return LEAST_SPREAD, 1.0

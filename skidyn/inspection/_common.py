@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What all pictures share: colours, reading of tables, thinning, axes."""
+"""Common parts of all pictures: colours, reading of tables, thinning, axes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from skidyn._signals import Array, Signals, read_signals
 if TYPE_CHECKING:
     from skidyn.robots import Robot
 
-#: Okabe and Ito's colours, told apart by colour-blind people; lines differ in style as well.
+#: Okabe and Ito's colours, which colour-blind people can distinguish; lines also differ in style.
 MEASURED, PREDICTED, RESIDUAL, EFFECT, NOISE = "#595959", "#D55E00", "#0072B2", "#000000", "#999999"
 #: A line of a picture holds about this many points; more cannot be seen.
 DRAWN = 4000
@@ -27,7 +27,7 @@ def pyplot() -> Any:
 
 
 def robot_of(estimator: Any, robot: Robot | None) -> Robot:
-    """Robot that was given, or else that of the estimator."""
+    """The given robot, else that of the estimator."""
     from skidyn.robots import Robot
 
     for found in (robot, getattr(estimator, "robot_", None), getattr(estimator, "robot", None)):
@@ -39,7 +39,7 @@ def robot_of(estimator: Any, robot: Robot | None) -> Robot:
 def read_table(estimator: Any, X: Any, y: Any, robot: Robot | None) -> tuple[Signals, Array, Robot]:
     """Signals and measured torque of a table that follows the X contract."""
     robot = robot_of(estimator, robot)
-    # A picture needs a clock only to be drawn over; without one it is drawn over the sample number.
+    # Time is needed only for the axis of a picture; without it the sample number is used.
     signals, torque = read_signals(
         X,
         y,

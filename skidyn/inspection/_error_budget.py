@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where the error goes, step by step, from the first model to the noise floor."""
+"""Waterfall of the squared error from the first model to the noise floor."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ if TYPE_CHECKING:
 
 
 class ErrorBudgetDisplay:
-    """Waterfall of the squared error of one joint: what each step removes, what is left.
+    """Waterfall of the squared error of one joint: the part that each step removes, and the rest.
 
-    Shares of squared error add up, root mean square errors do not; the latter stand over the bars.
-    Build it with :meth:`from_diagnosis`, :meth:`from_estimator` or :meth:`from_predictions`.
+    Shares of squared error add up, root mean square errors do not; the latter are shown above the
+    bars. Build it with :meth:`from_diagnosis`, :meth:`from_estimator` or :meth:`from_predictions`.
 
     Parameters
     ----------
     labels : sequence of str
-        Names of the models in the order they are compared; for the second and later ones, what
-        was added.
+        Names of the models in the order they are compared; for the second and later ones, the added
+        effect.
     rmse : array-like of shape (n_models,), N m or N
-        Their errors.
+        Root mean square errors of the models.
     noise_floor : float, optional
         Error that no model could remove, N m or N.
     joint : str, default="joint"
@@ -52,7 +52,7 @@ class ErrorBudgetDisplay:
     figure_ : matplotlib Figure
         Figure.
     bars_ : matplotlib BarContainer
-        One bar per step, the last one for what is left.
+        One bar per step; the last one is the remaining error.
     noise_line_ : matplotlib Line2D or None
         Noise floor.
 
@@ -226,7 +226,7 @@ class ErrorBudgetDisplay:
             color=[MEASURED, *falls, NOISE], edgecolor="black", linewidth=0.6,
         )  # fmt: skip
         for bar in self.bars_[1:-1]:
-            bar.set_hatch("///")  # changes are told from totals without colour
+            bar.set_hatch("///")  # distinguishes changes from totals without colour
         for i, (height, bottom) in enumerate(zip(heights, bottoms, strict=True)):
             ax.annotate(
                 self._text(i), (i, max(bottom, bottom + height)), (0, 3),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Error by joint and regime: where a model fails, at a glance."""
+"""Error of a model by joint and regime."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 class ErrorMapDisplay:
     """Error by joint and regime: rest, reversal, slow, medium, fast, loaded, warm.
 
-    The colour is the error of the regime over that of the whole joint, so that strong and weak
-    joints can be compared; the numbers are the errors. Build it with :meth:`from_diagnosis`,
-    :meth:`from_estimator` or :meth:`from_predictions`.
+    The colour is the ratio of the error in the regime to that of the whole joint, so that strong
+    and weak joints can be compared; the numbers are the errors. Build it with
+    :meth:`from_diagnosis`, :meth:`from_estimator` or :meth:`from_predictions`.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class ErrorMapDisplay:
         diagnosis : Diagnosis
             From :func:`skidyn.diagnosis.diagnose`.
         after : bool, default=False
-            With the findings added.
+            Draw the errors with the findings added.
         ax : matplotlib Axes, optional
             Axes; a new figure by default.
 
@@ -140,7 +140,7 @@ class ErrorMapDisplay:
         y_true, y_pred : array-like of shape (n_samples, n_joints), N m or N
             Measured and predicted torque.
         signals : Signals
-            Motion, which tells the regimes.
+            Motion, from which the regimes are found.
         joint_names : sequence of str, optional
             Names of the joints.
         ax : matplotlib Axes, optional
@@ -180,7 +180,7 @@ class ErrorMapDisplay:
             _, ax = pyplot().subplots(figsize=size, layout="constrained")
         self.ax_, self.figure_ = ax, ax.figure
         relative = self._relative()
-        # cividis reads the same for people with any kind of colour blindness
+        # cividis looks nearly the same with any kind of colour blindness
         self.image_ = ax.imshow(relative, cmap="cividis", vmin=0, vmax=2, aspect="auto")
         self.text_ = np.empty(shape, dtype=object)
         for j, k in np.ndindex(*shape):

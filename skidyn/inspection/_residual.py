@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The residual against any signal, with the curve of an effect that would explain it."""
+"""Residual against any signal, with the curve of an effect that would explain it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from skidyn.robots import Robot
 
 BINS = 40
-#: Points drawn; more hide each other.
+#: Number of points drawn; more would cover each other.
 POINTS = 5000
 
 
@@ -48,7 +48,7 @@ class ResidualDisplay:
     joint : str, default="joint"
         Name of the joint.
     variable : str, default="signal"
-        What x is, with its unit.
+        Name of x, with its unit.
     candidate : str, default="candidate"
         Name of the candidate.
     unit : str, default="N m"
@@ -133,8 +133,8 @@ class ResidualDisplay:
         joint : int, default=1
             Joint whose residual is drawn, counted from 1.
         candidate : fitted regressor, optional
-            A richer model; what it predicts beyond ``estimator`` is drawn as the candidate's
-            curve.
+            A richer model; the difference of its prediction from that of ``estimator`` is drawn as
+            the candidate's curve.
         robot : Robot, optional
             Needed for regressors that have none of their own.
         ax : matplotlib Axes, optional
@@ -187,7 +187,7 @@ class ResidualDisplay:
         joint : int, default=1
             Joint, counted from 1.
         variable : str, default="signal"
-            What the signal is, with its unit.
+            Name of the signal, with its unit.
         curve : tuple of ndarray, optional
             ``(x, torque)`` of a candidate effect.
         unit : str, default="N m"
@@ -215,7 +215,7 @@ class ResidualDisplay:
     def from_finding(
         cls, finding: Finding, *, joint: int | None = None, unit: str = "N m", ax: Any = None
     ) -> ResidualDisplay:
-        """Draw a finding of a diagnosis: what the model lacks, and the effect that fills it.
+        """Draw a finding of a diagnosis: the residual, and the effect that explains it.
 
         Parameters
         ----------
@@ -285,7 +285,7 @@ class ResidualDisplay:
         ax.set_xlabel(self.variable)
         ax.set_ylabel(f"residual ({self.unit})")
         ax.set_title(self.joint, loc="left")
-        # under the picture a legend never hides the data
+        # below the picture a legend never covers the data
         ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3, frameon=False)
         tidy(ax)
         return self

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Torque against measurement over time, with the residual under it."""
+"""Measured and predicted torque over time, with the residual below."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class TorqueDisplay:
-    """Measured and predicted torque of one joint over time, the residual under them.
+    """Measured and predicted torque of one joint over time, with the residual below.
 
     Build it with :meth:`from_estimator` or :meth:`from_predictions`.
 
@@ -162,7 +162,7 @@ class TorqueDisplay:
         y_true, y_pred : array-like of shape (n_samples, n_joints) or (n_samples,), N m or N
             Measured and predicted torque.
         time : array-like of shape (n_samples,), s, optional
-            Time; the sample number by default. Where it goes back a new line begins.
+            Time; the sample number by default. Where it decreases, a new line begins.
         joint : int, default=1
             Joint, counted from 1.
         unit : str, default="N m"
@@ -224,7 +224,7 @@ class TorqueDisplay:
         above.set_ylabel(f"torque ({self.unit})" if self.unit == "N m" else f"force ({self.unit})")
         below.set_ylabel(f"residual ({self.unit})")
         below.set_xlabel("time (s)")
-        # beside the title, where it hides no curve
+        # next to the title, where it covers no curve
         above.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, frameon=False)
         for axes in self.ax_:
             tidy(axes)

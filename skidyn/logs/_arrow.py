@@ -15,7 +15,7 @@ from skidyn._optional import import_optional
 from skidyn.logs._bounds import Budget, check_size, try_in_another_process
 from skidyn.logs._files import Channel, stack_rows, table_from_arrays
 
-#: Types that are read as a dictionary and its places: a text may be named again and again.
+#: Types that are read as a dictionary with indices, since a text may be repeated many times.
 _TEXT = ("string", "large_string", "binary", "large_binary", "dictionary")
 _OTHER_TEXT = ("string_view", "binary_view", "fixed_size_binary")
 #: Values that are decoded at once.
@@ -25,7 +25,7 @@ _WIDTH = {"INT96": 12}
 _LEAST_WIDTH = 8
 #: Bytes that an object of Python takes beside its content, text or an array.
 _OBJECT = 112
-#: What a file says of a column that is not of its own: the rows of pandas.
+#: Name of the index column of pandas, which is not a column of the log.
 _INDEX = "__index_level_"
 
 
@@ -49,8 +49,8 @@ def read_parquet_channels(path: Path, max_bytes: int) -> list[Channel]:
 def check_parquet_size(path: Path, metadata: Any, max_bytes: int) -> int:
     """Refuse a file that decodes to too much; returns the most values that a row may have.
 
-    What is stored of a column says nothing about it: a page may name one value of a dictionary a
-    million times.
+    The stored size of a column is no bound: a page may refer to one value of a dictionary a million
+    times.
     """
     size = values = 0
     for k in range(metadata.num_row_groups):
@@ -112,7 +112,7 @@ def _joined(batches: Iterator[Any], budget: Budget) -> dict[str, np.ndarray]:
 
 
 def _decoded(column: Any) -> int:
-    """Bytes of a column once it is an array: runs, or nothing at all, take no room in a file."""
+    """Bytes of a column as an array; runs and null values take no space in a file."""
     types = import_optional("pyarrow.types", extra="io")
     kind, size = column.type, _LEAST_WIDTH * len(column)
     if types.is_dictionary(kind):
@@ -130,7 +130,7 @@ def _is_list(kind: Any) -> bool:
 
 
 def _is_plain(kind: Any) -> bool:
-    """Whether values of a type are single ones, which nothing repeats or nests."""
+    """Whether values of a type are single ones, without repetition or nesting."""
     types = import_optional("pyarrow.types", extra="io")
     return not (
         types.is_nested(kind) or types.is_dictionary(kind) or types.is_run_end_encoded(kind)
@@ -140,8 +140,8 @@ def _is_plain(kind: Any) -> bool:
 def _array(column: Any) -> np.ndarray:
     """Values of a column: numbers, dates, times since something, or objects.
 
-    Structures, and lists or repeated values that are more than numbers or text, become None: they
-    are no signals, and small files can nest and repeat them without end.
+    Structures, and lists or repeated values other than numbers or text, become None: they are not
+    signals, and small files can nest and repeat them without limit.
     """
     types = import_optional("pyarrow.types", extra="io")
     kind = column.type

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Bounds on what is decoded: files may unpack to a thousand times what they are."""
+"""Bounds on decoded data: files may unpack to a thousand times their size."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from typing import IO, Any
 from skidyn._exceptions import LogError
 from skidyn._optional import import_optional
 
-#: Largest log that is read without being asked for, in bytes once unpacked.
+#: Default bound of the unpacked size of a log, in bytes.
 MAX_BYTES = 8 * 2**30
-#: Bytes of a stream that are unpacked at once, when only their number is wanted.
+#: Bytes of a stream that are unpacked at a time if only their number is needed.
 _STEP = 2**20
 #: What a process of another reader takes beyond the numbers themselves: decoders keep up to two
 #: copies of what they unpack.
@@ -35,7 +35,7 @@ def check_size(path: Path, size: int, max_bytes: int) -> None:
 
 
 class Budget:
-    """What may still be unpacked of one file."""
+    """Number of bytes of one file that may still be unpacked."""
 
     def __init__(self, path: Path, max_bytes: int) -> None:
         self.path, self.max_bytes, self.used = path, max_bytes, 0
@@ -46,7 +46,7 @@ class Budget:
         check_size(self.path, self.used, self.max_bytes)
 
     def unpack(self, data: bytes | IO[bytes], compression: str) -> None:
-        """Count what compressed data holds, without keeping it; headers may say anything.
+        """Count the bytes in compressed data without storing them, since headers may be wrong.
 
         Parameters
         ----------
@@ -74,7 +74,7 @@ class Budget:
                     part = decoder.decompress(rest, _STEP)
                     rest = b""
                     if not part and decoder.needs_input:
-                        return  # cut off; the reader says so
+                        return  # cut off; the reader reports it
                     self.take(len(part))
                 rest = decoder.unused_data or b""
         else:
@@ -117,7 +117,7 @@ def _bag_records(file: IO[bytes], end: int) -> Iterator[tuple[dict[bytes, bytes]
             header[name] = value
             at += 4 + length
         if len(tail := file.read(4)) < 4:
-            return  # cut off; the reader says so
+            return  # cut off; the reader reports it
         yield header, struct.unpack("<L", tail)[0]
 
 
@@ -180,26 +180,26 @@ except MemoryError:
 
 
 def try_in_another_process(path: Path, max_bytes: int, imports: str, statement: str) -> None:
-    """Decode a file where it can do no harm: compiled readers may crash, or fill the memory.
+    """Decode a file in another process, since compiled readers may crash or fill the memory.
 
     Parameters
     ----------
     path : Path
         File; ``sys.argv[1]`` of the statement.
     max_bytes : int
-        Largest size once unpacked; three times as much and 256 MiB may be taken on the way.
+        Largest size once unpacked; three times as much and 256 MiB may be used during reading.
     imports, statement : str
         Python of the trial.
 
     Raises
     ------
     LogError
-        The reader failed, crashed, or wanted more memory.
+        The reader failed, crashed, or needed more memory.
     """
     code = _TRIAL.format(imports=imports, statement=statement)
     few = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     done = subprocess.run(
-        # -P: no module of the working directory, where the file may have come with some
+        # -P: no modules of the working directory, which may have come with the file
         [sys.executable, "-P", "-c", code, str(path), str(_COPIES * max_bytes + _OVERHEAD)],
         capture_output=True,
         text=True,

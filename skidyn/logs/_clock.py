@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Time in logs: clocks, alignment of channels, and where one trajectory ends."""
+"""Time in logs: clocks, alignment of channels, and borders of trajectories."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-#: A clock whose step is longer than so many of a channel's is slower.
+#: A clock is slower than a channel if its step is longer than this many of the channel's.
 SLOWER = 1.75
 
 
@@ -39,7 +39,7 @@ def seconds(table: pd.DataFrame, rate: float | None, source: str) -> np.ndarray:
     Raises
     ------
     LogError
-        No clock at all, one that cannot be read, or a rate that is none.
+        There is no clock, it cannot be read, or the rate is invalid.
     """
     import pandas
 
@@ -62,7 +62,7 @@ def seconds(table: pd.DataFrame, rate: float | None, source: str) -> np.ndarray:
         return np.asarray(since, dtype=np.float64)
     if column.dtype.kind in "fiu":
         return np.asarray(column, dtype=np.float64)
-    if not _is_date(column):  # pandas takes dates for numbers of its own unit
+    if not _is_date(column):  # pandas converts dates to numbers in its own unit
         try:
             return np.asarray(pandas.to_numeric(column), dtype=np.float64)
         except (TypeError, ValueError):
@@ -88,7 +88,7 @@ def align_channels(
     rate: float | None,
     notes: list[str],
 ) -> pd.DataFrame:
-    """Bring channels with clocks of their own to one clock.
+    """Bring channels with separate clocks to one clock.
 
     The clock is that of the channel with the positions, or regular at ``rate``; other signals are
     interpolated linearly, never beyond their first and last sample and never across a gap.
@@ -102,7 +102,7 @@ def align_channels(
     rate : float or None, Hz
         Rate of the common clock.
     notes : list of str
-        What was done is appended here.
+        Notes on the result are appended here.
 
     Returns
     -------
@@ -112,8 +112,8 @@ def align_channels(
     Raises
     ------
     LogError
-        A rate that is none, a signal that occurs in two channels, a clock that starts anew in one
-        of several channels, or channels that do not overlap in time.
+        The rate is invalid, a signal occurs in two channels, a clock restarts in one of several
+        channels, or channels do not overlap in time.
     """
     import pandas
 
@@ -208,7 +208,7 @@ def _resampled(table: pd.DataFrame, rate: float, notes: list[str]) -> pd.DataFra
 
 
 def _in_gap(time: np.ndarray, clock: np.ndarray) -> np.ndarray:
-    """Which times of a clock lie in a gap of a channel."""
+    """Mask of times of a clock in a gap of a channel."""
     steps = np.diff(time)
     moving = steps[steps > 0]
     if not len(moving):
@@ -222,8 +222,8 @@ def _in_gap(time: np.ndarray, clock: np.ndarray) -> np.ndarray:
 def _interpolate(table: pd.DataFrame, clock: np.ndarray) -> pd.DataFrame:
     """Columns of a channel at other times; numbers of trajectories are not mixed.
 
-    On a slower clock a value is the mean over one of its steps: single samples would carry noise
-    and vibration that are faster than the clock, and look slow there.
+    On a slower clock a value is the mean over one of its steps: in single samples, noise and
+    vibration faster than the clock would appear as slow motion.
     """
     import pandas
 
@@ -250,7 +250,7 @@ def _slower(step: float, time: np.ndarray) -> bool:
 
 
 def _half_step(time: np.ndarray, clock: np.ndarray) -> np.ndarray | None:
-    """Half the span to average over, short of ends and gaps; None unless the clock is slower."""
+    """Half the averaging span, limited by ends and gaps; None unless the clock is slower."""
     step = float(np.median(np.diff(clock))) if len(clock) > 1 else 0.0
     if not _slower(step, time):
         return None
@@ -286,7 +286,7 @@ def _mean_around(
 
 
 def split_at_restarts(time: np.ndarray) -> tuple[np.ndarray, int]:
-    """Trajectory numbers for a log whose clock starts anew with every run.
+    """Trajectory numbers for a log whose clock restarts with every run.
 
     A step back to the beginning (within 5 % of what has passed) is a new run; a smaller step back
     is left for :func:`skidyn._checks.check_time_order` to refuse.
@@ -295,7 +295,7 @@ def split_at_restarts(time: np.ndarray) -> tuple[np.ndarray, int]:
     -------
     trajectory : ndarray of shape (n_samples,)
     restarts : int
-        Number of times the clock started anew.
+        Number of restarts of the clock.
     """
     number = np.zeros(len(time), dtype=np.int64)
     begin = 0
@@ -357,7 +357,8 @@ def _rest_middles(
 ) -> list[int]:
     """Rows in the middle of rests: for at least ``dwell`` s no joint leaves its band of noise.
 
-    The band, and not the step from row to row, tells a rest with a noisy encoder from slow motion.
+    The band, and not the step from row to row, distinguishes a rest with a noisy encoder from slow
+    motion.
     """
     if len(time) < 3:
         return []

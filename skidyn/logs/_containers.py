@@ -17,7 +17,7 @@ from skidyn._optional import import_optional
 from skidyn.logs._bounds import Budget, check_size, try_in_another_process
 from skidyn.logs._files import Channel, of_one_length, table_from_arrays
 
-#: Groups within groups; the time that names take grows as the square of their depth.
+#: Largest depth of groups; the time to process names grows as its square.
 DEEPEST = 32
 
 
@@ -25,7 +25,7 @@ def read_hdf5_channels(path: Path, max_bytes: int, topics: Sequence[str] | None)
     """Read an HDF5 file: each group with numeric datasets, and each table, is a channel.
 
     A group without a clock uses that of a group within, or of the root, when lengths agree. Groups
-    that all hold the same columns, and the elements of a struct array of MATLAB, are trajectories.
+    with the same columns, and the elements of a struct array of MATLAB, are trajectories.
     """
     h5py = import_optional("h5py", extra="io")
     try:
@@ -37,7 +37,7 @@ def read_hdf5_channels(path: Path, max_bytes: int, topics: Sequence[str] | None)
         budget = Budget(path, max_bytes)
         for item in datasets:
             budget.take(item.nbytes)
-            # a chunk is decoded as a whole, and may be larger than what is in use of it
+            # a chunk is decoded as a whole, and may be larger than its used part
             check_size(path, int(np.prod(item.chunks or 0)) * item.dtype.itemsize, max_bytes)
         _refuse_other_files(path, datasets)
         groups, names = _numeric_groups(file, datasets, budget)
@@ -80,7 +80,7 @@ def _datasets(group: Any, path: Path, seen: set[Any], depth: int = 0) -> Iterato
 
 
 def _refuse_other_files(path: Path, datasets: Sequence[Any]) -> None:
-    """An HDF5 file may name others, anywhere, as the place of its numbers."""
+    """Refuse an HDF5 file with numbers in other files, which may be anywhere."""
     for item in datasets:
         if item.is_virtual or item.external:
             other = item.virtual_sources()[0].file_name if item.is_virtual else item.external[0][0]
@@ -178,7 +178,7 @@ def _numeric_groups(
             for k, reference in enumerate(np.ravel(item[()])):  # a field of a struct array
                 part = file[reference] if reference else None
                 if part is not None and hasattr(part, "dtype") and part.dtype.kind in "fiub":
-                    budget.take(part.nbytes)  # one may be named again and again
+                    budget.take(part.nbytes)  # one may be referenced many times
                     run = groups.setdefault(f"{group}({k + 1})", {})
                     run[name] = _samples_first(part[()])
         elif item.ndim in (1, 2) and item.dtype.kind in "fiub":
@@ -187,13 +187,13 @@ def _numeric_groups(
 
 
 def _holds_references(item: Any) -> bool:
-    """Whether the elements of a dataset are references to others, as MATLAB keeps them."""
+    """Whether the elements of a dataset are references to others, as in files of MATLAB."""
     h5py = import_optional("h5py", extra="io")
     return h5py.check_ref_dtype(item.dtype) is h5py.Reference
 
 
 def _names(file: Any, item: Any, budget: Budget) -> list[str]:
-    """Names of joints, one by one: a small file may name a long text again and again."""
+    """Names of joints, one by one, since a small file may repeat a long text many times."""
     names = []
     for place in np.ndindex(item.shape):
         text = _text(file, item[place])
@@ -203,7 +203,7 @@ def _names(file: Any, item: Any, budget: Budget) -> list[str]:
 
 
 def _text(file: Any, value: Any) -> str:
-    """Text of an element: bytes, text, or what a cell of MATLAB refers to."""
+    """Text of an element: bytes, text, or the content of a cell of MATLAB."""
     if isinstance(value, bytes):
         return value.decode()
     if hasattr(value, "typecode") or type(value).__name__ == "Reference":
@@ -216,9 +216,9 @@ def _is_clock(name: str) -> bool:
 
 
 def _with_clock(channels: list[Channel], path: Path) -> list[Channel]:
-    """Channels with a clock, where there are such: constants and settings have none."""
+    """Channels with a clock, if there are any; constants and settings have none."""
     timed = [c for c in channels if any(_is_clock(str(name)) for name in c.table.columns)]
-    # a clock alone tells nothing
+    # a clock alone is no signal
     timed = [c for c in timed if len(c.table.columns) > 1] or timed
     left = [c.name for c in channels if c not in timed]
     if not timed or not left:
@@ -234,7 +234,7 @@ def _with_clock(channels: list[Channel], path: Path) -> list[Channel]:
 
 
 def _runs(channels: list[Channel], path: Path) -> list[Channel]:
-    """Channels that hold the same columns as one, each a trajectory."""
+    """Merge channels with the same columns; each is a trajectory."""
     columns = {frozenset(c.table.columns) for c in channels}
     if len(channels) == 1 or len(columns) > 1 or "trajectory" in next(iter(columns)):
         return channels
@@ -251,7 +251,7 @@ def _runs(channels: list[Channel], path: Path) -> list[Channel]:
 
 
 def _samples_first(values: np.ndarray) -> np.ndarray:
-    """Blocks of (joints, samples), as MATLAB users keep them, the other way round."""
+    """Transpose blocks of (joints, samples), which are usual in MATLAB."""
     if values.ndim == 2 and values.shape[0] < values.shape[1]:
         return values.T
     return values

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Readers of tables: text and NumPy archives. Each gives channels of named columns."""
+"""Readers of tables (text and NumPy archives), which return channels of named columns."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-#: Names of fields that are left out: those of rows, and what stands behind the last separator.
+#: Names of fields that are left out: row names, and the empty field after the last separator.
 _ROW_NAMES, _NOTHING = "names of rows", "behind the last separator"
 
 
@@ -101,7 +101,7 @@ def read_csv_channels(path: Path, max_bytes: int) -> list[Channel]:
 
 @dataclass
 class _Shape:
-    """How many fields the rows of a text have, and whether the last is always empty."""
+    """Number of fields in the rows of a text, and whether the last is always empty."""
 
     width: int = 0
     n_rows: int = 0
@@ -182,7 +182,7 @@ def _open_text(path: Path) -> Any:
 
 
 def _unpacked(path: Path, most: int) -> int:
-    """Bytes of a file once unpacked; of a compressed one no further than the most allowed."""
+    """Unpacked bytes of a file, up to the permitted number."""
     if path.suffix.lower() != ".gz":
         return path.stat().st_size
     size = 0
@@ -193,12 +193,12 @@ def _unpacked(path: Path, most: int) -> int:
 
 
 def list_cells(column: Any, name: str, source: str) -> np.ndarray | None:
-    """Block (n, joints) of a text column of lists such as ``"[0.1, 0.2]"``; None if it is none.
+    """Block (n, joints) of a text column of lists such as ``"[0.1, 0.2]"``, or None.
 
     Raises
     ------
     LogError
-        A cell among lists that is none, or lists of differing length.
+        A cell is not a list, or lists differ in length.
     """
     if column.dtype.kind not in "OUT" or not len(column):
         return None
@@ -246,7 +246,7 @@ def of_one_length(arrays: Mapping[str, np.ndarray], source: str) -> dict[str, np
     n = max(lengths, key=lambda length: (lengths[length], length))
     others = {name: len(a) for name, a in numeric.items() if len(a) != n}
     for name, length in others.items():
-        # a vector such as q0, of one number a joint, is no signal
+        # a vector such as q0 with one number per joint is not a signal
         if 2 * length > n and quantity_of(name) is not None:
             like = next(name for name, a in numeric.items() if len(a) == n)
             raise LogError(
@@ -318,7 +318,7 @@ def table_from_arrays(columns: Mapping[str, np.ndarray]) -> pd.DataFrame:
         single = values.ndim == 1 or values.shape[1] == 1
         if single and name not in PER_JOINT:
             column = values.reshape(len(values))
-            # as objects: pandas would write out each text, however often it is named
+            # as objects: pandas would store each text at every repetition
             text = column.dtype == object
             flat[name] = pandas.Series(column, dtype=object) if text else column
         else:

@@ -32,7 +32,7 @@ class Run:
     files : list of Path
         One file, or one per signal.
     joints : list of str
-        Names of the joints, where a file beside the tables lists them.
+        Names of the joints, if a file in the folder lists them.
     """
 
     name: str
@@ -41,7 +41,7 @@ class Run:
 
 
 def find_runs(path: str | os.PathLike[str]) -> list[Run]:
-    """Recordings that a path stands for: itself, the matches of a pattern, or those of a folder.
+    """Recordings of a path: the file itself, the matches of a pattern, or the files of a folder.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def find_runs(path: str | os.PathLike[str]) -> list[Run]:
     Raises
     ------
     LogError
-        A pattern without matches, or a folder without logs.
+        A pattern has no matches, or a folder has no logs.
     """
     given = Path(path)
     if not given.exists() and glob.has_magic(str(path)):
@@ -113,8 +113,8 @@ def _lerobot_runs(folder: Path) -> list[Run]:
 def read_runs(run: Run, read: Callable[[Path], list[Channel]]) -> list[tuple[str, list[Channel]]]:
     """Channels of every recording in the files of a run.
 
-    Files that hold positions and torques each are recordings of their own; others are channels of
-    one recording, and a file that is named after a signal holds that signal.
+    Files with both positions and torques are separate recordings; others are channels of one
+    recording, and a file named after a signal contains that signal.
 
     Parameters
     ----------
@@ -150,12 +150,12 @@ def _is_whole(channels: Sequence[Channel]) -> bool:
 
 
 def _of_one_signal(file: Path) -> str | None:
-    """Quantity that a file is named after."""
+    """Quantity in the name of a file."""
     return quantity_of(file.name.partition(".")[0])
 
 
 def _as_signal(channel: Channel, file: Path) -> Channel:
-    """A channel of a file that is named after a signal, its columns named so too."""
+    """A channel of a file that is named after a signal, with columns of this name."""
     quantity = _of_one_signal(file)
     if quantity is None or quantity == "trajectory":
         return channel
@@ -176,7 +176,7 @@ def _as_signal(channel: Channel, file: Path) -> Channel:
 
 
 def _side_by_side(channels: Sequence[Channel]) -> list[Channel]:
-    """Channels without a clock put beside the one of as many rows that has one."""
+    """Merge channels without a clock with the one with a clock and equally many rows."""
     import pandas
 
     def has_clock(channel: Channel) -> bool:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which reader decodes which kind of file: the one table of log formats."""
+"""Table of log formats and their readers."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from skidyn.logs._containers import read_hdf5_channels, read_matlab_channels
 from skidyn.logs._files import Channel, read_csv_channels, read_npz_channels
 from skidyn.logs._ros import read_bag_channels, read_mcap_channels
 
-#: Reads a file of at most so many bytes once unpacked; some channels of a container may be chosen.
+#: Reader of a file up to an unpacked size, optionally of some channels only.
 Reader = Callable[[Path, int, Sequence[str] | None], list[Channel]]
 
-#: How a file begins that Git LFS has not fetched.
+#: Beginning of a file that Git LFS has not fetched.
 POINTER = b"version https://git-lfs"
 #: Suffixes of text, the only files that may be compressed.
 TEXT = (".csv", ".tsv", ".txt", ".dat")
 
 
 def _whole(read: Callable[[Path, int], list[Channel]]) -> Reader:
-    """Reader of a format with one clock, in which there is nothing to choose."""
+    """Reader of a format with one clock and without options."""
     return lambda path, max_bytes, topics: read(path, max_bytes)
 
 
@@ -102,13 +102,13 @@ def decode(path: Path, topics: Sequence[str] | None, max_bytes: int) -> list[Cha
     Raises
     ------
     LogError
-        No such file, one of an unknown kind, or whatever a decoder says about a damaged one.
+        The file does not exist, is of an unknown kind, or is damaged.
     """
     try:
         return _decode(path, topics, max_bytes)
     except (LogError, ImportError):
         raise
-    except Exception as error:  # decoders raise whatever the bytes lead them to
+    except Exception as error:  # decoders may raise any exception
         what = f"{type(error).__name__}: {error}"
         raise LogError(
             f"{path}: damaged, or its suffix does not match its content ({what})."

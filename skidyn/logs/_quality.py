@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How good a log is: clock, resolution, consistency and excitation, before any model is fitted."""
+"""Quality of a log before any fit: clock, resolution, consistency and excitation."""
 
 from __future__ import annotations
 
@@ -96,8 +96,8 @@ class LogQuality:
     largest_gap : float, s
         Longest step inside a trajectory.
     repeated_rows : int
-        Rows in which no position changes although joints move: the recorder polled faster than
-        the robot reported.
+        Rows in which no position changes although joints move: the logger polled faster than the
+        robot reported.
     joints : tuple of JointQuality
         One per joint.
     checks : tuple of Suspicion
@@ -170,7 +170,7 @@ class LogQuality:
         return "\n".join([*self._told(), *lines]).rstrip()
 
     def _told(self) -> list[str]:
-        """What looks wrong, one paragraph each."""
+        """Warnings, one paragraph each."""
         lines = [f"! {fault}" for fault in self.faults]
         for check in self.checks:
             mark = {"certain": "!!", "suspected": "! ", "noted": "- "}[check.certainty]
@@ -201,7 +201,7 @@ def check_log(frame: pd.DataFrame, robot: Robot | None = None) -> LogQuality:
     Raises
     ------
     LogError
-        Columns are missing, hold no numbers, or do not fit the robot; time goes backwards.
+        Columns are missing, contain no numbers, or do not match the robot; time goes backwards.
 
     Examples
     --------
@@ -212,7 +212,7 @@ def check_log(frame: pd.DataFrame, robot: Robot | None = None) -> LogQuality:
     >>> quality.n_samples, round(quality.rate), quality.gaps
     (400, 100, 0)
     """
-    from skidyn.measurement import (  # with them come the fits
+    from skidyn.measurement import (  # also imports the fits
         Measurement,
         check_measurement,
         count_same_stamps,
@@ -252,7 +252,7 @@ def check_log(frame: pd.DataFrame, robot: Robot | None = None) -> LogQuality:
     unique = check_time_order(time, trajectory)
     same_stamps = count_same_stamps(time, q, trajectory)
     if same_stamps:
-        time = regular_clock(time, trajectory)  # what else is wrong shows with the remedy alone
+        time = regular_clock(time, trajectory)  # other errors are visible only with the remedy
     elif not unique.all():
         messages.append(f"{int((~unique).sum())} row(s) repeat the time of the previous row.")
         time, q, dq, ddq, tau, trajectory = (a[unique] for a in (time, q, dq, ddq, tau, trajectory))
@@ -327,7 +327,7 @@ _TORQUE_HEAD = "      torque range  at limit  at rest     dq/q'  delay ms"
 
 
 def _motion_cells(joint: JointQuality) -> str:
-    """How one joint was moved, as a row of the printed report."""
+    """Motion of one joint, as a row of the printed report."""
     low, high = joint.position_range
     step = f"{joint.resolution:8.2g}" if np.isfinite(joint.resolution) else "       -"
     return (

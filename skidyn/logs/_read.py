@@ -67,9 +67,9 @@ def read_log(
         CSV or text (``.csv .tsv .txt .dat``), Parquet (``.parquet``), Feather, NumPy (``.npz``),
         HDF5 (``.h5 .hdf5``), MATLAB (``.mat``), MCAP (``.mcap``), ROS 1 bag (``.bag``), ROS 2 bag
         (its folder, or ``.db3``); text may be compressed (``.csv.gz``) and hold lists in columns.
-        Several files become several trajectories. A pattern (``"runs/*.csv"``) or a folder stands
-        for the logs in it; files of a folder that hold one signal each (``q.csv``, ``tau.csv``,
-        ``commands.csv``) are one recording. A LeRobot data set is its folder.
+        Several files become several trajectories. A pattern (``"runs/*.csv"``) or a folder means
+        the logs in it; files of a folder with one signal each (``q.csv``, ``tau.csv``,
+        ``commands.csv``) are one recording. A LeRobot data set is given by its folder.
     robot : Robot, optional
         Its joint names are searched in the column names and determine the order of the columns; the
         log is checked against its limits and its gravity.
@@ -85,8 +85,8 @@ def read_log(
     rate : float, Hz, optional
         Sampling rate of logs without a time column.
     resample_rate : float, Hz, optional
-        Rate of a regular clock; None takes the recorded one, that of the positions where signals of
-        one file have several. Signals that are faster are averaged over one step of it.
+        Rate of a regular clock; None uses the recorded one, or that of the positions if signals of
+        one file have several. Faster signals are averaged over one step of it.
     missing : {"error", "drop"}, default="error"
         Rows with NaN or infinite values: refuse the log, or leave them out with a warning.
     split_gaps : float, s, "auto" or None, default="auto"
@@ -95,8 +95,8 @@ def read_log(
     split_dwells : float, s, optional
         Cut a trajectory in the middle of each rest longer than this.
     order : sequence of int or mapping, optional
-        For each joint of the robot the number, from 1, of the column that holds it:
-        ``[2, 1, 3]``; of one quantity only: ``{"tau": [2, 1, 3]}``.
+        For each joint of the robot the number, from 1, of its column: ``[2, 1, 3]``; of one
+        quantity only: ``{"tau": [2, 1, 3]}``.
     flip : sequence of str or int, default=()
         Signals whose sign is changed: a joint, by name or number, means its torque; ``"q3"`` its
         position with velocity and acceleration; ``"dq3"`` or ``"tau3"`` one column.
@@ -133,8 +133,8 @@ def read_log(
         Refuse a log without torque. False also reads logs of commands and positions, for which the
         torque is computed from the servos (:func:`skidyn.simulation.servo_torque`).
     check : bool, default=True
-        Check the quality of the log (:func:`check_log`) and warn of problems. A log without torque
-        is not checked.
+        Check the quality of the log (:func:`check_log`) and warn about problems. A log without
+        torque is not checked.
     max_bytes : int
         Largest size of one file once unpacked.
 
@@ -150,7 +150,7 @@ def read_log(
     Raises
     ------
     LogError
-        The log cannot be used as it is; the message states the reason and the remedy.
+        The log cannot be used unchanged; the message states the reason and the remedy.
 
     Examples
     --------
@@ -227,7 +227,7 @@ def read_log(
         warn_about_log(note)
     if check and "tau1" in frame:
         quality = check_log(frame, robot)
-        # wrong bodies of the description are no fault of the log: diagnose tells who keeps them
+        # wrong bodies of the description are not an error of the log; diagnose reports them
         told = [str(check) for check in quality.checks if check.check != "bodies"]
         for message in (*quality.faults, *told):
             warn_about_log(message)
@@ -235,7 +235,7 @@ def read_log(
 
 
 def _check_mapping(name: str, value: Any, kinds: tuple[type, ...]) -> None:
-    """Refuse anything but an object of names; a report or an option may hold any JSON."""
+    """Refuse anything but an object of names, since a report or an option may be any JSON."""
     example = '{"q": ["pos_a", "pos_b"]}' if name == "columns" else '{"q": "deg"}'
     expected = LogError(f"{name} is {value!r}; expected an object such as {example}.")
     if value is None:
@@ -250,12 +250,12 @@ def _check_mapping(name: str, value: Any, kinds: tuple[type, ...]) -> None:
             raise expected
 
 
-#: How many of how many, as the notes of remedies say it.
+#: Text "k of n" in the notes of remedies.
 _OF = re.compile(r"(\d+) of (\d+)")
 
 
 def _counted(notes: Sequence[str]) -> dict[str, int]:
-    """In how many files each note is; those of remedies that differ by counts alone are summed.
+    """Number of files with each note; notes of remedies that differ only by counts are summed.
 
     >>> _counted(["flip: 1 of 3 rows", "cut", "flip: 2 of 4 rows"])
     {'flip: 3 of 7 rows': 2, 'cut': 1}
@@ -275,7 +275,7 @@ def _counted(notes: Sequence[str]) -> dict[str, int]:
 
 
 def _told_once(notes: Sequence[str], n_files: int) -> list[str]:
-    """Each note once, with the number of files that it holds for.
+    """Each note once, with its number of files.
 
     >>> _told_once(["no velocities", "cut", "no velocities"], 3)
     ['no velocities (2 of 3 files)', 'cut (1 of 3 files)']
@@ -293,7 +293,7 @@ def _refuse_other_columns(
     first_joints: Sequence[str],
     file: Path,
 ) -> None:
-    """Files of one log must hold the same signals of the same joints."""
+    """Check that the files of one log have the same signals of the same joints."""
     if list(joints) != list(first_joints):
         raise LogError(
             f"{file}: its joints ({', '.join(joints)}) are not those of the first file "

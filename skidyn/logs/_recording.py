@@ -43,7 +43,7 @@ def load_recording(
     run : int, str, sequence of them or None, default=None
         Numbers or names of the runs to take; all if None.
     drive_gains : sequence of float, N m/A or N/A, optional
-        Torque per ampere of each joint; makes torques from currents.
+        Torque per ampere of each joint, to compute torques from currents.
     missing : {"drop", "error"}, default="drop"
         Rows that the recording marks as unreadable (NaN): leave them out with a warning, or raise.
 
@@ -58,7 +58,7 @@ def load_recording(
     Raises
     ------
     LogError
-        The file is no such archive, a run does not exist, or the log cannot be used.
+        The file is not such an archive, a run does not exist, or the log cannot be used.
 
     Examples
     --------
@@ -75,7 +75,7 @@ def load_recording(
     (0.5, (5, 5))
     >>> folder.cleanup()
     """
-    from sklearn.utils import Bunch  # a second of imports, for this result only
+    from sklearn.utils import Bunch  # its import takes a second and is needed only here
 
     file = Path(path)
     if not file.exists():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Remedies for a log whose signals are not what they seem: each is asked for, counted and noted."""
+"""Remedies for a log with wrong signals: each is requested, counted and noted."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
     from skidyn.robots import Robot
 
-#: Quantities that turn with the position of a joint.
+#: Quantities whose sign changes with that of the position of a joint.
 MOTION = ("q", "dq", "ddq", "cmd")
 QUANTITIES = (*MOTION, "tau", "temp")
 #: Share of the largest torque below zero that a magnitude may reach.
 BELOW = 0.01
-#: How the notes of remedies begin.
+#: Beginning of the notes of remedies.
 REMEDIES = (
     "flip:",
     "gain:",
@@ -41,7 +41,7 @@ REMEDIES = (
 
 @dataclass(frozen=True)
 class Remedies:
-    """What the caller of ``read_log`` asked to be fixed; see there."""
+    """Requested remedies of ``read_log``."""
 
     order: Sequence[int] | Mapping[str, Sequence[int]] | None = None
     flip: Sequence[str | int] = ()
@@ -79,8 +79,8 @@ def mend_columns(
     Raises
     ------
     LogError
-        A joint or column that the log lacks, an order that is none, a gain that is not finite or
-        zero, a position that holds itself, or no commanded positions to take the sign from.
+        A joint or column does not exist, an order is invalid, a gain is zero or not finite, a
+        position includes itself, or there are no commanded positions for the sign.
     """
     table = table.copy()
     if remedies.order is not None:
@@ -116,7 +116,7 @@ def mend_columns(
 
 
 def restore_gravity(table: pd.DataFrame, robot: Robot | None, notes: list[str]) -> pd.DataFrame:
-    """Add the gravity torque of the described bodies, which a driver had taken off.
+    """Add the gravity torque of the described bodies, which a driver had subtracted.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def restore_gravity(table: pd.DataFrame, robot: Robot | None, notes: list[str]) 
     Raises
     ------
     LogError
-        There is no robot, or nothing pulls at it.
+        There is no robot, or it has no gravity torque.
     """
     if robot is None:
         raise LogError("restore_gravity adds the gravity torque of a robot; give robot=.")
@@ -164,7 +164,7 @@ def mend_rows(table: pd.DataFrame, n: int, remedies: Remedies, notes: list[str])
     Raises
     ------
     LogError
-        A clock of another name, or a channel that the log lacks.
+        The name of the clock is unknown, or a channel does not exist.
     """
     names = [f"q{k + 1}" for k in range(n)]
     if remedies.unwrap:
@@ -188,7 +188,7 @@ def mend_rows(table: pd.DataFrame, n: int, remedies: Remedies, notes: list[str])
     if remedies.lowpass:
         table = _without_lowpass(table, remedies.lowpass, notes)
     if remedies.late:
-        from skidyn.preprocessing import advance_channels  # only for this: it brings scikit-learn
+        from skidyn.preprocessing import advance_channels  # needed only here; imports scikit-learn
 
         before = len(table)
         for name, delay in _each(remedies.late, table, "late"):
@@ -209,7 +209,7 @@ def mend_rows(table: pd.DataFrame, n: int, remedies: Remedies, notes: list[str])
 
 
 def _all(table: pd.DataFrame) -> str:
-    """Count of rows where all of them are meant, as other notes count."""
+    """Text of a count of all rows, in the form of other notes."""
     return f"{len(table)} of {len(table)}"
 
 
@@ -255,7 +255,7 @@ def _reorder(
 
 
 def _take_apart(table: pd.DataFrame, n: int, summed: Mapping[str, str], notes: list[str]) -> None:
-    """Take the position of another joint, as it was recorded, off positions that hold it."""
+    """Subtract the recorded position of another joint from positions that include it."""
     recorded = table.copy()
     for name, other in summed.items():
         own, held = re.fullmatch(r"q(\d+)", name), re.fullmatch(r"(-?)q(\d+)", str(other))
@@ -296,7 +296,7 @@ def _flipped(item: str | int, table: pd.DataFrame, joints: Sequence[str]) -> lis
 def _each(
     values: Mapping[str, float] | None, table: pd.DataFrame, option: str
 ) -> list[tuple[str, float]]:
-    """Column and value, a quantity standing for all its joints."""
+    """Columns and values; a quantity means all its joints."""
     told: list[tuple[str, float]] = []
     for name, value in (values or {}).items():
         joints = [c for c in table.columns if re.fullmatch(rf"{re.escape(name)}\d+", str(c))]
@@ -364,7 +364,7 @@ def _split_at_leaps(table: pd.DataFrame, names: Sequence[str], notes: list[str])
 def _without_lowpass(
     table: pd.DataFrame, constants: Mapping[str, float], notes: list[str]
 ) -> pd.DataFrame:
-    """Undo low passes of first order within stretches without gaps."""
+    """Undo first-order low passes within intervals without gaps."""
     from skidyn.measurement import without_lowpass
 
     time, number = table["time"].to_numpy(dtype=float), table["trajectory"].to_numpy()

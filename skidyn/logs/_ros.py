@@ -26,8 +26,8 @@ from skidyn.logs._bounds import (
 )
 from skidyn.logs._files import Channel, table_from_arrays
 
-#: Largest message in JSON, bytes: states of joints take some hundred, and what is read of a
-#: message takes up to fifty times as much as its text.
+#: Largest message in JSON, bytes: joint states take some hundred, and a parsed message takes up to
+#: fifty times the memory of its text.
 LARGEST_MESSAGE = 2**20
 #: Topic, message type, time of recording in ns, message.
 Message = tuple[str, str, int, Any]
@@ -47,7 +47,7 @@ def read_mcap_channels(path: Path, max_bytes: int, topics: Sequence[str] | None)
             source = reader.make_reader(file, validate_crcs=True, decoder_factories=decoders)
             summary = source.get_summary()
             held = {}
-            if summary is not None:  # an unfinished file has none; then every message is decoded
+            if summary is not None:  # an incomplete file has none; then every message is decoded
                 schemas = {k: schema.name for k, schema in summary.schemas.items()}
                 held = {c.topic: schemas.get(c.schema_id, "") for c in summary.channels.values()}
             wanted = _wanted(held, topics, path) if held else topics
@@ -77,7 +77,7 @@ def _read_json(data: bytes) -> Any:
 
 
 class _ProtobufDecoders:
-    """Messages in protobuf; the library for them is needed only where there are any."""
+    """Messages in protobuf; their library is needed only if there are any."""
 
     def __init__(self) -> None:
         self._decoders: Any = None
@@ -134,7 +134,7 @@ def _bare_database(path: Path) -> Iterator[Message]:
 
 
 def _wanted(held: Mapping[str, str], topics: Sequence[str] | None, path: Path) -> list[str]:
-    """Topics to read: those asked for, or all with joint states."""
+    """Topics to read: the requested ones, or all with joint states."""
     wanted = [
         topic
         for topic, kind in held.items()
@@ -174,7 +174,7 @@ def _channels(
             values = dict(_numbers(message, ""))
         else:
             continue
-        key = topic, frozenset(values)  # joints may come in another order with every message
+        key = topic, frozenset(values)  # the order of joints may differ between messages
         if key not in rows:
             rows[key] = _Samples(tuple(values))
         rows[key].append(_stamp(message, recorded), values)
@@ -196,7 +196,7 @@ class _Samples:
         self._values = array("d")
 
     def append(self, stamp: int, values: Mapping[str, float]) -> None:
-        """Add a message; its fields may come in any order."""
+        """Add a message with its fields in any order."""
         self.stamps.append(stamp)
         self._values.extend([values[name] for name in self.names])
 
@@ -211,7 +211,7 @@ class _Samples:
 
 
 def _stamp(message: Any, recorded: int) -> int:
-    """Time of the header in ns, or of the recording where the header has none."""
+    """Time of the header in ns, or of the recording if the header has none."""
     header = getattr(message, "header", None)
     stamp = getattr(header, "stamp", None)
     if stamp is None:
@@ -252,7 +252,7 @@ def _fields(message: Any) -> tuple[str, ...]:
     if isinstance(message, SimpleNamespace):
         return tuple(vars(message))
     described = getattr(message, "DESCRIPTOR", None)
-    if described is not None:  # an absent part is left out: types may hold themselves
+    if described is not None:  # an absent part is left out, since types may contain themselves
         absent = {
             field.name
             for field in described.fields

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""From the channels of one file to a clean table of signals in SI units."""
+"""Conversion of the channels of one file to a clean table of signals in SI units."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ if TYPE_CHECKING:
 
 ColumnMap = Mapping[str, str | int | Sequence[str | int]]
 ORDER = ("q", "dq", "ddq", "tau", "temp", "cmd")
-#: Beyond, whole numbers in floating point leave others out.
+#: Beyond this, floating point cannot represent all whole numbers.
 LARGEST_NUMBER = 2**53
 
 
 @dataclass(frozen=True)
 class TableOptions:
-    """What the caller of ``read_log`` said about the table; see there."""
+    """Options of ``read_log`` for the table."""
 
     robot: Robot | None = None
     columns: ColumnMap | None = None
@@ -61,7 +61,7 @@ class TableOptions:
 
     @property
     def needed(self) -> tuple[str, ...]:
-        """Quantities that the log must hold."""
+        """Required quantities of the log."""
         return ("q", "tau") if self.needs_torque else ("q",)
 
 
@@ -73,11 +73,11 @@ def build_table(
     Parameters
     ----------
     channels : sequence of Channel
-        What the file holds.
+        Channels of the file.
     source : str
         Name of the file for messages.
     options : TableOptions
-        What the caller said.
+        Options of the caller.
 
     Returns
     -------
@@ -89,7 +89,7 @@ def build_table(
     Raises
     ------
     LogError
-        The log cannot be used as it is.
+        The log cannot be used unchanged.
     """
     match = match_names(
         list(dict.fromkeys(str(name) for c in channels for name in c.table.columns)),
@@ -117,7 +117,7 @@ def _renamed(
 ) -> pd.DataFrame:
     """The numeric columns of a channel under the names of a log, in SI units."""
     new_name = {old: new for new, old in match.columns.items()}
-    # a column that was not chosen must not bear the name of a signal
+    # a column that was not chosen must not have the name of a signal
     new_name |= {n: f"{n} of the file" for n in match.columns if n not in new_name}
     table = channel.table.rename(columns=lambda name: new_name.get(str(name), str(name)))
     table["time"] = seconds(table, options.rate, f"{source} ({channel.name})")
@@ -161,7 +161,7 @@ def _refuse_unused_units(
 def _torque_from_current(
     table: pd.DataFrame, n: int, gains: Sequence[float] | None, source: str
 ) -> pd.DataFrame:
-    """Torque columns from currents and gains; currents alone are never taken for torques."""
+    """Torque columns from currents and gains; currents alone are never used as torques."""
     import pandas as pd
 
     currents = [f"i{k + 1}" for k in range(n)]
@@ -253,7 +253,7 @@ def _clean(
 def _same_stamps(
     table: pd.DataFrame, n: int, number: np.ndarray, source: str, options: TableOptions
 ) -> int:
-    """Rows that coarse stamps make look as if they repeated the one before."""
+    """Rows that seem to repeat the previous one only because of coarse stamps."""
     from skidyn.measurement import count_same_stamps
 
     q = table[[f"q{k + 1}" for k in range(n)]].to_numpy()
@@ -275,7 +275,7 @@ def _split(
     source: str,
     options: TableOptions,
 ) -> None:
-    """Cut at gaps and rests in place, and note how many pieces came of it."""
+    """Cut at gaps and rests in place, and note the number of pieces."""
     for name in ("split_gaps", "split_dwells"):
         if isinstance(value := getattr(options, name), bool):
             raise LogError(

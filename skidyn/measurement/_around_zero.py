@@ -18,15 +18,15 @@ from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import cut_columns, readable_fits
 
 Rows: TypeAlias = NDArray[np.intp]
-#: Share of rows with a torque of zero, in runs of at least so many and so often (drives that are
-#: switched off are so for long), that is a dead band; how many times as often as values one step
-#: beside it, where the torque comes in steps; fewest values of a torque that is not so coarse that
-#: zero is one of few.
+#: Dead band: least share of rows with zero torque; least length and number of their runs (drives
+#: that are switched off have few long runs); least ratio to the frequency of values one step from
+#: zero, for a torque in steps; least number of values of a torque that is not too coarse.
 BAND, RUN, PASSES, OFTENER, FINE = 0.01, 4, 10, 4.0, 50
 #: Least speed of rows that count, as a share of the largest.
 FAST = 0.02
-#: Recordings at least; rows at the start of each; share of the spread that gravity has there; share
-#: of gravity that may be left there or on average; slope of the torque on gravity in recordings.
+#: Least number of recordings; rows at the start of each; least share of gravity in the spread
+#: there; largest share of gravity that may remain there or on average; slope of the torque on
+#: gravity in recordings.
 RECORDINGS, ROWS, HEAVY, LEFT, FELT = 3, 5, 0.1, 0.1, 0.5
 
 
@@ -75,11 +75,11 @@ def _zeros(measurement: Measurement, k: int) -> float:
         return 0.0
     share = float(passes.sum()) / len(torque)
     step = position_step(torque)
-    if np.isfinite(step):  # steps of a sensor come as often beside zero as there
+    if np.isfinite(step):  # steps of a sensor are as frequent near zero as at zero
         beside, next_to = (
             float(np.mean(np.abs(np.abs(torque) - n * step) < 0.1 * step)) / 2 for n in (1, 2)
         )
-        # and where small torques are frequent, more often the nearer they are to zero
+        # and if small torques are frequent, more so the closer they are to zero
         rising = max(1.0, beside / max(next_to, 1e-12))
         if np.mean(torque == 0) < OFTENER * beside * rising:
             return 0.0
@@ -87,7 +87,7 @@ def _zeros(measurement: Measurement, k: int) -> float:
 
 
 class TaredTorque(Check):
-    """Torque that was set to zero for each recording, with the gravity that it held there."""
+    """Torque that was set to zero for each recording, including its gravity."""
 
     name = "tared_torque"
     of_sensor = True
@@ -139,7 +139,7 @@ def _without(torque: Array, pull: Array, parts: Sequence[Rows]) -> list[int]:
 
 
 def _felt(fits: Fits, joint: int) -> bool:
-    """Whether the torque of a joint follows changes of gravity, beside inertia and friction."""
+    """Whether the torque of a joint contains changes of gravity, in addition to other parts."""
     torque, counts = fits.mean_torque(joint)
     still, pulls = fits.gravity_parts(Reading())
     pull = np.tensordot(fits.robot.gravity, pulls, 1)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Check of the axes of joints: whether one of them turns about another axis of its frame.
+"""Check of the axes of joints, one of which may turn about another axis of its frame.
 
-Descriptions of other variants of a robot, or written by hand, have a joint about another axis. No
-bodies make up for that. Every joint is tried about the other axes of its own frame; the other
-direction of its own axis is a sign, which another check tells.
+Descriptions of other variants of a robot, or written by hand, may have a joint about a wrong axis,
+which no bodies can compensate. Every joint is tried about the other axes of its own frame; the
+opposite direction of its own axis is a sign, which another check finds.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from skidyn.robots import Robot
 
 #: Error of the stated bodies, as a share of a torque's spread, from which axes are tried.
 WORTH = 0.08
-#: Log-likelihood that another axis must gain with stated bodies, and beside any effect; the share
-#: of it that it must gain there; how many are looked at more closely.
+#: Least log-likelihood gain of another axis with stated bodies, and in addition to any effect;
+#: least share of it there; number of axes that are examined in detail.
 LEAST, SURE, BESIDE, FINALISTS = 15.0, 40.0, 0.3, 4
 
 
 @dataclass(frozen=True)
 class Axis:
-    """Another axis of a joint, and what it explains."""
+    """Another axis of a joint, and its gain."""
 
     joint: int
     direction: Array
@@ -45,7 +45,7 @@ class Axis:
 
 
 class Axes(Check):
-    """A joint that turns, or slides, along another axis than the description says."""
+    """A joint with another axis than in the description."""
 
     name = "axes"
     suspects = "the axis of a joint in the description that differs from that of the robot"
@@ -60,7 +60,7 @@ class Axes(Check):
         found = find_axis(fits)
         if found is None:
             return
-        # a sign, an order or a zero may look like another axis, and the other way round
+        # a sign, an order or a zero may look like another axis, and vice versa
         if sum(c.gain for c in asked_changes(measurement, fits) if not c.other) > found.gain:
             return
         gains = np.nan_to_num(found.fits.nominal(Reading()).gain)
@@ -114,7 +114,7 @@ def find_axis(fits: Fits) -> Axis | None:
     """
     robot, tree = fits.robot, fits.robot.tree
     if len(tree.parents) != robot.n_joints:
-        return None  # bodies that mimic others have no columns of their own
+        return None  # bodies of mimic joints have no separate columns
     few = fits.thinned(max(FEWEST_ROWS, MOST_ROWS // fits.n_joints))
     rough = few.nominal(Reading(), 1)
     every = np.vstack([np.eye(3), -np.eye(3)])

@@ -18,41 +18,41 @@ from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import asked_changes, readable_fits
 
-#: Log-likelihood that another scale must gain, and where the stated bodies do not say so as well.
+#: Least log-likelihood gain of another scale, and its value if the stated bodies do not confirm it.
 LEAST, SURE = 15.0, 40.0
-#: Share of a torque's spread that the robot must explain for its multiple to be told.
+#: Least share of a torque's spread that the robot must explain for its multiple to be reported.
 EXPLAINED = 0.5
-#: Multiples of the robot's own torque that wrong masses may well make.
+#: Multiples of the robot's own torque that may be due to wrong masses.
 USUAL = (0.4, 2.5)
-#: Multiples that are those of wrong masses unless the other joints deny it.
+#: Multiples that are attributed to wrong masses unless the other joints contradict.
 CLEARLY = (0.62, 1.6)
 #: Multiples of an effort limit that only another unit reaches.
 FAR = 20.0
-#: Standard error of a scale that is told although stated bodies alone do not tell it.
+#: Largest standard error of a scale that is reported without confirmation by the stated bodies.
 TELLING = 0.15
 #: Rates of clock and velocities that are tried.
 RATES = (0.1, 0.2, 0.33, 0.5, 2.0, 3.0, 5.0, 10.0)
 AS_IT_IS = Reading()
 #: Factors of units of torque.
 UNITS = {1e3: "Nmm", 1e2: "Ncm", 1e-3: "kNm"}
-#: Error with stated bodies, as a share of the spread, and in errors with identified ones, from
-#: which the stated ones are not those of the robot; share of a torque that bodies are to hold.
+#: Error with stated bodies, as a share of the spread, and as a multiple of that with identified
+#: ones, from which the stated ones are wrong; least share of the bodies in a torque.
 WRONG, TIMES, HEAVY = 0.2, 3.0, 0.3
 #: Error of any bodies, as a share of the spread, and in errors of the mean of a row, from which a
 #: torque is nearly unrelated to the motion.
 UNRELATED, BEYOND = 0.67, 4.0
-#: Share of that which any function of the position must leave, and the places of one.
+#: Least share of it that any function of the position must leave, and the nodes of such a function.
 LEFT, PLACES = 0.8, 16
 #: Largest share of friction, and that of the joint in the middle, where there is none.
 FRICTIONLESS, HARDLY = 0.12, 0.05
-#: How near a computed torque is to that of the stated bodies, how little friction it holds, and
-#: how little better any other bodies are.
+#: A computed torque: largest difference from that of the stated bodies, largest share of friction,
+#: and largest gain by any other bodies.
 EQUAL, CLOSE, NONE, NO_BETTER = 0.01, 0.1, 0.01, 1.25
 
 
 @dataclass
 class Explained:
-    """How well stated and identified bodies explain the torque of every joint that is used.
+    """Fits of the torque of every used joint with stated and identified bodies.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class Explained:
 
     @cached_property
     def spread(self) -> Array:
-        """Spread of the torque; half its deviation at least, where it is mostly the same."""
+        """Spread of the torque; at least half its standard deviation, if it is mostly constant."""
         torques = [self._torque(k) for k in self.joints]
         return np.array([max(_spread(t), 0.5 * float(np.std(t))) + 1e-12 for t in torques])
 
@@ -87,7 +87,7 @@ class Explained:
 
     @cached_property
     def shares(self) -> tuple[Array, Array]:
-        """What the stated bodies and friction hold, as shares of the spread."""
+        """Parts of the stated bodies and of friction, as shares of the spread."""
         columns = self.fits.columns(Reading())
         held = []
         for k in self.joints:
@@ -210,7 +210,7 @@ class TorqueScale(Check):
                 f"it is {told} times that of the stated bodies, and {fitted} times that of bodies "
                 "that explain the other joints"
             )
-        # A torque that bodies make at this scale is one that the joint holds: the limit is wrong.
+        # If bodies need a torque of this scale, the joint can provide it, and the limit is wrong.
         usual = {k for k, gain in gains.items() if USUAL[0] <= gain <= USUAL[1]}
         far = _beyond_limits(measurement).items()
         beyond = {k: times for k, times in far if k not in found and k not in usual}
@@ -236,7 +236,7 @@ class TorqueScale(Check):
 
 
 def _all_factors(fits: Fits, gains: dict[int, float], typical: float) -> dict[int, float]:
-    """Factors of torques none of which is at its scale; those of unknown ones are free, too."""
+    """Factors of torques all of which have a wrong scale; those of unknown ones are free, too."""
     usable = [k for k in range(fits.n_joints) if fits.usable(k)]
     found = refined_scales(fits, {}, {k: gains.get(k, typical) for k in usable})
     known = [k for k in usable if k in gains or found.errors[k] < TELLING]
@@ -244,15 +244,15 @@ def _all_factors(fits: Fits, gains: dict[int, float], typical: float) -> dict[in
 
 
 def _rate_gain(fits: Fits, rate: float) -> float:
-    """Log-likelihood that another rate of clock and velocities gains."""
+    """Log-likelihood gain of another rate of clock and velocities."""
     here, there = fits.nominal(Reading()), fits.nominal(Reading(stretch=rate))
     return float(there.margin(here).sum())
 
 
 def _other_rate(fits: Fits) -> float | None:
-    """Rate of clock and velocities at which every torque is at a scale that bodies make.
+    """Rate of clock and velocities at which all torques have the scale of the bodies.
 
-    Inertia grows with its square, gravity does not, so that no scale of a torque does the same.
+    Inertia grows with its square and gravity does not, so no scale of a torque is equivalent.
     """
     best, log = max((_rate_gain(fits, float(np.exp(x))), x) for x in np.log(RATES))
     step = 0.2
@@ -269,7 +269,7 @@ def _other_rate(fits: Fits) -> float | None:
 
 
 def _beyond_limits(measurement: Measurement) -> dict[int, float]:
-    """Torques far beyond what the description says a joint can hold, while others are within."""
+    """Torques far beyond the effort limit of the description, while others are within."""
     robot = measurement.robot
     if robot is None:
         return {}
@@ -282,7 +282,7 @@ def _beyond_limits(measurement: Measurement) -> dict[int, float]:
 
 
 def _one_sided(gains: Array) -> bool:
-    """Whether all multiples are too small, or all too large, to be those of wrong masses."""
+    """Whether all multiples are too small, or all too large, to be due to wrong masses."""
     return bool(np.all(gains < USUAL[0]) or np.all(gains > USUAL[1]))
 
 
@@ -294,7 +294,7 @@ def _gain_remedy(factors: dict[int, float]) -> tuple[str, str]:
 
 
 def _unit_like(gain: float) -> float | None:
-    """The factor of a unit that a multiple of the robot's torque is near."""
+    """The factor of a unit close to a multiple of the robot's torque."""
     return next((f for f in UNITS if abs(np.log(gain / f)) < 0.3), None)
 
 
@@ -308,24 +308,24 @@ def joint_gain(fits: Fits, k: int, gain: float) -> tuple[float, float, float]:
     k : int
         Joint, from 0.
     gain : float
-        What its torque is of that of the stated bodies.
+        Ratio of its torque to that of the stated bodies.
 
     Returns
     -------
     gain, gained, apart : float
-        Scale, log-likelihood that it gains over none, and over one four times as far or as near.
+        Scale, its log-likelihood gain over none, and over one four times as large or as small.
     """
     plain = fits.identified(Reading())
     rows = float(fits.moving[:, k].sum())
 
     def gained(log: float) -> float:
         other = fits.scaled({k: float(np.exp(log))}).identified(Reading())
-        # the density of a torque is that of the divided one over the gain
+        # the density of a torque is that of the scaled torque divided by the gain
         change = other.margin(plain)
         change[k] -= rows * log / max(other.inflation[k], 1.0)
         return float(change.sum())
 
-    step = 0.08  # summits are as narrow as the noise is small
+    step = 0.08  # maxima are narrow if the noise is small
     best, log = max((gained(x), x) for x in np.log(gain) + step * np.arange(-5, 6))
     while step > 0.005:
         near, other = max((gained(x), x) for x in (log - step, log + step))
@@ -338,7 +338,7 @@ def joint_gain(fits: Fits, k: int, gain: float) -> tuple[float, float, float]:
 
 
 def _known_gains(fits: Fits, reading: Reading = AS_IT_IS) -> dict[int, float]:
-    """Multiple of the robot's own torque, of the columns of which it explains enough."""
+    """Multiple of the robot's own torque, for columns of which it explains enough."""
     here = fits.nominal(reading)
     s = fits.motion(reading)
     known = {}
@@ -400,9 +400,9 @@ class UnexplainedTorque(Check):
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         seen = explained(measurement)
         if seen is None or measurement.stale or measurement.frictionless:
-            return  # what rough derivatives, or another friction, leave is no other signal
+            return  # rough derivatives, or another friction, are no other signal
         least = np.minimum(*seen.errors)
-        steady = seen.scatter / np.sqrt(6)  # white noise is no mistake
+        steady = seen.scatter / np.sqrt(6)  # white noise is not an error of the log
         bad: NDArray[np.bool_] = (least > UNRELATED) & (least > BEYOND * steady)
         unlike = [k for k, found in zip(seen.joints, bad, strict=True) if found]
         joints = [k for k in unlike if _left_by_position(seen, k) > LEFT]
@@ -420,9 +420,9 @@ class UnexplainedTorque(Check):
 
 
 def _left_by_position(seen: Explained, k: int) -> float:
-    """Share of what identified bodies leave of a torque that no function of the position explains.
+    """Share of the residual of identified bodies that no function of the position explains.
 
-    A spring of any form, or a stop, has to do with the motion.
+    A spring of any form, or a stop, is related to the motion.
     """
     residual = seen.identified.residual[k]
     q = seen.fits.average(seen.fits.signals.q[:, k])[seen.fits.moving[:, k]]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks of single channels: joints that stand still, torque that is constant, held or clipped."""
+"""Checks of single channels: joints at rest, torque that is constant, held or clipped."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from skidyn.measurement._measures import is_held, position_step
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import cut_columns
 
-#: Share of rows at the extreme torque from which it is told.
+#: Share of rows at the extreme torque from which it is reported.
 CLIPPED = 0.002
-#: Step of a position from which it is coarse, rad: a turn in 13 bits.
+#: Least step of a coarse position, rad: a turn in 13 bits.
 COARSE = 0.9 * 2 * np.pi / 2**13
-#: Fourth differences of a torque over its spread from which it has noise, and those of which they
-#: are fewest: of recordings with a noise of their own no joint is below 4e-4.
+#: Fourth differences of a torque relative to its spread above which it has noise; joints of
+#: recordings with noise are never below 4e-4.
 NOISELESS, ENOUGH = 1e-5, 200
-#: Share of rows that hold the torque of the row before, while it is not coarse, to be told.
+#: Least share of rows with the torque of the previous row, for a torque that is not coarse.
 HELD = 0.3
 
 
@@ -47,7 +47,7 @@ class StillJoint(Check):
 
 
 class CoarsePosition(Check):
-    """Positions in steps that are felt as accelerations."""
+    """Positions in steps that are large enough to affect accelerations."""
 
     name = "coarse_position"
     suspects = "positions in coarse steps"
@@ -62,7 +62,7 @@ class CoarsePosition(Check):
         coarse = {k: step for k, step in steps.items() if step > COARSE}
         for k in steps:
             if k not in coarse and _is_short(q[:, k]):
-                # the step of eleven binary digits at the largest position
+                # the step of eleven bits at the largest position
                 coarse[k] = 2.0 ** np.floor(np.log2(np.abs(q[:, k]).max()) - 10)
         if coarse:
             largest = max(coarse.values())
@@ -108,7 +108,7 @@ class ConstantTorque(Check):
         for k in range(measurement.n_joints):
             torque = measurement.torque[:, k]
             if k in lost:
-                continue  # told as such
+                continue  # reported already
             if np.ptp(torque) == 0:
                 yield self.suspicion(
                     f"the torque of {measurement.joint(k)} is constant",
@@ -118,7 +118,7 @@ class ConstantTorque(Check):
                 )
                 continue
             if len(measurement.leaps):
-                continue  # parts between leaps have no numbers of their own
+                continue  # parts between jumps have no separate numbers
             still = [
                 int(run) for run in runs if len(runs) > 1 and np.ptp(torque[number == run]) == 0
             ]
@@ -206,7 +206,7 @@ class HeldTorque(Check):
         shares, lost = np.zeros(measurement.n_joints), cut_columns(measurement)
         for k in range(measurement.n_joints):
             torque = measurement.torque[:, k]
-            # even steps are those of a coarse sensor, not of a slow one
+            # equal steps are due to a coarse sensor, not a slow one
             fine = len(np.unique(torque)) > 0.1 * len(torque) and np.isnan(position_step(torque))
             if k not in lost and fine:
                 shares[k] = np.mean(torque[1:][moved] == torque[:-1][moved])
@@ -223,7 +223,7 @@ class HeldTorque(Check):
 
 
 class BrokenSamples(Check):
-    """Single samples that leap away and back."""
+    """Single samples that jump away and back."""
 
     name = "broken_samples"
     suspects = "single outlying samples: lost packets, bus errors"

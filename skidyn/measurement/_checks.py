@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The checks of a measurement, in the order in which they change an answer."""
+"""The checks of a measurement, in the order of their influence on the result."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ from skidyn.measurement._units import ClockUnit, PositionUnit, WrappedPosition
 from skidyn.measurement._velocity import JoinedRecordings, Velocity, VelocityDelay
 
 TARED, UNSIGNED = TaredTorque(), UnsignedTorque()
-#: Nothing else in skidyn keeps a list of checks.
+#: The only list of checks in skidyn.
 CHECKS: tuple[Check, ...] = (
     LostRows(),
     ClockUnit(),
@@ -135,7 +135,7 @@ def check_measurement(measurement: Measurement) -> list[Suspicion]:
     ('velocity', '--units dq=deg/s')
     """
     found: list[Suspicion] = []
-    misread = 3  # the first stage that would fit columns that are read wrongly
+    misread = 3  # the first stage that would fit wrongly interpreted columns
     for check in CHECKS:
         if check.stage >= misread or (check.of_sensor and measurement.of_servos):
             continue
@@ -155,14 +155,14 @@ def check_measurement(measurement: Measurement) -> list[Suspicion]:
     return sorted(found, key=lambda s: CERTAINTIES.index(s.certainty))
 
 
-#: Checks whose certain suspicions make every fit of the robot meaningless, and those of which
-#: mere suspicions do.
+#: Checks whose certain suspicions make every fit of the robot meaningless, and checks of which any
+#: suspicion does.
 _UNITS = CHECKS[:5]
 _SCALES = (*CHECKS[1:3], TARED)
 
 
 def names_in_doubt(found: list[Suspicion]) -> list[str]:
-    """What is suspected of a measurement that a diagnosis would give a name of physics.
+    """Suspicions about a measurement that a diagnosis would report as a physical effect.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def names_in_doubt(found: list[Suspicion]) -> list[str]:
     Returns
     -------
     list of str
-        Empty where nothing of the kind is suspected.
+        Empty if there are none.
     """
     names = {check.name for check in CHECKS if check.misnames}
     return [s.suspicion for s in found if s.check in names and s.certainty != "noted"]

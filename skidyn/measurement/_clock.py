@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks of the clock: stamps that jitter, rows that repeat or were made up, gaps."""
+"""Checks of the clock: jittering stamps, repeated or interpolated rows, gaps."""
 
 from __future__ import annotations
 
@@ -15,29 +15,29 @@ from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import is_repeated, position_step
 from skidyn.measurement._suspicion import Suspicion
 
-#: Stamps nearer than this share of a step to a regular clock do not jitter.
+#: Stamps closer to a regular clock than this share of a step do not jitter.
 REGULAR = 1e-3
 #: Half width in samples of the polynomial that predicts a position from its neighbours.
 NEIGHBOURS = np.array([-2, -1, 1, 2])
-#: Fewest rows of a stretch, and rows away from repetitions without which all of them count.
+#: Least rows of an interval, and least rows away from repetitions; with fewer, all rows are used.
 SHORTEST, FRESH = 8, 200
-#: Twice the log-likelihood ratio from which the stamps are told to jitter, and surely do.
+#: Twice the log-likelihood ratio from which jitter is suspected, and is certain.
 TOLD, CERTAIN = 20.0, 60.0
 #: Steps by which stamps may be off a clock that is still regular.
 WANDERING = 1.0
-#: Log-likelihood of the torque that even steps must gain for the stamps to do harm; share of a step
-#: by which stamps are off that do, where there is no robot to say so.
+#: Log-likelihood gain of the torque by even steps from which jitter is harmful; error of stamps, as
+#: a share of a step, that is harmful if there is no robot to test it.
 HARM, OFF = 15.0, 0.02
-#: Share of the steps that are longer from which they may be those of rounded stamps, and how far
-#: these are from even ones, in steps: rows that are lost now and then take a clock farther away.
+#: Share of long steps from which stamps may be rounded, and largest distance of rounded stamps from
+#: even ones, in steps; lost rows make the distance larger.
 MISSING, ROUNDED = 0.05, 1.5
-#: Share of rows that repeat, or lie on a line between their neighbours.
+#: Share of rows that repeat the previous one, or lie on a line between their neighbours.
 REPEATED, ON_A_LINE = 0.02, 0.3
-#: Share of rows with the stamp of the row before from which the stamps are too coarse.
+#: Share of rows with the stamp of the previous row from which the stamps are too coarse.
 SAME = 0.05
 #: Share of repeated rows from which accelerations, and with them findings, are wrong.
 MANY = 0.2
-#: Steps of a sensor that a position changes by at most where rows repeat because it is coarse.
+#: Most steps of a sensor by which a position changes after rows that repeat because it is coarse.
 STEPS = 3.0
 
 
@@ -73,7 +73,7 @@ def regular_clock(time: Array, trajectory: NDArray[np.int64]) -> Array:
         own = regular[rows]
         if len(own) < 3:
             continue
-        # every row, or with missing rows where the steps between stamps say so: the straighter
+        # every row, or with missing rows according to the steps between stamps: the straighter one
         step = _step(own)
         every = np.arange(len(own))
         even = np.polyval(np.polyfit(every, own, 1), every)
@@ -91,7 +91,7 @@ def regular_clock(time: Array, trajectory: NDArray[np.int64]) -> Array:
 
 
 def count_same_stamps(time: Array, q: Array, trajectory: NDArray[np.int64]) -> int:
-    """Rows with the stamp of the row before although joints have moved on; 0 where they are few.
+    """Number of rows with the stamp of the previous row although joints moved; 0 if they are few.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def count_same_stamps(time: Array, q: Array, trajectory: NDArray[np.int64]) -> i
     Returns
     -------
     int
-        Stamps that are rounded to more than a step of the samples are so many.
+        Large for stamps that are rounded to more than a step of the samples.
 
     Examples
     --------
@@ -130,7 +130,7 @@ def _step(time: Array) -> float:
 
 @dataclass(frozen=True)
 class Jitter:
-    """How far stamps are off a regular clock, and which of the two the positions follow.
+    """Distance of stamps from a regular clock, and comparison of both with the positions.
 
     Attributes
     ----------
@@ -138,9 +138,9 @@ class Jitter:
         Root mean square distance of the stamps from the regular clock.
     margin : float
         Twice the log-likelihood ratio of the positions for the regular clock against the stamps;
-        positive where samples were taken at even steps.
+        positive if samples were taken at even steps.
     ratio : float
-        Error of predicted positions with the stamps over that with the regular clock.
+        Ratio of the errors of predicted positions with the stamps and with the regular clock.
     """
 
     spread: float
@@ -168,7 +168,7 @@ def find_jitter(
     trajectory : ndarray of shape (n_samples,)
         Trajectory of every row.
     repeated : ndarray of shape (n_samples,) of bool, optional
-        Rows that repeat the one before; what is next to one follows neither clock.
+        Rows that repeat the previous one; their neighbours agree with neither clock.
     """
     regular = regular_clock(time, trajectory)
     segments = find_segments(trajectory, time)
@@ -185,7 +185,7 @@ def find_jitter(
             errors = [e[fresh] for e in errors]
     for k in range(q.shape[1]):
         with_stamps, even = (np.abs(e[:, k]) for e in errors)
-        # the larger half says what the clock does; the rest are rows in which a joint rests
+        # the larger half shows the clock; the rest are rows with a joint at rest
         sizes = [float(np.mean(np.sort(e)[len(e) // 2 :] ** 2)) for e in (with_stamps, even)]
         if min(sizes) <= 0:
             continue
@@ -196,14 +196,14 @@ def find_jitter(
 
 
 def _all_fresh(fresh: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Whether a row and two on either side are no repetitions, of all rows but two at each end."""
+    """Whether a row and two on either side are not repetitions, without two rows at each end."""
     if len(fresh) < SHORTEST:
         return np.zeros(0, dtype=bool)
     return np.asarray(np.all([fresh[k : len(fresh) - 4 + k] for k in range(5)], axis=0))
 
 
 def _prediction_errors(time: Array, q: Array) -> Array:
-    """Positions less their prediction by the cubic through two neighbours on either side."""
+    """Positions minus their prediction by the cubic through two neighbours on either side."""
     n = len(time)
     if n < SHORTEST or np.any(np.diff(time) <= 0):
         return np.zeros((0, q.shape[1]))
@@ -215,7 +215,7 @@ def _prediction_errors(time: Array, q: Array) -> Array:
             if a != b:
                 weights[:, a] *= (time[middle] - around[:, b]) / (around[:, a] - around[:, b])
     predicted = np.einsum("ia,iak->ik", weights, q[middle[:, None] + NEIGHBOURS])
-    gain = np.sqrt(1 + np.sum(weights**2, axis=1))  # noise of the positions enters all alike
+    gain = np.sqrt(1 + np.sum(weights**2, axis=1))  # the noise of the positions affects all equally
     return np.asarray((q[middle] - predicted) / gain[:, None])
 
 
@@ -288,14 +288,14 @@ class ClockJitter(Check):
 
 
 def _gained_by_torque(measurement: Measurement) -> float | None:
-    """Log-likelihood that the torque gains by even steps; None without a robot.
+    """Log-likelihood gain of the torque by even steps; None without a robot.
 
-    Accelerations jitter much where motion is slow, but there they hardly matter.
+    For slow motion accelerations have much jitter, but little influence.
     """
     fits = measurement.fits
     if fits is None:
         return None
-    from skidyn.measurement._fits import Reading, make_fits  # with it all columns of the evidence
+    from skidyn.measurement._fits import Reading, make_fits  # also imports the evidence
 
     signals = measurement.whole
     even = signals.with_(time=regular_clock(signals.clock, signals.trajectory))
@@ -329,9 +329,10 @@ class RepeatedRows(Check):
 
 
 def _coarse(measurement: Measurement) -> bool:
-    """Whether rows repeat because the position sensor is coarse: torque then goes on changing.
+    """Whether rows repeat because the position sensor is coarse: torque then still changes.
 
-    What changes after a coarse step is a step or two; after rows that repeat, all that was missed.
+    After coarse rows, positions change by a step or two; after repeated rows, by all the missed
+    motion.
     """
     s = measurement.signals
     sizes = []
@@ -413,7 +414,7 @@ class Gaps(Check):
 
 
 class SlowSampling(Check):
-    """Too few samples a second for accelerations."""
+    """Too low a sampling rate for accelerations."""
 
     name = "slow_sampling"
     suspects = "a sampling rate that is too low for accelerations"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Recordings and channels that are in a log twice."""
+"""Recordings and channels that occur twice in a log."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._suspicion import Suspicion
 
-#: Error that rounding leaves of a copy, as a share of its spread, and values that it has at least.
+#: Rounding error of a copy, as a share of its spread, and least number of its values.
 ROUNDING, FEWEST_VALUES = 1e-6, 50
 
 
 def copied_rows(signals: Signals, torque: Array) -> NDArray[np.bool_]:
     """Rows of recordings that repeat an earlier one sample by sample.
 
-    Held-out error presumes that the recordings left out are new: a copy of one that is not left
-    out makes any function look right.
+    The held-out error assumes that the held-out recordings are new: with a copy in the training
+    data any function would seem correct.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class CopiedTorque(Check):
 
 
 def copied_columns(measurement: Measurement) -> list[tuple[int, str, int]]:
-    """Torques that are another channel: joint, what it is, and of which joint, from 0."""
+    """Torques that equal another channel: joint, channel, and its joint, from 0."""
     if measurement.copies is None:
         s, torque = measurement.signals, measurement.torque
         channels = {"torque": torque, "position": s.q, "velocity": s.dq}
@@ -100,7 +100,7 @@ def copied_columns(measurement: Measurement) -> list[tuple[int, str, int]]:
 
 
 def _is_line(x: Array, y: Array) -> bool:
-    """Whether one channel is a multiple of another, with an offset, but for rounding."""
+    """Whether one channel is a multiple of another, with an offset, up to rounding."""
     few = slice(None, None, max(1, len(x) // 50))
     if not _nearly(x[few], y[few]):
         return False

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Delay of the torque against the motion, from identified bodies, friction and rotor inertia."""
+"""Delay of the torque relative to the motion, from identified bodies, friction and rotors."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from skidyn.measurement._fits import (
 )
 from skidyn.robots import base_parameter_index, with_whole_turns
 
-#: Lags that are tried, s, and groups of rows that are left out in turn.
+#: Lags that are tried, s, and number of groups of rows that are left out in turn.
 LAGS = np.linspace(-0.06, 0.06, 13)
 GROUPS = 8
-#: Distance of the lags between which a parabola is laid, s, and how often at most.
+#: Distance of the lags of a parabola, s, and most repetitions.
 NEAR, STEPS = 2e-3, 6
 #: Fewest rows of a recording for its own lag.
 FEWEST_OF_RUN = 15
-#: How near lags of joints in one recording are that agree, s.
+#: Largest difference of agreeing lags of joints in one recording, s.
 NEARLY = 0.008
-#: How far a lag may move, s, or twice its standard error.
+#: Largest change of a lag, s, or twice its standard error.
 FAR = 1e-3
 #: Least velocity of rows that count, in rad/s (a tenth of it in m/s).
 SLIDING = 0.05
@@ -47,13 +47,13 @@ class RunDelay:
     lag, error : float, s
         Lag and its standard error, from joint to joint.
     gain : float
-        Log-likelihood gained by it over the lag of the other recordings.
+        Its log-likelihood gain over the lag of the other recordings.
     agreeing : float
-        Share of the likelihood gained on joints whose own lag is near it.
+        Share of the gain on joints whose own lag is close to it.
     left : float
-        Root mean square of what it leaves over the noise of the other recordings.
+        Root mean square residual with it, relative to the noise of the other recordings.
     before : float
-        That at the lag of the other recordings.
+        The same at the lag of the other recordings.
     usual : float, s
         Lag of the other recordings.
     """
@@ -74,25 +74,25 @@ class Delay:
     Attributes
     ----------
     common : float, s
-        Lag of all joints together; positive where torque is late, NaN where it cannot be told.
+        Lag of all joints together; positive if torque is late, NaN if it cannot be determined.
     error : float, s
         Its standard error.
     joints, errors : ndarray of shape (n_joints,), s
-        Lag of every joint by itself and its standard error, NaN where it cannot be told.
+        Lag of every joint alone and its standard error, NaN if it cannot be determined.
     gain : float
         Log-likelihood gained by the common lag.
     gains : ndarray of shape (n_joints,)
         Log-likelihood that every joint gains by its own lag.
     halves : ndarray of shape (n_joints, 2), s
-        Lag in the slower and in the faster rows of every joint: a delay is the same in both, what
-        friction does when a joint turns is not.
+        Lag in the slower and in the faster rows of every joint: a delay is the same in both, unlike
+        friction at reversals.
     early, late : float, s
-        Common lag in the first and in the second half of the recordings; clocks of other rates
-        drift apart.
+        Common lag in the first and in the second half of the recordings; clocks with different
+        rates drift apart.
     drift_error : float, s
         Standard error of their difference.
     runs : dict of int to RunDelay
-        What every recording says.
+        Result of every recording.
     """
 
     common: float
@@ -211,13 +211,13 @@ def _run_costs(
         rows = run_of == run
         own = basis[rows]
         gram = np.eye(basis.shape[1]) - own.T @ own
-        gram[np.diag_indices(len(gram))] += 1e-3  # what only this recording moves is not known
+        gram[np.diag_indices(len(gram))] += 1e-3  # excited only by this recording
         bodies = np.linalg.solve(gram, whole - own.T @ y[rows])
         noise = float(np.mean((y[~rows] - basis[~rows] @ bodies) ** 2)) if (~rows).any() else 0.0
         if rows.sum() < FEWEST_OF_RUN or noise <= 0:
             continue
         left = torque[rows] - (own @ bodies)[:, None]
-        # what the bodies of the others are not known to costs nothing
+        # unknown parameters of the others' bodies have no penalty
         known = (left**2).sum(axis=0) - ((own.T @ left) ** 2).sum(axis=0)
         yield run, known / (2 * noise)
 
@@ -249,7 +249,7 @@ def _of_runs(squares: Mapping[int, list[Array]], counts: Mapping[int, int]) -> d
 
 
 class JointFit:
-    """Fits of all joints together to torques that are changed, with bodies that they share.
+    """Fits of all joints together to changed torques, with common bodies.
 
     Parameters
     ----------
@@ -296,7 +296,7 @@ class JointFit:
         return sum(fit.likelihood for fit in self.fit(samples))
 
     def left(self, samples: Array, fitted: Sequence[RobustFit]) -> Array:
-        """What fits leave of the torque of every sample, for the joints that are fitted."""
+        """Residual torque of every sample, for the fitted joints."""
         robot, s = self.fits.robot, self.signals
         parameters = np.zeros((robot.n_bodies, 10))
         for place, fit in zip(self.places, fitted, strict=True):
@@ -313,18 +313,18 @@ class JointFit:
 def refined_lag(fits: Fits, start: float, error: float, late: Sequence[int]) -> float:
     """Lag of some torques at which all joints together are explained best.
 
-    Bodies are the same for all joints here, and residuals Student's t, so that it is known better
-    than from joints one by one, and costs more. Where it is far from what joints say by themselves,
-    an effect that is missing has moved it, and it stays as it was.
+    Bodies are common to all joints here, and residuals have Student's t distribution, so that it is
+    more accurate than from single joints, but takes more time. If it is far from the lags of single
+    joints, a missing effect has influenced it, and it is not changed.
 
     Parameters
     ----------
     fits : Fits
         Rows.
     start : float, s
-        About how late they are.
+        Approximate lag.
     error : float, s
-        Standard error of that.
+        Standard error of the start.
     late : sequence of int
         Joints, from 0, whose torque is late; that of others is not.
 
@@ -364,14 +364,14 @@ def _spread(values: list[float]) -> float:
 
 
 def _sliding(fits: Fits, signals: Signals, joint: int) -> NDArray[np.bool_]:
-    """Rows in which a joint slides one way: friction turns while it sticks, before it moves."""
+    """Rows in which a joint slides in one direction; friction changes sign while it sticks."""
     speed = (signals.dq[:, joint] / signals.unit[joint]).reshape(fits.n_rows, -1)
     fast = np.abs(speed).min(axis=1) > SLIDING
     return np.asarray(fast & (np.abs(np.sign(speed).sum(axis=1)) == speed.shape[1]))
 
 
 def _bent_friction(signals: Signals, joint: int) -> Array:
-    """Friction that falls or rises with speed: taken for viscous it would look like a lead."""
+    """Friction that falls or rises with speed; as viscous friction it would look like a lead."""
     speed = signals.dq[:, joint] / signals.unit[joint]
     sign = np.tanh(speed / SIGN_BLUR)
     falling = [sign * np.exp(-np.abs(speed) / slow) for slow in (0.03, 0.1, 0.3)]
@@ -379,20 +379,20 @@ def _bent_friction(signals: Signals, joint: int) -> Array:
 
 
 def _lowest(cost: Array) -> float:
-    """Lag of least cost, between those tried by a parabola."""
+    """Lag of least cost, interpolated by a parabola."""
     k = int(np.argmin(cost))
     return float(LAGS[k] + float(LAGS[1] - LAGS[0]) * _bottom(cost, k))
 
 
 def _least(cost: Array) -> float:
-    """Least cost, between the lags that were tried."""
+    """Least cost, interpolated between the lags that were tried."""
     k = int(np.argmin(cost))
     step = _bottom(cost, k)
     return float(cost[k] - 0.25 * step * (cost[k - 1] - cost[k + 1]) if step else cost[k])
 
 
 def _bottom(cost: Array, k: int) -> float:
-    """Where a parabola through a cost and its neighbours is least, in their distance."""
+    """Minimum of a parabola through a cost and its neighbours, in units of their distance."""
     if k in (0, len(cost) - 1):
         return 0.0
     left, middle, right = cost[k - 1 : k + 2]

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whether another reading explains more than the physical effects that could look like it.
+"""Comparison of another reading with physical effects that could look like it.
 
-A contact moves the torque of a joint as another zero of its position does, and a spring between two
-joints as another sign. So a reading is held against every effect of the catalogue that needs
-nothing but motion, on the joints it is about. In both fits bodies may differ from those of the
-description: what only wrong bodies support gains nothing, and bodies of negative mass cannot take
-the place of a sign. How far they may differ is what explains most, so that a description that fits
-to 3 % in one reading and to 30 % in another supports the first.
+A contact changes the torque of a joint like another zero of its position, and a spring between two
+joints like another sign. So a reading is compared with every effect of the catalogue that needs
+only the motion, on the joints concerned. In both fits bodies may differ from those of the
+description: a reading that is supported only by wrong bodies has no gain, and bodies of negative
+mass cannot replace a sign. The permitted difference is the one with the largest likelihood, so that
+a description that fits to 3 % in one reading and to 30 % in another supports the first.
 """
 
 from __future__ import annotations
@@ -23,26 +23,26 @@ from skidyn.measurement._near_bodies import LOOSE, POWERS, ExtraColumns, Factore
 
 #: Mass of a payload, as a share of the robot's, and its distance in m (one standard deviation).
 CARRIED, AWAY = 0.1, 0.2
-#: Effects that are looked at more closely.
+#: Number of effects that are examined in detail.
 FINALISTS = 4
-#: What each parameter of an effect costs in log-likelihood: half the logarithm of some 150 rows.
+#: Penalty of each parameter of an effect in log-likelihood: half the logarithm of some 150 rows.
 COST = 2.5
 
 
 @dataclass(frozen=True)
 class Duel:
-    """A reading against the effect that takes most of its place.
+    """A reading compared with the effect that reduces its gain most.
 
     Attributes
     ----------
     gain : float
-        Log-likelihood that the reading gains over the log as it is, if bodies may differ.
+        Log-likelihood gain of the reading over the unchanged log, if bodies may differ.
     beside : float
-        What it gains where the effect is there as well, and where it is not: the lesser.
+        The smaller of its gains with and without the effect.
     rival : float
-        What the effect gains over the log as it is, less the cost of its parameters.
+        Gain of the effect over the unchanged log, minus the penalty of its parameters.
     effect : str
-        Title of the effect; empty if none takes anything of the reading's place.
+        Title of the effect; empty if none reduces the gain of the reading.
     """
 
     gain: float
@@ -59,11 +59,11 @@ def fight(fits: Fits, before: Reading, reading: Reading, joints: Sequence[int]) 
     fits : Fits
         Rows.
     before, reading : Reading
-        As the log is read, and as it is suspected to have to be read.
+        The present and the suspected reading of the log.
     joints : sequence of int
         Joints, from 0, on which effects are tried.
     """
-    # both have the scale of the torque that the reading asks for
+    # both have the scale of the torque that the reading implies
     gains = np.nan_to_num(fits.nominal(reading).gain)
     inflation = np.maximum(fits.identified(before).inflation, 1.0)
     here, there = (NearBodies(fits, r, gains, inflation) for r in (before, reading))
@@ -73,12 +73,12 @@ def fight(fits: Fits, before: Reading, reading: Reading, joints: Sequence[int]) 
 def duel_of(
     here: NearBodies, there: NearBodies, joints: Sequence[int], but: Sequence[str] = ()
 ) -> Duel:
-    """Hold one fit against another and the effects that could look like it.
+    """Compare one fit with another and with the effects that could look like it.
 
     Parameters
     ----------
     here, there : NearBodies
-        As the log is read, or the robot described, and as it is suspected to have to be.
+        The present and the suspected reading of the log, or description of the robot.
     joints : sequence of int
         Joints, from 0, on which effects are tried.
     but : sequence of str, default=()
@@ -94,14 +94,14 @@ def duel_of(
     for effect, columns, cost in _likely(here, joints, but=but):
         with_it = here.fit(columns).posterior
         rival, beside = with_it - cost - plain, there.fit(columns).posterior - with_it
-        # what only explains something else takes nothing of the reading's place
+        # an effect that explains something else does not reduce the gain of the reading
         if rival > 0 and beside < duel.beside:
             duel = Duel(gain, beside, rival, effect.title)
     return duel
 
 
 def left_by_effects(fits: Fits, joint: int, rows: NDArray[np.bool_]) -> tuple[float, float]:
-    """What some rows leave, and leave at best where an effect acts on their joint.
+    """Residual of some rows, and the least residual with an effect on their joint.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def left_by_effects(fits: Fits, joint: int, rows: NDArray[np.bool_]) -> tuple[fl
 
 
 def _effects() -> Iterator[Effect]:
-    """Effects of the catalogue that follow from the motion of every moment alone."""
+    """Effects of the catalogue that depend only on the present motion."""
     for kind in list_effects():
         effect = get_effect(kind)
         plain = not set(effect.needs) - {"robot"} and effect.search != "spectrum"
@@ -147,7 +147,7 @@ def _likely(
     rows: NDArray[np.bool_] | None = None,
     but: Sequence[str] = (),
 ) -> list[tuple[Effect, ExtraColumns, float]]:
-    """Effects on some joints that promise most, in their best shapes, and what they cost.
+    """The most promising effects on some joints, in their best shapes, with their penalties.
 
     Where rows are given, the effects are those that may act in one recording alone, in them.
     """
@@ -178,7 +178,7 @@ def _shapes(
 ) -> Iterator[ExtraColumns]:
     """Columns of an effect on some joints, in all shapes of its grid."""
     signals, fits = bodies.signals, bodies.fits
-    robot = signals.robot if effect.kind == "payload" else None  # it is but another body
+    robot = signals.robot if effect.kind == "payload" else None  # it is only another body
     if robot is not None:
         masses = np.asarray(robot.inertial_parameters, dtype=float).reshape(-1, 10)[:, 0]
         known = CARRIED * float(masses.sum()) * AWAY**POWERS
@@ -187,18 +187,18 @@ def _shapes(
             continue
         if effect.scope != "robot" and any(effect.not_shown(signals, j) for j in site):
             continue
-        # a payload or a wrench is tried in all recordings: those without it are known then
+        # a payload or a wrench is tried in all recordings
         grid = effect.grid(signals, site) if effect.search == "grid" else [{}]
         for shape in grid:
             if not effect.admissible(signals, site, shape):
                 continue
             coefficients = effect.coefficients_of(shape)
             if len(coefficients) > len(effect.coefficients):
-                continue  # a form with more of them takes the place of anything in a simple motion
+                continue  # a form with more of them could explain anything in a simple motion
             spread = np.full(len(coefficients), np.inf) if robot is None else known
             positive = tuple(k for k, c in enumerate(coefficients) if c.sign == 1)
             if robot is not None:
-                # what one recording lacks of a load, the others may carry: its mass is negative
+                # a load missing in one recording may be present in the others: its mass is negative
                 positive = (0,) if rows is None else ()
             columns = {
                 j: fits.average(np.asarray(values))

@@ -14,16 +14,17 @@ from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._suspicion import Suspicion
 
-#: Share of the squared step of all positions that lies along their velocities, so that a step says
-#: how much time it took, with two joints and with more.
+#: Least share of the squared step of all positions along their velocities for a step to determine
+#: its time, with two joints and with more.
 ALONG_TWO, ALONG = 0.98, 0.9
-#: Steps of a position, in its scatter, from which single rows can be told.
+#: Steps of a position, in units of its scatter, from which single rows can be judged.
 CLEAR = 4.0
-#: Share of moving rows that go backwards in time, and that skip others, to be told and to be sure.
+#: Share of moving rows backwards in time, and of rows that skip others, for a suspicion and for
+#: certainty.
 BACKWARDS, SKIPPED, SURELY = 0.1, 0.004, 0.02
-#: How many times as often steps are two or more as they are none, or between one and two.
+#: Ratio of the number of steps of two or more to that of zero, or between one and two.
 OTHERS = 3.0
-#: How nearly the time of a step is a whole number of steps of the clock.
+#: Tolerance for the time of a step to be a whole number of steps of the clock.
 WHOLE = 0.25
 #: Steps from row to row, as shares of a joint's spread and of what velocities make of them, that
 #: rows in no order at all have.
@@ -32,7 +33,7 @@ LARGE, FASTER = 0.05, 5.0
 
 @dataclass(frozen=True)
 class Elapsed:
-    """Time that every step of the positions took by the recorded velocities, in steps of the clock.
+    """Time of every step of the positions according to the velocities, in steps of the clock.
 
     Attributes
     ----------
@@ -96,7 +97,7 @@ def elapsed_steps(measurement: Measurement) -> Elapsed | None:
 
 
 class LostRows(Check):
-    """Rows that are not in the order of time, or between which others were lost."""
+    """Rows in wrong order of time, or with lost rows between them."""
 
     name = "lost_rows"
     suspects = "rows that are not in the order of time, or between which rows are missing"

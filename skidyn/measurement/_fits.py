@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Averaged rows of a measurement, and how well a robot explains them in one reading or another.
+"""Averaged rows of a measurement, and fits of a robot to them in different readings.
 
 The torque of each joint is fitted as a multiple of the robot's own torque and its friction, rotor
 inertia and offset, all but the offset not negative: a negative friction would feed energy. Rows
-that no reading explains weigh little, because residuals are Student's t. Identified bodies are the
-second opinion: what only wrong masses in the description support, they do not confirm.
+that no reading explains have a low weight, because residuals have Student's t distribution. Fits
+with identified bodies are a second test, which does not confirm a reading that is supported only by
+wrong masses of the description.
 
 References
 ----------
@@ -29,42 +30,42 @@ from skidyn._signals import SIGN_BLUR, Array, Signals
 from skidyn.evidence import REST, smooth_motion
 from skidyn.robots import Robot, base_parameter_index, with_whole_turns
 
-#: Width of a row in s and the samples in it; rows used at most, over all stretches of the log.
+#: Width of a row in s and the samples in it; most rows used, over all intervals of the log.
 WIDTH, SAMPLES, MOST_ROWS = 0.125, 6, 1200
 #: Degrees of freedom of the residuals, and rounds of the fit.
 FREEDOM, ROUNDS = 4.0, 5
-#: Largest likeness of neighbouring rows: what bodies that are a little wrong leave is alike over
-#: seconds, and would make any log too short.
+#: Largest correlation of neighbouring rows: the residual of slightly wrong bodies is correlated
+#: over seconds, and would make any log too short.
 MOST_ALIKE = 0.875
-#: Columns of a joint beside those of the bodies: friction, rotor inertia and a constant.
+#: Columns of a joint in addition to those of the bodies: friction, rotor inertia and a constant.
 OWN = 4
 #: Fewest rows of a joint for a fit.
 FEWEST = 25
-#: Motions of which columns are kept.
+#: Number of motions whose columns are cached.
 KEPT = 2
-#: What of a reading does not concern the motion.
+#: Parts of a reading that do not concern the motion.
 _PLAIN: dict[str, Any] = {"flip_torque": frozenset(), "torque_order": None}
 
 
 @dataclass(frozen=True)
 class Reading:
-    """How the columns of a log are to be read; the default takes them as they are.
+    """A reading of the columns of a log; the default leaves them unchanged.
 
     Attributes
     ----------
     flip_motion, flip_torque : frozenset of int
         Joints, from 0, whose positions and velocities, or torques, have the opposite sign.
     order, torque_order : tuple of int or None
-        Column that holds each joint: of all signals, and of the torque beside that.
+        Column of each joint: for all signals, and for the torque in addition.
     summed : tuple of (int, int)
-        Joints whose position holds that of the joint before as well, and its sign: angles against
-        the base, as of arms whose links are driven by parallelograms.
+        Joints whose position includes that of the previous joint, and its sign: angles relative to
+        the base, as for arms whose links are driven by parallelograms.
     zero : tuple of (int, float)
-        Joints and what their position reads at the robot's zero.
+        Joints and their recorded positions at the robot's zero.
     gravity : tuple of float or None
         Gravity in the base frame, m/s^2; the robot's own if None.
     size, stretch : float
-        Factors of positions, and of time, that are to be taken off.
+        Factors of positions, and of time, to be divided out.
     sized : frozenset of int or None
         Joints, from 0, whose positions have that factor; all if None.
     """
@@ -83,7 +84,7 @@ class Reading:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Fit of a reading, by column of the recorded torque, whichever joint it is read as.
+    """Fit of a reading, by column of the recorded torque, for any assignment to joints.
 
     Attributes
     ----------
@@ -96,7 +97,7 @@ class Outcome:
     scale : ndarray of shape (n_joints,)
         Scale of the residual.
     inflation : ndarray of shape (n_joints,)
-        By how much neighbouring rows that are alike make the likelihood look surer.
+        Overestimation of the likelihood due to correlated neighbouring rows.
     """
 
     likelihood: Array
@@ -106,10 +107,10 @@ class Outcome:
     inflation: Array
 
     def margin(self, other: Outcome) -> Array:
-        """By how much this reading is more likely than another, by joint.
+        """Log-likelihood gain of this reading over another, by joint.
 
-        Neighbouring rows are as alike as the more likely of the two leaves them, so that the margin
-        of the other over this one is the same with the opposite sign.
+        The correlation of neighbouring rows is that of the more likely one, so that the gain of the
+        other over this one is the same with the opposite sign.
         """
         change = self.likelihood - other.likelihood
         inflation = np.where(change > 0, self.inflation, other.inflation)
@@ -143,9 +144,10 @@ class Fits:
     recorded : Recorded
         Torque at the full rate, for rows at other times.
     left_out : frozenset of int
-        Columns of the torque, from 0, that are of no use.
+        Columns of the torque, from 0, that are not used.
     backend : {"numpy", "once"}, default="numpy"
-        How torques are computed; no program is worth writing for a robot that is only tried.
+        Method to compute torques; for a robot that is only tried, generating a program is not worth
+        its time.
     """
 
     robot: Robot
@@ -176,13 +178,13 @@ class Fits:
         return Fits(self.robot, self.signals, self.torque, self.moving, self.recorded, left_out)
 
     def of(self, robot: Robot) -> Fits:
-        """The same rows, for another robot with the same joints that is only tried."""
+        """The same rows, for another robot with the same joints, which is only tried."""
         return Fits(
             robot, self.signals, self.torque, self.moving, self.recorded, self.left_out, "once"
         )
 
     def thinned(self, count: int) -> Fits:
-        """Some of the rows, evenly over the log: enough to see what may be wrong."""
+        """Some of the rows, evenly over the log, for a first test."""
         step = self.n_rows // count
         if step < 2:
             return self
@@ -200,7 +202,7 @@ class Fits:
         return replace(self, torque=torque, _known={}, _fitted={})
 
     def with_gravity(self, reading: Reading) -> Fits:
-        """The same rows with the gravity torque of the stated bodies added, read as they are."""
+        """The same rows with the gravity torque of the stated bodies added."""
         pull = self.robot.gravity_torque(self.motion(reading).q)
         torque = self.torque.copy()
         for joint in range(self.n_joints):
@@ -222,7 +224,7 @@ class Fits:
         return np.asarray(total / SAMPLES)
 
     def motion(self, reading: Reading) -> Signals:
-        """Motion as a reading has it."""
+        """Motion in a reading."""
         order = list(reading.order or range(self.n_joints))
         sign = np.ones(self.n_joints)
         sign[list(reading.flip_motion)] = -1
@@ -244,7 +246,7 @@ class Fits:
         return s.with_(q=q - zero, dq=dq, ddq=ddq)
 
     def torque_column(self, reading: Reading, joint: int) -> tuple[int, float]:
-        """Column that holds the torque of a joint, and its sign."""
+        """Column of the torque of a joint, and its sign."""
         column = joint if reading.torque_order is None else reading.torque_order[joint]
         column = column if reading.order is None else reading.order[column]
         return column, -1.0 if joint in reading.flip_torque else 1.0
@@ -272,7 +274,7 @@ class Fits:
         return column not in self.left_out and int(self.moving[:, column].sum()) >= fewest
 
     def nominal(self, reading: Reading, rounds: int = ROUNDS) -> Outcome:
-        """Fit with the bodies that the robot's description states."""
+        """Fit with the bodies of the robot's description."""
         read = [(j, *self.torque_column(reading, j)) for j in range(self.n_joints)]
         read = [key for key in read if self.usable(key[1])]
         fits = self._joint_fits(replace(reading, **_PLAIN), read, rounds)
@@ -312,7 +314,7 @@ class Fits:
             own = self._own_torque(motion, s)
             sign = np.tanh(s.dq / (SIGN_BLUR * s.unit))
             parts = [own, *(self.average(x) for x in (s.dq, sign, s.ddq))]
-            while len(self._moved) >= KEPT:  # readings come one after the other
+            while len(self._moved) >= KEPT:  # readings are tried one after another
                 del self._moved[next(iter(self._moved))]
             self._moved[motion] = np.stack(parts, axis=1)
         return self._moved[motion]
@@ -350,7 +352,7 @@ class Fits:
         return self._parts[motion]
 
     def identified(self, reading: Reading) -> Outcome:
-        """Fit with bodies that are identified, alike for all joints."""
+        """Fit with identified bodies, common to all joints."""
         if reading not in self._known:
             self._known[reading] = self._identified(reading)
         return self._known[reading]
@@ -362,7 +364,7 @@ class Fits:
     def predicted_without(
         self, parts: Iterable[NDArray[np.bool_]]
     ) -> Iterator[dict[int, tuple[Array, float]]]:
-        """What bodies that are identified without some rows predict for these.
+        """Predictions for some rows by bodies identified without them.
 
         Parameters
         ----------
@@ -396,7 +398,7 @@ class Fits:
         return Fits(self.robot, signals, torque, self.moving[rows], recorded, self.left_out)
 
     def bodies(self) -> tuple[Array, dict[int, float]]:
-        """Identified coefficients of the log as it is, and scale of the residual by joint."""
+        """Identified coefficients of the unchanged log, and scale of the residual by joint."""
         joints, designs, places, targets = self._designs(Reading())
         fits = fit_together(designs, places, targets)
         found = np.zeros(1 + max((int(place.max()) for place in places), default=0))
@@ -405,7 +407,7 @@ class Fits:
         return found, {k: fit.scale for k, fit in zip(joints, fits, strict=True)}
 
     def residuals(self, bodies: Array, reading: Reading) -> dict[int, Array]:
-        """What identified coefficients leave of the torque of every joint, read in some way."""
+        """Residual torque of identified coefficients for every joint, in some reading."""
         robot, s = self._robot(reading), self.motion(reading)
         base = base_parameter_index(robot)
         parameters, own = np.zeros((robot.n_bodies, 10)), np.zeros((self.n_joints, OWN))
@@ -428,7 +430,7 @@ class Fits:
         return replace(self.robot, gravity=np.asarray(reading.gravity))
 
     def _own_columns(self, s: Signals, joint: int) -> Array:
-        """Mean columns of what a joint has beside the bodies, shape (n_rows, OWN)."""
+        """Mean columns of a joint in addition to those of the bodies, shape (n_rows, OWN)."""
         return self.average(np.column_stack([friction(s, joint), np.ones(len(s.q))]))
 
     def _designs(
@@ -448,9 +450,9 @@ class Fits:
         return [read[j][0] for j in joints], designs, places, targets
 
     def _felt_columns(self, motion: Reading) -> list[tuple[Array, NDArray[np.int64]]]:
-        """Mean columns of what every joint feels, and the places of their coefficients.
+        """Mean columns that act on every joint, and the indices of their coefficients.
 
-        Those of the last motion are kept: readings of the torque share them.
+        Those of the last motion are cached, since readings of the torque share them.
         """
         if motion not in self._felt:
             self._felt.clear()
@@ -496,7 +498,7 @@ class RobustFit:
 
     @cached_property
     def inflation(self) -> float:
-        """By how much neighbouring rows that are alike make the likelihood look surer."""
+        """Overestimation of the likelihood due to correlated neighbouring rows."""
         return _inflation(self.residual)
 
 
@@ -508,7 +510,7 @@ def friction(signals: Signals, joint: int) -> Array:
 
 
 def make_fits(signals: Signals, torque: Array, robot: Robot) -> Fits | None:
-    """Rows of a measurement; None where no stretch of it is long enough.
+    """Rows of a measurement; None if no interval of it is long enough.
 
     Parameters
     ----------
@@ -530,7 +532,7 @@ def make_fits(signals: Signals, torque: Array, robot: Robot) -> Fits | None:
     blocks = np.concatenate(parts) if parts else np.zeros((0, SAMPLES), dtype=int)
     if len(blocks) < FEWEST:
         return None
-    if len(blocks) > MOST_ROWS:  # stretches of rows from everywhere in the log
+    if len(blocks) > MOST_ROWS:  # intervals of rows from all parts of the log
         blocks = blocks[_stretches(len(blocks))]
     rows_used = blocks.ravel()
     taken = motion.take(rows_used).with_(robot=None)
@@ -559,7 +561,7 @@ def running_mean(values: Array, width: int) -> Array:
 
 
 def fit_admissible(columns: Array, y: Array, rounds: int = ROUNDS) -> RobustFit:
-    """Robust fit with an offset that may be anything and coefficients that are not negative."""
+    """Robust fit with a free offset and coefficients that are not negative."""
     size = np.linalg.norm(columns, axis=0)
     size[size == 0] = 1.0
     a = columns / size
@@ -610,7 +612,7 @@ def fit_at_once(columns: Array, y: Array, use: NDArray[np.bool_]) -> list[Robust
 
 
 def _not_negative(gram: Array, right: Array) -> Array:
-    """Least squares without negative coefficients: the best of all sets of columns that give none.
+    """Least squares without negative coefficients: the best of all admissible sets of columns.
 
     Parameters
     ----------
@@ -692,7 +694,7 @@ def student(residual: Array, scale: float) -> float:
 
 
 def robust_likelihood(residual: Array) -> float:
-    """Log-likelihood of residuals at the scale at which it is about greatest."""
+    """Log-likelihood of residuals at approximately the best scale."""
     scale = float(np.std(residual)) + 1e-12
     for _ in range(ROUNDS):
         weight = (FREEDOM + 1) / (FREEDOM + (residual / scale) ** 2)
@@ -701,7 +703,7 @@ def robust_likelihood(residual: Array) -> float:
 
 
 def _inflation(residual: Array) -> float:
-    """Variance inflation of a mean of rows, from the likeness of neighbouring rows."""
+    """Variance inflation of a mean of rows, from the correlation of neighbouring rows."""
     if len(residual) < FEWEST:
         return 1.0
     r = residual - np.median(residual)

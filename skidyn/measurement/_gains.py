@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Scales of torques, refined together with bodies that all joints share.
+"""Scales of torques, refined together with common bodies of all joints.
 
-What a torque is of that of the stated bodies says its scale to as many per cent as these bodies are
-off. Joints that move the same bodies tell scales against each other far better, so that bodies near
-the description and scales are found together.
+The ratio of a torque to that of the stated bodies gives its scale with the relative error of these
+bodies. Joints that move the same bodies determine relative scales far better, so bodies near the
+description and scales are found together.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from skidyn._signals import Array
 from skidyn.measurement._fits import Fits, Reading
 from skidyn.measurement._near_bodies import ExtraColumns, Factored, NearBodies
 
-#: Steps at most, the largest one, and that which ends them.
+#: Most steps, the largest one, and the one that ends them.
 STEPS, FARTHEST, CLOSE = 8, 0.3, 1e-3
-#: Shares of their masses and lengths to which bodies are known: scales should follow from how
-#: joints feel the same bodies, and not from how far bodies are off.
+#: Relative uncertainty of bodies, so that scales follow from common bodies of joints and not from
+#: errors of bodies.
 SHARE = 1.0
 #: How far a scale may be from that of the stated bodies, as a share of it (one standard deviation).
 KNOWN_TO = 0.5
@@ -32,12 +32,12 @@ ROUND, NEARLY, ALIKE, KNOWN, FAR = 1.5, 0.01, 0.1, 0.1, 3.0
 
 @dataclass(frozen=True)
 class Scales:
-    """Scales of torques, and how well they are known.
+    """Scales of torques with their standard errors.
 
     Attributes
     ----------
     gains : dict of int to float
-        What each torque is of that of the robot, by joint from 0.
+        Ratio of each torque to that of the robot, by joint from 0.
     errors : dict of int to float
         Standard errors of their logarithms; where all torques are at another scale, against their
         mean.
@@ -48,9 +48,9 @@ class Scales:
 
     @property
     def factors(self) -> dict[int, float]:
-        """Factors that take the scales off; one for all where they do not differ.
+        """Factors that remove the scales; one for all if they do not differ.
 
-        A round number near by is taken for a single one that is not known better.
+        A nearby round number is used for a single one that is not known better.
         """
         logs = np.log([self.gains[k] for k in self.gains])
         errors = np.array([self.errors[k] for k in self.gains]) + 1e-4
@@ -61,7 +61,7 @@ class Scales:
         if known.sum() > 1 and np.all(apart < np.where(known, ALIKE, FAR * errors)):
             one = _rounded(float(np.exp(-common)), float(np.sum(errors**-2) ** -0.5))
             return dict.fromkeys(self.gains, one)
-        if len(logs) > 1:  # what they are against each other is known better than any of them
+        if len(logs) > 1:  # their ratios are known better than any of them
             return {k: float(f"{1 / gain:.4g}") for k, gain in self.gains.items()}
         return {k: _rounded(1 / gain, self.errors[k]) for k, gain in self.gains.items()}
 
@@ -122,7 +122,7 @@ def refined_scales(fits: Fits, gains: Mapping[int, float], free: Mapping[int, fl
 
 
 def _rounded(factor: float, error: float) -> float:
-    """A factor, or the number of two digits, or reciprocal of one, that it may as well be."""
+    """A factor, or an equally likely number of two digits or its reciprocal."""
     near = (float(f"{factor:.2g}"), 1 / float(f"{1 / factor:.2g}"))
     best = min(near, key=lambda x: abs(x / factor - 1))
     within = abs(best / factor - 1) < min(NEARLY, ROUND * error)

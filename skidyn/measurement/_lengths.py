@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Check of the lengths of links: those at which bodies near the stated ones explain the torque.
+"""Check of the lengths of links, by the torque of bodies near the stated ones.
 
-Bodies cannot make up for all of a wrong length: the inertia that joints feel of each other depends
-on it. So the factor of every length is found step by step, together with the bodies, and both pay
-for how far they are from the description. A length that no torque depends on, such as that before
-the last joints of a wrist, stays as it is and nothing is said of it.
+Bodies cannot fully compensate a wrong length, because the coupling inertia of joints depends on it.
+So the factor of every length is found step by step, together with the bodies, and both have a
+penalty for the distance from the description. A length on which no torque depends, such as that
+before the last joints of a wrist, is not changed and not reported.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ from skidyn.robots import Robot
 #: Factor, as a logarithm, to which the lengths of a description may be known (one standard
 #: deviation), the largest step of it, and how many steps are made.
 KNOWN_TO, STEP, ROUNDS = 0.2, 0.3, 3
-#: Logarithm of a factor that no description is wrong by: something else is.
+#: Largest logarithm of a factor; beyond it, something else is wrong.
 FARTHEST = 0.6
-#: Log-likelihood below which a step is not worth making.
+#: Least log-likelihood gain of a step.
 LITTLE = 4.0
 #: Least length, m, and the change of a factor for a slope.
 LEAST_LENGTH, SLOPE = 1e-3, 1e-3
 #: Log-likelihood that other lengths must gain with bodies near the stated ones, also where the
 #: effect is there that takes most of their place, and with any bodies.
 LEAST, CONFIRMED = 10.0, 3.0
-#: Standard errors, and share, by which a length must be off to be named.
+#: Least error of a length to be reported, in standard errors, and as a share.
 ERRORS, SHARE = 3.0, 0.03
 
 
@@ -47,11 +47,11 @@ class Stretched:
     Attributes
     ----------
     bodies : list of int
-        Bodies whose distance from their parent is found.
+        Bodies whose distance from their parent is estimated.
     factors, errors : ndarray of shape (n_bodies,)
         Logarithms of their factors, and standard errors.
     gain : float
-        Log-likelihood gained, less what the lengths cost.
+        Log-likelihood gain minus the penalty of the lengths.
     here, there : NearBodies
         Fits with the lengths of the description and with these.
     """
@@ -86,7 +86,7 @@ class Lengths(Check):
         confirmed = float(found.there.fits.identified(Reading()).margin(plain).sum())
         if confirmed < CONFIRMED:
             return
-        # any bodies are those with any payload
+        # arbitrary bodies include any payload
         duel = duel_of(
             found.here,
             found.there,
@@ -151,7 +151,7 @@ def find_lengths(fits: Fits) -> Stretched | None:
         factors = factors + np.clip(covariance @ right, -STEP, STEP)
         longer = fits.of(stretched(fits.robot, bodies, factors))
         there = NearBodies(longer, Reading(), gains, inflation)
-    # lengths are integrated out: those that are known well have less to choose from
+    # lengths are integrated out, which penalises uncertain ones
     cost = 0.5 * float(np.sum((factors / KNOWN_TO) ** 2))
     cost -= 0.5 * float(np.linalg.slogdet(covariance / KNOWN_TO**2)[1])
     gain = there.plain.posterior - here.plain.posterior - cost

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Low passes of first order: taken out of a channel, and told from a delay."""
+"""First-order low passes: removal from a channel, and distinction from a delay."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ TRIED, STEP, LEAST_STEP = (0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0), 0.1, 0.005
 def suspect_lowpass(
     check: Check, what: str, column: str, constant: float, evidence: str, joints: Iterable[int] = ()
 ) -> Suspicion:
-    """Suspicion that a channel went through a low pass, with the remedy that takes it out.
+    """Suspicion that a channel has passed a low pass, with the remedy that removes it.
 
     Parameters
     ----------
     check : Check
-        Under whose name it is said.
+        Check that reports it.
     what : str
-        The channel in words.
+        Text of the channel.
     column : str
         Its name in the remedy, such as ``"tau"`` or ``"q2"``.
     constant : float, s
         Time constant.
     evidence : str
-        What speaks for it.
+        Evidence for it.
     joints : iterable of int, default=()
         Joints, from 0.
     """
@@ -50,12 +50,12 @@ def suspect_lowpass(
 
 
 def without_lowpass(time: Array, values: Array, constant: float) -> Array:
-    """What a low pass of first order was given, from what came out of it.
+    """Input of a first-order low pass from its output.
 
     Parameters
     ----------
     time : ndarray of shape (n_samples,), s
-        Rising stamps of one stretch.
+        Increasing stamps of one interval.
     values : ndarray of shape (n_samples,) or (n_samples, n_channels)
         Filtered values.
     constant : float, s
@@ -64,7 +64,7 @@ def without_lowpass(time: Array, values: Array, constant: float) -> Array:
     Returns
     -------
     ndarray of the shape of ``values``
-        The first one is that which came out: what came before it is not known.
+        The first value is that of the output, because earlier values are unknown.
     """
     out = np.array(values, dtype=float)
     passed = 1 - np.exp(-np.diff(time) / constant)
@@ -74,13 +74,13 @@ def without_lowpass(time: Array, values: Array, constant: float) -> Array:
 
 
 def summit(likelihood: Callable[[float], float], tried: Sequence[float]) -> tuple[float, float]:
-    """Positive number at which a likelihood is greatest, and that likelihood.
+    """Positive number with the largest likelihood, and this likelihood.
 
     Parameters
     ----------
     likelihood : callable
     tried : sequence of float
-        Where it is looked for first.
+        Initial values.
     """
     best, log = max((likelihood(x), float(np.log(x))) for x in tried)
     step = STEP
@@ -94,17 +94,17 @@ def summit(likelihood: Callable[[float], float], tried: Sequence[float]) -> tupl
 
 
 def lowpass_of_torque(fits: Fits, lag: float, late: Sequence[int]) -> tuple[float, float]:
-    """Time constant of a low pass in the place of a delay, and log-likelihood gained over that.
+    """Time constant of a low pass instead of a delay, and its log-likelihood gain over the delay.
 
-    Bodies are fitted to the torque without the low pass. What they leave goes through it again, so
-    that both hypotheses are of the torque as it was recorded.
+    Bodies are fitted to the torque without the low pass. Their residual is filtered again, so that
+    both hypotheses refer to the recorded torque.
 
     Parameters
     ----------
     fits : Fits
         Rows.
     lag : float, s
-        About how late the torque seems to be.
+        Approximate lag of the torque.
     late : sequence of int
         Joints, from 0, whose torque is late.
     """
@@ -114,7 +114,7 @@ def lowpass_of_torque(fits: Fits, lag: float, late: Sequence[int]) -> tuple[floa
     step = float(np.median(steps))
     parts = np.split(np.arange(len(clock)), np.flatnonzero(np.abs(steps / step - 1) > 0.5) + 1)
 
-    from scipy.signal import lfilter  # half a second of imports that few logs need
+    from scipy.signal import lfilter  # its import takes half a second, and few logs need it
 
     def filtered(constant: float) -> float:
         torque = np.empty_like(source.torque)
@@ -150,5 +150,5 @@ def lowpass_of_torque(fits: Fits, lag: float, late: Sequence[int]) -> tuple[floa
 
     constant, best = summit(filtered, [share * lag for share in TRIED])
     _, other = summit(delayed, [share * lag for share in (0.8, 1.0, 1.2)])
-    # how late a low pass makes slow motion is known better than its form
+    # the delay of slow motion by a low pass is known better than its form
     return constant + still_late(constant), best - other

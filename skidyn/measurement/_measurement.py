@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The measurement that is checked, with quantities that several checks use."""
+"""The measurement to be checked, with quantities that several checks use."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from skidyn.robots import Robot
 
 
-#: Correlation of integrated velocity with position from which its slope is a scale, and how far
-#: the slopes of joints that share one may differ.
+#: Correlation of integrated velocity with position from which its slope is a scale, and largest
+#: difference of the slopes of joints with a common one.
 ALIKE, SHARED = 0.9, 0.05
 
 
@@ -97,13 +97,13 @@ class Measurement:
     frictionless: bool = field(default=False, repr=False)
     clock: float = field(default=1.0, repr=False)
     millimetres: set[int] = field(default_factory=set, repr=False)
-    #: Rows to which positions leap; trajectories are taken to end there.
+    #: Rows to which positions jump; trajectories end before them.
     leaps: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         s = self.signals
         self.leaps = find_leaps(s.q, s.clock, s.trajectory)
-        if len(self.leaps):  # no other check should take a leap for motion
+        if len(self.leaps):  # no other check should interpret a jump as motion
             cut = np.zeros(s.n_samples, dtype=np.int64)
             cut[1:] = s.trajectory[1:] != s.trajectory[:-1]
             cut[self.leaps] = 1
@@ -164,7 +164,7 @@ class Measurement:
 
     @cached_property
     def whole(self) -> Signals:
-        """Motion without samples that leap away and back, which a diagnosis leaves out as well."""
+        """Motion without samples that jump away and back, which a diagnosis omits as well."""
         from skidyn.evidence import without_broken_positions  # with it all columns of the evidence
 
         return self.signals if self.signals.time is None else without_broken_positions(self.signals)
@@ -193,9 +193,9 @@ class Measurement:
 
     @cached_property
     def unwrapped(self) -> Array:
-        """Positions without leaps by a turn, where they stay within one.
+        """Positions without jumps by a turn, if they stay within one.
 
-        Of one that leaps, recordings may lie a turn apart as well.
+        Recordings of such a position may also differ by a turn.
         """
         q = self.whole.q.copy()
         turn = 2 * np.pi
@@ -225,13 +225,13 @@ class Measurement:
 
     @cached_property
     def excited(self) -> list[bool]:
-        """Which joints move enough to be identified."""
+        """Joints that move enough to be identified."""
         s = self.signals
         return [excited(s.q[:, k], s.dq[:, k], s.segments) for k in range(self.n_joints)]
 
     @cached_property
     def repeated(self) -> int:
-        """Rows that repeat all positions of the row before although joints move."""
+        """Rows that repeat all positions of the previous row although joints move."""
         s = self.signals
         return int(is_repeated(s.q, s.dq, s.trajectory).sum())
 

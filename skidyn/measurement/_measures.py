@@ -9,19 +9,19 @@ import numpy as np
 
 #: Windows over which velocity is compared with differentiated position, s.
 WINDOW = 0.05
-#: Share of rows that hold all torques to be told, and of those that hold any.
+#: Least share of rows that hold all torques to be reported, and of those that hold any.
 HELD, AT_ONCE = 0.2, 0.7
-#: A leap of a position is so many times farther than its steps before and after, so many times
-#: beyond what positions leave of even motion, and farther than this share of its range; recordings
-#: are joined in this many places at most, as a share of the rows.
+#: Least size of a jump of a position: as a multiple of its steps before and after, as a multiple of
+#: the deviation from even motion, and as a share of its range; most joined places,
+#: as a share of the rows.
 FARTHER, BEYOND, RANGE, PLACES = 4.0, 8.0, 1e-3, 2e-3
-#: Share of zeros among torques from which they come by themselves; way of a joint, as a share of
-#: its range, while torques that do not change are not measured.
+#: Share of zeros among torques above which zeros are normal; travel of a joint, as a share of its
+#: range, during which constant torques are not measured.
 MOSTLY_ZERO, IDLE_WAY = 0.3, 0.01
-#: Rows, and time in s, at an end of a recording in which no torque changes, to be told.
+#: Least rows, and time in s, at an end of a recording without changes of torque, to be reported.
 IDLE_ROWS, IDLE_TIME = 8, 0.05
-#: Steps that a position may be held before it catches up, and the share of the way that its
-#: velocity makes of a usual step by which it then moves on.
+#: Most steps that a position may be held before it catches up, and the share of the distance that
+#: its velocity implies by which it then moves on.
 CATCH_UP, CAUGHT = 5, 0.3
 
 
@@ -85,7 +85,7 @@ def _caught_up(
 
 
 def is_held(torque: np.ndarray, moved: np.ndarray) -> np.ndarray:
-    """Rows in which all torques at once are those of the row before, as a mask.
+    """Rows in which all torques equal those of the previous row, as a mask.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def is_held(torque: np.ndarray, moved: np.ndarray) -> np.ndarray:
     same = same[:, changing]
     together = np.all(same, axis=1) & moved
     share, single = together.sum() / moved.sum(), same[moved].mean(axis=0)
-    # Joints that hold for reasons of their own do so together now and then.
+    # Joints that hold independently sometimes do so at the same time.
     by_chance = float(np.prod(single))
     at_once = share - by_chance > 0.5 * (float(single.min()) - by_chance)
     if share > HELD and share > AT_ONCE * single.max() and at_once:
@@ -118,9 +118,9 @@ def is_held(torque: np.ndarray, moved: np.ndarray) -> np.ndarray:
 def idle_rows(
     position: np.ndarray, torque: np.ndarray, time: np.ndarray, trajectory: np.ndarray
 ) -> np.ndarray:
-    """Rows at the ends of recordings in which torque was not measured yet, or any more, as a mask.
+    """Rows at the ends of recordings in which torque was not measured, as a mask.
 
-    Before drives are enabled every torque is zero; a recorder whose torques come late repeats the
+    Before drives are enabled every torque is zero; a logger that receives torques late repeats the
     first ones.
 
     Parameters
@@ -161,7 +161,7 @@ def idle_rows(
 
 
 def rest_share(velocity: np.ndarray) -> float:
-    """Share of rows in which a joint stands: below 0.5 % of its largest velocity."""
+    """Share of rows in which a joint is at rest: below 0.5 % of its largest velocity."""
     largest = np.abs(velocity).max()
     return float(np.mean(np.abs(velocity) <= 0.005 * largest)) if largest > 0 else 1.0
 
@@ -182,7 +182,7 @@ def longest_plateau_share(torque: np.ndarray, segments: Sequence[slice]) -> floa
     if span == 0:
         return 1.0
     at_limit = (torque >= torque.max() - 1e-6 * span) | (torque <= torque.min() + 1e-6 * span)
-    at_limit &= torque != 0  # the least magnitude is no limit
+    at_limit &= torque != 0  # the smallest magnitude is not a limit
     rows = 0
     for part in segments:
         edges = np.flatnonzero(np.diff(np.r_[0, at_limit[part].astype(int), 0]))
@@ -227,7 +227,7 @@ def excited(position: np.ndarray, velocity: np.ndarray, segments: Sequence[slice
 
 
 def _held_before(moved: np.ndarray) -> np.ndarray:
-    """How many steps without motion, of the last ``CATCH_UP``, come before every step."""
+    """Number of steps without motion among the last ``CATCH_UP`` before every step."""
     held = np.zeros(moved.shape, dtype=int)
     still = np.ones(moved.shape, dtype=bool)
     for back in range(1, CATCH_UP + 1):
@@ -238,7 +238,7 @@ def _held_before(moved: np.ndarray) -> np.ndarray:
 
 
 def find_leaps(q: np.ndarray, time: np.ndarray, trajectory: np.ndarray) -> np.ndarray:
-    """Rows to which positions leap from the row before, to stay there.
+    """Rows to which positions jump from the previous row and remain there.
 
     Parameters
     ----------
@@ -252,7 +252,7 @@ def find_leaps(q: np.ndarray, time: np.ndarray, trajectory: np.ndarray) -> np.nd
     Returns
     -------
     ndarray of int
-        Empty where no position leaps, or so many that it is no matter of joining.
+        Empty if no position jumps, or too many do for joined recordings.
     """
     n = len(q)
     if n < 20:

@@ -50,7 +50,7 @@ class ExtraColumns:
 
 @dataclass(frozen=True)
 class NearFit:
-    """A robust fit: what it is worth, its coefficients, normal equations, weights and residuals."""
+    """A robust fit: its likelihood, coefficients, normal equations, weights and residuals."""
 
     posterior: float
     coefficients: Array
@@ -68,11 +68,11 @@ class NearBodies:
     fits : Fits
         Rows.
     reading : Reading
-        How they are read.
+        Reading of the rows.
     gains : ndarray of shape (n_joints,)
         Scale of every column of the torque.
     inflation : ndarray of shape (n_joints,)
-        By how much rows of a column look surer than they are.
+        Overestimation of the information of rows of a column.
     """
 
     def __init__(self, fits: Fits, reading: Reading, gains: Array, inflation: Array) -> None:
@@ -104,7 +104,7 @@ class NearBodies:
             self.rows.append(use)
             self.designs.append(np.hstack([(own * size)[:, moved], (np.std(y) + 1e-12) * rubs]))
             self.places.append(np.append(moved, first + np.arange(4)))
-            self.positive += range(first, first + 3)  # negative friction would feed energy
+            self.positive += range(first, first + 3)  # negative friction would generate energy
             self.targets.append(sign * y - own @ stated)
 
     @cached_property
@@ -113,7 +113,7 @@ class NearBodies:
         return self.fit()
 
     def fit(self, extra: ExtraColumns | None = None) -> NearFit:
-        """Fit, with the columns of an effect where there are some."""
+        """Fit, with the columns of an effect if given."""
         return max((self.fit_to(share, extra) for share in KNOWN_TO), key=lambda f: f.posterior)
 
     def fit_to(self, share: float, extra: ExtraColumns | None = None) -> NearFit:
@@ -162,7 +162,7 @@ class NearBodies:
         departure = 0.5 * float(np.sum((found[bodies] / share) ** 2))
         if extra is not None:
             departure += 0.5 * float(np.sum(extra.precision * found[-extra.count :] ** 2))
-        # bodies are integrated out: a description that is known well has less to choose from
+        # bodies are integrated out, which penalises an uncertain description
         narrowed = 0.5 * float(np.linalg.slogdet(gram[bodies, bodies] * share**2)[1])
         return NearFit(sum(alike) - departure - narrowed, found, gram, weights, residuals, scales)
 
@@ -175,12 +175,12 @@ class NearBodies:
         return np.asarray(robot.inertial_parameters + found.reshape(-1, 10))
 
     def promise(self, extra: ExtraColumns, factor: Factored) -> float:
-        """About what columns gain: with the weights of the fit without them."""
+        """Approximate gain of columns, with the weights of the fit without them."""
         left, right = self.without_bodies(extra, factor)
         return 0.5 * float(right @ np.linalg.solve(left, right))
 
     def without_bodies(self, extra: ExtraColumns, factor: Factored) -> tuple[Array, Array]:
-        """Normal equations of columns from which what bodies and friction explain is taken off."""
+        """Normal equations of columns after elimination of bodies and friction."""
         m, plain = extra.count, self.plain
         own, right, cross = np.zeros((m, m)), np.zeros(m), np.zeros((self.size, m))
         for k, j in enumerate(self.joints):
@@ -224,7 +224,7 @@ class Factored:
 
 
 def solved(gram: Array, right: Array, positive: Sequence[int]) -> Array:
-    """Least squares in which coefficients that would be negative and must not are left out."""
+    """Least squares in which coefficients that would be negative, but must not, are left out."""
     free = np.ones(len(right), dtype=bool)
     found = np.zeros(len(right))
     for _ in range(len(positive) + 1):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Check of recordings against each other: one in other units, signs, or with another's torque."""
+"""Comparison of recordings: one with other units, signs, or the torque of another."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import asked_changes
 
-#: Fewest rows of a recording for a word on it.
+#: Fewest rows of a recording to be judged.
 FEWEST = 12
 #: Log-likelihood that another multiple must gain in a recording, and another zero, which is free.
 LEAST, SURE = 15.0, 40.0
-#: Least spread of what the other recordings predict, in residuals, for its multiple to be told.
+#: Least spread of what the other recordings predict, in residuals, for its multiple to be reported.
 CLEAR = 2.0
 #: Correlation with the prediction from which a recording is only at another scale, and below which
 #: it has nothing to do with it.
 SCALED, UNLIKE = 0.8, 0.4
 #: Multiples that are those of the other recordings, and the share of these that have one.
 ONE, MOST = (0.7, 1.4), 0.6
-#: Share of rows at the extreme torque from which its multiple in a recording says nothing.
+#: Share of rows at the extreme torque from which its multiple in a recording is meaningless.
 CUT = 0.1
 #: Residual of a recording over that of all from which its torque is of something else.
 LARGER = 3.0
@@ -38,7 +38,7 @@ LARGER = 3.0
 BETTER = 0.8
 #: Share of its residual that the best effect may leave, and still be what is odd in a recording.
 LEFT = 0.5
-#: Residual from which a different zero of a position is tried, and the least that is told, rad.
+#: Residual from which a different zero of a position is tried, and the least that is reported, rad.
 SHIFTED, LEAST_ZERO = 3.0, np.deg2rad(4)
 #: Error of identified bodies, as a share of the spread, from which recordings are predicted by the
 #: bodies of the others alone.
@@ -49,7 +49,7 @@ FAR = 50.0
 
 @dataclass(frozen=True)
 class Multiple:
-    """What the torque of a joint in a recording is of what all recordings predict."""
+    """Torque of a joint in a recording relative to the prediction from all recordings."""
 
     joint: int
     run: int
@@ -62,7 +62,7 @@ class Multiple:
 
 
 class OddRecording(Check):
-    """A recording whose torque is not that of the others."""
+    """A recording whose torque is inconsistent with the others."""
 
     name = "odd_recording"
     suspects = (
@@ -73,7 +73,7 @@ class OddRecording(Check):
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         if measurement.stale or measurement.lost or measurement.odd:
-            return  # what is left is that of the clock, or of another robot
+            return  # the rest is due to the clock, or another robot
         seen = explained(measurement)
         if seen is None:
             return
@@ -99,7 +99,7 @@ class OddRecording(Check):
                 if not (alike or one.spoils):
                     continue
                 if _clipped(measurement, one):
-                    continue  # its torque is another multiple because it is cut
+                    continue  # its torque has another multiple because it is saturated
                 within = USUAL[0] <= one.multiple <= USUAL[1]
                 if not within and one.gain > LEAST and abs(one.likeness) > SCALED:
                     scaled.append(one)
@@ -116,7 +116,7 @@ class OddRecording(Check):
                 shifted[worst.run] = zero
                 unlike = [one for one in unlike if one.run != worst.run]
         if shifted:
-            # what is read wrongly in all recordings may be felt most in one
+            # a wrong reading of all recordings may affect one most
             asked = sum(c.gain for c in asked_changes(measurement, seen.fits) if not c.other)
             shifted = {run: zero for run, zero in shifted.items() if zero[2] > asked}
         measurement.odd = bool(scaled or unlike or shifted)
@@ -143,7 +143,7 @@ class OddRecording(Check):
                 [one.joint for one in own],
             )
         if measurement.frictionless:
-            return  # what is left is that of another friction
+            return  # the rest is due to another friction
         for run in sorted({one.run for one in unlike} - {one.run for one in scaled}):
             own = [one for one in unlike if one.run == run]
             names = ", ".join(measurement.joint(one.joint) for one in own)
@@ -211,7 +211,7 @@ def _zero_of(fits: Fits, run: int) -> tuple[int, float, float] | None:
     worst = max(before, key=lambda k: before[k], default=None)
     if worst is None or value - plain < SURE or abs(angle) < LEAST_ZERO:
         return None
-    # bodies that know of this recording as well may explain it without another zero
+    # bodies identified with this recording may explain it without another zero
     elsewhere, everywhere = fits.only(~rows).residuals(bodies, Reading()), fits.bodies()[0]
     here = own.residuals(bodies, Reading(zero=((joint, angle),)))
     known = fits.residuals(everywhere, Reading())
@@ -236,7 +236,7 @@ def _rows_of(fits: Fits, run: int) -> NDArray[np.bool_]:
 def _multiples(seen: Explained) -> list[Multiple]:
     """Multiples of every joint and recording with enough rows."""
     fits, outcome = seen.fits, seen.identified
-    # one recording of a few spoils the bodies that all of them identify
+    # one of few recordings distorts the bodies identified from all of them
     apart = bool(np.any(seen.errors[1] > SPOILED))
     told = []
     runs = np.unique(fits.signals.trajectory)

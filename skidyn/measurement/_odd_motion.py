@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Check of recordings against each other: velocities, positions or a clock unlike the others'."""
+"""Comparison of recordings: velocities, positions or a clock unlike those of the others."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ LEAST_SPEED, LEAST_SWEPT = 0.02, 0.1
 
 
 class OddMotion(Check):
-    """A recording in which velocities, positions or the clock are not those of the others."""
+    """A recording with velocities, positions or a clock inconsistent with the others."""
 
     name = "odd_motion"
     suspects = (
@@ -108,7 +108,7 @@ def odd_motion(signals: Signals, position: Array) -> dict[int, dict[int, float]]
         for r in np.flatnonzero((scaled & (off > FAR)) | other).tolist():
             slope = float(slopes[r, k]) if scaled[r] else float("nan")
             found.setdefault(int(runs[r]), {})[k] = slope
-    # what differs in many is no matter of single recordings
+    # a difference in many is not one of single recordings
     return found if len(found) <= (1 - MOST) * len(runs) else {}
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Readings of a log that differ from the owner's in one thing, and the search for the best."""
+"""Readings of a log that differ from the user's in one respect, and search for the best."""
 
 from __future__ import annotations
 
@@ -15,30 +15,30 @@ from skidyn.measurement._duel import fight
 from skidyn.measurement._fits import Fits, Outcome, Reading, friction
 from skidyn.robots import Robot
 
-#: Log-likelihood, after the likeness of neighbouring rows is taken off, that a change must gain.
+#: Least log-likelihood gain of a change, corrected for the correlation of neighbouring rows.
 LEAST = 15.0
 #: What it must gain at least where identified bodies decide, by so much, and the share of a joint's
 #: residual that it then takes off.
 WEAKEST, DECISIVE, HALF = 3.0, 60.0, 0.5
 #: What it gains with stated bodies where identified ones, that could be negative, need not agree.
 OVERWHELMING = 100.0
-#: Changes of one joint that gain alike up to this, or this share, cannot be told apart.
+#: Changes of one joint whose gains differ by less than this, or this share, cannot be separated.
 TIED, ALIKE = 3.0, 0.05
-#: Share of the gain up to which another kind of change of the same joints may be meant as well.
+#: Share of the gain within which another kind of change of the same joints is equally possible.
 RIVALS = 0.2
-#: What a change must gain with identified bodies. Negative masses could take the place of torque
-#: with the opposite sign or of gravity that points up or is absent, so that these gain little.
+#: What a change must gain with identified bodies. Negative masses could replace torque with the
+#: opposite sign or gravity that points up or is absent, so that these gain little.
 NEEDED = {
     **dict.fromkeys(("motion_sign", "joint_sign", "order", "torque_order", "summed", "zero"), 10.0),
     **dict.fromkeys(("torque_sign", "gravity"), -3.0),
 }
-#: What a change must gain beside the one that gains most, as a share.
+#: Least gain of a change relative to the largest one, as a share.
 BESIDE = 0.3
-#: Share of gravity that a compensated torque may still hold: bodies are known to so much.
+#: Share of gravity that a compensated torque may still contain, the uncertainty of bodies.
 LEFT_OVER = 0.4
-#: Least share of a joint's spread that the new reading must take away.
+#: Least share of a joint's spread that the new reading must remove.
 LEAST_DROP = 0.15
-#: Strength of gravity, and the least angle that is no tilt of a table, degrees.
+#: Strength of gravity, and the largest tilt of a table, degrees.
 GRAVITY, LEAST_ANGLE = 9.81, 20.0
 #: Cosine of the angle to an axis from which gravity is along that axis.
 UPRIGHT = 0.995
@@ -46,9 +46,9 @@ UPRIGHT = 0.995
 PARALLEL = 0.999
 #: Offsets of a position that are tried, rad.
 OFFSETS = np.deg2rad([-135, -90, -45, -15, 15, 45, 90, 135, 180])
-#: What a reading may be instead if it gains little over bodies near those of the description.
+#: Alternative of a reading that gains little over bodies near those of the description.
 OTHER_BODIES = "bodies that differ from the description"
-#: Rounds of the fits that only rank, and how many changes are looked at more closely.
+#: Rounds of the fits for ranking, and number of changes that are examined in detail.
 SCREENED, FINALISTS = 1, 12
 #: Rows of these fits at least, and at most over the number of joints.
 FEWEST_ROWS, MOST_ROWS = 150, 2800
@@ -56,7 +56,7 @@ FEWEST_ROWS, MOST_ROWS = 150, 2800
 
 @dataclass(frozen=True)
 class Change:
-    """One thing in which a reading differs from the log as its owner reads it.
+    """One difference of a reading from that of the user.
 
     Attributes
     ----------
@@ -68,17 +68,17 @@ class Change:
     reading : Reading
         With this change and those found before it.
     gain, confirmed : float
-        Log-likelihood gained with the bodies of the description, and with identified ones.
+        Log-likelihood gain with the bodies of the description, and with identified ones.
     untuned : float
-        What it gains in few rows, of a zero at the best of the angles that all joints are tried at.
+        Its gain in few rows; of a zero, at the best of the angles tried for all joints.
     drop : float
-        Share of the residual's spread that it takes off, of the joint that gains most.
+        Share of the residual's spread that it removes, on the joint that gains most.
     rivals : tuple of str
-        Other kinds of change of the same joints that explain as much.
+        Other kinds of change of the same joints that explain equally much.
     other : str
-        What explains as much and is no reading, such as a physical effect; empty if nothing does.
+        An equally good explanation other than a reading, such as a physical effect; empty if none.
     restorable : bool
-        Of torque without gravity: it was taken off with the bodies of the description.
+        For torque without gravity: whether it was subtracted with the bodies of the description.
     """
 
     kind: str
@@ -96,9 +96,9 @@ class Change:
 def find_changes(fits: Fits) -> list[Change]:
     """Changes to the reading that explain the measurement better, the strongest first.
 
-    One change is made at a time, the one that gains most; what is left decides on the next. At the
-    end every change must still gain against the reading without it, and identified bodies must not
-    deny it.
+    One change is made at a time, the one that gains most; the residual determines the next. At the
+    end every change must still gain over the reading without it, and identified bodies must not
+    contradict it.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def find_changes(fits: Fits) -> list[Change]:
         best = _best(fits, reading)
         if best is None:
             break
-        # an exchange that goes further takes the place of the one before
+        # a more extensive exchange replaces the previous one
         found = [c for c in found if not (best.kind == c.kind and "order" in c.kind)]
         found.append(best)
         reading = best.reading
@@ -121,7 +121,7 @@ def find_changes(fits: Fits) -> list[Change]:
 def _best(fits: Fits, reading: Reading) -> Change | None:
     """The alternative that gains most and that identified bodies confirm.
 
-    Few rounds tell which alternatives to look at more closely.
+    Few rounds select the alternatives to be examined in detail.
     """
     here, few = fits.nominal(reading), fits.thinned(max(FEWEST_ROWS, MOST_ROWS // fits.n_joints))
     rough = few.nominal(reading, SCREENED)
@@ -153,12 +153,12 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
     absent = judged[0] if judged and judged[0].kind == "no_gravity" else None
     if absent is not None and absent.gain >= LEAST:
         if _without_gravity(fits, reading, here):
-            # identified bodies make up for what is left of it
+            # identified bodies compensate the rest of it
             restored, kept = _restored_gain(fits, absent.reading, reading)
             another = any(c.kind == "gravity" and c.gain > absent.gain - TIED for c in judged)
             if another and restored < LEAST:
-                return replace(absent, rivals=("gravity",))  # along it no joint feels a change
-            # where bodies of any mass explain the torque with gravity, those stated are wrong
+                return replace(absent, rivals=("gravity",))  # no torque depends on gravity along it
+            # if bodies of any mass explain the torque with gravity, the stated ones are wrong
             if kept > -TIED:
                 return replace(absent, restorable=restored > LEAST)
             judged = [c for c in judged if c.kind != "gravity"]
@@ -174,7 +174,7 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
         if change.gain < BESIDE * most and confirmed < DECISIVE:
             continue  # something else explains far more
         plain = change.gain >= OVERWHELMING and change.drop >= HALF
-        # any zero of a last joint is that of another body, which identified bodies are free to be
+        # a zero of a last joint is equivalent to another body, which identified bodies may be
         zero = change.kind == "zero" and _is_all(fits, change, before)
         plain &= NEEDED[change.kind] < 0 or zero
         if strong and (plain or confirmed >= NEEDED[change.kind]):
@@ -193,8 +193,8 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
 
 
 def _first(accepted: list[Change]) -> Change:
-    """The change that gains most; a fixed one goes before an angle that is free."""
-    # both are likelihoods of the same torque; turning all of it round changes nothing identified
+    """The change that gains most; a fixed one has priority over a free angle."""
+    # both are likelihoods of the same torque; reversing all of it changes nothing identified
     first = max(accepted, key=lambda c: c.gain + c.confirmed)
     close = max(TIED, ALIKE * first.gain)
     tied = [
@@ -207,9 +207,9 @@ def _first(accepted: list[Change]) -> Change:
 
 
 def _but_for_angle(change: Change, zero: Change) -> bool:
-    """Whether a change gains what a zero does before its angle is fitted.
+    """Whether a change gains as much as a zero before its angle is fitted.
 
-    A robot upside down is one whose first joint, about a level axis, is half a turn off.
+    A robot upside down is equivalent to half a turn of a first joint with a horizontal axis.
     """
     if zero.kind != "zero" or change.kind != "gravity" or change.reading.gravity is None:
         return False
@@ -218,7 +218,7 @@ def _but_for_angle(change: Change, zero: Change) -> bool:
 
 
 def _against_effects(fits: Fits, reading: Reading, here: Outcome, change: Change) -> Change | None:
-    """The change, with what else it may be; None where an effect, or other bodies, explain it."""
+    """The change with its alternatives; None if an effect, or other bodies, explain it."""
     most = int(np.argmax(fits.nominal(change.reading).margin(here)))
     duel = fight(fits, reading, change.reading, change.joints or (most,))
     if min(duel.gain, duel.beside) >= LEAST and duel.beside >= BESIDE * duel.gain:
@@ -233,7 +233,7 @@ def _against_effects(fits: Fits, reading: Reading, here: Outcome, change: Change
 def _refined(fits: Fits, change: Change) -> Change:
     """The zero of a position at which the robot explains the torque best, near one that was tried.
 
-    Halving steps: the likelihood has one summit within half a step of what was tried.
+    By halving steps, since the likelihood has one maximum within half a step.
     """
 
     def likelihood(reading: Reading) -> float:
@@ -245,7 +245,7 @@ def _refined(fits: Fits, change: Change) -> Change:
 def _sharpened(fits: Fits, change: Change) -> Change:
     """The zero at which identified bodies fit best: those of the description are not exact."""
     if change.confirmed < NEEDED["zero"]:
-        return change  # they follow any zero
+        return change  # they can represent any zero
 
     def likelihood(reading: Reading) -> float:
         return float(fits.identified(reading).likelihood.sum())
@@ -254,7 +254,7 @@ def _sharpened(fits: Fits, change: Change) -> Change:
 
 
 def _climbed(change: Change, likelihood: Callable[[Reading], float], degrees: float) -> Change:
-    """Angle of the last zero at the summit of a likelihood, by halving steps."""
+    """Angle of the last zero at the maximum of a likelihood, by halving steps."""
     *others, (joint, angle) = change.reading.zero
 
     def reading(angle: float) -> Reading:
@@ -276,7 +276,7 @@ UNEXPLAINED = 0.1
 
 
 def _is_all(fits: Fits, change: Change, identified: Outcome) -> bool:
-    """Whether stated bodies and another zero do what identified bodies do without it.
+    """Whether stated bodies with another zero are as good as identified bodies without it.
 
     Bodies that are not those stated look like another zero of their joint, but leave more.
     """
@@ -293,7 +293,7 @@ def _same_place(one: Change, other: Change) -> bool:
 
 
 def _all_gain(fits: Fits, change: Change, reading: Reading, here: Outcome) -> bool:
-    """Whether the columns that other joints get now are what is explained better by them."""
+    """Whether the gain is due to the columns that the joints now get."""
     if "order" not in change.kind:
         return True
     there = fits.nominal(change.reading)
@@ -313,7 +313,7 @@ def _drop(before: Outcome, after: Outcome) -> float:
 
 
 def _alternatives(fits: Fits, reading: Reading, here: Outcome) -> Iterator[Change]:
-    """Readings that differ from one in a single thing."""
+    """Readings that differ from one in a single respect."""
     joints = range(fits.n_joints)
     for j in joints:
         own = frozenset([j])
@@ -322,7 +322,7 @@ def _alternatives(fits: Fits, reading: Reading, here: Outcome) -> Iterator[Chang
         yield Change("motion_sign", (j,), replace(reading, flip_motion=flip_motion))
         both = replace(reading, flip_torque=flip_torque, flip_motion=flip_motion)
         yield Change("joint_sign", (j,), both)
-    # one at a time they would contradict each other: all of them is another convention
+    # single ones would contradict each other; all of them are another convention
     every = replace(reading, flip_torque=frozenset(joints) ^ reading.flip_torque)
     yield Change("torque_sign", tuple(joints), every)
     yield from _orders(fits, reading)
@@ -342,7 +342,7 @@ def _alternatives(fits: Fits, reading: Reading, here: Outcome) -> Iterator[Chang
 
 
 def _parallel(robot: Robot) -> Iterator[tuple[int, int]]:
-    """Turning joints about an axis parallel to that before, and whether it points the same way."""
+    """Revolute joints with an axis parallel to the previous one, and its relative direction."""
     tree, turning = robot.tree, [kind == "revolute" for kind in robot.joint_types]
     if len(tree.parents) != robot.n_joints:
         return  # bodies that mimic others have no columns of their own
@@ -380,7 +380,7 @@ def _gravities(fits: Fits, reading: Reading, here: Outcome) -> Iterator[Change]:
     own = np.asarray(fits.robot.gravity, dtype=float)
     known = bool(np.linalg.norm(own))
     if known:
-        # first, so that it goes before a direction in which no joint feels gravity
+        # first, so that it has priority over a direction of gravity without torque
         yield Change("no_gravity", (), replace(reading, gravity=(0.0, 0.0, 0.0)))
     directions = [sign * axis for axis in np.eye(3) for sign in (-1.0, 1.0)]
     best = fitted_gravity(fits, reading, here)
@@ -396,15 +396,15 @@ def _gravities(fits: Fits, reading: Reading, here: Outcome) -> Iterator[Change]:
 
 
 def _without_gravity(fits: Fits, reading: Reading, here: Outcome) -> bool:
-    """Whether the gravity that fits best is but a small part of the robot's own."""
+    """Whether the gravity that fits best is only a small part of the robot's own."""
     best, own = fitted_gravity(fits, reading, here), np.asarray(fits.robot.gravity, dtype=float)
     return best is not None and abs(float(best @ own / (own @ own))) < LEFT_OVER
 
 
 def _restored_gain(fits: Fits, without: Reading, reading: Reading) -> tuple[float, float]:
-    """Log-likelihood gained if stated bodies, and not the robot's own, took gravity off.
+    """Log-likelihood gain if gravity was subtracted with stated bodies, not the robot's own.
 
-    Beside it that which the likelier of both gains over the log as it is, with bodies of any mass.
+    Also returns the gain of the likelier of both over the unchanged log, with bodies of any mass.
     """
     whole = fits.with_gravity(without).identified(replace(without, gravity=None))
     absent, present = fits.identified(without), fits.identified(reading)

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Check whether torque was smoothed: dry friction then begins to turn before its joint does.
+"""Check for smoothed torque: dry friction then begins to change before its joint reverses.
 
-Dry friction turns where a joint does. What friction does when a joint turns (presliding) comes
-after it and takes a way; a low pass without delay spreads the step over the same time before and
-after, in all joints alike. Left alone, it gets the name of a presliding friction. Friction that
-follows the speed, which falls or rises as the joint comes to rest, changes before the turn as well,
-but by the speed and not by time: it is fitted, too.
+Dry friction changes its sign when a joint reverses. Presliding comes after the reversal and takes a
+distance; a low pass without delay spreads the step over the same time before and after, equally in
+all joints. Without this check it would be reported as presliding friction. Friction that depends on
+the speed, which falls or rises as the joint comes to rest, changes before the reversal as well, but
+with the speed and not with time: it is fitted, too.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ WIDTHS = 0.01 * 2.0 ** np.arange(6)
 WAYS = np.array([0.001 * 2.0**k for k in range(8)])
 #: Speeds, rad/s (a tenth in m/s), below which friction fades or grows, and by how many times.
 SPEEDS, TIMES = 0.02 * 2.0 ** np.arange(5), (1.0, 3.0, 10.0)
-#: Half of the time around a turn that is looked at, s, and the degree of what else is there.
+#: Half of the time around a reversal, s, and degree of the polynomial for other torques.
 AROUND, DEGREE = 0.4, 3
 #: Turns of a joint, at least and at most; samples around each at least.
 FEWEST, MOST, SAMPLES = 6, 60, 15
@@ -49,16 +49,16 @@ LATE = 0.012
 
 @dataclass(frozen=True)
 class Turns:
-    """What friction in different forms explains around the turns of a joint.
+    """Likelihood of different forms of friction around the reversals of a joint.
 
     Attributes
     ----------
     step : float
-        Log-likelihood of friction that turns at once.
+        Log-likelihood of friction that changes at once.
     smoothed : ndarray of shape (n_widths,)
-        That of smoothed friction.
+        Log-likelihood of smoothed friction.
     other : float
-        That of the best other friction: of presliding, or of one that follows the speed.
+        Log-likelihood of the best other friction: presliding, or one that depends on the speed.
     """
 
     step: float
@@ -67,12 +67,12 @@ class Turns:
 
     @property
     def width(self) -> int:
-        """Place of the best width."""
+        """Index of the best width."""
         return int(np.argmax(self.smoothed))
 
     @property
     def gain(self) -> float:
-        """What smoothing gains over what friction can do by itself, and over hardly any of it."""
+        """Gain of smoothing over friction alone, and over very weak smoothing."""
         friction = max(self.step, self.other, float(self.smoothed[0]))
         return float(self.smoothed.max()) - friction
 
@@ -93,9 +93,9 @@ class SmoothedTorque(Check):
             return
         delay = measured_delay(measurement)
         if delay is not None and delay.common > LATE:
-            return  # a filter that makes late is told as such
+            return  # a filter with delay is reported by another check
         found = {}
-        motion = smooth_motion(measurement.signals)  # noise would blur when a joint turns
+        motion = smooth_motion(measurement.signals)  # noise would shift reversals
         step = column_step(motion, AROUND, motion.half_width)
         index, few = motion.thinned(step)
         torque = running_mean(measurement.torque, step)[index]
@@ -137,7 +137,7 @@ def at_turns(signals: Signals, torque: Array, joint: int) -> Turns | None:
     Returns
     -------
     Turns or None
-        None where it turns too seldom.
+        None if it reverses too rarely.
     """
     dq = signals.dq[:, joint]
     steps = np.diff(signals.clock)
@@ -203,7 +203,7 @@ def _without(values: Array, slow: Array) -> Array:
 
 
 def _likelihood(f: Array, y: Array) -> tuple[float, Array]:
-    """Log-likelihood of one size of friction, and what it leaves."""
+    """Log-likelihood of one size of friction, and its residual."""
     weight = np.ones(len(y))
     scale, rest = 1.0, y
     for _ in range(5):

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a check suspects about a measurement, and the option that fixes it."""
+"""Suspicions of checks about a measurement, and the options that fix them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any, Literal
 
-#: ``certain``: the measurement is not what its names and units say, and no diagnosis of it is true.
-#: ``suspected``: it probably is not. ``noted``: it is, but there is something it cannot tell.
+#: ``certain``: the measurement does not agree with its names and units, and no diagnosis of it is
+#: valid. ``suspected``: it probably does not. ``noted``: it does, but has a limitation.
 Certainty = Literal["certain", "suspected", "noted"]
 CERTAINTIES: tuple[Certainty, ...] = ("certain", "suspected", "noted")
 

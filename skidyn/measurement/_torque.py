@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks that fit the robot: sign, order, gravity, zero, scale and delay of what was recorded."""
+"""Checks that fit the robot: sign, order, gravity, zero, scale and delay of the recording."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ BELOW, TURNS = 0.01, 4
 CUT = 0.05
 #: Log-likelihood that the magnitude must gain over the torque itself, and to be sure.
 LEAST, SURE = 15.0, 40.0
-#: Share of a torque's spread that the robot must explain for its multiple to be told.
+#: Share of a torque's spread that the robot must explain for its multiple to be reported.
 EXPLAINED = 0.5
-#: Multiples of the robot's own torque that wrong masses may well make.
+#: Multiples of the robot's own torque that may be due to wrong masses.
 USUAL = (0.4, 2.5)
 #: Factors of units of torque.
 UNITS = {1e3: "Nmm", 1e2: "Ncm", 1e-3: "kNm"}
-#: Smallest delay that is told, s, how many standard errors it must have, and how far the lag of a
-#: joint may be from it.
+#: Smallest delay that is reported, s, how many standard errors it must have, and how far the lag of
+#: a joint may be from it.
 SMALLEST, ERRORS, ALIKE = 0.004, 5.0, 0.006
 #: How many standard errors lags in the halves of recordings must differ by: that there is a lag is
 #: known then.
@@ -59,7 +59,7 @@ WHOLE, MOST_WHOLE = 4e-4, 0.1
 
 
 class UnsignedTorque(Check):
-    """Magnitudes in the place of torques, as servos report their current."""
+    """Magnitudes in place of torques, as for currents reported by servos."""
 
     name = "unsigned_torque"
     of_sensor = True
@@ -103,7 +103,7 @@ class UnsignedTorque(Check):
 
 
 def _cut(torque: Array) -> float:
-    """Share of zeros beyond those of a coarse magnitude, which has as many of its first step."""
+    """Share of zeros beyond that of a coarse magnitude, which equals that of its first step."""
     least = float(torque[torque > 0].min(initial=np.inf))
     first = float(np.mean((torque > 0) & (torque < 1.5 * least)))
     return max(0.0, float(np.mean(torque == 0)) - 3 * first)
@@ -124,7 +124,7 @@ def cut_columns(measurement: Measurement) -> list[int]:
                 found.append(k)
     moving = {k for k, moves in enumerate(measurement.excited) if moves}
     others = [k for k in sorted(moving - set(found)) if measurement.torque[:, k].min() >= 0]
-    # among magnitudes, zeros are those of a joint that is at rest
+    # among magnitudes, zeros belong to a joint at rest
     return [] if len(others) >= 2 and moving <= {*found, *others} else found
 
 
@@ -133,10 +133,10 @@ def _turns(measurement: Measurement, k: int) -> int:
 
 
 def unsigned_columns(measurement: Measurement) -> tuple[list[int], dict[int, float]]:
-    """Columns of the torque that hold magnitudes, and how much likelihood a fit gains by it.
+    """Columns of the torque that contain magnitudes, and their log-likelihood gains.
 
-    A single column is told by a fit of the magnitude of the robot's torque; where no column of
-    three or more is ever negative although all joints reverse, none has a sign.
+    A single column is found by a fit of the magnitude of the robot's torque; if no column of three
+    or more is ever negative although all joints reverse, none has a sign.
     """
     if measurement.unsigned is None:
         measurement.unsigned = _unsigned(measurement)
@@ -163,12 +163,12 @@ def _unsigned(measurement: Measurement) -> tuple[list[int], dict[int, float]]:
                 gains[k] = gain
     enough = len(one_sided) >= 3 or max(gains.values(), default=0.0) > SURE
     if enough and set(moving) <= set(one_sided):
-        return one_sided, gains  # a recorder of magnitudes gives no column a sign
+        return one_sided, gains  # a logger of magnitudes records no sign in any column
     return sorted(gains), gains  # gravity alone may give one a single sign
 
 
 def _magnitude_gain(fits: Fits, k: int) -> float:
-    """Log-likelihood that the magnitude of the robot's torque gains over the torque itself."""
+    """Log-likelihood gain of the magnitude of the robot's torque over the torque itself."""
     if not fits.usable(k):
         return 0.0
     s = fits.motion(Reading())
@@ -180,7 +180,7 @@ def _magnitude_gain(fits: Fits, k: int) -> float:
     plain = max(fit_admissible(columns, sign * y).likelihood for sign in (1.0, -1.0))
     best = -np.inf
     size = float(np.abs(columns[:, 0]).mean()) + 1e-12
-    for share in (0.0, 0.3, 3.0):  # how much friction there is before anything is fitted
+    for share in (0.0, 0.3, 3.0):  # amounts of friction before any fit
         guess = columns[:, 0] + share * size * columns[:, 2]
         for _ in range(8):
             sign = np.where(guess < 0, -1.0, 1.0)
@@ -190,12 +190,12 @@ def _magnitude_gain(fits: Fits, k: int) -> float:
     return best - plain if np.isfinite(best) else 0.0
 
 
-#: Share of the torque left over that another zero must take off to be certain.
+#: Least share of the residual torque that another zero must remove to be certain.
 MOSTLY = 0.8
 
 
 class Columns(Check):
-    """Signs, order and zero of joints, and gravity, that are not those of the robot."""
+    """Signs, order and zero of joints, and gravity, that differ from those of the robot."""
 
     name = "reading"
     suspects = (
@@ -207,7 +207,7 @@ class Columns(Check):
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         fits = measurement.fits
         if fits is None or measurement.odd:
-            return  # recordings that contradict each other have no reading
+            return  # contradictory recordings have no common reading
         changes = asked_changes(measurement, fits)
         orders = [change for change in changes if change.kind in ORDERS]
         for kind in dict.fromkeys(change.kind for change in changes):
@@ -223,7 +223,7 @@ class Columns(Check):
     ) -> Suspicion:
         turned = [j for change in changes for j in change.joints]
         joints = sorted(set(turned))
-        if kind.endswith("_sign"):  # what was turned round twice is as it was
+        if kind.endswith("_sign"):  # a sign changed twice is unchanged
             joints = [j for j in joints if turned.count(j) % 2]
         names = ", ".join(measurement.joint(j) for j in joints)
         best = max(changes, key=lambda change: change.gain)
@@ -289,7 +289,7 @@ ORDERS = ("order", "torque_order")
 
 
 def _ordered(measurement: Measurement, final: Reading) -> tuple[str, tuple[str, str]]:
-    """What is said of columns in another order, and the remedy."""
+    """Text for columns in another order, and the remedy."""
     every = range(measurement.n_joints)
     motion = [k + 1 for k in (final.order or every)]
     torque = [final_column + 1 for final_column in _torque_order(final, every)]
@@ -316,7 +316,7 @@ def _torque_order(reading: Reading, every: Iterable[int]) -> list[int]:
     return [k if reading.order is None else reading.order[k] for k in own]
 
 
-#: What another reading of the same joints would mean.
+#: Meaning of another reading of the same joints.
 _RIVALS = {
     "torque_sign": "the torque with the opposite sign",
     "motion_sign": "the position with the opposite sign",
@@ -331,7 +331,7 @@ _RIVALS = {
 
 
 def _one_of_two(told: Suspicion, changes: Iterable[Change]) -> Suspicion:
-    """What is reported: one of two causes where something else explains the torque as well."""
+    """Text of the suspicion: one of two causes if another one explains the torque equally well."""
     others = dict.fromkeys(change.other for change in changes if change.other)
     if not others:
         return told
@@ -345,7 +345,7 @@ def _one_of_two(told: Suspicion, changes: Iterable[Change]) -> Suspicion:
 
 
 def asked_changes(measurement: Measurement, fits: Fits) -> list[Change]:
-    """Changes to the reading of all recordings that a measurement asks for."""
+    """Changes to the reading of all recordings that the measurement implies."""
     if measurement.changes is None:
         measurement.changes = find_changes(fits.without(_lost_columns(measurement)))
     return measurement.changes
@@ -379,7 +379,7 @@ def _lost_columns(measurement: Measurement) -> list[int]:
 
 
 class TorqueDelay(Check):
-    """Torque that is late or early against the motion, alike in all joints."""
+    """Torque that is late or early relative to the motion, equally in all joints."""
 
     name = "torque_delay"
     suspects = (
@@ -393,7 +393,7 @@ class TorqueDelay(Check):
         if found is None or fits is None or not np.isfinite(found.common):
             return
         if measurement.stale or measurement.computed or measurement.smoothed:
-            return  # held and interpolated values are late, or early, by themselves
+            return  # held and interpolated values are always late or early
         drift = found.late - found.early
         if abs(drift) > max(SMALLEST, DRIFTING * found.drift_error) and found.gain > LEAST:
             yield self.suspicion(
@@ -422,7 +422,7 @@ class TorqueDelay(Check):
         near = max(ALIKE, 0.3 * abs(found.common))
         alike = np.abs(found.joints[use] - found.common) < np.maximum(near, 2 * found.errors[use])
         weight = found.gains[use] / max(float(found.gains[use].sum()), 1e-12)
-        # where positions are late, the torque is early by as much, and not by itself
+        # if positions are late, the torque is early by the same time
         early = measurement.late_position
         if early and abs(found.common + early) < max(ALIKE, 0.3 * early):
             return
@@ -478,7 +478,7 @@ class TorqueDelay(Check):
             )
 
     def _late_command(self, lag: float, error: float, n_alike: int) -> Suspicion:
-        """A torque of servos that is early: it follows from commands that have not arrived yet."""
+        """A torque of servos that is early, since commands are used before their arrival."""
         return self.suspicion(
             "commands reach the servos later than the controller states, by about "
             f"{1e3 * lag:.0f} ms of delay or more",
@@ -500,7 +500,7 @@ class TorqueDelay(Check):
 
 
 def _lowpass(fits: Fits, lag: float, late: Sequence[int]) -> float | None:
-    """Time constant of a low pass that makes torque late; None where a delay explains it better."""
+    """Time constant of a low pass that delays torque; None if a pure delay is more likely."""
     if lag < FILTERED:
         return None
     constant, gain = lowpass_of_torque(fits, lag, late)
@@ -508,7 +508,7 @@ def _lowpass(fits: Fits, lag: float, late: Sequence[int]) -> float | None:
 
 
 def _whole(measurement: Measurement, lag: float) -> float:
-    """A lag, as a whole number of samples where it is near one: buffers delay by whole samples."""
+    """A lag, rounded to whole samples if it is close, since buffers delay by whole samples."""
     samples = lag * measurement.rate
     near = min(WHOLE * measurement.rate, MOST_WHOLE)
     return (
@@ -519,7 +519,7 @@ def _whole(measurement: Measurement, lag: float) -> float:
 
 
 def late_runs(found: Delay) -> dict[int, RunDelay]:
-    """Recordings whose torque is late or early by itself."""
+    """Single recordings with late or early torque."""
     odd = {
         run: one
         for run, one in found.runs.items()
@@ -536,9 +536,9 @@ def late_runs(found: Delay) -> dict[int, RunDelay]:
 
 
 def late_joints(found: Delay) -> list[int]:
-    """Joints whose torque is late or early by itself, from 0.
+    """Single joints with late or early torque, from 0.
 
-    Friction that turns late looks like a delay of its joint, but by another time where the joint is
+    Friction that changes late looks like a delay of its joint, but by another time if the joint is
     faster.
     """
     late = []

@@ -210,7 +210,7 @@ class PositionUnit(Check):
             )
 
     def _beyond_limits(self, measurement: Measurement, both: dict[str, str]) -> Iterator[Suspicion]:
-        """Positions far outside of the limits: in degrees, or of the motors before the gears."""
+        """Positions far outside the limits: in degrees, or of the motors before the gears."""
         turning, limits, known = _limits(measurement)
         largest = np.abs(measurement.signals.q).max(axis=0)
         named = [
@@ -219,7 +219,7 @@ class PositionUnit(Check):
         ]
         outside = _too_far(measurement, FAR) & ~np.array(named)
         if not outside.any():
-            return  # told by their velocities, joint by joint
+            return  # found by their velocities, joint by joint
         k = int(np.argmax(np.where(outside, largest / limits, 0)))
         where = f"the limit is {limits[k]:.3g} rad" if known[k] else "one turn is 6.28 rad"
         seen = f"q{k + 1} ({measurement.joint_names[k]}) reaches {largest[k]:.4g} rad where {where}"
@@ -355,7 +355,7 @@ def _sharpened(fits: Fits, size: float, joints: frozenset[int] | None) -> float:
         left, middle, right = (likelihood(log + x) for x in (-step, 0.0, step))
         bend = 2 * middle - left - right
         if bend <= 0:
-            return size  # bodies make up for any size
+            return size  # bodies compensate any size
         error = step / np.sqrt(bend)
         log += float(np.clip(0.5 * step * (right - left) / bend, -2 * step, 2 * step))
         step /= 2
@@ -378,14 +378,14 @@ def _round(factor: float) -> float:
 
 
 def _round_counts(counts: float) -> float:
-    """Power of two or round number of counts in a turn that counts are near."""
+    """Power of two or round number close to the counts of a turn."""
     digits = 10.0 ** max(0, np.floor(np.log10(counts)) - 1)
     near = (2.0 ** round(np.log2(counts)), round(counts / digits) * digits)
     return next((x for x in near if abs(x / counts - 1) < WHOLE), counts)
 
 
 class WrappedPosition(Check):
-    """Positions that leap by a turn at the border of a turn."""
+    """Positions that jump by a turn at its border."""
 
     name = "wrapped_position"
     suspects = "positions that jump by a full turn"
@@ -412,6 +412,6 @@ class WrappedPosition(Check):
 
 
 def unit_remedy(units: dict[str, str]) -> tuple[str, str]:
-    """The remedy that says units."""
+    """The remedy with units."""
     words = ",".join(f"{name}={unit}" for name, unit in units.items())
     return f"--units {words}", f"units={units}"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks of velocities against positions: sign, scale, order, delay, and leaps of positions."""
+"""Checks of velocities against positions: sign, scale, order, delay, and jumps of positions."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ from skidyn.measurement._units import (
 LEAST_MOTION, LEAST_SPEED = 0.02, 0.02
 #: Windows over which velocities are compared with positions, at most.
 WINDOWS = 3000
-#: Lags of the velocity that are tried, s; the least that is told, s and in time steps; the share
-#: of the difference that it takes away; joints that agree and how nearly, s.
+#: Lags of the velocity that are tried, s; the least that is reported, s and in time steps; the
+#: share of the difference that it takes away; joints that agree and how nearly, s.
 LAGS = np.linspace(-0.1, 0.1, 21)
 SMALLEST, STEPS, TAKEN, AGREEING, NEARLY = 0.006, 1.2, 0.3, 0.75, 0.01
-#: What a low pass leaves, as a share of what a delay leaves, to be told; how near constants of
-#: joints are that share one.
+#: Largest residual of a low pass to be reported, as a share of that of a delay; largest difference
+#: of a common time constant between joints.
 FILTERED, SAME_FILTER = 0.4, 0.15
 
 
@@ -92,7 +92,7 @@ class Velocity(Check):
             if k in measurement.millimetres:
                 continue
             if measurement.clock != 1 and _cause(slope, correlation) in ("scale", "other"):
-                continue  # to be told when time is in seconds
+                continue  # reported when time is in seconds
             groups.setdefault(_cause(slope, correlation), []).append(k)
         return [self._told(measurement, cause, joints) for cause, joints in groups.items()]
 
@@ -152,7 +152,7 @@ class Velocity(Check):
 
 
 def _runs_backwards(measurement: Measurement, joints: list[int]) -> bool:
-    """Whether the torque, too, is explained better if time runs the other way."""
+    """Whether the torque is also explained better with reversed time."""
     every = set(joints) >= {k for k, moves in enumerate(measurement.excited) if moves}
     fits = measurement.fits
     return every and fits is not None and gained(fits, Reading(stretch=-1.0)) > LEAST
@@ -169,7 +169,7 @@ def _constant(measurement: Measurement) -> list[int]:
 
 
 def _of_units(slope: float) -> bool:
-    """Whether a slope that all joints share is told as a unit of the clock or of positions."""
+    """Whether a common slope of all joints is reported as a unit of the clock or of positions."""
     return any(is_near(slope, factor) for factor in (*CLOCKS, *POSITIONS))
 
 
@@ -187,7 +187,7 @@ def _cause(slope: float, correlation: float) -> str:
 
 
 def _other_order(measurement: Measurement) -> list[int] | None:
-    """Column that holds the velocity of each joint, if they are exchanged; None otherwise."""
+    """Column of the velocity of each joint, if they are exchanged; None otherwise."""
     n = measurement.n_joints
     own = np.array([likeness for _, likeness in measurement.velocities])
     odd = [k for k in range(n) if measurement.excited[k] and abs(own[k]) < ALIKE]
@@ -214,7 +214,7 @@ def _other_order(measurement: Measurement) -> list[int] | None:
 
 
 class VelocityDelay(Check):
-    """Velocities that are late or early against the positions, alike in all joints."""
+    """Velocities that are late or early relative to the positions, equally in all joints."""
 
     name = "velocity_delay"
     suspects = (
@@ -223,7 +223,7 @@ class VelocityDelay(Check):
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         if measurement.stale:
-            return  # what is held or interpolated is late by itself
+            return  # held or interpolated values are always late
         lags = {
             k: _lag(measurement.signals, k)
             for k, (slope, likeness) in enumerate(measurement.velocities)
@@ -270,7 +270,7 @@ class VelocityDelay(Check):
         return suspect_lowpass(self, what, column, constant, evidence, joints)
 
     def _single(self, measurement: Measurement, lags: dict[int, float]) -> Iterator[Suspicion]:
-        """Joints whose velocity is late or early by itself."""
+        """Single joints with late or early velocity."""
         least = max(SMALLEST, STEPS / measurement.rate)
         odd = [k for k, lag in lags.items() if abs(lag) > least]
         right = sum(abs(lag) < SMALLEST / 2 for lag in lags.values())
@@ -297,7 +297,7 @@ class VelocityDelay(Check):
 
 
 def _lag(signals: Signals, k: int) -> float:
-    """Lag of a joint's velocity behind the rate of its position, s; NaN where it cannot be told."""
+    """Lag of a joint's velocity behind the rate of its position, s; NaN if undetermined."""
     errors, plain = np.zeros(len(LAGS)), 0.0
     for window in _windows(signals, k):
         errors += [window.error(lag) for lag in LAGS]
@@ -419,7 +419,7 @@ def _lowpass(signals: Signals, lags: Mapping[int, float]) -> float | None:
 
 
 class JoinedRecordings(Check):
-    """Positions that leap to another place and go on from there: recordings joined, or cut out."""
+    """Positions that jump and continue from there: joined recordings, or missing parts."""
 
     name = "joined"
     suspects = "recordings that were joined into one, or from which a part was cut out"

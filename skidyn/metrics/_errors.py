@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 def _pair(y_true: ArrayLike, y_pred: ArrayLike) -> tuple[Array, Array]:
-    """Both as (n_samples, n_joints), checked."""
+    """Check both arrays and return them with shape (n_samples, n_joints)."""
     true, pred = (np.asarray(y, dtype=np.float64) for y in (y_true, y_pred))
     if true.shape != pred.shape:
         raise ValueError(
@@ -153,7 +153,7 @@ def percent_improvement(before: ArrayLike, after: ArrayLike) -> Any:
     Returns
     -------
     improvement : float or ndarray of shape (n_joints,), %
-        Negative where the error grew.
+        Negative if the error grew.
 
     Examples
     --------
@@ -233,7 +233,7 @@ def joint_scores(estimator: Any, X: Any, y: ArrayLike) -> dict[str, float]:
     -------
     scores : dict of float
         Greater is better: the mean over joints under the names of :data:`SCORERS`, such as
-        ``"neg_mean_absolute_error"``, and each joint under the name with ``"_J1"``, .. behind it.
+        ``"neg_mean_absolute_error"``, and each joint under the name followed by ``"_J1"``, ...
 
     Examples
     --------
@@ -254,7 +254,7 @@ def joint_scores(estimator: Any, X: Any, y: ArrayLike) -> dict[str, float]:
     return scores
 
 
-#: Rows of the table behind the names of the scorers.
+#: Rows of the table by the names of the scorers.
 _ROWS = {
     "r2": "R2",
     "neg_mean_squared_error": "MSE",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Is one model better than another, judged over whole recordings."""
+"""Comparison of two models over whole recordings."""
 
 from __future__ import annotations
 
@@ -86,8 +86,8 @@ def paired_comparison(
 ) -> PairedComparison:
     """Compare two models by their errors on the same recordings.
 
-    Rows of one recording are far from independent, so the recording is the unit: the logarithm of
-    the error ratio of each recording (mean over joints) goes through a paired t interval.
+    Rows of one recording are far from independent, so the recording is the unit: the interval is a
+    paired t interval of the logarithm of the error ratio of each recording (mean over joints).
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def paired_comparison(
     Returns
     -------
     PairedComparison
-        With fewer than two recordings the interval is infinite.
+        Ratio with its interval, which is infinite with fewer than two recordings.
 
     Examples
     --------

@@ -22,9 +22,9 @@ Rows = NDArray[np.intp]
 
 #: Two samples this close in every feature, in standard deviations, count as the same motion.
 SAME_MOTION = 0.02
-#: A fold whose test rows meet the training rows' motion more often than this is reported.
+#: A fold in which a larger share of test rows repeats motion of training rows is reported.
 REPEATED_SHARE = 0.1
-#: Test rows looked at per fold.
+#: Number of test rows checked per fold.
 LOOKED_AT = 2000
 
 
@@ -51,7 +51,7 @@ class LeakageGuard(BaseCrossValidator):
     cv : cross-validator, int or iterable, default=5
         Guarded cross-validator; its folds are passed on unchanged.
     trajectory, time : int, str or None, default="auto"
-        Key columns; they are no part of the motion.
+        Key columns; they are not part of the motion.
 
     See Also
     --------
@@ -117,7 +117,7 @@ class LeakageGuard(BaseCrossValidator):
 
 
 def find_leaks(X: NDArray[Any], keys: Keys, folds: list[Any]) -> Bunch:
-    """Trajectories that folds share, and the share of test rows whose motion was trained on."""
+    """Trajectories that folds share, and the share of test rows with motion of training rows."""
     trajectory = keys.trajectories(X)
     features = X[:, list(keys.features)]
     spread = features.std(axis=0)
@@ -125,7 +125,7 @@ def find_leaks(X: NDArray[Any], keys: Keys, folds: list[Any]) -> Bunch:
     shared: set[Any] = set()
     repeated = []
     for train, test in folds:
-        # a single recording can only be shared; what counts is whether its motion is
+        # a single recording is always shared; the question is whether its motion is
         if len(np.unique(trajectory)) > 1:
             shared |= set(np.intersect1d(trajectory[train], trajectory[test]).tolist())
         looked_at = test[:: max(1, len(test) // LOOKED_AT)]

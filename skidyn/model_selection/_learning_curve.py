@@ -38,7 +38,7 @@ def trajectory_learning_curve(
     y : array-like of shape (n_samples,) or (n_samples, n_joints), N m (N for prismatic joints)
         Torque.
     n_trajectories : array-like of int, default=None
-        Sizes of the training set; 1, 2, 4, .. up to what every fold leaves if None.
+        Sizes of the training set; 1, 2, 4, .. up to the number that every fold leaves if None.
     cv : int or cross-validator, default=5
         Number of trajectory folds, or a cross-validator.
     trajectory : int or str, default="trajectory"
@@ -48,7 +48,7 @@ def trajectory_learning_curve(
     n_jobs : int, default=None
         Fits at the same time.
     random_state : int, RandomState or None, default=None
-        Draws the order in which each fold takes up trajectories; each size extends the one before.
+        Seed of the order in which each fold adds trajectories; each size extends the previous one.
 
     Returns
     -------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shuffled rows, which an estimator that reads earlier rows cannot use as they are."""
+"""Order of shuffled rows for estimators that use earlier rows."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from skidyn.model_selection._leakage import LeakageWarning
 
 
 def order_of_log(estimator: Any, X: NDArray[Any], keys: Keys) -> NDArray[np.intp] | None:
-    """Order of the rows of a fit by trajectory and time, with a warning where they are shuffled."""
+    """Order of the rows of a fit by trajectory and time, with a warning if they are shuffled."""
     order = time_order(X, keys)
     if order is not None:
         warnings.warn(

@@ -32,8 +32,8 @@ def column_of(X: Any, column: int | str, what: str) -> NDArray[Any]:
 class TrajectoryKFold(BaseCrossValidator):
     """K folds by trajectory: no trajectory is in training and test rows at once.
 
-    The trajectory is read from a column of X, so the folds stay whole inside ``GridSearchCV``,
-    stacking and nested cross-validation, where ``groups`` does not arrive. The folds are those of
+    The trajectory is read from a column of X, so the folds are correct inside ``GridSearchCV``,
+    stacking and nested cross-validation, to which ``groups`` is not passed. The folds are those of
     :class:`sklearn.model_selection.GroupKFold` with these groups.
 
     Parameters
@@ -45,7 +45,7 @@ class TrajectoryKFold(BaseCrossValidator):
 
     See Also
     --------
-    PhaseKFold : For one recording of a motion that repeats itself.
+    PhaseKFold : For one recording of a periodic motion.
     LeakageGuard : Warns about folds that share a trajectory or a motion.
 
     Examples
@@ -190,7 +190,7 @@ class PhaseKFold(BaseCrossValidator):
 
 
 def held_out_folds(trajectory: NDArray[Any], n_splits: int, *, guard: int = 0) -> list[Any]:
-    """Folds for cross-fitting inside an estimator: by trajectory, or by blocks of the only one.
+    """Folds for cross-fitting inside an estimator: by trajectory, or by blocks of a single one.
 
     With fewer trajectories than folds each trajectory is one fold; a single trajectory is cut into
     ``n_splits`` contiguous blocks and ``guard`` rows around a test block are left out of training.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What all recurrent regressors share: checks, scaling, resampling, held-out rows, streaming."""
+"""Base of the recurrent regressors: checks, scaling, resampling, held-out rows, streaming."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ from skidyn.preprocessing import scaling_of
 
 Array = NDArray[np.float64]
 
-#: Fits that are trained side by side in one process.
+#: Number of fits that are trained side by side in one process.
 SIDE_BY_SIDE = 10
 
 
@@ -73,8 +73,8 @@ class SequenceRegressor(
         "time": [str, Integral, None],
         "random_state": ["random_state"],
     }
-    # BaggingRegressor leaves the rows in order and bootstraps through weights only if they are
-    # requested; with metadata routing on, this is the request
+    # BaggingRegressor leaves the rows in order and bootstraps through weights only if weights are
+    # requested; with metadata routing enabled, these lines request them
     __metadata_request__fit = {"sample_weight": True}
     __metadata_request__score = {"sample_weight": True}
 
@@ -122,21 +122,21 @@ class SequenceRegressor(
         self._set_skorch(skorch)
 
     def __getstate__(self) -> dict[str, Any]:
-        """State with weights as plain arrays in place of the net, as pickle and skops can store."""
+        """State with plain arrays of weights in place of the net, for pickle and skops."""
         state = dict(super().__getstate__())
         if "_net" in state:
             state["_weights"] = self.weights_
             del state["_net"]
         return state
 
-    # ---- what subclasses may change ----
+    # ---- for subclasses to override ----
 
     def _inputs(self, X: Array, keys: Keys) -> Array:
         """Inputs of the network, in physical units."""
         return X[:, list(keys.features)]
 
     def _network(self, n_inputs: int, n_outputs: int, seed: int) -> dict[str, Any]:
-        """What the LSTM network is made with."""
+        """Constructor arguments of the LSTM network."""
         sizes = {name: getattr(self, name) for name in ("hidden_size", "dense_size", "dropout")}
         given = {k.removeprefix("module__"): v for k, v in self._skorch().items() if "module_" in k}
         unknown = sorted(set(given) - set(sizes))
@@ -159,7 +159,7 @@ class SequenceRegressor(
         X : DataFrame or array-like of shape (n_samples, n_features)
             Features, with key columns; rows of a trajectory in order of time.
         y : array-like of shape (n_samples,) or (n_samples, n_outputs), N m (N if prismatic)
-            Torque, or what is left of it.
+            Torque, or the torque that a physical model leaves unexplained.
         sample_weight : array-like of shape (n_samples,), default=None
             Weight of each row's squared error. Rows of weight zero still serve as history.
 
@@ -193,7 +193,7 @@ class SequenceRegressor(
         return self
 
     def _tasks(self, X: Array, y: Array, weight: Array, keys: Keys, seed: int) -> list[Task]:
-        """Networks to be trained, one or one an output, and what they learn."""
+        """Networks to be trained (one, or one per output) with their targets."""
         used = weight > 0
         targets = y.reshape(len(y), -1)
         inputs = self._inputs(X, keys)
@@ -214,7 +214,7 @@ class SequenceRegressor(
         return [[j] for j in range(n_outputs)] if self.per_joint else [list(range(n_outputs))]
 
     def _store(self, training: Training, numbers: Sequence[int]) -> None:
-        """Keep what the networks have become; `numbers` are those of this estimator's."""
+        """Store the results of the networks with these numbers, which are this estimator's."""
         self.__dict__.pop("_net", None)
         self._weights = [training.weights[k] for k in numbers]
         if len(numbers) == len(training.weights):
@@ -225,7 +225,7 @@ class SequenceRegressor(
 
     @property
     def net_(self) -> Any:
-        """The initialised net of skorch with the fitted weights."""
+        """Initialised skorch net with the fitted weights."""
         check_is_fitted(self)
         if "_net" not in vars(self):
             net = make_net(self._networks(), self._plan(), weights=self._weights)
@@ -239,7 +239,7 @@ class SequenceRegressor(
         return weights_of(self._net.module_) if "_net" in vars(self) else self._weights
 
     def _networks(self) -> list[Network]:
-        """Class of each network, and what it was made with."""
+        """Class and constructor arguments of each network."""
         return [(self._module, parameters) for parameters in self._made_with]
 
     def _plan(self) -> Plan:
@@ -261,10 +261,10 @@ class SequenceRegressor(
     # ---- predict ----
 
     def predict(self, X: Any) -> Array:
-        """Predict the torque of every row from it and the rows before it in its segment.
+        """Predict the torque of every row from that row and the earlier rows of its segment.
 
-        Rows that come later change nothing: predicting a growing log gives the same numbers as
-        predicting it whole. Use :meth:`stream` to predict only the new rows.
+        Later rows have no influence: predicting a growing log gives the same numbers as predicting
+        the whole log at once. Use :meth:`stream` to predict only the new rows.
 
         Parameters
         ----------
@@ -300,12 +300,12 @@ class SequenceRegressor(
         return np.concatenate(parts, axis=1) * self.output_scale_ + self.output_offset_
 
     def stream(self) -> TorqueStream:
-        """Begin to predict a log that arrives bit by bit.
+        """Begin to predict a log that arrives in parts.
 
         Returns
         -------
         stream : TorqueStream
-            Its ``predict`` takes new rows and returns their torque.
+            Object whose ``predict`` takes new rows and returns their torque.
         """
         check_is_fitted(self)
         return TorqueStream(self)
@@ -313,20 +313,20 @@ class SequenceRegressor(
 
 @dataclass
 class PendingFit:
-    """A fit that is prepared: data checked, weights drawn, nothing trained yet.
+    """A prepared fit: data checked, sample weights drawn, nothing trained yet.
 
     Attributes
     ----------
     estimator : SequenceRegressor
-        What is fitted.
+        Regressor to be fitted.
     X, y, weight : ndarray
-        All rows, and the weight of each with the bootstrap in it.
+        All rows, and the weight of each row including the bootstrap.
     validation : ndarray of bool or None
-        Rows that decide when to stop.
+        Rows whose loss decides when to stop.
     keys : Keys
         Key columns of X.
     seed : int
-        Draws initial weights, order of windows and dropout.
+        Seed of initial weights, order of windows and dropout.
     """
 
     estimator: SequenceRegressor
@@ -338,20 +338,20 @@ class PendingFit:
     seed: int
 
     def leave_out(self, rows: NDArray[np.intp]) -> None:
-        """Take the weight from rows, unless nothing would be left."""
+        """Set the weight of rows to zero, unless no row with weight would be left."""
         weight = self.weight.copy()
         weight[rows] = 0.0
         if (weight > 0).any():
             self.weight = weight
 
     def unseen(self, trajectories: NDArray[Any]) -> NDArray[np.bool_]:
-        """Rows of trajectories of which no row counts in the training."""
+        """Rows of trajectories of which no row has a weight in the training."""
         _, number = np.unique(trajectories, return_inverse=True)
         unused: NDArray[np.bool_] = np.bincount(number, self.weight) == 0
         return unused[number]
 
     def tasks(self) -> list[Task]:
-        """Networks to be trained; scales the data."""
+        """Scale the data and return the networks to be trained."""
         model = self.estimator
         model._one_dimensional = self.y.ndim == 1
         tasks = model._tasks(self.X, self.y, self.weight, self.keys, self.seed)
@@ -359,7 +359,7 @@ class PendingFit:
         return tasks
 
     def train(self) -> None:
-        """Train this one alone."""
+        """Train this fit alone."""
         model, tasks = self.estimator, self.tasks()
         segments, plan = self.keys.segments(self.X), model._plan()
         with fit_progress(model, model.max_epochs, self.X, self.y) as progress:
@@ -374,8 +374,8 @@ _PENDING: ContextVar[list[PendingFit] | None] = ContextVar("pending", default=No
 def deferred_training() -> Iterator[list[PendingFit]]:
     """Collect fits of recurrent regressors in this thread instead of training them.
 
-    So scikit-learn's ``BaggingRegressor`` draws and seeds the members, and :func:`train_together`
-    trains them side by side.
+    With it, scikit-learn's ``BaggingRegressor`` only draws and seeds the members; then
+    :func:`train_together` trains them side by side.
     """
     pending: list[PendingFit] = []
     token = _PENDING.set(pending)
@@ -386,7 +386,7 @@ def deferred_training() -> Iterator[list[PendingFit]]:
 
 
 def train_together(pending: list[PendingFit], n_jobs: int | None) -> None:
-    """Train collected fits of clones, several side by side; `n_jobs` changes no bit of them."""
+    """Train collected fits of clones side by side; the result does not depend on `n_jobs`."""
     size = SIDE_BY_SIDE if all(fit.estimator._plan().is_plain for fit in pending) else 1
     groups = [pending[i : i + size] for i in range(0, len(pending), size)]
     trained = Parallel(n_jobs=n_jobs)(delayed(_train_group)(group) for group in groups)
@@ -422,7 +422,7 @@ def _trajectory_bootstrap(
 def _held_out_rows(
     trajectories: NDArray[Any], weight: Array, fraction: float, rng: np.random.RandomState
 ) -> NDArray[np.bool_]:
-    """Rows that decide when to stop: whole trajectories, or the end of the only one."""
+    """Rows whose loss decides when to stop: whole trajectories, or the end of a single one."""
     labels, number = np.unique(trajectories[weight > 0], return_inverse=True)
     if len(labels) > 1:
         n_held_out = min(max(1, round(fraction * len(labels))), len(labels) - 1)

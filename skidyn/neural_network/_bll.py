@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Bagged LSTM networks under a meta-regressor (BLL)."""
+"""Bagged LSTM networks, stacked by a meta-regressor (BLL)."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ from skidyn.preprocessing import without_keys_inside
 
 Array = NDArray[np.float64]
 
-#: Folds of the trajectories that members leave out in turn.
+#: Number of folds of the trajectories; each member leaves out one of them.
 FOLDS = 20
-#: Folds of the stacking where members are trained again for it.
+#: Number of folds of the stacking if members are trained again for it.
 BLOCKS = 3
-#: Folds and strengths among which that of the default meta-regressor is chosen.
+#: Number of folds, and strengths from which the default meta-regressor's is chosen.
 FOLDS_OF_HEAD, ALPHAS = 5, (1.0, 1e2, 1e4, 1e6)
 
 
@@ -53,49 +53,49 @@ class BLLRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEst
 
     Members are trained on bootstraps of the log; their mean is the input of a meta-regressor,
     which is trained on predictions for trajectories that the averaged members have not seen. (The
-    paper [1]_ trains it on the rows that it then reports; :ref:`papers_own_forms` has all that
-    differs.)
+    paper [1]_ trains it on the rows for which it reports errors; :ref:`papers_own_forms` lists all
+    differences.)
 
-    To learn what a physical model leaves over, put it into :class:`skidyn.hybrid.HybridRegressor`:
+    To learn the residual of a physical model, use it in :class:`skidyn.hybrid.HybridRegressor`:
     ``HybridRegressor(physics, BLLRegressor())``.
 
-    By itself it has its place only where no model of the robot exists: with a URDF, a rigid
-    body with friction predicts far better on most logs (:doc:`/user_guide/learners`).
+    Without a physical model it is useful only if no model of the robot exists: with a URDF, a
+    rigid-body model with friction predicts far better on most logs (:doc:`/user_guide/learners`).
 
     Parameters
     ----------
     estimator : estimator, default=None
         Member: a network of this package, any scikit-learn regressor or a skorch
         ``NeuralNetRegressor``, also inside a ``Pipeline``; :class:`LSTMRegressor` if None. Its key
-        columns are set from those given here; one that has no parameters for them does not see
-        them. With ``per_joint=True`` of the member each output has networks of its own.
+        columns are set from those given here; a member without such parameters does not get the key
+        columns. If the member has ``per_joint=True``, each output has its own networks.
     final_estimator : estimator, default=None
-        Meta-regressor. If None, a ridge that shrinks towards the members' mean, as strongly as
-        predicts left-out trajectories best; the mean itself where that is better. One of a single
-        output is fitted once for each output.
+        Meta-regressor. If None, a ridge regression that shrinks towards the members' mean, with the
+        strength that predicts left-out trajectories best, or the mean itself if that is better. A
+        regressor of a single output is fitted once for each output.
     n_estimators : int, default=10
         Members.
     resample : {"window", "trajectory"}, default="window"
         Draw single target rows or whole trajectories with replacement. Rows that are not drawn
-        still serve as history. Trajectories give a more realistic spread; but every member then
-        misses a third of them, which costs accuracy.
+        still serve as history. Whole trajectories give a more realistic spread, but every member
+        then misses a third of them, which reduces accuracy.
     cv : int, cross-validator or None, default=None
-        How the meta-regressor gets inputs from rows that members have not seen. None takes each
-        trajectory's mean over the members that have not seen it, which costs no training: with
-        ``resample="trajectory"`` those whose bootstrap left it out; with ``"window"`` every member
-        leaves out one of twenty folds of the trajectories in turn. A number (or a cross-validator)
-        trains the members again without each fold; so does None with fewer than three trajectories
-        or members that are no networks of this package (3 folds, by trajectory or, of a single one,
-        by blocks of rows).
+        How the meta-regressor's inputs are predicted on rows that members have not seen. With None,
+        they are the mean over the members that have not seen the trajectory, which needs no further
+        training: with ``resample="trajectory"`` the members whose bootstrap left it out; with
+        ``"window"`` every member leaves out one of twenty folds of the trajectories. With a number
+        (or a cross-validator) the members are trained again without each fold; so they are with
+        None if there are fewer than three trajectories or the members are not networks of this
+        package (3 folds, by trajectory or, for a single one, by blocks of rows).
     n_jobs : int, default=None
-        Processes. Ten networks are trained side by side in each, since most of a small network's
-        step is overhead that they can share; so more processes serve more than ten members.
-        Members with callbacks, an optimiser of their own or ``verbose`` are trained one by one, and
-        come out the same.
+        Number of processes. Each trains ten networks side by side, since most of the time of a
+        small network's step is overhead that they can share; more processes therefore help only
+        with more than ten members. Members with callbacks, an optimiser of their own or ``verbose``
+        are trained one by one, with the same result.
     trajectory, time : int, str or None, default="auto"
         Key columns of X.
     random_state : int, RandomState or None, default=None
-        Seeds members, bootstraps and the meta-regressor; the result does not depend on `n_jobs`.
+        Seed of members, bootstraps and the meta-regressor; the result does not depend on `n_jobs`.
 
     Attributes
     ----------
@@ -104,12 +104,12 @@ class BLLRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEst
     final_estimator_ : estimator
         The meta-regressor.
     n_stacked_ : int
-        Rows that had a prediction by members that had not seen them, and trained the
-        meta-regressor.
+        Number of rows on which the meta-regressor was trained: those with a prediction by members
+        that had not seen them.
     n_features_in_ : int
-        Columns of X.
+        Number of columns of X.
     feature_names_in_ : ndarray of str
-        Their names, where X has names.
+        Names of the columns, if X has names.
 
     References
     ----------
@@ -176,13 +176,13 @@ class BLLRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEst
         """Make the BLL of the paper's table III.
 
         One LSTM with 32 cells per joint, learning rate 0.01, 130 epochs, batches of 32, window
-        bootstrap, and the meta-network 100-50-25 with rectifiers, trained alike. The paper gives
-        neither the number of members (10 here) nor the window (10 rows here).
+        bootstrap, and a meta-network with layers of 100, 50 and 25 rectifiers, trained in the same
+        way. The paper gives neither the number of members (10 here) nor the window (10 rows here).
 
         Parameters
         ----------
         **parameters : dict
-            Other parameters, or changed ones.
+            Further parameters; they override those of the paper.
 
         Returns
         -------
@@ -225,9 +225,9 @@ class BLLRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEst
         X : DataFrame or array-like of shape (n_samples, n_features)
             Features, with key columns; rows of a trajectory in order of time.
         y : array-like of shape (n_samples,) or (n_samples, n_outputs), N m (N if prismatic)
-            Torque, or what a physical model leaves over.
+            Torque, or the residual of a physical model.
         sample_weight : array-like of shape (n_samples,), default=None
-            Weight of each row: members draw rows in proportion to it.
+            Weight of each row: members draw rows in proportion to their weights.
         groups : array-like of shape (n_samples,), default=None
             Groups of the rows for a `cv` that splits by groups, such as ``GroupKFold``.
 
@@ -264,7 +264,7 @@ class BLLRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEst
                 )
                 inputs[test] = _member_mean(again, X[test])
         honest = np.isfinite(inputs).all(axis=1)
-        if not honest.any():  # too few rows to hold any out: stack what there is
+        if not honest.any():  # too few rows to hold any out: stack all of them
             inputs, honest = _member_mean(self.bagging_, X), np.ones(len(X), dtype=bool)
         self.n_stacked_ = int(honest.sum())
         weight = None if sample_weight is None else sample_weight[honest]
@@ -287,11 +287,11 @@ class BLLRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEst
         trajectories: NDArray[Any],
         leave_out: bool,
     ) -> tuple[BaggingRegressor, NDArray[np.bool_] | None]:
-        """Fitted members, and which rows each has not seen (None if that is unknown)."""
+        """Fitted members, and the rows that each has not seen (None if unknown)."""
         fitted = clone(bagging)
         if not isinstance(fitted.estimator, SequenceRegressor):
             return _fit(fitted, X, y, weight), None
-        # the bagging only draws and seeds, in this process whatever backend is set
+        # the bagging only draws and seeds, in this process regardless of the joblib backend
         with parallel_config("sequential"), deferred_training() as pending:
             _fit(fitted, X, y, weight)
         unseen = None
@@ -308,7 +308,7 @@ class BLLRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEst
         member = LSTMRegressor() if self.estimator is None else clone(self.estimator)
         member = _with_skorch_members(member)
         names = member.get_params()
-        # BaggingRegressor hands arrays down, so the keys are given by position
+        # BaggingRegressor passes arrays to the members, so the keys are given by position
         position = {"trajectory": keys.trajectory, "time": keys.time}
         wanted = {name: name.rpartition("__")[2] for name in names}
         member.set_params(**{n: position[key] for n, key in wanted.items() if key in position})
@@ -378,9 +378,9 @@ class BLLRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEst
 
 
 def _fit_head(head: Any, X: Array, y: Array, weight: Array | None) -> Any:
-    """Fitted meta-regressor, once for each output where it takes no more than one.
+    """Fitted meta-regressor, once for each output if it supports only one.
 
-    Tags do not tell: MLPRegressor takes several outputs and says that it does not.
+    Its tags are no guide: those of MLPRegressor deny several outputs although it supports them.
     """
     try:
         return _fit(head, X, y, weight)
@@ -393,10 +393,11 @@ def _fit_head(head: Any, X: Array, y: Array, weight: Array | None) -> Any:
 def _ridge_towards_mean(
     X: Array, y: Array, weight: Array | None, trajectories: NDArray[Any]
 ) -> Ridge:
-    """What the members' mean misses, by a ridge, if left-out trajectories are better for it.
+    """Ridge correction of the members' mean, if it predicts left-out trajectories better.
 
-    Rows of a trajectory are alike, and the means of the few members that have not seen a row are
-    poorer than that of all: leaving out single rows would trust such a correction far too much.
+    Rows of a trajectory are similar, and the mean over the few members that have not seen a row is
+    less accurate than that over all members. Leaving out single rows would therefore overrate such
+    a correction.
     """
     missing = y.reshape(len(y), -1) - X
     size, spread = X.std(axis=0), y.reshape(len(y), -1).std(axis=0)
@@ -415,13 +416,13 @@ def _ridge_towards_mean(
             best, least = Ridge(alpha=alpha), error
             found = clone(best).fit(scaled, missing, weight)
             correction, offset = np.atleast_2d(found.coef_) / size, found.intercept_
-    best.fit(X, X)  # for what a fitted estimator has beside its coefficients
+    best.fit(X, X)  # sets the fitted attributes other than the coefficients
     best.coef_, best.intercept_ = np.eye(X.shape[1]) + correction, offset
     return best
 
 
 def _with_skorch_members(member: Any) -> Any:
-    """A member in which nets of skorch, alone or as a part, take tables of double precision."""
+    """Member whose skorch nets, alone or as a part, accept tables in double precision."""
     if isinstance(member, NeuralNet):
         return SkorchMember(member)
     nets = {k: v for k, v in member.get_params().items() if isinstance(v, NeuralNet)}
@@ -444,7 +445,7 @@ def _member_mean(bagging: BaggingRegressor, X: Array) -> Array:
 
 
 def _unseen_means(bagging: BaggingRegressor, X: Array, unseen: NDArray[np.bool_]) -> Array:
-    """Mean over the members that have not seen a row; nan where every member has."""
+    """Mean over the members that have not seen a row; nan if every member has seen it."""
     total: Any = 0.0
     for member, rows in zip(bagging.estimators_, unseen[..., None], strict=True):
         total = total + np.where(rows, member.predict(X).reshape(len(X), -1), 0.0)

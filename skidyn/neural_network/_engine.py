@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Training and running of sequence networks; skorch does the training inside."""
+"""Training (by skorch) and prediction of sequence networks."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ from skidyn.neural_network._windows import WindowLoader, WindowSet, window_rows,
 
 Array = NDArray[np.float64]
 
-#: Rows that go through the network at once in prediction; more would only need memory.
+#: Rows per call of the network in prediction; more rows would only need more memory.
 ROWS_AT_ONCE = 65536
 
-#: Class of a network and what it is made with.
+#: Class of a network and its constructor arguments.
 Network = tuple[type[nn.Module], dict[str, Any]]
 
 
@@ -47,10 +47,10 @@ class Plan:
     settings : dict
         Parameters of skorch's net.
     slow_parameters : str
-        Name of a parameter that moves at a tenth of the learning rate and does not shrink; empty
-        for none.
+        Name of a parameter that is trained with a tenth of the learning rate and without weight
+        decay; empty for none.
     weight_decay : float
-        Of the default optimiser.
+        Weight decay of the default optimiser.
     """
 
     window: int
@@ -61,19 +61,19 @@ class Plan:
 
     @property
     def callbacks(self) -> list[Any]:
-        """Callbacks of the user without the names that skorch allows for them."""
+        """Callbacks of the user, without the names that skorch accepts with them."""
         given = self.settings["callbacks"] or []
         return [entry[1] if isinstance(entry, tuple) else entry for entry in given]
 
     @property
     def is_plain(self) -> bool:
-        """Whether nothing looks at single networks, so that many can be trained as one."""
+        """Whether no setting depends on single networks, so that many can be trained as one."""
         plain = self.settings["optimizer"] is None and not self.settings["callbacks"]
         return plain and not self.settings["verbose"]
 
     @property
     def validates(self) -> bool:
-        """Whether a callback watches the loss on rows that are held out."""
+        """Whether a callback monitors the loss on held-out rows."""
         watched = (getattr(callback, "monitor", None) for callback in self.callbacks)
         return any(callable(name) or str(name).startswith("valid") for name in watched)
 
@@ -89,20 +89,20 @@ def _is_a(callback: Any, kind: type) -> bool:
 
 @dataclass(frozen=True)
 class Task:
-    """One network and what it is to learn.
+    """One network and its training data.
 
     Attributes
     ----------
     module : type
         Maps (n_windows, window + stride, n_inputs) to (n_windows, stride, n_outputs).
     parameters : dict
-        What it is made with.
+        Constructor arguments.
     inputs, targets : ndarray of shape (n_samples, n_inputs) and (n_samples, n_outputs)
         Scaled.
     weight : ndarray of shape (n_samples,)
         Weight of each row's error; rows of weight zero still serve as history.
     seed : int
-        Draws the order of windows.
+        Seed of the order of windows.
     """
 
     module: type[nn.Module]
@@ -120,13 +120,13 @@ class Training:
     Attributes
     ----------
     net : NeuralNet
-        The net that was trained, of all networks together.
+        Trained net, which holds all networks.
     weights : list of dict of str to ndarray
         Weights of each network.
     loss_curves : list of list of float
         Mean squared error of each network's scaled targets after each epoch.
     validation_curve : list of float
-        That of the validation rows; empty without them.
+        The same error on the validation rows; empty without them.
     """
 
     net: NeuralNet
@@ -138,8 +138,8 @@ class Training:
 class SequenceNet(NeuralNet):
     """Mean squared error in which each target row has a weight (last column of the targets).
 
-    The errors of networks that are trained together are added up, so each one's gradient is that of
-    its own error.
+    The errors of networks that are trained together are added, so the gradient of each network is
+    that of its own error.
     """
 
     def get_loss(self, y_pred: Any, y_true: Any, X: Any = None, training: bool = False) -> Any:
@@ -152,7 +152,7 @@ class SequenceNet(NeuralNet):
 
 
 class _PlainNet(SequenceNet):
-    """The same without the detours by which skorch serves any optimiser, data and callback."""
+    """The same without the overhead of skorch's support for any optimiser, data and callback."""
 
     def train_step(self, batch: Any, **fit_params: Any) -> dict[str, Any]:
         inputs, targets = batch
@@ -164,7 +164,7 @@ class _PlainNet(SequenceNet):
 
 
 class _Progress(Callback):
-    """Hands skorch's epochs on to scikit-learn's callbacks; refuses a diverged fit."""
+    """Report skorch's epochs to scikit-learn's callbacks; raise an error if a fit diverges."""
 
     def __init__(self, progress: FitProgress | None = None) -> None:
         self.progress = progress
@@ -198,21 +198,21 @@ def make_net(
     weights: Sequence[Weights] | None = None,
     **more: Any,
 ) -> NeuralNet:
-    """A net of skorch for networks that are trained side by side.
+    """Make a skorch net for networks that are trained side by side.
 
-    Most of a small network's step is overhead (gathering, optimiser, bookkeeping), which all
-    networks share.
+    Most of the time of a small network's step is overhead (gathering, optimiser, bookkeeping),
+    which all networks share.
 
     Parameters
     ----------
     networks : sequence of (type, dict)
-        Class of each network, all of one architecture, and what it is made with.
+        Class and constructor arguments of each network; all have one architecture.
     plan : Plan
         Settings.
     callbacks : sequence
         Callbacks before those of the plan.
     weights : sequence of dict or None
-        Weights of each network; those drawn at random if None.
+        Weights of each network; drawn at random if None.
     **more : dict
         Further parameters of the net.
 
@@ -243,7 +243,7 @@ def make_net(
 
 
 def made(networks: Sequence[Network], weights: Sequence[Weights] | None = None) -> list[nn.Module]:
-    """Networks, with given weights or new ones."""
+    """Networks with given or new weights."""
     modules = [kind(**parameters) for kind, parameters in networks]
     for module, own in zip(modules, weights or (), strict=weights is not None):
         from_arrays(module, own)
@@ -262,15 +262,15 @@ def train(
     Parameters
     ----------
     tasks : list of Task
-        Networks and what they learn.
+        Networks and their training data.
     validation : ndarray of bool of shape (n_samples,) or None
-        Rows that only judge.
+        Rows for validation only.
     segments : list of slice
         Rows that belong together.
     plan : Plan
         Settings.
     progress : FitProgress or None
-        Told about every epoch.
+        Receives every epoch.
     """
     device = torch.device(plan.settings["device"])
 
@@ -288,7 +288,7 @@ def train(
     callbacks: list[Any] = [("progress", follow)]
     split, weights = None, [task.weight for task in tasks]
     if not plan.schedules:
-        # steps that shrink to nothing average the noise of small batches away
+        # steps that decrease to zero average out the noise of small batches
         cosine = torch.optim.lr_scheduler.CosineAnnealingLR
         callbacks.append(("cosine", LRScheduler(cosine, T_max=plan.settings["max_epochs"])))
     if validation is not None:
@@ -305,7 +305,7 @@ def train(
     )
     with single_thread():
         net.fit(window_set(weights), None)
-    net.set_params(train_split=None)  # it holds the log
+    net.set_params(train_split=None)  # it holds a copy of the log
     follow.progress = None
     curves = np.array(follow.loss_curves).T.tolist()
     return Training(net, weights_of(net.module_), curves, follow.validation_curve)
@@ -319,13 +319,13 @@ def weights_of(module: nn.Module) -> list[Weights]:
 
 
 def networks_of(module: nn.Module, networks: Sequence[Network]) -> list[nn.Module]:
-    """Each network of a module, to be run alone."""
+    """Networks of a module, each to be run alone."""
     together = isinstance(module, StackedNetwork | Members)
     return made(networks, weights_of(module)) if together else [module]
 
 
 def _side_by_side(networks: list[nn.Module]) -> nn.Module:
-    """One module of many; torch's own LSTM kernel is the fastest for a single network."""
+    """One module of several; torch's own LSTM kernel is the fastest for a single network."""
     plain = [network for network in networks if isinstance(network, LSTMNetwork)]
     return StackedNetwork(plain) if len(plain) == len(networks) else Members(networks)
 
@@ -341,12 +341,12 @@ def run(
     """Outputs of a network for every row of a log.
 
     Every segment is cut at multiples of ``stride`` rows from its start, so the output of a row
-    depends on rows before it alone and does not change when the log grows.
+    depends only on that row and earlier rows, and does not change when the log grows.
 
     Parameters
     ----------
     network : Module
-        With its weights.
+        Network with its weights.
     inputs : ndarray of shape (n_samples, n_inputs)
         Scaled.
     segments : list of slice
@@ -354,7 +354,7 @@ def run(
     window, stride : int
         As in training.
     device : str
-        Where to run it.
+        Torch device.
 
     Returns
     -------

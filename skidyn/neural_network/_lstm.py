@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Recurrent regressors that know nothing of physics: plain LSTM and NDL."""
+"""Recurrent regressors without physics: plain LSTM and NDL."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from skidyn.neural_network._engine import Plan
 
 Array = NDArray[np.float64]
 
-#: Of networks that know no physics.
+#: Weight decay of networks without physics.
 WEIGHT_DECAY = 0.3
 
 
 class LSTMRegressor(SequenceRegressor):
     """Long short-term memory network: one LSTM layer and a linear output.
 
-    Each row is predicted from itself and the rows before it in its segment (contiguous rows of
-    one trajectory without a gap in time). The log is cut into pieces of `stride` rows; the network
-    reads the `window` rows before each of them as history, and is trained on all rows of a piece
-    at once.
+    Each row is predicted from itself and the earlier rows of its segment (contiguous rows of one
+    trajectory without a gap in time). The log is cut into pieces of `stride` rows; the network
+    reads the `window` rows before each of them as history, and is trained on all rows of a piece at
+    once.
 
-    Weights decay (``optimizer__weight_decay=0.3``), since trajectories of minutes are few and a
-    network memorises them. Training is that of skorch: its callbacks, optimisers and nets are those
-    of this regressor.
+    Weights decay (``optimizer__weight_decay=0.3``), since a log of some minutes has few
+    trajectories, which a network memorises. The network is trained by skorch, whose callbacks and
+    optimisers can be used.
 
-    Without physics it has its place only where no model of the robot exists: with a URDF, a rigid
-    body with friction predicts far better on most logs (:doc:`/user_guide/learners`).
+    It is useful only if no model of the robot exists: with a URDF, a rigid-body model with friction
+    predicts far better on most logs (:doc:`/user_guide/learners`).
 
     Parameters
     ----------
@@ -44,11 +44,11 @@ class LSTMRegressor(SequenceRegressor):
         Add a linear function of the row itself to the output. Torque is nearly linear in the
         acceleration, also beyond the training range, where an LSTM is flat.
     direction : "auto", sequence of int or str, or None, default="auto"
-        Velocities whose sign the network reads as well, since friction turns over with it:
-        ``"auto"`` takes the columns whose names begin with ``dq``, of an X without names none.
+        Velocities whose sign is a further input, since friction changes sign with it: ``"auto"``
+        takes the columns whose names begin with ``dq``, and none if X has no names.
     window : int, default=1
-        Rows of history: each prediction has at least `window` and less than `window + stride` rows
-        behind it. What the torque remembers for longer needs more.
+        Rows of history: each prediction uses at least `window` and less than `window + stride`
+        earlier rows. A torque that depends on a longer past needs more.
     {PARAMETERS}
 
     Attributes
@@ -58,13 +58,13 @@ class LSTMRegressor(SequenceRegressor):
     See Also
     --------
     NDLRegressor : With the fully connected layer of the literature.
-    SDLRegressor : Reads the rigid-body torque as well.
+    SDLRegressor : The same with the rigid-body torque among its inputs.
     BLLRegressor : Bags and stacks such networks.
 
     Notes
     -----
-    Computations inside are in single precision on one thread; inputs and outputs are double.
-    With ``sample_weight``, rows of weight zero are still read as history.
+    Internal computations are in single precision on one thread; inputs and outputs are double. With
+    ``sample_weight``, rows of weight zero are still read as history.
 
     References
     ----------
@@ -121,7 +121,7 @@ def directions(given: Any, names: Any, n_features: int) -> list[int]:
     Parameters
     ----------
     given : "auto", sequence of int or str, or None
-        As the user gave it.
+        Value given by the user.
     names : sequence of str or None
         Names of the columns.
     n_features : int
@@ -140,18 +140,17 @@ class NDLRegressor(LSTMRegressor):
     """Nonparametric deep learning model: LSTM, fully connected layer, dropout, output.
 
     The network of [1]_, section 2.2.2: Glorot input weights, forget-gate bias 1; its scaling is
-    ``scaling="minmax"``, and ``linear=False, direction=None`` leaves out what was added to it
-    (:ref:`papers_own_forms`). It learns the torque from positions, velocities and
-    accelerations without any physics. Windows, training and prediction are those of
-    :class:`LSTMRegressor`.
+    ``scaling="minmax"``, and ``linear=False, direction=None`` removes what skidyn added to it
+    (:ref:`papers_own_forms`). It learns the torque from positions, velocities and accelerations
+    without physics. Windows, training and prediction are those of :class:`LSTMRegressor`.
 
-    Without physics it has its place only where no model of the robot exists: with a URDF, a rigid
-    body with friction predicts far better on most logs (:doc:`/user_guide/learners`).
+    It is useful only if no model of the robot exists: with a URDF, a rigid-body model with friction
+    predicts far better on most logs (:doc:`/user_guide/learners`).
 
     Parameters
     ----------
     dense_size : int, default=32
-        Width of the fully connected layer (tanh; the paper does not name its activation).
+        Width of the fully connected layer (tanh; the paper does not state its activation).
     dropout : float, default=0.1
         Share of the fully connected layer's outputs dropped in training.
     per_joint : bool, default=False
@@ -160,11 +159,11 @@ class NDLRegressor(LSTMRegressor):
         Add a linear function of the row itself to the output. Torque is nearly linear in the
         acceleration, also beyond the training range, where an LSTM is flat.
     direction : "auto", sequence of int or str, or None, default="auto"
-        Velocities whose sign the network reads as well, since friction turns over with it:
-        ``"auto"`` takes the columns whose names begin with ``dq``, of an X without names none.
+        Velocities whose sign is a further input, since friction changes sign with it: ``"auto"``
+        takes the columns whose names begin with ``dq``, and none if X has no names.
     window : int, default=1
-        Rows of history: each prediction has at least `window` and less than `window + stride` rows
-        behind it. What the torque remembers for longer needs more.
+        Rows of history: each prediction uses at least `window` and less than `window + stride`
+        earlier rows. A torque that depends on a longer past needs more.
     {PARAMETERS}
 
     Attributes

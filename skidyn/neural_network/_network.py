@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The torch modules, initialised and run without touching torch's global random state."""
+"""The torch modules, initialised and run without use of torch's global random state."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Weights = dict[str, NDArray[np.float32]]
 def single_thread() -> Iterator[None]:
     """Run torch on one thread.
 
-    The matrices are small: more threads gain nothing, slow each other down where several members
+    The matrices are small: more threads bring no gain, slow each other down when several members
     are trained at once, and would make the last digits depend on the machine.
     """
     before = torch.get_num_threads()
@@ -50,8 +50,8 @@ class _SeededDropout(nn.Module):
 class LSTMNetwork(nn.Module):
     """One LSTM layer, optionally a fully connected layer with dropout, and a linear output.
 
-    Input weights begin as Glorot's, the recurrence orthogonal, the bias of the forget gate at 1,
-    other biases and the path around the LSTM at 0.
+    Initial values: Glorot's for input weights, orthogonal matrices for the recurrence, 1 for the
+    bias of the forget gate, 0 for other biases and for the path around the LSTM.
 
     Parameters
     ----------
@@ -62,13 +62,13 @@ class LSTMNetwork(nn.Module):
     hidden_size : int, default=32
         Cells of the LSTM.
     dense_size : int, default=0
-        Width of the fully connected layer; 0 leaves it and the dropout out.
+        Width of the fully connected layer; 0 for a network without this layer and dropout.
     dropout : float, default=0.0
         Share of its outputs dropped in training.
     linear : bool, default=False
-        A linear path from the inputs of a row to its outputs, around the LSTM.
+        Add a linear path from the inputs of a row to its outputs, around the LSTM.
     seed : int, default=0
-        Draws initial weights and dropout.
+        Seed of initial weights and dropout.
     """
 
     def __init__(
@@ -84,7 +84,7 @@ class LSTMNetwork(nn.Module):
     ) -> None:
         super().__init__()
         self.window = window
-        # made on "meta" nothing is drawn from torch's global generator
+        # on device "meta" nothing is drawn from torch's global generator
         with torch.device("meta"):
             self.lstm = nn.LSTM(n_inputs, hidden_size, batch_first=True)
             self.dense = nn.Linear(hidden_size, dense_size) if dense_size else None
@@ -100,7 +100,7 @@ class LSTMNetwork(nn.Module):
                 nn.init.orthogonal_(parameter, generator=generator)
             else:
                 nn.init.xavier_uniform_(parameter, generator=generator)
-        # torch's LSTM adds two biases; learned twice, a gate would move twice as fast as the rest
+        # torch's LSTM adds two biases; if both were learned, a gate would change twice as fast
         self.lstm.get_parameter("bias_hh_l0").requires_grad_(False)
         with torch.no_grad():
             self.lstm.get_parameter("bias_ih_l0")[hidden_size : 2 * hidden_size] = 1.0
@@ -115,7 +115,7 @@ class LSTMNetwork(nn.Module):
 
 
 class Members(nn.ModuleList):
-    """Networks of any kind, each with its own inputs, run one after another."""
+    """Networks of any kind, each with its own inputs, which run one after another."""
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         """Map (n_members, n_windows, n_rows, n_inputs) to outputs, member by member."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One constructor for all recurrent regressors, and skorch's own parameters beside it."""
+"""Common constructor of the recurrent regressors, with the parameters of skorch."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from typing import Any
 #: Parameters that go to the network, its optimiser and the callbacks, named as in skorch.
 PREFIXES = ("module__", "optimizer__", "callbacks__")
 
-#: What every recurrent regressor takes; its docstring has the line ``{PARAMETERS}`` in this place.
+#: Parameters of every recurrent regressor; they replace the line ``{PARAMETERS}`` of docstrings.
 PARAMETERS = """\
     window : int, default=4
-        Rows of history: each prediction has at least `window` and less than `window + stride` rows
-        behind it. What the torque remembers for longer needs more.
+        Rows of history: each prediction uses at least `window` and less than `window + stride`
+        earlier rows. A torque that depends on a longer past needs more.
     stride : int, default=4
-        Rows per piece. Neighbouring rows carry nearly the same information, so shorter pieces learn
-        more from an epoch, and cost more: ``1 + window / stride`` LSTM steps per row.
+        Rows per piece. Neighbouring rows carry nearly the same information, so with shorter pieces
+        an epoch has more effect, and takes longer: ``1 + window / stride`` LSTM steps per row.
     hidden_size : int, default=32
         Cells of the LSTM.
     dense_size : int, default=0
-        Width of the fully connected layer (tanh) after the LSTM; 0 is none.
+        Width of the fully connected layer (tanh) after the LSTM; 0 for no such layer.
     dropout : float, default=0.0
         Share of the fully connected layer's outputs dropped in training.
     max_epochs : int, default=100
@@ -32,39 +32,40 @@ PARAMETERS = """\
     batch_size : int, default=32
         Pieces per step.
     optimizer : type of torch.optim.Optimizer or None, default=None
-        None is AdamW with a weight decay (0.3, of SDL 0.05), which keeps a network from learning
-        joints as functions of other joints, and ``betas=(0.8, 0.95)``, since torch's own need more
-        steps than a log of minutes gives. ``optimizer__weight_decay=0.0`` makes it plain Adam:
-        parameters named as in skorch are taken as well, ``optimizer__...``, ``callbacks__...`` and
-        ``module__...`` (`hidden_size`, `dense_size` and `dropout` of the network).
+        None is AdamW with a weight decay (0.3, for SDL 0.05), which keeps a network from predicting
+        a joint from the motion of other joints, and ``betas=(0.8, 0.95)``, since torch's defaults
+        need more steps than a log of some minutes gives. ``optimizer__weight_decay=0.0`` gives
+        plain Adam. Further parameters are named as in skorch: ``optimizer__...``,
+        ``callbacks__...`` and ``module__...`` (`hidden_size`, `dense_size` and `dropout` of the
+        network).
     callbacks : list of skorch callbacks or None, default=None
-        Such as ``EarlyStopping`` and ``Checkpoint``. Rows are held out for those that watch the
-        validation loss, as these two do.
+        Callbacks such as ``EarlyStopping`` and ``Checkpoint``. Rows are held out if a callback
+        monitors the validation loss, as these two do.
     validation_fraction : float, default=0.1
-        Share of the trajectories that is held out then (at least one); of a single trajectory its
-        last rows.
+        Share of the trajectories that is held out in this case (at least one); of a single
+        trajectory, the share of its last rows.
     scaling : {"standard", "minmax"}, default="standard"
-        Inputs and outputs are scaled to zero mean and unit variance, or to the range 0 to 1, which
-        leaves an offset and little variance, and so learns far more slowly.
+        Scale inputs and outputs to zero mean and unit variance, or to the range 0 to 1, which
+        leaves an offset and little variance and makes training far slower.
     resample : {None, "trajectory"}, default=None
-        Draw trajectories with replacement before training, for ensembles.
+        Whether to draw trajectories with replacement before training, for ensembles.
     device : str, default="cpu"
         Torch device, such as ``"cuda"``.
     verbose : int, default=0
         Above 0 skorch prints a line for every epoch.
     trajectory, time : int, str or None, default="auto"
         Key columns of X: ``"auto"`` takes the column of that name if X has names. They separate
-        segments and are no features.
+        segments and are not features.
     random_state : int, RandomState or None, default=None
-        Draws initial weights, order of windows, dropout, held-out trajectories and bootstrap. An
+        Seed of initial weights, order of windows, dropout, held-out trajectories and bootstrap. An
         integer gives bit-equal results whatever the number of processes.
 """
 
-#: What every recurrent regressor has after a fit; the line ``{ATTRIBUTES}`` stands for it.
+#: Attributes of every fitted regressor; they replace the line ``{ATTRIBUTES}`` of docstrings.
 ATTRIBUTES = """\
     net_ : skorch.NeuralNet
-        The initialised net with the fitted weights; its ``history`` and callbacks are those of the
-        training in the process that trained it. Predictions are made with ``net_.module_``.
+        The initialised net with the fitted weights; its ``history`` and callbacks are available
+        only in the process that trained it. Predictions are made with ``net_.module_``.
     weights_ : list of dict of str to ndarray
         Weights of the network, or of one network per output.
     loss_curve_, validation_curve_ : list of float
@@ -72,25 +73,25 @@ ATTRIBUTES = """\
     n_iter_ : int
         Epochs trained, over all networks.
     input_offset_, input_scale_, output_offset_, output_scale_ : ndarray
-        Scaling.
+        Offset and scale of inputs and outputs.
     n_features_in_ : int
-        Columns of X.
+        Number of columns of X.
     feature_names_in_ : ndarray of str
-        Their names, where X has names.
+        Names of the columns, if X has names.
 """
 
 
 def _without(shared: str, docstring: str) -> str:
-    """Shared entries, but for those that a docstring has of its own."""
+    """Shared entries, except those that a docstring has itself."""
     entries = re.split(r"(?m)^(?=    \S)", shared)
     return "".join(e for e in entries if f"\n    {e.strip().split(' : ')[0]} : " not in docstring)
 
 
 class SkorchParameters:
-    """Constructors that extend that of their base class, and parameters named as in skorch.
+    """Constructors that extend that of the base class, and parameters named as in skorch.
 
-    A subclass lists what it adds and hands the rest on as ``**parameters``; its signature, its
-    docstring and with them scikit-learn's ``get_params`` know all of them.
+    A subclass lists only its own parameters and passes the others on as ``**parameters``; its
+    signature, its docstring and scikit-learn's ``get_params`` then include all of them.
     """
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
@@ -133,7 +134,7 @@ class SkorchParameters:
         Parameters
         ----------
         deep : bool, default=True
-            Also those of estimators among the parameters.
+            Include the parameters of nested estimators.
 
         Returns
         -------

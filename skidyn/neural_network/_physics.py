@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Physics that a network reads: its torque, and how the torque changes with each coefficient."""
+"""Physics as input of a network: its torque, and the torque per unit of each coefficient."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class BareRigidBody:
     robot : Robot
         The robot.
     columns : Columns
-        Which column of X means what.
+        Meaning of the columns of X.
     """
 
     def __init__(self, robot: Robot, columns: Columns) -> None:
@@ -53,16 +53,16 @@ class BareRigidBody:
 
 
 class IdentifiedPhysics:
-    """Rigid body with effects as an :class:`~skidyn.identification.RBDRegressor` identified them.
+    """Rigid body with effects, identified by an :class:`~skidyn.identification.RBDRegressor`.
 
-    Effects that see a load see that of the identified model.
+    Effects that depend on the load use the load of the identified model.
 
     Parameters
     ----------
     model : RBDRegressor
         Not fitted, or fitted by :meth:`fit`.
     columns : Columns
-        Which column of X means what.
+        Meaning of the columns of X.
     """
 
     def __init__(self, model: RBDRegressor, columns: Columns) -> None:

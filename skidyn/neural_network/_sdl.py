@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Network that reads the rigid-body torque, learned together with the rigid body (SDL)."""
+"""Network with the rigid-body torque as input, trained together with the rigid body (SDL)."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ from skidyn.robots import Robot
 
 Array = NDArray[np.float64]
 
-#: Directions of the rigid-body parameters that move the torque less than this share of the
+#: Directions of the rigid-body parameters that change the torque by less than this fraction of the
 #: strongest direction cannot be identified from the log and stay at the robot's own values.
 IDENTIFIABLE = 1e-4
 
 
 class _JointNetwork(nn.Module):
-    """Rigid body and LSTM in one graph, so that both are optimised together.
+    """Rigid body and LSTM in one graph, to be optimised together.
 
     An input row is ``[features, torque, regressor]``: the scaled features, the scaled torque that
     the robot's own parameters give, and how the torque changes along each identified direction of
@@ -69,44 +69,44 @@ class _JointNetwork(nn.Module):
 
 
 def _writes(callback: Any) -> bool:
-    """Whether a callback writes files, which are for the model and not for its held-out copies."""
+    """Whether a callback writes files; such callbacks are not given to the held-out copies."""
     own = callback[1] if isinstance(callback, tuple) else callback
     return isinstance(own, Checkpoint | TrainEndCheckpoint)
 
 
 class SDLRegressor(SequenceRegressor):
-    """Semiparametric deep learning model: an LSTM network that also reads a physical torque.
+    """Semiparametric deep learning model: an LSTM network with a physical torque as further input.
 
     The network of :class:`NDLRegressor` with the torque of a physical model among its inputs [1]_.
     The model's coefficients (inertial parameters, and effects such as friction) start at their
     least-squares values and are optimised together with the network through the columns in which
     the torque is linear (``rigid_body="joint"``), or stay at these values (``"frozen"``).
-    Directions of the coefficients that the log does not show keep the model's own values.
+    Directions of the coefficients that the log does not excite keep the model's own values.
 
-    Far from the training samples the network's output fades into the physical torque. What the
-    optimisation adds to the physics counts as much as it is worth on held-out trajectories, joint
-    by joint, so that the model is not worse than its physics (see `cv`). A robot alone has no
-    friction: given an RBDRegressor with effects, the model predicts far better on all logs of
+    Far from the training samples the prediction fades into the physical torque. The torque that the
+    optimisation adds to the physics is weighted for each joint by its benefit on held-out
+    trajectories, so that the model is not worse than its physics (see `cv`). A robot alone has no
+    friction: with an RBDRegressor with effects, the model predicts far better on all logs of
     :doc:`/user_guide/learners`.
 
     Parameters
     ----------
     physics : Robot, RBDRegressor, str or path
-        What is read: the rigid body of a robot (or of its URDF), as in the paper, or a rigid body
-        with effects, which is identified first. Its robot's joints are those that the columns of X
-        describe.
+        Source of the physical torque: the rigid body of a robot (or of its URDF), as in the paper,
+        or a rigid body with effects, which is identified first. The columns of X must describe the
+        joints of this robot.
     rigid_body : {"joint", "frozen"}, default="joint"
         Whether the coefficients are optimised with the network.
     residual : bool, default=True
-        Add the physical torque to the network's output, so that the network learns what is
-        missing. False is the paper's architecture, which only reads it
-        (:ref:`papers_own_forms` has all that differs).
+        Add the physical torque to the network's output, so that the network learns only the
+        residual. False is the paper's architecture, in which this torque is only an input
+        (:ref:`papers_own_forms` lists all differences).
     cv : int, cross-validator, iterable of splits or None, default=3
-        Folds, by trajectory (or by blocks of a single one) where it is a number, on which copies of
-        the model are held out to find ``learned_weight_``. None keeps all that the network learned
-        and trains once, as does ``residual=False``.
+        Folds on which copies of the model are tested to find ``learned_weight_``; a number splits
+        by trajectory, or a single trajectory by blocks. None trains once and keeps the full output
+        of the network, as does ``residual=False``.
     fade_out : bool, default=True
-        Fade into the physical torque far from the training samples.
+        Fade the prediction into the physical torque far from the training samples.
     dense_size : int, default=32
         Width of the fully connected layer.
     dropout : float, default=0.1
@@ -116,19 +116,19 @@ class SDLRegressor(SequenceRegressor):
     Attributes
     ----------
     physics_ : Robot or RBDRegressor
-        The physics as given, identified where it has effects.
+        The given physics, identified if it has effects.
     learned_weight_ : ndarray of shape (n_joints,)
-        Factor of what the optimisation adds to the physics: its least-squares factor on held-out
-        trajectories less one standard error, between 0 and 1.
+        Factor of the torque that the optimisation adds to the physics: the least-squares factor on
+        held-out trajectories minus one standard error, between 0 and 1.
     coef_ : ndarray of shape (n_coefficients,)
-        What the optimisation added to the coefficients of ``physics_``: inertial parameters of
-        every body, then its effects.
+        Values that the optimisation added to the coefficients of ``physics_``: first the inertial
+        parameters of every body, then the effects.
     initial_coef_ : ndarray of shape (n_coefficients,)
-        The least-squares values that it started from.
+        Least-squares values from which the optimisation started.
     inertial_parameters_ : ndarray of shape (n_bodies, 10)
         Rigid-body parameters in the model; see :attr:`skidyn.robots.Robot.inertial_parameters`.
     initial_inertial_parameters_ : ndarray of shape (n_bodies, 10)
-        Least-squares values that the optimisation started from.
+        Least-squares values from which the optimisation started.
     radius_ : float
         Distance from the training samples that counts as outside, in standard deviations per
         feature (root mean square).
@@ -136,7 +136,7 @@ class SDLRegressor(SequenceRegressor):
 
     See Also
     --------
-    skidyn.hybrid.HybridRegressor : Physics of any kind with a learner that may stay silent.
+    skidyn.hybrid.HybridRegressor : Physics of any kind with a learner that may have zero weight.
 
     References
     ----------
@@ -194,7 +194,7 @@ class SDLRegressor(SequenceRegressor):
         self.fade_out = fade_out
 
     def fit(self, X: Any, y: Any, sample_weight: Any = None, groups: Any = None) -> SDLRegressor:
-        """Train the network and the physics, and find how much of what they learn to keep.
+        """Train the network and the physics, and find the weight of the learned torque.
 
         Parameters
         ----------
@@ -219,7 +219,7 @@ class SDLRegressor(SequenceRegressor):
         return self
 
     def _held_out_weight(self, X: Any, y: Any, sample_weight: Any, groups: Any) -> Array:
-        """Weight of what is learned beyond the physics, from copies that have not seen a fold."""
+        """Weight of the learned torque, from copies of the model that have not seen a fold."""
         array = validate_data(self, X, reset=False, dtype=np.float64)
         table = array if column_names(X) is None else X
         target = np.asarray(y, dtype=np.float64)
@@ -256,7 +256,7 @@ class SDLRegressor(SequenceRegressor):
         return weight
 
     def _physics_torque(self, X: Array) -> Array:
-        """Torque of the physics by itself: as it was identified, or by least squares."""
+        """Torque of the physics alone, with its identified or least-squares coefficients."""
         physics = self._read(self.physics_)
         torque = physics.torque(X)
         if isinstance(physics, BareRigidBody):
@@ -264,7 +264,7 @@ class SDLRegressor(SequenceRegressor):
                 torque[part] += np.einsum("jpc,p->cj", columns, self.initial_coef_, optimize=True)
         return torque
 
-    # The two hooks that the common tests replace, because their tables are of any width.
+    # Two hooks that the common tests of scikit-learn replace, because their tables have any width.
 
     @property
     def _robot(self) -> Robot:
@@ -346,9 +346,9 @@ class SDLRegressor(SequenceRegressor):
     def _identify(
         self, physics: Any, X: Array, missing: Array, rows: NDArray[np.bool_]
     ) -> tuple[Array, Array]:
-        """Directions of the coefficients that the log shows, and their least-squares coordinates.
+        """Directions of the coefficients that the log excites, and their least-squares coordinates.
 
-        Moving by 1 along any of them changes the scaled torque by 1 (root mean square), so one
+        A step of 1 along any direction changes the scaled torque by 1 (root mean square), so one
         step size suits all of them.
         """
         missing = missing / self.output_scale_
@@ -381,12 +381,11 @@ class SDLRegressor(SequenceRegressor):
         )
 
     def rigid_body_torque(self, X: Any) -> Array:
-        """Torque of the physics, which the prediction falls back on.
+        """Torque of the physics, to which the prediction fades far from the training samples.
 
-        Its coefficients are the learned ones, ``coef_``, as far as ``learned_weight_`` keeps what
-        was learned. With ``residual=False`` nothing but the
-        network reads the learned torque, which may then be far from one: there they are the
-        least-squares ones, ``initial_coef_``.
+        Its coefficients include ``coef_``, weighted by ``learned_weight_``. With ``residual=False``
+        the learned coefficients only serve the network and need not give a physical torque; then
+        the least-squares values ``initial_coef_`` are used.
 
         Parameters
         ----------
@@ -425,7 +424,7 @@ class SDLRegressor(SequenceRegressor):
         return distances(features, self._scale, self._reference) / self.radius_
 
     def _rigid_body(self, X: Array) -> tuple[Array, Array]:
-        """Torque that the network reads, and torque that the prediction falls back on."""
+        """Torque that is an input of the network, and torque to which the prediction fades."""
         physics = self._read(self.physics_)
         last_resort = [] if self.residual else [self.initial_coef_]
         coefficients = np.stack([self.coef_, *last_resort])
@@ -453,7 +452,7 @@ class SDLRegressor(SequenceRegressor):
         return self._weighted(X, kept * torque + (1 - kept) * last_resort)
 
     def _weighted(self, X: Array, torque: Array) -> Array:
-        """As much of a torque beyond the physics as held-out trajectories support."""
+        """Torque beyond the physics, weighted as held-out trajectories support it."""
         if not hasattr(self, "learned_weight_"):
             return torque
         physics = self._physics_torque(X)

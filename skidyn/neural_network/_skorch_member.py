@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A network of skorch as a regressor of scikit-learn."""
+"""A skorch network as a scikit-learn regressor."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from sklearn.utils import check_random_state
 
 
 class SkorchMember(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
-    """A skorch net that takes tables of double precision, and targets of one or two dimensions.
+    """A skorch net that accepts tables in double precision, and targets of one or two dimensions.
 
-    skorch casts nothing, and a net whose output has one column silently learns nonsense from
-    targets without columns (its loss subtracts every target from every output).
+    skorch casts nothing. A net whose output has one column is trained wrongly, without an error, on
+    one-dimensional targets (its loss subtracts every target from every output).
 
     Parameters
     ----------
     net : skorch.NeuralNet
         Predicts (n_samples, n_outputs).
     random_state : int, RandomState or None, default=None
-        Draws initial weights and the order of rows.
+        Seed of initial weights and of the order of rows.
     """
 
     def __init__(self, net: Any, random_state: Any = None) -> None:

@@ -15,9 +15,9 @@ from skidyn.neural_network._network import LSTMNetwork, Weights
 class _StackedLSTM(torch.autograd.Function):
     """LSTM layers of several members with a backward pass written out by hand.
 
-    What a small layer costs is calls, not arithmetic. Here each time step is a handful of calls
-    for all members: one product of ``[x, 1, h]`` with the weights, forward, and two, backward.
-    Gates are in torch's order: input, forget, cell, output.
+    The cost of a small layer is that of its calls, not of its arithmetic. Here each time step takes
+    a few calls for all members: one product of ``[x, 1, h]`` with the weights forward, and two
+    backward. Gates are in torch's order: input, forget, cell, output.
     """
 
     @staticmethod
@@ -43,7 +43,7 @@ class _StackedLSTM(torch.autograd.Function):
         ):
             torch.bmm(row, weights, out=gate)
             torch.tanh(g, out=u)
-            gate.sigmoid_()  # that of g goes unused; one call for all is faster
+            gate.sigmoid_()  # the result for g is not used; one call for all gates is faster
             torch.mul(i, u, out=after).addcmul_(f, before)
             torch.tanh(after, out=tanh)
             torch.mul(o, tanh, out=h)
@@ -53,7 +53,7 @@ class _StackedLSTM(torch.autograd.Function):
     @staticmethod
     @once_differentiable
     def backward(ctx: Any, *gradients: torch.Tensor) -> tuple[None, torch.Tensor]:
-        """Gradient of the weights; that of the inputs is not asked for."""
+        """Gradient of the weights; that of the inputs is not needed."""
         (outer,) = gradients
         weights, read, gates, candidate, cell, squashed = ctx.saved_tensors
         size = weights.shape[-1] // 4
@@ -84,7 +84,7 @@ class _StackedLSTM(torch.autograd.Function):
 
 
 def _rows(*tables: torch.Tensor) -> list[tuple[torch.Tensor, ...]]:
-    """What tables hold for each time step; far cheaper than to index each of them."""
+    """Slices of the tables for each time step; far faster than indexing every table."""
     return list(zip(*(table.unbind() for table in tables), strict=True))
 
 
@@ -94,7 +94,7 @@ class StackedNetwork(nn.Module):
     Parameters
     ----------
     networks : list of LSTMNetwork
-        Initialised; they stay as they are.
+        Initialised; they are not changed.
     """
 
     def __init__(self, networks: list[LSTMNetwork]) -> None:

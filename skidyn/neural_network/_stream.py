@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Prediction of a log that arrives bit by bit."""
+"""Prediction of a log that arrives in parts."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ Array = NDArray[np.float64]
 
 
 class TorqueStream:
-    """Predicts new rows of a log; keeps no more of the past than the network reads.
+    """Predict new rows of a log, keeping only the part of the past that the network uses.
 
     Parameters
     ----------
     estimator : estimator
-        A fitted recurrent regressor; made by its ``stream`` method.
+        A fitted recurrent regressor, whose ``stream`` method makes this object.
 
     Examples
     --------
@@ -50,14 +50,14 @@ class TorqueStream:
         Returns
         -------
         y : ndarray of shape (n_new_samples,) or (n_new_samples, n_outputs), N m (N if prismatic)
-            Their torque, as ``predict`` of the whole log gives it.
+            Their torque, equal to that of ``predict`` for the whole log.
         """
         estimator = self._estimator
         new = validate_data(estimator, X, reset=False, dtype=np.float64)
         log = np.concatenate([self._past, new])
         torque = estimator._predict_array(log)[len(self._past) :]
         last = estimator._keys().segments(log)[-1]
-        # the current piece and the history before it; cut at a piece's edge, so the grid stays
+        # the current piece and the history before it; cut at the edge of a piece to keep the grid
         window, stride = estimator.window, estimator.stride
         n_pieces = (last.stop - last.start) // stride - -(-window // stride)
         keep_from = last.start + max(0, n_pieces) * stride

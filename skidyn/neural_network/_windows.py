@@ -27,11 +27,11 @@ def window_starts(segments: list[slice], stride: int, phase: int = 0) -> NDArray
 def window_rows(
     starts: NDArray[np.int64], window: int, stride: int
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Rows that each window reads, and which of its targets lie in the segment.
+    """Rows that each window reads, and a mask of its targets that lie in the segment.
 
-    A window reads ``window`` rows of history and then its ``stride`` target rows. Where the
-    history would begin before the segment, the segment's first row stands in for it, as if the
-    robot had rested there.
+    A window reads ``window`` rows of history and then its ``stride`` target rows. If the history
+    would begin before the segment, the first row of the segment is repeated, as if the robot had
+    rested there.
 
     Returns
     -------
@@ -87,7 +87,7 @@ class WindowSet(torch.utils.data.Dataset[Any]):
         raise TypeError("windows are gathered in batches")
 
     def cut(self, member: int, phase: int) -> NDArray[np.int64]:
-        """Those windows (see :func:`window_starts`) in which some target counts for a member."""
+        """Windows (see :func:`window_starts`) in which some target has a weight for a member."""
         starts = window_starts(self.segments, self.stride, phase)
         begin, end = starts[:, 0], starts[:, 0] + self.stride
         n_before = self.n_before[member]
@@ -98,14 +98,14 @@ class WindowSet(torch.utils.data.Dataset[Any]):
     def gather(
         self, starts: torch.Tensor, counts: torch.Tensor
     ) -> tuple[torch.Tensor, torch.Tensor]:
-        """Inputs and targets of windows (n_members, n_windows, 3), some of which may not count."""
-        # times first, as the stacked networks read them
+        """Inputs and targets of windows (n_members, n_windows, 3), some of which may be padding."""
+        # time first, as the stacked networks expect
         start, first, last = starts.unbind(-1)
         wanted = self._offsets + start
         rows = wanted.clamp(first, last)
         valid = (rows == wanted)[self.window :] & counts
         rows += self._first_rows
-        # an embedding is a table whose rows are looked up; the fastest way torch has
+        # an embedding is a table whose rows are looked up; torch has no faster way
         targets = embedding(rows[self.window :], self.targets)
         targets[..., -1] *= valid
         return embedding(rows, self.inputs).permute(1, 2, 0, 3), targets.permute(1, 2, 0, 3)
@@ -114,11 +114,11 @@ class WindowSet(torch.utils.data.Dataset[Any]):
 class WindowLoader:
     """Batches of windows, gathered at once instead of sample by sample.
 
-    A batch holds one batch of every member, or that of the only one. There are as many batches as
-    all windows of the log make, so that what a member sees does not depend on the others: one with
-    fewer windows has smaller batches, filled up with windows that do not count. For training
-    (``generators`` given, one a member) the windows come in random order, and each pass cuts the
-    log at another phase, so that no alignment of the windows is learned.
+    A batch holds one batch of each member. The number of batches is that of all windows of the log,
+    so that the data of a member does not depend on the other members: a member with fewer windows
+    has smaller batches, padded with windows of weight zero. For training (``generators`` given, one
+    per member) the windows come in random order, and each pass cuts the log at another phase, so
+    that no alignment of the windows is learned.
     """
 
     def __init__(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Every recording against all others: drive gains that are not the same in all of them."""
+"""Comparison of every recording with all others, to find changed drive gains."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from skidyn._signals import Array
 from skidyn.evidence import jackknife
 from skidyn.payload._runs import Runs
 
-#: Blocks of time of a recording, left out in turn for the standard error of its share.
+#: Number of blocks of time of a recording, left out in turn for the standard error of its share.
 BLOCKS = 10
-#: What a recording has to differ by to be named: standard errors, and at least this share.
+#: Least difference of a recording to be reported: in standard errors, and as a share.
 DIFFERS, LEAST = 4.0, 0.01
-#: Standard error, as a share, beyond which a recording says nothing about a joint.
+#: Standard error, as a share, beyond which a recording has no information about a joint.
 LARGEST_ERROR = 0.1
 
 
 @dataclass(frozen=True)
 class Shares:
-    """What every recording measures of what all others let expect of it.
+    """Measured values of every recording relative to those expected from all others.
 
     Attributes
     ----------
     names : tuple of str
-        Recordings, such as ``"loaded 1"``: their order is that in which they were given.
+        Recordings, such as ``"loaded 1"``, in the given order.
     values, std : ndarray of shape (n_recordings, n_joints)
         Shares and their standard errors; NaN for the only recording of its kind, and for joints
         that it does not move.
@@ -51,20 +51,21 @@ class Shares:
 def compare_recordings(
     runs: Runs, predict: Callable[[NDArray[np.int64]], Sequence[Array]]
 ) -> Shares:
-    """Share of the expected torque or current that every recording measures, joint by joint.
+    """Measured torque or current of every recording as a share of the expected, by joint.
 
     Parameters
     ----------
     runs : Runs
         Averaged rows of all recordings.
     predict : callable
-        From the folds that are left out to what the others let expect of all rows, per joint.
+        Function of the left-out folds that returns the values of all rows expected from the others,
+        per joint.
 
     Returns
     -------
     Shares
-        The standard error of a share holds the spread over the blocks of its recording and, since
-        the others say what to expect, half the usual distance between recordings.
+        The standard error of a share includes the spread over the blocks of its recording and,
+        because the expectation comes from the others, half the usual distance between recordings.
     """
     rows, n = runs.problem.rows, len(runs.target)
     numbers = np.unique(runs.problem.signals.trajectory)
@@ -96,7 +97,7 @@ def compare_recordings(
 
 
 def differing(shares: Shares, joint_names: Sequence[str]) -> list[str]:
-    """A note where a recording measures more or less than the others let expect."""
+    """A note if a recording differs from the value expected from the others."""
     away = np.abs(shares.values - 1.0)
     told = (shares.std < LARGEST_ERROR) & (away > LEAST) & (away > DIFFERS * shares.std)
     if not told.any():

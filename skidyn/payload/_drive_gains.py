@@ -18,7 +18,7 @@ from skidyn.payload._by_recording import Shares, compare_recordings, differing
 from skidyn.payload._runs import FRICTION, Runs, interval_factor, make_runs, open_columns, read_runs
 from skidyn.robots import Robot
 
-#: Rounds of weights, evaluations in each, and the relative change that ends them.
+#: Number of rounds of weights, evaluations in each, and the relative change that ends them.
 PASSES, EVALUATIONS, SMALL = 4, 60, 1e-9
 
 
@@ -33,7 +33,7 @@ class DriveGainEstimate:
     units : tuple of str
         ``"N m/A"`` or ``"N/A"`` of each joint.
     gains : ndarray of shape (n_joints,)
-        Torque per ampere, N m/A or N/A; NaN where the motion does not show it.
+        Torque per ampere, N m/A or N/A; NaN if the motion does not determine it.
     std : ndarray of shape (n_joints,)
         Standard errors by the jackknife over trajectories or blocks of time.
     interval : ndarray of shape (n_joints, 2)
@@ -72,7 +72,7 @@ class DriveGainEstimate:
 
     @property
     def text(self) -> str:
-        """The result in words."""
+        """Text of the result."""
         rows = zip(self.joint_names, self.gains, self.units, self.interval, strict=True)
         lines = [
             f"{name}: {gain:.4g} {unit} (95 %: {low:.4g} to {high:.4g})"
@@ -143,7 +143,7 @@ def estimate_drive_gains(
     mass : float
         Known mass of the load, kg.
     com : sequence of 3 floats, optional
-        Its centre of mass in the frame of the link, m, if that is known too; found otherwise.
+        Its centre of mass in the frame of the link, m, if known; otherwise it is estimated.
     drive_gains : sequence of float, N m/A or N/A, optional
         Gains with which the torque columns were computed from currents; 1 by default.
     link : str, optional
@@ -152,7 +152,7 @@ def estimate_drive_gains(
         Effects in addition to the rigid body; viscous and dry friction, offset and rotor inertia by
         default.
     smooth : bool or None, default=None
-        Derive velocity and acceleration from the positions. None does so where the runs have no
+        Derive velocity and acceleration from the positions. None does so if the runs have no
         accelerations.
 
     Returns
@@ -163,7 +163,7 @@ def estimate_drive_gains(
     Raises
     ------
     SkidynError
-        Runs that cannot be used, an unknown link, or a mass that is not positive.
+        Runs cannot be used, the link is unknown, or the mass is not positive.
 
     References
     ----------
@@ -275,10 +275,10 @@ def _estimate(runs: Runs, robot: Robot, known: Array, nominal: Array) -> DriveGa
 
 @dataclass(frozen=True)
 class _System:
-    """Currents as functions of the unknown parameters and of one over the gains.
+    """Currents as functions of the unknown parameters and of the inverse gains.
 
     The current of joint j is ``k_j (A_j x + b_j)``: A_j the columns of the unknown parameters of
-    load, robot and friction, b_j the torque of what is known of the load.
+    load, robot and friction, b_j the torque of the known part of the load.
     """
 
     known: Array
@@ -323,7 +323,8 @@ class _System:
         found /= np.delete(size, width - 1)
         gains = found[width - 1 :]
         if np.any(gains <= 0):
-            # Noise drowns what ties some joint to the load: begin with gains that fit in size.
+            # The noise exceeds the torque of the load on some joint: begin with gains of the right
+            # size.
             gains = np.where(gains > 0, gains, np.median(np.abs(gains)) + 1e-300)
         start: Array = np.r_[found[: width - 1], 1 / gains]
         return start
@@ -341,7 +342,7 @@ class _System:
         return np.concatenate(residuals), np.vstack(slopes)
 
     def refine(self, whole: list[Array], noise: Array, solution: Array) -> Array:
-        """Levenberg-Marquardt from a solution nearby."""
+        """Levenberg-Marquardt from a nearby solution."""
         found = least_squares(
             lambda z: self.linearised(whole, noise, z)[0],
             solution,

@@ -32,12 +32,13 @@ CONFOUNDED = (
     "Mass and drive gains scale alike: gains that are 1 % too large make every parameter 1 % too "
     "large. Only a known load separates them (estimate_drive_gains)."
 )
-#: Times the noise of the joints is estimated anew and the fit repeated.
+#: Number of times that the noise of the joints is estimated and the fit repeated.
 PASSES = 3
-#: Standard errors from the common size beyond which a joint's own is told as contradicting it, and
-#: the standard error, as a share, beyond which a joint weighs too badly to contradict anything.
+#: Difference of a joint's own estimate from the common one, in standard errors, beyond which a
+#: contradiction is reported, and standard error, as a share, beyond which a joint is too imprecise
+#: for it.
 DISAGREES, LARGEST_ERROR = 4.0, 0.3
-#: Radius in m of the sphere that stands for a payload where the data leaves its inertia open.
+#: Radius in m of the sphere used for a payload whose inertia the data does not determine.
 RADIUS = 0.05
 
 
@@ -48,7 +49,7 @@ class PayloadEstimate:
     Parameters
     ----------
     mass : float
-        kg; NaN where the motion shows its first moment only.
+        kg; NaN if the motion determines only its first moment.
     com : ndarray of shape (3,)
         Centre of mass in the frame of the link, m.
     inertia : ndarray of shape (3, 3)
@@ -70,7 +71,7 @@ class PayloadEstimate:
     notes : tuple of str
         Notes on parameters that cannot be separated or determined.
     first_moment : ndarray of shape (3,)
-        Mass times centre of mass, kg m; NaN where the motion does not show it.
+        Mass times centre of mass, kg m; NaN if the motion does not determine it.
     first_moment_interval : ndarray of shape (3, 2)
         95 % intervals, kg m.
     by_joint, by_joint_std : ndarray of shape (n_joints,)
@@ -113,11 +114,11 @@ class PayloadEstimate:
 
     @property
     def text(self) -> str:
-        """The result in words."""
+        """Text of the result."""
         return "\n".join([*self._body(), *self._errors(), *self._joints(), *self.notes])
 
     def _errors(self) -> list[str]:
-        """Errors of the joints that the payload loads, without it and with it."""
+        """Errors of the joints loaded by the payload, without it and with it."""
         rows = zip(self.joint_names, self.units, self.rmse_before, self.rmse_after, strict=True)
         return ["error of the loaded runs without the payload and with it:"] + [
             f"  {name} ({j}): {digits(before)} → {digits(after)} {unit}"
@@ -248,7 +249,8 @@ def identify_payload(
     Raises
     ------
     SkidynError
-        Runs that cannot be used, an unknown link, or neither unloaded runs nor a fitted model.
+        Runs cannot be used, the link is unknown, or there are neither unloaded runs nor a fitted
+        model.
 
     See Also
     --------
@@ -321,8 +323,8 @@ def _prediction(model: Robot | RBDRegressor, loaded: Any) -> Array:
 
 
 def _estimate(runs: Runs, link: str, notes: list[str], com: Array | None = None) -> PayloadEstimate:
-    # Parameters of the body from those that are free: with a known centre of mass one number
-    # stands for mass and first moment.
+    # Parameters of the body from the free ones: with a known centre of mass one number determines
+    # mass and first moment.
     free = np.eye(10)
     if com is not None:
         free = np.delete(free, [1, 2, 3], axis=1)
@@ -401,7 +403,7 @@ def _estimate(runs: Runs, link: str, notes: list[str], com: Array | None = None)
         parameters = _consistent(whole, solution[:10], is_open)
     about = _about_com(parameters)
     mass, first = parameters[0], parameters[1:4]
-    least = wide * float(np.max(std[[4, 7, 9]]))  # of Ixx, Iyy, Izz; NaN where one is open
+    least = wide * float(np.max(std[[4, 7, 9]]))  # of Ixx, Iyy, Izz; NaN if one is undetermined
     if np.trace(about) < least:
         notes.append(
             "The inertia about the centre of mass is smaller than this motion can resolve "
@@ -430,7 +432,7 @@ def _sphere(mass: float, com: Array) -> Array:
 
 
 def _by_joint(runs: Runs, body: Array) -> tuple[Array, Array]:
-    """Size of the payload by every joint alone, over the common one, with its standard error."""
+    """Size of the payload from every joint alone, over the common one, with standard error."""
     shares, errors = [], []
     for own, rest, target, fold in zip(runs.body, runs.rest, runs.target, runs.fold, strict=True):
         torque = own @ body
@@ -447,7 +449,7 @@ def _by_joint(runs: Runs, body: Array) -> tuple[Array, Array]:
 
 
 def _disagreement(shares: Array, errors: Array) -> list[str]:
-    """A note where joints weigh differently beyond their errors."""
+    """A note if the estimates of the joints differ by more than their errors."""
     felt = np.flatnonzero(np.isfinite(shares) & (errors < LARGEST_ERROR))
     if len(felt) < 2:
         return []
@@ -482,7 +484,7 @@ def _triangle(rows: Array) -> Array:
 
 
 def _solve(factor: Array) -> Array:
-    """Least squares of the smallest size where columns depend on each other."""
+    """Least squares, with the smallest solution for dependent columns."""
     columns, target = factor[:, :-1], factor[:, -1]
     size = np.linalg.norm(columns, axis=0)
     size[size == 0] = 1.0
@@ -495,7 +497,7 @@ def _noise(designs: list[Array], targets: list[Array], solution: Array) -> Array
 
 
 def _consistent(whole: Array, free: Array, is_open: NDArray[np.bool_]) -> Array:
-    """The body that can exist and explains the torque best, everything else refitted."""
+    """The possible body that explains the torque best, with all other parameters fitted again."""
     if free[0] > 0:
         mass, com = free[0], np.where(is_open[1:4], 0.0, free[1:4]) / free[0]
     else:
@@ -505,7 +507,7 @@ def _consistent(whole: Array, free: Array, is_open: NDArray[np.bool_]) -> Array:
     inertia = np.diag(ball) + shift
     start = np.r_[mass, mass * com, inertia[np.triu_indices(3)]]
     n_rest = whole.shape[1] - 11
-    # What is beside the body has no bounds: it is eliminated, which leaves the body's own rows.
+    # The other parameters have no bounds: they are eliminated, which leaves the body's own rows.
     swapped = _triangle(np.hstack([whole[:, 10:-1], whole[:, :10], whole[:, -1:]]))
     own = swapped[n_rest:]
     found, _ = make_consistent(start[None], own[:, n_rest:-1], own[:, -1], np.zeros(0), np.zeros(0))
@@ -523,7 +525,7 @@ def _about_com(parameters: Array) -> Array:
 def _loaded_errors(
     designs: list[Array], runs: Runs, solution: Array, width: int = 10
 ) -> tuple[Array, Array]:
-    """Errors on the rows that feel the payload, without it and with it."""
+    """Errors on the rows with the payload, without it and with it in the model."""
     errors = []
     for design, target, body in zip(designs, runs.target, runs.body, strict=True):
         felt = np.any(body != 0, axis=1)

@@ -21,11 +21,11 @@ from skidyn.robots import Robot
 
 #: Parameters of a body, as in :attr:`skidyn.robots.Robot.inertial_parameters`.
 SYMBOLS = ("m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
-#: Effects beside the rigid body that nearly every geared robot has.
+#: Effects in addition to the rigid body that nearly every geared robot has.
 FRICTION = ("viscous", "coulomb", "offset", "rotor_inertia")
-#: Blocks of time of the only recording with, or without, the load.
+#: Number of blocks of time for a single recording with, or without, the load.
 BLOCKS = 10
-#: Share of a column that must be left when all others are taken out of it.
+#: Share of a column that must remain after elimination of all others.
 LEAST_SHARE = 1e-6
 
 
@@ -36,7 +36,7 @@ class Runs:
     Attributes
     ----------
     problem : Problem
-        Rows, folds and the columns of what the robot has without a load.
+        Rows, folds and the columns of the robot without a load.
     body : list of ndarray of shape (n_rows_j, 10)
         Per joint, torque per unit of every parameter of a body at the link; zero without load.
     rest : list of ndarray of shape (n_rows_j, n_rest)
@@ -63,12 +63,12 @@ class Runs:
 def read_runs(
     robot: Robot, loaded: Any, unloaded: Any, smooth: bool | None
 ) -> tuple[Signals, Array, NDArray[np.bool_], bool]:
-    """Signals and torque of all runs, which samples carry the load, and whether to smooth.
+    """Signals and torque of all runs, a mask of samples with the load, and whether to smooth.
 
     Raises
     ------
     SkidynError
-        No run, or a run without the torque columns.
+        There is no run, or a run has no torque columns.
     """
     frames = [(frame, True) for frame in _frames(loaded, "loaded")]
     frames += [(frame, False) for frame in _frames(unloaded, "unloaded")]
@@ -102,7 +102,7 @@ def make_runs(
     smooth: bool,
     rigid_body: bool = True,
 ) -> Runs:
-    """Averaged rows of the runs; the torque is taken as it is."""
+    """Averaged rows of the runs; the torque is used unchanged."""
     terms = tuple(terms)
     problem = make_problem(
         signals,
@@ -124,7 +124,7 @@ def in_body(robot: Robot, link: str | None) -> tuple[int, Array]:
     Raises
     ------
     SkidynError
-        No such link, or one that does not move.
+        The link does not exist, or does not move.
     """
     if link is None:
         return robot.n_bodies - 1, np.eye(10)
@@ -140,12 +140,12 @@ def in_body(robot: Robot, link: str | None) -> tuple[int, Array]:
 
 
 def interval_factor(n_folds: int) -> float:
-    """Half width of a 95 % interval in standard errors from that many folds."""
+    """Half width of a 95 % interval in standard errors for a number of folds."""
     return float(student_t.ppf(0.975, max(1, n_folds - 1)))
 
 
 def open_columns(design: Array, columns: Sequence[int]) -> NDArray[np.bool_]:
-    """Which columns are, nearly, combinations of all others of a design or triangular factor."""
+    """Columns that are nearly combinations of all others of a design or triangular factor."""
     size = np.linalg.norm(design, axis=0)
     used = size > 0
     is_open: NDArray[np.bool_] = ~used
@@ -157,9 +157,9 @@ def open_columns(design: Array, columns: Sequence[int]) -> NDArray[np.bool_]:
 
 
 def _folds(problem: Problem, carries: NDArray[np.bool_]) -> tuple[list[NDArray[np.int64]], int]:
-    """Folds of the problem; the only recording with or without the load falls into blocks.
+    """Folds of the problem; a single recording with or without the load is split into blocks.
 
-    Without it nothing would tell load and robot apart.
+    Without it, load and robot could not be separated.
     """
     fold, n_folds = [f.copy() for f in problem.fold], problem.n_folds
     names = problem.signals.trajectory
@@ -220,12 +220,12 @@ def _joined(parts: Sequence[Signals], robot: Robot) -> Signals:
 def _body_rows(
     problem: Problem, robot: Robot, link: str | None, carries: NDArray[np.bool_]
 ) -> list[Array]:
-    """Averaged columns of a body fixed to a link, on the samples that carry it."""
+    """Averaged columns of a body fixed to a link, on the samples with the load."""
     body, frame = in_body(robot, link)
     columns = slice(10 * body, 10 * body + 10)
     s = problem.signals
     rows = [np.zeros((count, 10)) for count in problem.rows.counts]
-    weights = [w.tocsc() for w in problem.rows.weights]  # of which chunks of samples are taken
+    weights = [w.tocsc() for w in problem.rows.weights]  # for slicing by chunks of samples
     for chunk, regressor in robot.iter_torque_regressor(s.q, s.dq, s.ddq):
         for j, block in enumerate(rows):
             there = regressor[j, columns].T * carries[chunk, None]

@@ -15,7 +15,7 @@ def scaling_of(values: Array, kind: str) -> tuple[Array, Array]:
     Parameters
     ----------
     values : ndarray of shape (n_samples, n_columns)
-        What is to be scaled.
+        Values to be scaled.
     kind : {"standard", "minmax"}
         Which scaling.
 
@@ -28,6 +28,6 @@ def scaling_of(values: Array, kind: str) -> tuple[Array, Array]:
         offset, scale = values.min(axis=0), np.ptp(values, axis=0)
     else:
         offset, scale = values.mean(axis=0), values.std(axis=0)
-    # a column that is constant but for rounding must not be blown up
+    # a column that is constant up to rounding must not be enlarged
     floor = 10 * np.finfo(np.float64).eps * np.maximum(np.abs(offset), np.abs(values).max(axis=0))
     return offset, np.where(scale > floor, scale, 1.0)

@@ -24,16 +24,16 @@ class CurrentToTorque(LogTransformer):
     gear_ratio : float or array-like of shape (n_joints,), default=1.0
         Turns of the motor per turn of the joint.
     torque_constant : float or array-like of shape (n_joints,), N m/A, default=1.0
-        Motor torque per ampere. Give the product of both here if only that is known.
+        Motor torque per ampere. If only the product of both is known, give it here.
 
     Attributes
     ----------
     gain_ : ndarray of shape (n_joints,), N m/A
         Joint torque per ampere.
     n_features_in_ : int
-        Columns of X.
+        Number of columns of X.
     feature_names_in_ : ndarray of str
-        Their names, where X has names.
+        Names of the columns, if X has names.
 
     References
     ----------

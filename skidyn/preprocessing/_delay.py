@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Delay of one channel against another: estimated, and taken out."""
+"""Estimate and remove the delay of one channel relative to another."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Blocks of rows that are left out in turn for the standard error.
+#: Number of blocks of rows that are left out in turn for the standard error.
 BLOCKS = 10
 
 
 @dataclass(frozen=True)
 class DelayEstimate:
-    """Delay of one channel against another.
+    """Delay of one channel relative to another.
 
     Parameters
     ----------
     delay : float, s
-        Positive where the channel is late.
+        Positive if the channel is late.
     standard_error : float, s
-        From leaving out one tenth of the log at a time.
+        Jackknife estimate, with one tenth of the log left out at a time.
     correlation : float
         Correlation of the detrended signals after removing the delay.
 
@@ -86,8 +86,8 @@ def estimate_delay(
     Raises
     ------
     ValueError
-        No clock, signals of other length, too short a log, a constant signal, or no largest
-        correlation within ``largest``.
+        There is no clock, signals differ in length, the log is too short, a signal is constant, or
+        the correlation has no maximum within ``largest``.
 
     References
     ----------
@@ -188,10 +188,10 @@ def advance_channels(frame: pd.DataFrame, delays: Mapping[str, float]) -> pd.Dat
     Parameters
     ----------
     frame : DataFrame
-        A log with ``time`` (s) and, where it holds several, ``trajectory``.
+        A log with ``time`` (s) and, for several trajectories, ``trajectory``.
     delays : mapping of str to float, s
-        Delay of a column (``"tau3"``) or of a quantity (``"tau"``: all its joints); positive where
-        it is late.
+        Delay of a column (``"tau3"``) or of a quantity (``"tau"``: all its joints); positive if it
+        is late.
 
     Returns
     -------
@@ -231,7 +231,7 @@ def advance_channels(frame: pd.DataFrame, delays: Mapping[str, float]) -> pd.Dat
 
 
 def _read_at(time: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Values at other times: straight lines would flatten what is swift."""
+    """Values at other times; linear interpolation would reduce fast peaks."""
     if len(time) < 3 or np.any(np.diff(time) <= 0):
         return np.asarray(np.interp(wanted, time, values))
     inside = np.clip(wanted, time[0], time[-1])

@@ -22,7 +22,7 @@ from skidyn.preprocessing._smoothers import SMOOTHERS, Smoothed
 
 Array = NDArray[np.float64]
 
-#: Rows that the choice looks at, cut-offs tried per octave, and blocks for its standard error.
+#: Number of rows used for the choice, cut-offs per octave, and blocks for the standard error.
 CHOICE_ROWS, PER_OCTAVE, BLOCKS = 4_000, 2, 16
 #: Cut-offs tried, in Hz and as a share of the sampling rate.
 LOWEST_CUTOFF, HIGHEST_SHARE = 0.7, 0.25
@@ -43,19 +43,19 @@ class SmoothDerivatives(SignalTransformer):
     ----------
     columns : sequence of int or str, default=None
         Columns to smooth and differentiate. None means the velocities (columns whose names begin
-        with ``dq``) where there are some, otherwise the positions (``q``), or without names all
-        columns.
+        with ``dq``) if there are any, otherwise the positions (``q``), or all columns of an X
+        without names.
     derivatives : {1, 2}, default=None
-        How many are appended; None means one of velocities and two of anything else.
+        Number of derivatives that are appended; None means one for velocities and two otherwise.
     method : {"auto", "butterworth", "savitzky_golay", "kalman"}, default="auto"
         Zero-phase Butterworth of order 4 with central differences; local polynomials of degree 4;
-        Kalman smoother of a point with white jerk, the only one that uses unequal time steps as
-        they are. ``"auto"`` selects the one with the least error, or the Kalman smoother where the
+        Kalman smoother of a point with white jerk, the only one that uses unequal time steps
+        unchanged. ``"auto"`` selects the one with the least error, or the Kalman smoother if the
         time steps vary by more than 10 %.
     cutoff : float, Hz, default=None
         Frequency at which half of the amplitude passes; chosen if None. State it with every result.
     rate : float, Hz, default=None
-        Sampling rate where X has no time column.
+        Sampling rate if X has no time column.
     trajectory, time : int, str or None, default="auto"
         Key columns, passed on unchanged.
 
@@ -64,20 +64,20 @@ class SmoothDerivatives(SignalTransformer):
     columns_ : ndarray of int
         Positions of the columns that are smoothed.
     derivatives_ : int
-        How many derivatives are appended.
+        Number of derivatives that are appended.
     method_ : str
         Method that is used.
     cutoff_ : float, Hz
         Cut-off that is used.
     cv_results_ : dict of list
         ``method``, ``cutoff`` (Hz), ``error`` (mean square of the left-out error, geometric mean
-        over columns) and its ``standard_error``; empty where nothing was to be chosen.
+        over columns) and its ``standard_error``; empty if nothing was chosen.
     rate_ : float, Hz
         Sampling rate of the training log.
     n_features_in_ : int
-        Columns of X.
+        Number of columns of X.
     feature_names_in_ : ndarray of str
-        Their names, where X has names.
+        Names of the columns, if X has names.
 
     References
     ----------
@@ -229,7 +229,8 @@ def _smooth(method: str, times: Array, values: Array, cutoff: float) -> Smoothed
 def _left_out_error(parts: list[tuple[Array, Array]], method: str, cutoff: float) -> Array:
     """Mean squared left-out error per block of rows, geometric mean over columns.
 
-    The ends of a segment are left out: what a filter assumes beyond them would decide otherwise.
+    The ends of a segment are left out, so that the assumptions of a filter beyond them have no
+    influence.
     """
     total, rows = np.zeros((BLOCKS, parts[0][1].shape[1])), 0
     for times, values in parts:
@@ -239,7 +240,7 @@ def _left_out_error(parts: list[tuple[Array, Array]], method: str, cutoff: float
         means = [np.mean(block**2, axis=0) for block in np.array_split(inner, BLOCKS)]
         total, rows = total + len(inner) * np.array(means), rows + len(inner)
     squares = total / rows
-    # columns that do not move have no noise either; they must not decide
+    # constant columns have no noise; they must not influence the choice
     scale = squares.mean(axis=0)
     moving = scale > 1e-24
     if not moving.any():

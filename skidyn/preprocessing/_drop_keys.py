@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Features without key columns, which a learner that does not know them would memorise."""
+"""Features without key columns, which a learner without support for them would memorise."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ class DropKeys(SignalTransformer):
     Attributes
     ----------
     n_features_in_ : int
-        Columns of X.
+        Number of columns of X.
     feature_names_in_ : ndarray of str
-        Their names, where X has names.
+        Names of the columns, if X has names.
 
     Examples
     --------
@@ -53,7 +53,7 @@ class DropKeys(SignalTransformer):
         self.time = time
 
     def _learn(self, X: Array) -> None:
-        self._keys()  # tells of columns that are not there
+        self._keys()  # raises an error for missing columns
 
     def _changed(self, X: Array) -> Array:
         return X[:, list(self._keys().features)]
@@ -63,18 +63,18 @@ class DropKeys(SignalTransformer):
 
 
 def without_keys_inside(learner: Any, keys: Keys) -> Any:
-    """A learner whose parts that do not know key columns do not see them either.
+    """A learner whose parts without support for key columns do not get them.
 
-    Steps of a ``Pipeline`` after the last that knows key columns, and members of stackings and
-    votings that do not know them, get a :class:`DropKeys`, unless there is one already. (A learner
-    without any part that knows key columns never sees them: ``Keys.for_learner``.)
+    Steps of a ``Pipeline`` after the last one that supports key columns, and members of stackings
+    and votings that do not support them, get a :class:`DropKeys`, unless there is one already. (A
+    learner without any part that supports key columns never gets them: ``Keys.for_learner``.)
 
     Parameters
     ----------
     learner : estimator
         Not fitted.
     keys : Keys
-        Key columns of the table that the learner is fitted to.
+        Key columns of the table to which the learner is fitted.
 
     Returns
     -------
@@ -93,7 +93,7 @@ def without_keys_inside(learner: Any, keys: Keys) -> Any:
         if last == len(steps) - 1:
             steps[-1] = (steps[-1][0], without_keys_inside(steps[-1][1], keys))
         else:
-            # transformers of signals hand key columns on in their place
+            # transformers of signals pass key columns on in their positions
             steps.insert(last + 1, ("drop_keys", drop))
         return learner.__class__(**{**learner.get_params(deep=False), "steps": steps})
     if isinstance(getattr(learner, "estimators", None), list):
@@ -106,7 +106,7 @@ def without_keys_inside(learner: Any, keys: Keys) -> Any:
 
 
 def _drops_keys(learner: Any) -> bool:
-    """Whether a step of a Pipeline takes the key columns out already."""
+    """Whether a step of a Pipeline removes the key columns already."""
     if isinstance(learner, Pipeline):
         return any(_drops_keys(step) for _, step in learner.steps)
     return isinstance(learner, DropKeys)

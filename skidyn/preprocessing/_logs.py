@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Functions on whole logs: what changes rows or targets is not a step of a Pipeline."""
+"""Functions on whole logs that change rows or targets and cannot be steps of a Pipeline."""
 
 from __future__ import annotations
 

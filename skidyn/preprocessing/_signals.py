@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Transformers of signals: key columns pass untouched, nothing crosses the end of a segment."""
+"""Transformers of signals; key columns are unchanged, and segments are processed separately."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ Array = NDArray[np.float64]
 
 
 class SignalTransformer(LogTransformer):
-    """Base of transformers of signals, which know key columns and keep to their segments."""
+    """Base of transformers of signals with key columns and segments."""
 
     trajectory: ColumnSpec
     time: ColumnSpec
-    #: Whether the table that it gives is a log again: signals in their units, and key columns.
+    #: Whether the resulting table is a log: signals in their units, and key columns.
     gives_signals: ClassVar[bool] = True
 
     _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
@@ -39,7 +39,7 @@ class SignalTransformer(LogTransformer):
         return fitted_keys(self)
 
     def _segments(self, X: Array) -> list[slice]:
-        """Runs of rows that follow each other."""
+        """Slices of consecutive rows."""
         keys = self._keys()
         time = None if keys.time is None else X[:, keys.time]
         refuse_shuffled(type(self).__name__, keys.trajectories(X), time)
@@ -47,7 +47,7 @@ class SignalTransformer(LogTransformer):
 
 
 def _sampling_rate(X: Array, keys: Keys, segments: list[slice], rate: float | None) -> float:
-    """Samples per second: as given, or from the median step of the time column."""
+    """Samples per second, as given or from the median step of the time column."""
     if rate is not None:
         return float(rate)
     if keys.time is None:
@@ -60,7 +60,7 @@ def _sampling_rate(X: Array, keys: Keys, segments: list[slice], rate: float | No
 
 
 def segment_times(X: Array, keys: Keys, rows: slice, rate: float) -> Array:
-    """Times in s within a segment; an error where they do not advance."""
+    """Times in s within a segment; raises an error if they do not increase."""
     if keys.time is None:
         return np.arange(rows.stop - rows.start) / rate
     times: Array = X[rows, keys.time]
@@ -73,7 +73,7 @@ def segment_times(X: Array, keys: Keys, rows: slice, rate: float) -> Array:
 
 
 def refuse_cutoff(cutoff: float, rate: float) -> None:
-    """Refuse a cut-off that the sampling cannot show."""
+    """Raise an error for a cut-off that is too high for the sampling rate."""
     if not cutoff < rate / 2:
         raise ValueError(
             f"cutoff={cutoff} Hz is not below half the sampling rate ({rate / 2:.4g} Hz)."
@@ -96,7 +96,7 @@ class ButterworthFilter(SignalTransformer):
     Parameters
     ----------
     cutoff : float, Hz, default=10.0
-        Frequency at which one pass lets half of the power through; the filter runs forward and
+        Frequency at which one pass transmits half of the power; the filter runs forward and
         backward, which doubles its attenuation.
     order : int, default=4
         Order of one pass.
@@ -110,9 +110,9 @@ class ButterworthFilter(SignalTransformer):
     rate_ : float, Hz
         Sampling rate of the training log.
     n_features_in_ : int
-        Columns of X.
+        Number of columns of X.
     feature_names_in_ : ndarray of str
-        Their names, where X has names.
+        Names of the columns, if X has names.
 
     Examples
     --------
@@ -176,7 +176,7 @@ class TimeDerivative(SignalTransformer):
         smoothed signals. State the cut-off with every result, since it has a large influence on
         residuals.
     rate : float, Hz, default=None
-        Sampling rate where X has no time column.
+        Sampling rate if X has no time column.
     trajectory, time : int, str or None, default="auto"
         Key columns, passed on unchanged.
 
@@ -187,9 +187,9 @@ class TimeDerivative(SignalTransformer):
     rate_ : float, Hz
         Sampling rate of the training log.
     n_features_in_ : int
-        Columns of X.
+        Number of columns of X.
     feature_names_in_ : ndarray of str
-        Their names, where X has names.
+        Names of the columns, if X has names.
 
     Examples
     --------
@@ -261,7 +261,7 @@ class TimeDerivative(SignalTransformer):
 
 
 class SignalScaler(SignalTransformer):
-    """Scale signals to the range 0 to 1 or to unit variance, leaving key columns as they are.
+    """Scale signals to the range 0 to 1 or to unit variance, without a change of key columns.
 
     Parameters
     ----------
@@ -275,9 +275,9 @@ class SignalScaler(SignalTransformer):
     offset_, scale_ : ndarray of shape (n_features,)
         ``(X - offset_) / scale_``; 0 and 1 for key columns.
     n_features_in_ : int
-        Columns of X.
+        Number of columns of X.
     feature_names_in_ : ndarray of str
-        Their names, where X has names.
+        Names of the columns, if X has names.
 
     References
     ----------

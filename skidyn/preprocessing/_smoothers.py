@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Three smoothers that share one parameter, a cut-off in Hz, and tell their leave-one-out error.
+"""Three smoothers with one parameter, a cut-off in Hz, and a known leave-one-out error.
 
 Each maps the samples of one segment to smoothed values, first and second derivatives, all linear in
 the samples. ``weight`` is the weight of a sample in its own smoothed value (the diagonal of the hat
@@ -79,10 +79,10 @@ def savitzky_golay(times: Array, values: Array, cutoff: float) -> Smoothed:
 
 
 def kalman(times: Array, values: Array, cutoff: float) -> Smoothed:
-    """Kalman smoother of a point with white jerk; takes the recorded times as they are.
+    """Kalman smoother of a point with white jerk; uses the recorded times unchanged.
 
-    The ratio of jerk to measurement noise is that at which the smoother lets half of the amplitude
-    through at the cut-off, ``|H|^-1 = 1 + (f / cutoff)^6``.
+    The ratio of jerk to measurement noise is that at which the smoother transmits half of the
+    amplitude at the cut-off, ``|H|^-1 = 1 + (f / cutoff)^6``.
 
     References
     ----------
@@ -96,7 +96,7 @@ def kalman(times: Array, values: Array, cutoff: float) -> Smoothed:
     spread = np.empty((n, 3, 3))
     predicted, predicted_spread = np.empty_like(state), np.empty_like(spread)
     moves = np.empty((n, 3, 3))
-    # nothing is known of the start: a spread far above what the jerk builds up over one period
+    # the initial state is unknown: a variance far above that due to the jerk over one period
     wide = 1e6 * (2 * np.pi * cutoff) ** np.array([0.0, 2.0, 4.0])
     x, P = np.zeros((3, values.shape[1])), np.diag(wide)
     x[0] = values[0]
@@ -118,7 +118,7 @@ def kalman(times: Array, values: Array, cutoff: float) -> Smoothed:
 
 
 def _jerk_spread(h: float) -> Array:
-    """Covariance that white jerk of unit density builds up within a step ``h``."""
+    """Covariance due to white jerk of unit density within a step ``h``."""
     return np.array(
         [
             [h**5 / 20, h**4 / 8, h**3 / 6],
@@ -132,7 +132,7 @@ def _rate(times: Array) -> float:
     return float(1 / np.median(np.diff(times)))
 
 
-#: By the names that the user gives.
+#: Smoothers by the names for users.
 SMOOTHERS: dict[str, Smoother] = {
     "butterworth": butterworth,
     "kalman": kalman,

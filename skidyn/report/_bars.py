@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Errors before and after over the noise: the scale of the bars on the first screen."""
+"""Scale of the bars on the first screen: errors relative to the noise, before and after."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LOWEST = 0.5
 
 @dataclass(frozen=True)
 class Scale:
-    """Places of errors over noise along a bar.
+    """Positions of errors over noise along a bar.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class Scale:
         return [1, *(k for k in range(1 + step, int(self.largest) + 1) if k % step == 0)]
 
     def place(self, ratio: float | None) -> float:
-        """Length of a bar in per cent; zero where there is no number."""
+        """Length of a bar in per cent; zero if there is no number."""
         if ratio is None or not isfinite(ratio) or ratio <= 0:
             return 0.0
         if self.largest > LINEAR:
@@ -52,7 +52,7 @@ class Scale:
 
 
 def scale_of(ratios: Iterable[float | None]) -> Scale:
-    """A scale that holds all errors over noise, and the noise.
+    """A scale that includes all errors over noise, and the noise.
 
     Parameters
     ----------

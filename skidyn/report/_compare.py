@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from skidyn._signals import Array
     from skidyn.diagnosis import Diagnosis, Finding
 
-#: Errors whose ratio is within this share of one are alike.
+#: Errors whose ratio differs from one by less than this are treated as equal.
 ALIKE = 0.1
 #: Half the width of a 95 % interval in standard errors.
 NORMAL = 1.96
@@ -30,7 +30,7 @@ NORMAL = 1.96
 
 @dataclass(frozen=True)
 class Pair:
-    """Two diagnoses side by side, and what their comparison has found.
+    """Two diagnoses side by side, and the result of their comparison.
 
     Attributes
     ----------
@@ -152,7 +152,7 @@ def _side(diagnosis: Diagnosis, name: str, provenance: Mapping[str, Any]) -> dic
 
 def _ratios(first: Diagnosis, second: Diagnosis, same: bool) -> list[dict[str, Any]]:
     """Error of the second over the first, as given; an interval where the log is the same."""
-    from skidyn.metrics import paired_comparison  # not paid for by who only writes a page
+    from skidyn.metrics import paired_comparison  # not needed to write a page
 
     rows = []
     for j in range(len(first.joint_names)):
@@ -170,7 +170,7 @@ def _ratios(first: Diagnosis, second: Diagnosis, same: bool) -> list[dict[str, A
 
 def _errors(diagnosis: Diagnosis, joint: int) -> Array:
     """Mean squared error of every trajectory while the joint slides, (N m)^2 or N^2."""
-    from skidyn.metrics import trajectory_errors  # not paid for by who only writes a page
+    from skidyn.metrics import trajectory_errors  # not needed to write a page
 
     c = diagnosis.comparison
     use = c.sliding[:, joint]
@@ -181,9 +181,10 @@ def _errors(diagnosis: Diagnosis, joint: int) -> Array:
 
 
 def _findings(both: Sequence[Diagnosis], names: Sequence[str]) -> list[dict[str, Any]]:
-    """One row per kind and joint, with the parameters each of the two gives it.
+    """One row per kind and joint, with the parameters in each of the two.
 
-    Kinds that one of the logs cannot tell apart share a row: two names, one effect.
+    Kinds that one of the logs cannot separate share a row, since they are one effect with two
+    names.
     """
     rows: list[dict[str, Any]] = []
     for side, (diagnosis, name) in enumerate(zip(both, names, strict=True)):
@@ -201,7 +202,7 @@ def _findings(both: Sequence[Diagnosis], names: Sequence[str]) -> list[dict[str,
 
 
 def _row(rows: list[dict[str, Any]], finding: Finding, joint: int) -> dict[str, Any]:
-    """The row of a finding on a joint; a new one where neither it nor a rival has one."""
+    """The row of a finding on a joint; a new one if neither it nor a rival has one."""
     for row in rows:
         if row["joint"] != joint:
             continue
@@ -216,9 +217,9 @@ def _row(rows: list[dict[str, Any]], finding: Finding, joint: int) -> dict[str, 
 
 
 def _coefficients(both: Sequence[Diagnosis], same: bool) -> list[dict[str, Any]]:
-    """Coefficients of the models as given, fitted to all data, with 95 % intervals.
+    """Coefficients of the given models, fitted to all data, with 95 % intervals.
 
-    On two logs the estimates are independent, so that a difference can be judged.
+    On two logs the estimates are independent, so that a difference can be tested.
     """
     tables = [_table(diagnosis) for diagnosis in both]
     rows = []
@@ -230,14 +231,14 @@ def _coefficients(both: Sequence[Diagnosis], same: bool) -> list[dict[str, Any]]
             gap = known[0]["value"] - known[1]["value"]
             differs = bool(abs(gap) > NORMAL * np.hypot(known[0]["std"], known[1]["std"]))
         rows.append({"name": name, "sides": sides, "differs": differs})
-    # effects first: their names are short and their numbers mean something by themselves
+    # effects first: their names are short and their numbers have a direct meaning
     return sorted(rows, key=lambda row: "[" not in row["name"])
 
 
 def _table(diagnosis: Diagnosis) -> dict[str, dict[str, float]]:
     model = diagnosis.base_model
     if not hasattr(model, "with_effects"):
-        return {}  # a regressor without physics has no coefficients to name
+        return {}  # a regressor without physics has no named coefficients
     fitted = model.with_effects(()).fit(*diagnosis.data)
     return {
         row["name"]: {
@@ -251,7 +252,7 @@ def _table(diagnosis: Diagnosis) -> dict[str, dict[str, float]]:
 
 
 def _rows(both: Sequence[Diagnosis], report: dict[str, Any]) -> list[dict[str, Any]]:
-    """One row per joint with the errors of both as given; those that differ or fail are shown."""
+    """One row per joint with the errors of both; joints that differ or fail are shown."""
     rows = []
     for row, other, change in zip(
         *(d.story()["joints"] for d in both), report["ratios"], strict=True
@@ -278,7 +279,7 @@ def _rows(both: Sequence[Diagnosis], report: dict[str, Any]) -> list[dict[str, A
 
 
 def _headline(report: dict[str, Any]) -> str:
-    """The outcome in a few words: what only one of the two lacks, or how their errors compare."""
+    """The outcome in a few words: effects missing in only one of the two, or the error ratio."""
     names = report["names"]
     parts = []
     for name in names:

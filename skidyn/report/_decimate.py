@@ -21,12 +21,12 @@ def rows_with_peaks(
     segments : sequence of slice
         Contiguous runs of rows; buckets never cross them.
     n_buckets : int
-        About how many buckets all rows together are divided into.
+        Approximate number of buckets for all rows together.
 
     Returns
     -------
     rows : list of ndarray of int
-        Sorted rows of each segment; all of them where they are few.
+        Sorted rows of each segment; all of them if they are few.
     """
     arrays = [np.asarray(signal, dtype=float) for signal in signals]
     total = sum(s.stop - s.start for s in segments)

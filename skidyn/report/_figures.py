@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The page's still pictures in numbers: what the script hands to the plotting library."""
+"""Data of the page's static figures, which the script passes to the plotting library."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def finding_charts(finding: dict[str, Any], units: Sequence[str]) -> list[dict[s
 
 
 def fall_figure(errors: Sequence[Number], floor: Number, unit: str) -> dict[str, Any]:
-    """Error of one joint falling step by step to its noise floor.
+    """Error of one joint, decreasing step by step to its noise floor.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def budget_bars(
     """
     rows = []
     for shares in budget:
-        # a step can raise the error of a joint it does not serve: that is no share of it
+        # a step can increase the error of another joint, which is not a share of it
         positive = {cause: max(shares.get(cause) or 0.0, 0.0) for cause in causes}
         total = sum(positive.values()) or 1.0
         rows.append(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the page of a fleet shows: which robot deviates in which effect, and since when."""
+"""Data of the page of a fleet: robots that deviate, in which effect, and since when."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from skidyn.report._words import coefficient_told, since_told
 if TYPE_CHECKING:
     from skidyn.fleet import DriftReport, FleetComparison
 
-#: Robots that a headline names.
+#: Number of robots that are listed in the headline.
 NAMED = 3
 
 
 @dataclass(frozen=True)
 class Fleet:
-    """What the page of a fleet is about.
+    """Subject of the page of a fleet.
 
     Attributes
     ----------
     comparison : FleetComparison
         Every robot's deviation from the others.
     drift : mapping of str to DriftReport
-        Of the robots that were watched over time.
+        Drift of the robots that were monitored over time.
     """
 
     comparison: FleetComparison
@@ -106,7 +106,7 @@ def summarize_fleet(
 
 
 def _headline(report: dict[str, Any]) -> str:
-    """How many robots deviate, and which."""
+    """Number and names of the robots that deviate."""
     names = list(dict.fromkeys(row["robot"] for row in report["deviating"]))
     drifting = list(dict.fromkeys(row["robot"] for row in report["alarms"]))
     n = len(report["robots"])

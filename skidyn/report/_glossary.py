@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Words of the pages and what they mean, for hovering and for the list at the end."""
+"""Terms of the pages with their meanings, for hovering and for the list at the end."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ MEANINGS = {
     "1. Errors are held out by whole trajectories if there are enough of them.",
 }
 
-#: Words of the page of a fleet alone.
+#: Terms that occur only on the page of a fleet.
 FLEET_MEANINGS = {
     "distance": "The coefficient of a robot minus that of the others, divided by the scatter "
     "between robots.",
@@ -52,7 +52,7 @@ FLEET_MEANINGS = {
 
 
 def meaning(word: str) -> str:
-    """What a word of a page means.
+    """Meaning of a term of a page.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ DEEPEST = 5.0
 
 def judged_regimes(diagnosis: Diagnosis) -> list[list[bool]]:
     """Whether effects are judged in a regime, by joint and regime."""
-    from skidyn.diagnosis import regimes  # not paid for by who only writes a page
+    from skidyn.diagnosis import regimes  # not needed to write a page
 
     judged = diagnosis.comparison.judged_samples
     table = []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The residual over two variables: the shape of an effect that has no name."""
+"""The residual over two variables: the shape of an unknown effect."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ TILES, FEWEST = 14, 5
 
 
 def residual_maps(diagnosis: Diagnosis, finding: Finding) -> list[dict[str, Any]]:
-    """Median residual on tiles of the two variables that a nameless effect depends on.
+    """Median residual on tiles of the two variables on which an unknown effect depends.
 
     Parameters
     ----------
     diagnosis : Diagnosis
-        Its comparison holds the residual of the model as given.
+        Diagnosis, whose comparison contains the residual of the given model.
     finding : Finding
-        Anything but an unknown effect of two logged signals has no map.
+        Finding; only an unknown effect of two logged signals has a map.
 
     Returns
     -------
     list of dict
         Per joint ``joint`` (from 1), ``variables``, ``units``, ``x`` and ``y`` (edges of the
-        tiles) and ``table`` of shape (n_y, n_x), N m or N, NaN where the log has not been.
+        tiles) and ``table`` of shape (n_y, n_x), N m or N, NaN where the log has no samples.
     """
     comparison = diagnosis.comparison
     read = [_variable(comparison.signals, name) for name in finding.variables]

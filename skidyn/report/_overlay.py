@@ -21,7 +21,7 @@ BINS, FEWEST = 36, 20
 
 
 def overlays(both: Sequence[Diagnosis]) -> list[dict[str, Any]]:
-    """Residual of both, as given, against velocity and position of the own joint.
+    """Residual of both given models against velocity and position of the own joint.
 
     Parameters
     ----------
@@ -31,9 +31,10 @@ def overlays(both: Sequence[Diagnosis]) -> list[dict[str, Any]]:
     Returns
     -------
     list of dict
-        ``joint`` (from 1), ``variable``, ``unit``, ``x``, ``apart`` (how far the two part, over the
-        noise) and for each of the two ``sides`` ``median``, ``low`` and ``high`` (quartiles) of
-        the residual while the joint slides, N m or N; NaN where a log has not been.
+        ``joint`` (from 1), ``variable``, ``unit``, ``x``, ``apart`` (difference of the two,
+        relative to the noise) and for each of the two ``sides`` ``median``, ``low`` and ``high``
+        (quartiles) of the residual while the joint slides, N m or N; NaN where a log has no
+        samples.
     """
     signals = both[0].comparison.signals
     pictures = []
@@ -44,7 +45,7 @@ def overlays(both: Sequence[Diagnosis]) -> list[dict[str, Any]]:
             values = np.concatenate([x for x, _ in pairs])
             if len(values) < 2 * FEWEST:
                 continue
-            # the tails hold few samples, and would squeeze everything else
+            # the tails contain few samples, and would compress the rest
             low, high = np.quantile(values, [0.002, 0.998])
             if not high > low:
                 continue
@@ -63,7 +64,7 @@ def overlays(both: Sequence[Diagnosis]) -> list[dict[str, Any]]:
 
 
 def _apart(sides: Sequence[dict[str, Array]], noise: float) -> float:
-    """How far two curves part, over the noise: medians and quartiles, in the mean over bins."""
+    """Difference of two curves relative to the noise: medians and quartiles, mean over bins."""
     gaps = np.abs([sides[0][key] - sides[1][key] for key in ("low", "median", "high")])
     known = np.isfinite(gaps)
     return float(gaps[known].mean() / max(noise, 1e-300)) if known.any() else 0.0

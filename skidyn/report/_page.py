@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Pages made of their pictures: templates, filters, and everything a page carries inside."""
+"""Pages made of their pictures: templates, filters, and embedded scripts and styles."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ SCRIPTS = ("static/common.js", "static/figures.js", "static/panels.js")
 
 
 def render_page(page: str, summary: Summary, sub: str) -> str:
-    """A whole page from what its pictures have read; every text in it is escaped.
+    """A page from the data of its pictures; every text in it is escaped.
 
     Parameters
     ----------
     page : {"comparison", "diagnosis", "fleet"}
         Folder of ``skidyn/report/_pages``.
     summary : dict
-        Values of JSON: ``title``, and what the pictures have read by their names.
+        Values of JSON: ``title``, and the data of the pictures by their names.
     sub : str
         A line below the title.
 
     Returns
     -------
     html : str
-        A page that loads nothing from anywhere: styles, scripts and numbers are inside.
+        A self-contained page with styles, scripts and numbers.
     """
     environment = _environment()
     canvas, parts, contents, scripts = Canvas(), [], [], list(SCRIPTS)
@@ -64,8 +64,7 @@ def render_page(page: str, summary: Summary, sub: str) -> str:
 def _environment() -> Any:
     """Templates below ``skidyn/report``, with the filters that write numbers and words."""
     jinja2 = import_optional("jinja2", extra="report")
-    # autoescape: the safeguard against names of joints that hold markup; inside the script
-    # `tojson` does it
+    # autoescape is the safeguard against names of joints with markup; inside the script `tojson` is
     environment = jinja2.Environment(
         loader=jinja2.FunctionLoader(_resource),
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined,
@@ -92,7 +91,7 @@ def _resource(name: str) -> str:
 
 
 def number(value: Any) -> str:
-    """Three or four digits; a dash where there is no number."""
+    """Three or four digits; a dash if there is no number."""
     if value is None:
         return "–"
     return f"{value:.4g}".replace("-", "−") if isinstance(value, (int, float)) else str(value)
@@ -104,7 +103,7 @@ def percent(value: float | None) -> str:
 
 
 def change(ratio: float) -> str:
-    """Relative change in per cent, with a sign only where something changed."""
+    """Relative change in per cent, with a sign only if it is not zero."""
     rounded = round(100 * ratio)
     return f"{rounded:+d}%".replace("-", "−") if rounded else "0%"
 
@@ -115,12 +114,12 @@ def words(kind: str) -> str:
 
 
 def chance(q_value: float | None) -> str:
-    """A q-value; digits far below what any model of the noise can promise are not shown."""
+    """A q-value, without digits far below the accuracy of any noise model."""
     return "below 1e-15" if q_value is not None and q_value < 1e-15 else number(q_value)
 
 
 def short(value: float | None) -> str:
-    """Two significant digits; a dash where there is no number."""
+    """Two significant digits; a dash if there is no number."""
     return "–" if value is None else digits(value).replace("-", "−")
 
 
@@ -130,13 +129,13 @@ def capital(text: str) -> str:
 
 
 def breakable(name: str) -> Any:
-    """A name that a narrow place breaks behind its underscores rather than inside a word."""
+    """A name with line breaks permitted after underscores rather than inside a word."""
     markup = import_optional("markupsafe", extra="report").Markup
     return markup("_<wbr>").join(name.split("_"))
 
 
 def mathml(formula: str) -> Any:
-    """A formula in LaTeX as MathML, which browsers draw themselves."""
+    """A formula in LaTeX as MathML, which browsers can display."""
     convert = import_optional("latex2mathml.converter", extra="report").convert
     markup = import_optional("markupsafe", extra="report").Markup
     return markup(convert(formula.replace(r"\mathrm{sign}", r"\operatorname{sign}")))

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A picture of a page: one small class, one template, and a script where it draws in its own way.
+"""A picture of a page: one small class, one template, and a script if its figures need one.
 
-The module stands in the folder of its page, ``skidyn/report/_pages/<page>/<name>.py``, its template
-``<name>.html.jinja`` and its script ``<name>.js`` beside it. Nothing else names it: a page is made
-of the pictures in its folder and in the folder ``every``, in the order of their ``place``.
+The module is in the folder of its page, ``skidyn/report/_pages/<page>/<name>.py``, with its
+template ``<name>.html.jinja`` and its script ``<name>.js``. It is not registered elsewhere: a page
+is made of the pictures in its folder and in the folder ``every``, in the order of their ``place``.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ Summary = dict[str, Any]
 
 
 class Canvas:
-    """What the scripts of a page draw, collected from its pictures.
+    """Data for the scripts of a page, collected from its pictures.
 
     Attributes
     ----------
     numbers : dict
-        ``figures``, and whatever else a picture's own script reads.
+        ``figures``, and further data for the script of a picture.
 
     Examples
     --------
@@ -35,12 +35,12 @@ class Canvas:
         self.numbers: dict[str, Any] = {"figures": []}
 
     def figure(self, figure: dict[str, Any]) -> int:
-        """Number by which a template shows a figure; a figure shown twice is stored once.
+        """Number by which a template refers to a figure; a figure shown twice is stored once.
 
         Parameters
         ----------
         figure : dict
-            ``type`` is a drawing of ``static/figures.js``; the rest is what that draws.
+            ``type`` is a kind of figure in ``static/figures.js``; the rest is its data.
         """
         figures: list[dict[str, Any]] = self.numbers["figures"]
         if figure not in figures:
@@ -49,12 +49,12 @@ class Canvas:
 
 
 class Picture:
-    """A part of a page: what it reads, and what its template shows.
+    """A part of a page: the data that it reads, and the variables of its template.
 
     Attributes
     ----------
     place : int
-        The pictures of a page stand in this order.
+        Rank of the picture on its page.
     title : str, default=""
         Entry in the list of contents; none if empty.
 
@@ -74,12 +74,12 @@ class Picture:
     title: ClassVar[str] = ""
 
     def read(self, subject: Any) -> Any:
-        """What the page needs of a diagnosis, a comparison or a fleet.
+        """Data that the page needs of a diagnosis, a comparison or a fleet.
 
         Parameters
         ----------
         subject : object
-            What the page is about.
+            Diagnosis, comparison or fleet.
 
         Returns
         -------
@@ -94,9 +94,9 @@ class Picture:
         Parameters
         ----------
         summary : dict
-            What the pictures have read, by their names, and what all of them share.
+            Data of the pictures by their names, and common data.
         canvas : Canvas
-            Takes what is to be drawn.
+            Receives the figures.
 
         Returns
         -------
@@ -130,5 +130,5 @@ def pictures(page: str) -> dict[str, Picture]:
 
 
 def read_all(page: str, subject: Any) -> Summary:
-    """What every picture of a page reads of its subject, by the pictures' names."""
+    """Data that every picture of a page reads of its subject, by the pictures' names."""
     return {name: picture.read(subject) for name, picture in pictures(page).items()}

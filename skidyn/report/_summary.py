@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A diagnosis as a plain dictionary: all that the page shows, and nothing it has to compute."""
+"""A diagnosis as a plain dictionary with all data of the page, without further computation."""
 
 from __future__ import annotations
 

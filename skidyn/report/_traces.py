@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Torque over time, thinned for a screen, with what is not judged and what is cut off."""
+"""Torque over time, thinned for a screen, with unjudged intervals and peaks outside the axis."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 BUCKETS = 3000
 #: Gap between pieces of a log on the axis of time, as a share of the whole.
 GAP = 0.004
-#: Stretches that are not judged are joined where less than this share of the whole is between.
+#: Unjudged intervals are joined if less than this share of the whole is between them.
 JOIN = 1 / 1500
-#: The axis of the residual shows this share of the judged samples, and so much more room; peaks
-#: within ``REACH`` times that are shown too.
+#: The axis of the residual shows this share of the judged samples, with this margin; peaks within
+#: ``REACH`` times that are shown too.
 SHOWN, ROOM, REACH = 0.998, 1.15, 1.6
 
 
@@ -42,7 +42,7 @@ def traces(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         ``starts`` of the trajectories, ``apart`` (stretches of time that are not judged, with the
         reason) and ``frame`` (range of the residual's axis, and what lies outside it).
     """
-    from skidyn.diagnosis import regimes  # not paid for by who only writes a page
+    from skidyn.diagnosis import regimes  # not needed to write a page
 
     comparison, after = diagnosis.comparison, diagnosis.comparison_after
     signals = comparison.signals
@@ -61,7 +61,7 @@ def traces(diagnosis: Diagnosis) -> list[dict[str, Any]]:
                 "measured": measured[rows],
                 "before": before[rows],
                 "after": after.predicted[rows, j],
-                # where a line must not be drawn on from the previous row
+                # where no line must be drawn from the previous row
                 "breaks": np.cumsum([len(piece) for piece in pieces])[:-1],
                 "starts": starts,
                 "apart": [
@@ -94,7 +94,7 @@ def _stretches(
 
 
 def _frame(residuals: tuple[Array, ...], judged: NDArray[np.bool_]) -> dict[str, Any]:
-    """Range of the axis that shows nearly all judged samples, and how many peaks lie outside."""
+    """Range of the axis that shows nearly all judged samples, and the number of peaks outside."""
     peak = max(float(np.abs(r).max()) for r in residuals)
     use = judged if judged.any() else np.ones_like(judged)
     reach = ROOM * max(float(np.quantile(np.abs(r[use]), SHOWN)) for r in residuals)
@@ -105,7 +105,7 @@ def _frame(residuals: tuple[Array, ...], judged: NDArray[np.bool_]) -> dict[str,
 
 
 def elapsed(signals: Signals) -> tuple[Array, list[dict[str, Any]]]:
-    """Time that runs on over the borders of trajectories, with a gap that the eye sees.
+    """Time that continues across the borders of trajectories, with a visible gap.
 
     Parameters
     ----------
@@ -137,19 +137,19 @@ def elapsed(signals: Signals) -> tuple[Array, list[dict[str, Any]]]:
 def packed_table(
     table: Mapping[str, Any], columns: Mapping[str, Iterable[float | None]]
 ) -> dict[str, Any]:
-    """Columns over time as the script reads them.
+    """Columns over time in the format of the script.
 
     Parameters
     ----------
     table : mapping
         ``time`` and ``breaks``.
     columns : mapping of str to iterable of float or None
-        Values by the names that the plots use.
+        Values by their names in the plots.
 
     Returns
     -------
     dict
-        ``time`` and ``columns`` packed, ``breaks`` as they were.
+        ``time`` and ``columns`` packed, ``breaks`` unchanged.
     """
     return {
         "time": packed(table["time"]),
@@ -159,6 +159,6 @@ def packed_table(
 
 
 def packed(values: Iterable[float | None]) -> str:
-    """Base64 of 32-bit floats, a fifth of their size as text; NaN where there is no number."""
+    """Base64 of 32-bit floats, a fifth of their size as text; NaN if there is no number."""
     array = np.array([np.nan if v is None else v for v in values], dtype="<f4")
     return base64.b64encode(array.tobytes()).decode("ascii")

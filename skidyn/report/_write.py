@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Pages of a diagnosis, a comparison and a fleet: made, and written whole or not at all."""
+"""Make and write pages of a diagnosis, a comparison and a fleet; no file is left incomplete."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def write_html(path: PathLike, summary: dict[str, Any]) -> Path:
 
 
 def write_comparison(path: PathLike, summary: dict[str, Any]) -> tuple[Path, Path]:
-    """Write the page of a comparison, and its numbers as JSON beside it.
+    """Write the page of a comparison, and its numbers as JSON in the same folder.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def write_comparison(path: PathLike, summary: dict[str, Any]) -> tuple[Path, Pat
     beside = Path(path).with_suffix(".json")
     if beside == Path(path):
         raise SkidynError(f"{path}: the name of the page needs another suffix, such as .html")
-    writable(beside)  # neither without the other
+    writable(beside)  # both or neither
     page = write_text(path, render_comparison(summary))
     return page, write_json(beside, summary["report"])
 
@@ -183,6 +183,6 @@ def write_fleet(path: PathLike, summary: dict[str, Any]) -> Path:
 
 
 def _size(log: dict[str, Any], between: str) -> str:
-    """How many trajectories and samples a log has."""
+    """Numbers of trajectories and samples of a log."""
     n = log["n_trajectories"]
     return f"{n} trajector{'y' if n == 1 else 'ies'}{between}{log['n_samples']:,} samples"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""From links and joints to a tree of moving bodies."""
+"""Assembly of links and joints to a tree of moving bodies."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from skidyn.robots._description import Description, Joint, Mimic, is_positive
 
 @dataclass(frozen=True)
 class LinkPlacement:
-    """Where a link sits: the moving body that carries it (-1: the base) and its pose in there."""
+    """Place of a link: the moving body that carries it (-1: the base) and its pose in this body."""
 
     body: int
     rotation: np.ndarray
@@ -26,7 +26,7 @@ class LinkPlacement:
 
 @dataclass
 class Assembly:
-    """Moving bodies of a robot with everything fixed to them lumped in."""
+    """Moving bodies of a robot, including everything fixed to them."""
 
     joints: list[Joint] = field(default_factory=list)  # the independent ones
     body_names: list[str] = field(default_factory=list)
@@ -75,7 +75,7 @@ def assemble(description: Description, selected: Sequence[str] | None) -> Assemb
         children.setdefault(joint.parent, []).append(joint)
     assembly = Assembly()
     base = LinkPlacement(-1, np.eye(3), np.zeros(3))
-    # An explicit stack: chains of ten thousand joints would exhaust Python's.
+    # An explicit stack: chains of ten thousand joints would exceed Python's limit of recursion.
     stack: list[tuple[Joint | None, LinkPlacement]] = [(None, base)]
     while stack:
         arrival, placement = stack.pop()
@@ -184,7 +184,7 @@ def _root_of(description: Description) -> str:
 
 
 def _resolve_mimics(description: Description) -> dict[str, Mimic]:
-    """How every joint that can move follows an independent one (most follow themselves)."""
+    """Independent joint that each movable joint follows (most follow themselves)."""
     resolved: dict[str, Mimic] = {}
     for joint in description.joints.values():
         if joint.kind == "fixed":

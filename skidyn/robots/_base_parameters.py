@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Base parameters: the combinations of inertial parameters that torque depends on.
+"""Base parameters: the combinations of inertial parameters on which torque depends.
 
 References
 ----------
@@ -18,12 +18,11 @@ from numpy.typing import NDArray
 from skidyn._signals import Array
 from skidyn.robots._robot import Robot
 
-#: Random states from which the structure is read, and the tolerance of its rank.
+#: Number of random states from which the structure is found, and the tolerance of its rank.
 STATES, TOLERANCE = 400, 1e-9
-#: Error of the entries of a rotation whose angles were rounded to three digits behind the point,
-#: and that of numbers.
+#: Error of the entries of a rotation whose angles were rounded to three decimals, and of numbers.
 ROUNDED, EXACT = 5e-4, 1e-8
-#: Factors of a combination smaller than this are rounding.
+#: Factors of a combination smaller than this are due to rounding.
 NEGLIGIBLE = 1e-7
 
 
@@ -96,12 +95,12 @@ def base_parameter_index(robot: Robot) -> NDArray[np.int64]:
 
 @lru_cache(maxsize=64)
 def _find(robot: Robot) -> BaseParameters:
-    from scipy.linalg import qr, solve_triangular  # not paid for by who only reads a robot
+    from scipy.linalg import qr, solve_triangular  # not needed to read a robot
 
     robot = with_whole_turns(robot)
     rng = np.random.default_rng(0)
     n, p = robot.n_joints, 10 * robot.n_bodies
-    # More states than unknowns, whatever the size of the robot.
+    # More states than unknowns for any size of robot.
     count = max(STATES, 2 * p // n + 20)
     q, dq, ddq = rng.uniform(-np.pi, np.pi, (3, count, n))
     regressor = np.asarray(robot.torque_regressor(q, dq, ddq)).reshape(-1, p)
@@ -114,7 +113,7 @@ def _find(robot: Robot) -> BaseParameters:
     joined = solve_triangular(triangle[:rank, :rank], triangle[:rank, rank:])
     regrouping = np.zeros((rank, p))
     regrouping[np.arange(rank), independent] = 1.0
-    # Columns of unit size: what is negligible does not depend on units.
+    # Columns of unit size, so that the threshold does not depend on units.
     joined[np.abs(joined) < NEGLIGIBLE] = 0.0
     regrouping[:, dependent] = joined * size[dependent] / size[independent][:, None]
     order = np.argsort(independent)

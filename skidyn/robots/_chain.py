@@ -30,9 +30,9 @@ if TYPE_CHECKING:
 def build_chain(robot: Robot) -> Chain:
     """Chain of all bodies and of the links fixed to them, in float64 on the CPU.
 
-    Built from what was read already and not by the parsers of pytorch-kinematics: these carry
-    offsets through float32, whatever torch's default is (frames of the bundled robots are off by
-    1e-8 to 3e-7 m), take z for an axis that is missing, and know no locked joints.
+    Built from the parsed description and not by the parsers of pytorch-kinematics: these convert
+    offsets through float32, independent of torch's default (frames of the bundled robots have
+    errors of 1e-8 to 3e-7 m), use z for a missing axis, and do not support locked joints.
 
     Parameters
     ----------
@@ -86,21 +86,21 @@ def build_chain(robot: Robot) -> Chain:
 def describe_chain(
     chain: Chain, links: Mapping[str, Link], joints: Mapping[str, Joint]
 ) -> Description:
-    """What a chain says of frames and joints, with the inertia of its links beside it.
+    """Description of the frames and joints of a chain, with the inertia of its links.
 
     Parameters
     ----------
     chain : Chain
     links : mapping of str to Link
-        Inertia of links, in the frames of the chain; those that are not in it have no mass.
+        Inertia of links, in the frames of the chain; links without an entry have no mass.
     joints : mapping of str to Joint
-        Joints as a file has them: limits, what follows another joint, and whether turns are
-        endless. The others have the limits of the chain.
+        Joints of a file: limits, mimic joints, and continuous joints. The others have the limits of
+        the chain.
 
     Raises
     ------
     RobotDescriptionError
-        The chain has a name twice, or lacks a link that has a mass.
+        A name occurs twice in the chain, or a link with mass is not in the chain.
     """
     names = chain.get_frame_names(exclude_fixed=False)
     found = dict.fromkeys(names, Link("", np.zeros(10)))
@@ -145,7 +145,7 @@ def _joint_of(frame: Any, parent: str, joints: Mapping[str, Joint]) -> Joint:
     for offset in (frame.link.offset, frame.joint.offset):
         if offset is not None:
             pose = pose @ offset.get_matrix()[0].detach().cpu().numpy().astype(np.float64)
-    # The nearest rotation: a matrix that went through float32 is one to seven digits only.
+    # The nearest rotation: a matrix that was stored in float32 is a rotation to seven digits only.
     left, _, right = np.linalg.svd(pose[:3, :3])
     placed = (left @ right, pose[:3, 3])
     own = frame.joint
@@ -182,7 +182,7 @@ def _joint_of(frame: Any, parent: str, joints: Mapping[str, Joint]) -> Joint:
 
 
 def _largest(joint: Any, limit: str) -> float:
-    """Larger of a joint's two limits of speed or effort; infinite where it has none."""
+    """Larger of a joint's two limits of speed or effort; infinite if it has none."""
     pair = getattr(joint, limit, None)  # since pytorch-kinematics 0.7.5
     return np.inf if pair is None else float(np.max(np.abs(pair)))
 
@@ -197,7 +197,7 @@ def links_of(inertials: Mapping[str, Any]) -> dict[str, Link]:
     Raises
     ------
     RobotDescriptionError
-        They are not ten finite numbers, or no body has such an inertia.
+        They are not ten finite numbers, or the inertia is impossible.
     """
     links = {}
     for name, values in inertials.items():

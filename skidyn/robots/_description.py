@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a robot description says, whatever its format: links and joints in exact float64."""
+"""Content of a robot description in any format: links and joints in exact float64."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _MOMENT_TOLERANCE = 1e-6
 class Link:
     """A link with its inertial parameters about its own frame, shape (10,).
 
-    ``fault`` says what is wrong with its inertia; that counts only for the body it belongs to.
+    ``fault`` describes an error of its inertia; it matters only for the moving body of the link.
     """
 
     name: str
@@ -67,7 +67,7 @@ class Joint:
 
 @dataclass(frozen=True)
 class Description:
-    """A robot as its file describes it, in the order of the file."""
+    """A robot description in the order of its file."""
 
     name: str
     links: dict[str, Link]
@@ -143,7 +143,7 @@ def link_of(
     Raises
     ------
     RobotDescriptionError
-        The mass is negative, or mass or inertia is no number.
+        The mass is negative, or mass or inertia is not a number.
     """
     what = f"link {name!r}"
     if mass < 0:
@@ -178,7 +178,7 @@ def unit_axis(axis: np.ndarray, what: str) -> np.ndarray:
         The axis is zero.
     """
     largest = float(np.abs(axis).max())
-    # of entries up to one: the squares of 1e200 and of 1e-200 are no numbers of their own
+    # scaled to entries up to one: the squares of 1e200 and of 1e-200 overflow or vanish
     axis = axis / largest if largest > 0 else axis
     length = float(np.linalg.norm(axis))
     if length < 1e-9:
@@ -187,12 +187,12 @@ def unit_axis(axis: np.ndarray, what: str) -> np.ndarray:
 
 
 def check_limits(lower: float, upper: float, what: str) -> tuple[float, float]:
-    """The position limits, in their order.
+    """Lower and upper position limit.
 
     Raises
     ------
     RobotDescriptionError
-        The lower limit lies above the upper one.
+        The lower limit is above the upper one.
     """
     if lower > upper:
         raise RobotDescriptionError(
@@ -202,7 +202,7 @@ def check_limits(lower: float, upper: float, what: str) -> tuple[float, float]:
 
 
 def _fault(matrix: np.ndarray, what: str) -> str:
-    """Why no body has such an inertia, or ``""``; a warning where no distribution of mass has."""
+    """Reason why an inertia is impossible, or ``""``; warns if no mass distribution has it."""
     moments = np.linalg.eigvalsh(matrix)
     listed = ", ".join(f"{m:g}" for m in moments)
     if not is_positive(matrix):

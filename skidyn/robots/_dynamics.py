@@ -18,7 +18,7 @@ PARAMETER_SYMBOLS = ("m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz"
 
 
 class RigidBodyDynamics:
-    """Answers of a robot about motion and torque, from its tree and inertial parameters."""
+    """Kinematics and dynamics of a robot, from its tree and inertial parameters."""
 
     name: str
     joint_names: tuple[str, ...]
@@ -66,11 +66,11 @@ class RigidBodyDynamics:
         dtype : {numpy.float64, numpy.float32}, default=numpy.float64
             float32 is about twice as fast; its error stays below 2e-6 of the largest torque.
         backend : {"numpy", "once", "compiled"}, default="numpy"
-            ``"numpy"`` writes a program for this robot and keeps it. ``"once"`` writes none, which
-            is several times as fast for a robot that is evaluated only once on a few thousand
-            samples. ``"compiled"`` writes C text for this robot, compiles it once with the system's
-            C compiler (about a second) and is then several times as fast. The last two work in
-            float64 only.
+            ``"numpy"`` generates a program for this robot and keeps it. ``"once"`` generates none,
+            which is several times as fast for a robot that is evaluated only once on a few thousand
+            samples. ``"compiled"`` generates C text for this robot, compiles it once with the
+            system's C compiler (about a second) and is then several times as fast. The last two
+            work in float64 only.
 
         Returns
         -------
@@ -158,7 +158,7 @@ class RigidBodyDynamics:
         return self._engine.mass_matrix(self._signals(q=q), self._parameters(parameters))
 
     def forward_dynamics(self, q: Any, dq: Any, tau: Any, *, parameters: Any = None) -> np.ndarray:
-        """Joint accelerations that torques cause, without friction.
+        """Joint accelerations due to torques, without friction.
 
         Parameters
         ----------
@@ -213,8 +213,8 @@ class RigidBodyDynamics:
         dtype : {numpy.float64, numpy.float32}, default=numpy.float64
             Precision.
         out : ndarray of shape (n_joints, 10 * n_bodies, n_samples), default=None
-            Memory to write into, C-contiguous and of type ``dtype``; saves the time that the
-            operating system needs to hand out fresh memory.
+            Memory to write into, C-contiguous and of type ``dtype``; saves the time to allocate new
+            memory.
         backend : {"numpy", "compiled"}, default="numpy"
             ``"compiled"`` works as in :meth:`inverse_dynamics`; a few seconds to compile.
 
@@ -230,7 +230,7 @@ class RigidBodyDynamics:
     def iter_torque_regressor(
         self, q: Any, dq: Any, ddq: Any, chunk: int | None = None, *, backend: str = "numpy"
     ) -> Iterator[tuple[slice, np.ndarray]]:
-        """Yield the regressor chunk by chunk, without ever holding all of it.
+        """Yield the regressor chunk by chunk, without storing all of it.
 
         Parameters
         ----------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Links and joints of an MJCF model, as MuJoCo compiles it."""
+"""Links and joints of an MJCF model compiled by MuJoCo."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def parse_mjcf(source: str | bytes | os.PathLike[str]) -> tuple[Description, np.
     try:
         if is_text:
             model = mujoco.MjModel.from_xml_string(data.decode())
-        else:  # by its path, so that files that it includes and its meshes are found
+        else:  # by its path, so that included files and meshes are found
             model = mujoco.MjModel.from_xml_path(str(Path(source)))  # type: ignore[arg-type]
     except ValueError as error:
         raise RobotDescriptionError(
@@ -104,7 +104,7 @@ def _name(model: Any, j: int) -> str:
 def _joint(
     mujoco: Any, model: Any, j: int, followers: dict[int, Mimic]
 ) -> tuple[Joint, np.ndarray]:
-    """A joint as placed in the frame of its body, and the point of the body it turns about."""
+    """A joint in the frame of its body, and the point of the body about which it turns."""
     name, kind, dof = _name(model, j), model.jnt_type[j], int(model.jnt_dofadr[j])
     slide = kind == mujoco.mjtJoint.mjJNT_SLIDE
     if not slide and kind != mujoco.mjtJoint.mjJNT_HINGE:
@@ -142,14 +142,14 @@ def _joint(
         friction=float(np.ravel(model.dof_frictionloss[dof])[0]),
         mimic=followers.get(j),
     )
-    # The body stands as drawn where the joint is at its reference.
+    # The body has its pose in the file when the joint is at its reference.
     rotation, translation = joint.placement(-reference)
     anchor = np.zeros(3) if slide else np.array(model.jnt_pos[j])
     return replace(joint, rotation=rotation, translation=translation + anchor), anchor
 
 
 def _followers(mujoco: Any, model: Any) -> dict[int, Mimic]:
-    """Joints that a linear equality ties to another one."""
+    """Joints that are coupled to another one by a linear equality."""
     found: dict[int, Mimic] = {}
     for e in range(model.neq):
         joint, leader = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The robot as its description says, in URDF, SDF or MJCF."""
+"""A robot described in URDF, SDF or MJCF."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from skidyn.robots._sdf import parse_sdf
 from skidyn.robots._urdf import parse_urdf
 from skidyn.robots._xml import first_element, name_of, parse_robot_element, read_description
 
-#: By how much frames of a chain may differ from its description, m: it went through float32.
+#: Permitted difference between frames of a chain and its description, m, because of float32.
 _SINGLE_PRECISION = 1e-5
 
 if TYPE_CHECKING:
@@ -122,8 +122,8 @@ class Robot(RigidBodyDynamics):
         joints : sequence of str, default=None
             Joints that the logs cover, as in :meth:`from_urdf`.
         gravity : sequence of 3 floats, default=None
-            Gravitational acceleration in the base frame, m/s^2. None: (0, 0, -9.81), or what an
-            MJCF says.
+            Gravitational acceleration in the base frame, m/s^2. None: (0, 0, -9.81), or that of an
+            MJCF.
 
         Returns
         -------
@@ -167,7 +167,7 @@ class Robot(RigidBodyDynamics):
         """Read a robot from a URDF.
 
         Revolute, continuous, prismatic, fixed and mimic joints in any tree. A missing ``<axis>`` is
-        x, a missing ``<inertial>`` is no mass, as the URDF standard says. Angles are taken as
+        x, a missing ``<inertial>`` is no mass, as defined by the URDF standard. Angles are taken as
         written: 1.5708 stays 1.5708.
 
         Parameters
@@ -223,7 +223,7 @@ class Robot(RigidBodyDynamics):
 
         Revolute, continuous, prismatic and fixed joints of one model without nested models. Poses
         may be relative to links, joints and frames. A link without ``<inertial>`` has 1 kg and 1 kg
-        m^2, as the SDF standard says; a warning names it. The base frame is that of the model.
+        m^2, as defined by the SDF standard, with a warning. The base frame is that of the model.
 
         Parameters
         ----------
@@ -341,8 +341,8 @@ class Robot(RigidBodyDynamics):
         joints : sequence of str, default=None
             Joints that the logs cover, as in :meth:`from_urdf`.
         gravity : sequence of 3 floats, default=None
-            Gravitational acceleration in the base frame, m/s^2. None: (0, 0, -9.81), or what an
-            MJCF says.
+            Gravitational acceleration in the base frame, m/s^2. None: (0, 0, -9.81), or that of an
+            MJCF.
 
         Returns
         -------
@@ -447,7 +447,7 @@ class Robot(RigidBodyDynamics):
         return TorchDynamics(self)
 
     def __getstate__(self) -> dict[str, Any]:
-        # Without the cached engine: the pickle (and so its hash) does not depend on past calls.
+        # Without the cached engine, the pickle (and its hash) does not depend on earlier calls.
         return {name: self.__dict__[name] for name in self.__dataclass_fields__}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -457,7 +457,7 @@ class Robot(RigidBodyDynamics):
         self.__dict__.update(state)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Robot:
-        return self  # immutable: scikit-learn's clone shares it, with all that was traced
+        return self  # immutable: scikit-learn's clone shares it, with all traced programs
 
     def __repr__(self) -> str:
         return f"Robot({self.name!r}, n_joints={self.n_joints})"
@@ -514,7 +514,7 @@ class Robot(RigidBodyDynamics):
 
 
 def _read(source: str | bytes | os.PathLike[str]) -> tuple[Description, Any]:
-    """Description of a robot, and the gravity that it states or the usual one."""
+    """Description of a robot, and its gravity or the default."""
     data = read_description(source)
     kind = first_element(data)
     if kind == "mujoco":
@@ -526,7 +526,7 @@ def _read(source: str | bytes | os.PathLike[str]) -> tuple[Description, Any]:
 
 
 def _refuse_displaced(robot: Robot, described: Robot) -> None:
-    """Stop where a frame of a chain is elsewhere than its description says."""
+    """Raise an error if a frame of a chain differs from its description."""
     if robot.joint_names != described.joint_names:
         raise RobotDescriptionError(
             f"The chain has the joints {list(robot.joint_names)}, the description "

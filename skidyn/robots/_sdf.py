@@ -32,7 +32,7 @@ from skidyn.robots._xml import numbers_of, only, parse_xml, required, word
 
 Pose = tuple[np.ndarray, np.ndarray]
 
-#: Limits of this size and beyond stand for none in the standard.
+#: Limits of this size or larger mean no limit in the standard.
 _UNLIMITED = 1e16
 _IDENTITY: Pose = (np.eye(3), np.zeros(3))
 _WORLD = "world"
@@ -44,7 +44,7 @@ def parse_sdf(data: bytes, model: str | None) -> Description:
     Raises
     ------
     RobotDescriptionError
-        A link or joint is not described correctly, or the model is not a single one.
+        A link or joint is not described correctly, or there is not exactly one model.
     """
     root = parse_xml(data)
     if root.tag != "sdf":
@@ -83,7 +83,7 @@ def _find_model(root: ElementTree.Element, name: str | None) -> ElementTree.Elem
 
 
 class _Reader:
-    """Poses of all frames of one model, and what is read with them."""
+    """Poses of all frames of one model, for reading its links and joints."""
 
     def __init__(self, model: ElementTree.Element, version: tuple[int, ...]) -> None:
         self.model = model
@@ -96,7 +96,7 @@ class _Reader:
         self._poses: dict[str, Pose] = {"__model__": _IDENTITY, "": _IDENTITY, _WORLD: _IDENTITY}
 
     def read(self) -> Description:
-        """Everything, with a link of its own for the frame of the model."""
+        """The description, with an additional link for the frame of the model."""
         links = {_WORLD: Link(_WORLD, np.zeros(10))}
         links |= {e.get("name", ""): self._link(e) for e in self.model.findall("link")}
         joints: dict[str, Joint] = {}
@@ -104,13 +104,13 @@ class _Reader:
             self._add_joint(element, links, joints)
         carried = {joint.child for joint in joints.values()}
         roots = [name for name in links if name not in carried and name != _WORLD]
-        for name in roots[:1]:  # several are refused where the tree is assembled
+        for name in roots[:1]:  # several roots are refused during assembly
             joints[f"{name}_base"] = fixed_joint(f"{name}_base", _WORLD, name, self.pose(name))
         return Description(self.model.get("name") or "robot", links, joints)
 
     def pose(self, name: str) -> Pose:
         """Pose of a link, joint or frame in the frame of the model."""
-        way: dict[str, str] = {}  # frame, and that which it is relative to
+        way: dict[str, str] = {}  # frame, and the frame to which it is relative
         at = name
         while at not in self._poses:
             if at in way:
@@ -164,7 +164,7 @@ class _Reader:
     def _add_joint(
         self, element: ElementTree.Element, links: dict[str, Link], joints: dict[str, Joint]
     ) -> None:
-        """A joint, and a link without mass where the joint stands away from its child's frame."""
+        """A joint, and a link without mass if the joint is not at its child's frame."""
         name = element.get("name", "")
         what = f"joint {name!r}"
         parent, child = (self._link_of(_text(element, end, what)) for end in ("parent", "child"))
@@ -180,7 +180,7 @@ class _Reader:
         joints[f"{middle}_fixed"] = fixed_joint(f"{middle}_fixed", middle, child, after)
 
     def _link_of(self, name: str) -> str:
-        """The link that a name stands for: a frame stands for what it is attached to."""
+        """The link of a name; for a frame, the link to which it is attached."""
         element = self._elements.get(name)
         if element is None or element.tag == "link":
             return name
@@ -237,7 +237,7 @@ class _Reader:
         if direction is not None:
             values = numbers_of(direction.text or "", 3, f"the axis of {what}")
         frame = direction.get("expressed_in") if direction is not None else None
-        # Before 1.5 the axis was given in the frame of the model; from there to 1.7 on request.
+        # Before 1.5 the axis was given in the frame of the model; from 1.5 to 1.7 optionally.
         flag = (axis.findtext("use_parent_model_frame") or "").strip()
         if frame is None and (self.version < (1, 5) or flag in ("1", "true")):
             frame = "__model__"
@@ -310,7 +310,7 @@ def _number(element: ElementTree.Element, tag: str, what: str, default: float) -
 
 
 def _limit(element: ElementTree.Element, tag: str, what: str, default: float) -> float:
-    """A limit; negative efforts and velocities, and huge numbers, stand for none."""
+    """A limit; negative efforts and velocities, and huge numbers, mean none."""
     text = (element.findtext(tag) or "").strip()
     if not text or text.lstrip("+-").startswith("inf"):
         return default

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Symbols in place of numbers: NumPy code run on them writes itself down on a tape."""
+"""Symbols in place of numbers: NumPy code run on them is recorded on a tape."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Symbols(np.ndarray):
     """Array of scalars on a tape.
 
     NumPy's arithmetic on arrays of objects calls the methods of the objects, ``np.tanh`` the method
-    ``tanh`` and so on. What NumPy would decide by comparing is handed to the tape here.
+    ``tanh`` and so on. Functions that NumPy computes by comparison are recorded on the tape here.
     """
 
     def __array_ufunc__(
@@ -55,7 +55,7 @@ _OWN: dict[str, Callable[..., Any]] = {
 
 
 class Instant(Signals):
-    """One sample of symbols; a question for its past or its clock is refused."""
+    """One sample of symbols; access to its past or its time raises an error."""
 
     @property
     def segments(self) -> Any:
@@ -81,7 +81,7 @@ def filled(values: list[Any], shape: tuple[int, ...]) -> Symbols:
 
 
 def replay(program: Program, tape: Tape, inputs: dict[str, Any]) -> dict[tuple[int, ...], Scalar]:
-    """Write a program down again on another tape, with other scalars as its inputs."""
+    """Record a program again on another tape, with other scalars as its inputs."""
     values: dict[int, Any] = {}
     for index in program.tape.live(program.outputs.values()):
         node = program.tape.nodes[index]
@@ -106,7 +106,7 @@ _REPLAYED: dict[str, Callable[..., Scalar]] = {
 
 
 class SymbolicRobot:
-    """What effects and models ask of a robot, for one sample of symbols."""
+    """Functions of a robot that effects and models need, for one sample of symbols."""
 
     def __init__(self, robot: Robot, tape: Tape) -> None:
         self._robot = robot

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Newton-Euler in torch on the transforms of the robot's chain of pytorch-kinematics.
 
-Poses of all bodies come from one batched forward kinematics. What follows, velocities,
-accelerations and wrenches, is written in the base frame, in which the wrenches of bodies simply add
-up. The gradient of the poses is torch's own and not the analytical one of pytorch-kinematics, which
-cannot be differentiated again.
+Poses of all bodies come from one batched forward kinematics. Velocities, accelerations and wrenches
+are in the base frame, in which the wrenches of bodies can be added. The gradient of the poses is
+torch's and not the analytical one of pytorch-kinematics, which cannot be differentiated again.
 """
 
 from __future__ import annotations
@@ -169,7 +168,7 @@ def _inertia_columns(vector: Tensor) -> Tensor:
 def _poses(chain: Any, position: Tensor) -> dict[str, Tensor]:
     """Pose of every frame of a chain, (n, 4, 4), with derivatives of any order."""
     if hasattr(chain, "forward_kinematics_tensor"):
-        # since pytorch-kinematics 0.8; the gradient of its own cannot be differentiated again
+        # since pytorch-kinematics 0.8; its analytical gradient cannot be differentiated again
         table = chain.forward_kinematics_tensor(position, analytical_grad=False)
         return {name: table[index] for name, index in chain.frame_to_idx.items()}
     frames = chain.forward_kinematics(position)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Links and joints of a URDF.
 
-Read straight from the XML: the parser of pytorch-kinematics imports torch and matplotlib, takes z
-where the standard takes x for a missing axis, and its chains hold no inertials.
+It is read directly from the XML: the parser of pytorch-kinematics imports torch and matplotlib,
+uses z for a missing axis (the standard has x), and its chains contain no inertials.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def parse_urdf(root: ElementTree.Element) -> Description:
 
 
 def _pose(element: ElementTree.Element, what: str) -> tuple[np.ndarray, np.ndarray]:
-    """Rotation matrix and translation of the <origin> in an element, identity where none is."""
+    """Rotation matrix and translation of the <origin> of an element; identity by default."""
     origin = only(element, "origin", what)
     if origin is None:
         return np.eye(3), np.zeros(3)
@@ -115,7 +115,7 @@ def _scalar(
 
 
 def _axis(element: ElementTree.Element, what: str) -> np.ndarray:
-    """Unit axis; the URDF standard says x where none is given."""
+    """Unit axis; x by default, as in the URDF standard."""
     axis = only(element, "axis", what)
     if axis is None:
         return np.array([1.0, 0.0, 0.0])
@@ -125,7 +125,7 @@ def _axis(element: ElementTree.Element, what: str) -> np.ndarray:
 def _limits(
     element: ElementTree.Element, kind: str, what: str
 ) -> tuple[float, float, float, float]:
-    """Lower and upper position, velocity and effort limit; infinite where there is none."""
+    """Lower and upper position, velocity and effort limit; infinite by default."""
     limit = only(element, "limit", what)
     if limit is None:
         if kind != "continuous":
@@ -155,12 +155,12 @@ def _mimic(element: ElementTree.Element, what: str) -> Mimic | None:
 
 
 def refuse_repeated_names(elements: Iterable[ElementTree.Element]) -> None:
-    """Stop at a nameless element or at a name that comes twice.
+    """Raise an error for an element without a name or a name that occurs twice.
 
     Raises
     ------
     RobotDescriptionError
-        With the name.
+        The error states the name.
     """
     seen: set[str] = set()
     for element in elements:

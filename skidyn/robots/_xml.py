@@ -14,10 +14,11 @@ import numpy as np
 
 from skidyn._exceptions import RobotDescriptionError
 
-#: Larger descriptions are refused; whole humanoids take 1 MB, their meshes are other files.
+#: Larger descriptions are refused; that of a humanoid takes 1 MB, without its meshes.
 MAX_BYTES = 64 * 2**20
 
-#: What the dynamics needs; pictures, collision shapes, drivers and simulator settings are left out.
+#: Elements that the dynamics needs; visual and collision shapes, drivers and simulator settings are
+#: omitted.
 _KEPT_IN_LINK = frozenset({"inertial"})
 _KEPT_IN_JOINT = frozenset({"origin", "parent", "child", "axis", "limit", "dynamics", "mimic"})
 
@@ -53,22 +54,22 @@ def read_description(source: str | bytes | os.PathLike[str]) -> bytes:
 
 
 def name_of(source: str | bytes | os.PathLike[str]) -> str:
-    """Path of a description; a usual one where the source is the text itself."""
+    """Path of a description; a default one if the source is the text itself."""
     is_text = isinstance(source, bytes) or str(source).lstrip("\ufeff \t\r\n").startswith("<")
     return "robot.urdf.xacro" if is_text else os.fsdecode(source)
 
 
 def first_element(data: bytes) -> str:
-    """Name of the root element, which says the format of a description; empty if there is none."""
+    """Name of the root element, which determines the format; empty if there is none."""
     text = re.sub(rb"<!--.*?-->|<\?.*?\?>", b"", data[:100_000], flags=re.DOTALL)
     hit = re.search(rb"<\s*([A-Za-z_][\w.-]*)", text)
     return hit[1].decode() if hit else ""
 
 
 def parse_robot_element(data: bytes, path: str = "robot.urdf.xacro") -> ElementTree.Element:
-    """Root element with only links and joints in it, free of anything a parser could expand.
+    """Root element with only links and joints, without anything that a parser could expand.
 
-    The path is that of an error message.
+    The path is used in error messages.
 
     Raises
     ------
@@ -100,7 +101,7 @@ def parse_robot_element(data: bytes, path: str = "robot.urdf.xacro") -> ElementT
 
 
 def only(element: ElementTree.Element, tag: str, what: str) -> ElementTree.Element | None:
-    """The child with a tag, None without one.
+    """The only child with a tag, or None.
 
     Raises
     ------
@@ -156,11 +157,11 @@ def numbers(
     key : str
         Name of the attribute.
     count : int
-        How many numbers.
+        Number of values.
     what : str
-        Whose they are, for the message.
+        Element to which they belong, for the message.
     default : tuple of float or None
-        Values of an absent attribute; None where it must be there.
+        Values of an absent attribute; None if it is required.
 
     Returns
     -------
@@ -200,7 +201,7 @@ def numbers_of(text: str, count: int, what: str) -> np.ndarray:
 
 
 def parse_xml(data: bytes) -> ElementTree.Element:
-    """Root element, free of anything a parser could expand.
+    """Root element, without anything that a parser could expand.
 
     Raises
     ------
@@ -215,7 +216,7 @@ def parse_xml(data: bytes) -> ElementTree.Element:
 
 
 def _refuse_declarations(data: bytes) -> None:
-    """Stop at the first document type, before any entity of it could be expanded."""
+    """Raise an error at the first document type, before any entity can be expanded."""
 
     def refuse(*_: object) -> int:
         raise RobotDescriptionError(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which of several additions to a model make it move more like the robot."""
+"""Judgement of additions to a model by its simulated motion."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from skidyn.simulation._score import (
 
 Rows = NDArray[np.intp]
 
-#: Folds at most; a single recording is cut into as many pieces of time.
+#: Most folds; a single recording is cut into this many pieces of time.
 _FOLDS = 5
 
 
@@ -94,18 +94,18 @@ def judge_additions(
 
 @dataclass(frozen=True)
 class InTurn:
-    """What additions do one by one, and together.
+    """Results of additions one by one, and together.
 
     Parameters
     ----------
     verdicts : list of SimulationVerdict or None
-        Of every addition, on top of those before it that did not worsen the motion; None where
-        simulation says nothing.
+        Verdict of every addition, in addition to previous ones that did not worsen the motion; None
+        if simulation gives no evidence.
     added : list of bool
-        Whether the last model has it: neither worsens it the motion, nor is it an effect that
+        Whether the last model contains it: it neither worsens the motion nor is an effect that
         cannot be simulated.
     together : SimulationVerdict
-        The model with all that were added against the model without any.
+        The model with all added effects compared with the model without any.
     """
 
     verdicts: list[SimulationVerdict | None]
@@ -114,7 +114,7 @@ class InTurn:
 
     @property
     def silent(self) -> bool:
-        """Whether both motions are further from the log than that of a model without forces."""
+        """Whether both motions deviate more from the log than that of a model without forces."""
         return min(_typical(self.together.before), _typical(self.together.after)) >= 1.0
 
 
@@ -127,7 +127,7 @@ def judge_in_turn(
     controller: Controller | None = None,
     horizon: float | None = HORIZON,
 ) -> InTurn:
-    """Judge additions as :func:`judge_additions` does, and keep what they do together."""
+    """Judge additions like :func:`judge_additions`, and also their common result."""
     folds = _folds(model, X)
     torque = np.asarray(y, dtype=float)
     if model.consistent is False:

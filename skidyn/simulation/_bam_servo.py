@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A position servo on a pendulum, simulated and fitted as BAM does: no torque is logged."""
+"""A position servo on a pendulum without logged torque, simulated and fitted as in BAM."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from skidyn.robots import Robot
 
 #: Step of BAM's simulation, s.
 STEP = 0.005
-#: Velocity beyond which BAM gives up, rad/s.
+#: Velocity beyond which BAM aborts, rad/s.
 _FASTEST = 100.0
-#: Error (rad) beyond which a position counts by its size and no longer by its square.
+#: Error (rad) beyond which the loss is linear and no longer quadratic.
 _LARGE = 0.05
-#: Where the search starts, and its limits: BAM's own, widened.
+#: Initial values of the search, and its limits: those of BAM, widened.
 _TYPICAL = {
     "kt": (0.5, 0.05, 10.0),
     "R": (3.5, 0.2, 40.0),
@@ -139,7 +139,7 @@ def fit_bam_servo(
     Returns
     -------
     BamModel
-        To be written by :func:`skidyn.export.write_bam`.
+        Model that :func:`skidyn.export.write_bam` can write.
 
     Raises
     ------
@@ -162,7 +162,7 @@ def fit_bam_servo(
         [_TYPICAL.get(k, _QUADRATIC if k.endswith("quad") else _LOAD) for k in keys], dtype=float
     )
     first, low, high = rows.T
-    # Steps of the derivative, and what counts as one: parameters differ by orders of magnitude.
+    # Steps of the derivative, and units of the parameters, which differ by orders of magnitude.
     size = np.maximum(np.abs(first), 1e-3)
     delta = 1e-4 * size
 

@@ -18,14 +18,14 @@ from skidyn.export import name_term, static_model
 from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
 
-#: Local error of a step, relative and in rad or m. It leaves some 1e-4 rad; ten times less takes
-#: ten times as long, and instruments do not get better by it.
+#: Local error of a step, relative and in rad or m. The total error is some 1e-4 rad; a tenth of it
+#: takes ten times as long and does not improve instruments.
 _RELATIVE, _ABSOLUTE = 1e-4, 1e-6
 
-#: Poses at which the inertia is looked at.
+#: Number of poses at which the inertia is checked.
 _POSES = 20
 
-#: Distance from the reference, rad or m, at which a simulation is given up.
+#: Distance from the reference, rad or m, at which a simulation is aborted.
 _LOST = 10.0
 
 
@@ -159,7 +159,7 @@ def _unit_accelerations(q: Array) -> dict[str, Array]:
 
 
 def _check_inertia(torque: ScalarFunction, q: Array) -> None:
-    """Refuse a model whose inertia is not positive definite: it would run away at once."""
+    """Refuse a model whose inertia is not positive definite: its motion would diverge at once."""
     for row in np.unique(np.linspace(0, len(q) - 1, _POSES).astype(int)):
         _, rest, *columns = torque(_unit_accelerations(q[row]))
         least = np.linalg.eigvalsh(np.column_stack(columns) - rest[:, np.newaxis])[0]
@@ -208,7 +208,7 @@ def _follow(
         return _LOST - float(np.abs(state[:n] - wanted(at)).max())
 
     lost.terminal = True  # type: ignore[attr-defined]
-    # Dry friction is stiff: its sign turns over within a thousandth of a rad/s.
+    # Dry friction is stiff: its sign changes within a thousandth of a rad/s.
     solution = solve_ivp(
         change,
         (time[0], time[-1]),

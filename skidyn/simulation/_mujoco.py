@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""MuJoCo as the engine, where its elements hold the whole model."""
+"""MuJoCo as the engine, if its elements can represent the whole model."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def run_mujoco(model: RBDRegressor, task: Any, step: float) -> tuple[Array, Arra
             )
         world = mujoco.MjModel.from_xml_path(str(path))
     own = [model_joint(mujoco, world, name) for name in model.robot_.joint_names]
-    # Runge-Kutta where nothing is stiff; frictionloss is a constraint, which it treats as well.
+    # Runge-Kutta if nothing is stiff; it can treat frictionloss, which is a constraint.
     world.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
     world.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
     world.jnt_limited[:] = 0

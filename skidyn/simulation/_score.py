@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How far a simulated model is from the log, and whether a change of the model brings it nearer."""
+"""Errors of a simulated model, and comparison of two models by these errors."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from skidyn._signals import Array
 from skidyn.forward import STEP, Controller, ForwardModel, Task, read_task, run
 from skidyn.identification import RBDRegressor
 
-#: Seconds over which a model is simulated before it is put back on the log.
+#: Seconds over which a model is simulated before it is reset to the log.
 HORIZON = 1.0
 #: Error, relative to that of a model without forces, beyond which a piece is lost.
 FAR = 10.0
@@ -73,7 +73,7 @@ class SimulationErrors:
 
     @property
     def text(self) -> str:
-        """The errors in words, one line for each joint."""
+        """Text of the errors, one line for each joint."""
         length = "whole trajectories" if self.horizon is None else f"{self.horizon:g} s"
         lines = [
             f"simulation over {length}, {len(self.pieces)} pieces: position error (at the end), "
@@ -139,7 +139,7 @@ def simulation_errors(
     Parameters
     ----------
     model : RBDRegressor
-        Fitted model; the log should not be the one it was fitted to.
+        Fitted model; the log should not be the one to which it was fitted.
     X : DataFrame
         Held-out motion, as in :func:`simulate`.
     y : array-like of shape (n_samples, n_joints), optional
@@ -410,7 +410,7 @@ def compare_errors(before: SimulationErrors, after: SimulationErrors) -> Simulat
     """Verdict on the errors of the same pieces, without and with a change."""
     errors = before, after
     scale = np.maximum(errors[0].resting, 1e-12)
-    # Beyond FAR a motion is lost, however far it gets: one such piece is no more than one piece.
+    # Beyond FAR a motion is lost; its error is limited, so that a single piece does not dominate.
     joint_sizes = [np.minimum(e.pieces / scale, FAR) for e in errors]
     sizes = [np.sqrt(np.mean(size**2, axis=1)) for size in joint_sizes]
     ratio = np.log(sizes[1] + 1e-12) - np.log(sizes[0] + 1e-12)

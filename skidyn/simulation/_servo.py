@@ -20,12 +20,12 @@ from skidyn.robots import Robot
 
 #: Longest delay of the command that is tried, s.
 LONGEST_DELAY = 0.1
-#: Standard errors that the inverse of a gain has to be above zero.
+#: Least ratio of the inverse of a gain to its standard error.
 SEEN = 3.0
-#: Velocity (rad/s) below which dry friction may be anything up to its size, so that the error of
-#: position says nothing.
+#: Velocity (rad/s) below which dry friction may have any value up to its maximum, so that the
+#: position error has no information.
 RESTS = 0.03
-#: Share by which the gain of one recording may differ, and rows in motion that it takes.
+#: Share by which the gain of one recording may differ, and least rows in motion for the check.
 OTHER, LEAST_ROWS = 0.25, 200
 #: Blocks of time left out in turn for the standard error of a gain.
 BLOCKS = 10
@@ -183,7 +183,7 @@ def _warn_of_other_gains(
     shared: bool,
     whole: Array,
 ) -> None:
-    """Say so where the weight asks for another gain in one recording than in the others."""
+    """Warn if the weight gives a different gain in one recording than in the others."""
     names = np.unique(trajectory)
     if len(names) < 2:
         return
@@ -217,7 +217,7 @@ def _warn_of_other_gains(
 def _inverse_gains(
     designs: list[Array], error: Array, moves: NDArray[np.bool_], size: Array, shared: bool
 ) -> tuple[Array, float]:
-    """One over the gains, of all rows and without one block each, and what is left of the error."""
+    """Inverse gains of all rows and without one block each, and the remaining error."""
     rows = len(error)
     block = np.arange(rows) * BLOCKS // rows
     found, left = [], 0.0
@@ -230,7 +230,8 @@ def _inverse_gains(
             ]
             inverse = np.array([x[0] for x in parts])
         else:
-            # Friction of every joint is taken out of its torque and error; one slope is left.
+            # Friction of every joint is eliminated from its torque and error, which leaves one
+            # slope.
             pairs = []
             for j, (a, keep) in enumerate(zip(designs, used, strict=True)):
                 q, _ = np.linalg.qr(a[keep, 1:])
@@ -274,7 +275,7 @@ def _read(log: Any, robot: Robot | None) -> tuple[Signals, Array]:
 
 
 def _late(signals: Signals, reference: Array, delay: float) -> tuple[Array, Array]:
-    """The command as it reaches the servo, and its velocity."""
+    """The command as received by the servo, and its velocity."""
     wanted, rate = reference.copy(), np.zeros_like(reference)
     for rows in signals.segments:
         time = signals.clock[rows]

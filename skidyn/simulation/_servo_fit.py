@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Parameters of a joint in its loop, fitted to half of the pieces and judged on the other half.
+"""Parameters of a joint in its loop, fitted to half of the pieces and tested on the other half.
 
-A step of the simulation costs the same time for one model as for a hundred, so that all that are to
-be fitted to a joint take their steps together.
+A step of the simulation takes the same time for one model as for a hundred, so all models of a
+joint are fitted together.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from skidyn._signals import Array
 from skidyn.forward import JointLoop
 from skidyn.simulation._servo_laws import Range, units_of
 
-#: Steps of a fit at most, the fall of the squared error that ends it, dampings tried at once.
+#: Most steps of a fit, the decrease of the squared error that ends it, dampings tried at once.
 ROUNDS, SMALL = 10, 3e-3
 DAMPING = (0.0, 1e-3, 1e-2, 0.1, 1.0, 10.0)
-#: Numbers of a table of simulated positions at most, some 16 MB.
+#: Most numbers in a table of simulated positions, some 16 MB.
 MOST = 2_000_000
 
 
@@ -32,7 +32,7 @@ class Fit:
     values : dict of str to float
         Mean over the halves.
     left_out : ndarray of shape (n_pieces,)
-        From the fit to the other half; NaN where there is none.
+        Error with the fit to the other half; NaN without one.
     """
 
     values: dict[str, float]
@@ -50,7 +50,7 @@ def fit_all(
     start: Mapping[str, float],
     parts: Sequence[int] = (0, 1),
 ) -> list[Fit]:
-    """Fit models to half of the pieces, judge them on the other, and the other way round.
+    """Fit models to each half of the pieces and test them on the other.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def fit_all(
     models : sequence of dict of str to Range
         Parameters of each.
     start : dict of str to float
-        Values of parameters where the fits start.
+        Initial values of parameters.
     parts : sequence of int, default=(0, 1)
         Halves that are fitted.
 
@@ -69,7 +69,7 @@ def fit_all(
         One for each model.
     """
     searches = [_Search(loop, ranges, start, k) for ranges in models for k in parts]
-    # What hangs on a gear, and what creeps before it slides, is simulated by other equations.
+    # Gears and presliding are simulated with other equations.
     groups: dict[tuple[bool, bool], list[_Search]] = {}
     for search in searches:
         equations = "compliance" in search.names, "presliding" in search.names
@@ -108,7 +108,7 @@ class _Search:
         self.done = False
 
     def beside(self) -> Array:
-        """The values and those beside them, for a derivative."""
+        """The values, and neighbouring values for a derivative."""
         self.step = np.where(self.x + 1e-2 * self.size > self.high, -1e-2, 1e-2) * self.size
         return np.vstack([self.x, self.x + np.diag(self.step)])
 
@@ -124,7 +124,7 @@ class _Search:
         return np.asarray(np.clip(self.x - self.size * np.array(moves), self.low, self.high))
 
     def take(self, tried: Array, errors: Array) -> None:
-        """Go to the best of the steps; end where it gains nothing."""
+        """Take the best of the steps; end if it brings no gain."""
         costs = (errors[:, :, self.half] ** 2).sum(axis=(1, 2))
         best = int(np.argmin(costs))
         if not costs[best] < self.cost:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Effects that compete for the motion of a servo, with their parameters and how they are told."""
+"""Candidate effects for the motion of a servo, with their parameters and texts."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from skidyn.effects import get_effect
 from skidyn.forward import JointLoop
 
-#: Half of a play, as share of the way, and compliance, from which second fits start.
+#: Initial values of second fits: half of a play, as share of the travel, and compliance.
 FARTHER, SOFTER = 0.02, 5e-3
 
 
@@ -27,16 +27,16 @@ class Range:
 
 @dataclass(frozen=True)
 class ServoEffect:
-    """What a servo does by itself, which is no torque of the robot and so not in the catalogue.
+    """An effect of the servo itself, which is not a torque of the robot and not in the catalogue.
 
     Parameters
     ----------
     kind : str
         Name.
     title : str
-        The same in words.
+        Title.
     parameter : str
-        Name of its size, which is that of the argument of :class:`~skidyn.forward.Controller`.
+        Name of its size, equal to that of the argument of :class:`~skidyn.forward.Controller`.
     unit, unit_of_slider : str
         Its unit.
     """
@@ -52,7 +52,7 @@ class ServoEffect:
         return {self.parameter: self.unit_of_slider if slides else self.unit}
 
 
-#: Told as what the controller should have been given, and not as what a model lacks.
+#: Effects that are missing in the controller and not in the model.
 SERVO_EFFECTS = {
     "servo_deadband": ServoEffect("servo_deadband", "Deadband of the servo", "deadband", "rad", "m")
 }
@@ -87,7 +87,7 @@ LAWS: dict[str, dict[str, Range]] = {
     },
     "servo_deadband": {"deadband": Range(0.3, 0.0, 3.0, 0.1, "error")},
 }
-#: Effects of one group are one after the other in a gear; a second one would be the same again.
+#: Effects of one group act in series in a gear; a second one would be equivalent.
 GEARS = ("joint_elasticity", "backlash")
 
 
@@ -97,19 +97,19 @@ def title_of(kind: str) -> str:
 
 
 def units_told(kind: str, slides: bool) -> dict[str, str]:
-    """Units of the sizes that are told of a kind."""
+    """Units of the reported sizes of a kind."""
     if kind in SERVO_EFFECTS:
         return SERVO_EFFECTS[kind].units(slides)
     return get_effect(kind).units(slides)
 
 
 def rivals_of(loop: JointLoop, known: tuple[str, ...]) -> list[tuple[str, dict[str, Range]]]:
-    """Kinds that may be missing beside those that are known, some from two starts.
+    """Kinds that may be missing in addition to known ones, some with two starts.
 
     Parameters
     ----------
     loop : JointLoop
-        The joint; where a deadband is known no other is fitted.
+        The joint; if a deadband is known, no other is fitted.
     known : tuple of str
         Kinds that are part of the loop already.
     """
@@ -122,7 +122,7 @@ def rivals_of(loop: JointLoop, known: tuple[str, ...]) -> list[tuple[str, dict[s
 
 
 def starts_of(kind: str) -> list[dict[str, Range]]:
-    """Parameters of a kind; several where one start leads to a near minimum only."""
+    """Parameters of a kind; several if one start leads only to a local minimum."""
     law = LAWS[kind]
     if kind == "backlash":
         return [law, {**law, "gap": replace(law["gap"], start=FARTHER)}]
@@ -132,7 +132,7 @@ def starts_of(kind: str) -> list[dict[str, Range]]:
 
 
 def units_of(loop: JointLoop) -> dict[str, float]:
-    """What counts as one: a part of the joint's torque, its way, its speed."""
+    """Units: a part of the joint's torque, its travel, its speed."""
     seen = loop.valid
     torque = 0.05 * float(np.sqrt(np.mean(loop.torque[seen] ** 2))) + 1e-12
     speed = float(np.std(loop.dq[seen])) + 1e-9
@@ -150,10 +150,10 @@ def units_of(loop: JointLoop) -> dict[str, float]:
 
 
 def sizes_told(kind: str, values: dict[str, float]) -> dict[str, float]:
-    """Sizes of an effect as its catalogue calls them."""
+    """Sizes of an effect by their names in the catalogue."""
     if kind == "backlash":
         return {"gap": 2 * values["gap"]}
-    if kind == "dahl":  # the catalogue calls the way so
+    if kind == "dahl":  # the name of the distance in the catalogue
         return {"presliding": values["coulomb"] / values["presliding"]}
     if kind == "joint_elasticity":
         return {"K": 1.0 / values["compliance"]}

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Effects named by the motion of servos: what brings simulated motion to the logged one.
+"""Effects identified from the motion of servos, by simulation of the logged motion.
 
 The torque that accelerates a link is known from positions that were differentiated twice, with all
-their noise. An effect that lasts hundredths of a second drowns in it, while the motion that it
-causes stands far above the noise of the encoder. So each joint is simulated in its loop, others as
-logged, with its friction alone and with one effect more; what is fitted to half of the pieces is
-judged on the other half. The effect that helps most is taken, and the others compete again beside
-it. A link that moves by itself behind its gear is felt by the other joints: they are simulated
-along its motion, and not along that of its motor, once the gear is named.
+their noise. This noise hides an effect that lasts hundredths of a second, while the motion that it
+causes is far above the noise of the encoder. So each joint is simulated in its loop, with the
+others as logged, with its friction alone and with one effect more; models fitted to half of the
+pieces are tested on the other half. The effect with the largest gain is added, and the others are
+compared again in addition to it. A link that moves relative to its motor acts on the other joints:
+after its gear is identified, they are simulated along the motion of the link, and not along that of
+its motor.
 """
 
 from __future__ import annotations
@@ -40,19 +41,20 @@ from skidyn.simulation._servo_laws import (
 
 #: Length of a piece, s, and fewest pieces.
 PIECE, FEWEST_PIECES = 6.0, 4
-#: Times the noise of the positions, and least noise, rad or m, above which something is missing.
+#: Multiple of the noise of the positions, and least noise, rad or m, above which an effect is
+#: missing.
 STANDS_OUT, SMALLEST = 2.5, 2e-5
 #: Share of the squared error that a finding must remove, held out, and more than that
 #: share of the pieces on which it must help.
 LEAST_DROP, LEAST_PIECES = 0.3, 0.5
-#: The same of a second effect on a joint: what an effect that is not quite the true one leaves,
-#: others take a part of.
+#: The same for a second effect on a joint, because others explain part of the error of an effect
+#: that is not exact.
 SECOND_DROP = 0.6
-#: The simulation with the finding must err by less than this share of what the command itself errs.
+#: Largest error of the simulation with the finding, as a share of that of the command itself.
 NEARER = 0.5
-#: The best other explanation must leave so much of that to it.
+#: Least share of the gain that the best other explanation does not have.
 MARGIN = 0.15
-#: Effects of one joint at most.
+#: Most effects of one joint.
 MOST = 2
 
 
@@ -108,7 +110,7 @@ class ServoFinding:
 
     @property
     def sentence(self) -> str:
-        """In words."""
+        """Sentence on the finding."""
         return f"{self.title} of joint {self.joint} ({self.size}): {self.evidence}."
 
     @property
@@ -186,7 +188,7 @@ def explain_servo_motion(
 
     See Also
     --------
-    skidyn.diagnosis.diagnose : What the servo's torque lacks.
+    skidyn.diagnosis.diagnose : Effects missing in the servo's torque.
 
     Examples
     --------
@@ -232,7 +234,7 @@ def explain_servo_motion(
 
 @dataclass(frozen=True)
 class _Answer:
-    """What explains a joint best."""
+    """Best explanation of a joint."""
 
     finding: ServoFinding
     fit: Fit
@@ -245,7 +247,7 @@ class _Answer:
 
 @dataclass
 class _Joint:
-    """A joint with what is known of it."""
+    """A joint with its known effects."""
 
     index: int
     loop: JointLoop
@@ -257,7 +259,7 @@ class _Joint:
     compared: bool = False
 
     def restart(self, keep_gears: bool) -> None:
-        """Fit friction and what is known again."""
+        """Fit friction and known effects again."""
         kept = tuple(k for k in self.kinds if keep_gears and k in GEARS)
         self.kinds = (*self.given, *(k for k in kept if k not in self.given))
         models = [FRICTION]
@@ -269,12 +271,12 @@ class _Joint:
         self.answer, self.compared = None, False
 
     def compare(self) -> None:
-        """Look for the effect that explains the motion."""
+        """Search for the effect that explains the motion."""
         if not self.compared:
             self.answer, self.compared = _name(self), True
 
     def take(self) -> None:
-        """Let what was found be known."""
+        """Add the found effect to the known ones."""
         assert self.answer is not None
         self.kinds = (*self.kinds, self.answer.finding.kind)
         self.ranges = {**self.ranges, **self.answer.law}
@@ -305,7 +307,7 @@ class _Arm:
                 self._see_link(joint)
 
     def take(self, joint: _Joint) -> set[int]:
-        """Take what explains a joint; the joints that are looked at again for it."""
+        """Add the explanation of a joint; returns the joints to be searched again."""
         joint.take()
         if joint.kinds[-1] not in GEARS:
             return set()
@@ -317,7 +319,7 @@ class _Arm:
         return {other.index for other in others}
 
     def _see_link(self, joint: _Joint) -> None:
-        """How far the link is behind its motor, on which its own load depends, too."""
+        """Lag of the link behind its motor, on which its own load depends, too."""
         self.behind[joint.index] = joint.loop.twist(joint.plain.values)
         joint.loop = self._loop(joint.index)
         (joint.plain,) = fit_all(joint.loop, [joint.ranges], joint.plain.values)
@@ -329,7 +331,7 @@ class _Arm:
         q, dq, ddq = signals.q.copy(), signals.dq.copy(), signals.ddq.copy()
         rows = self.task.windows.rows
         for other, twist in self.behind.items():
-            # A jump of the link where its motor is put back on the log is no motion.
+            # A jump of the link where its motor is reset to the log is not a motion.
             held = next(x.loop.held for x in self.joints if x.index == other)
             still = maximum_filter1d(held.astype(np.uint8), 7, axis=0) > 0
             clock = self.task.windows.time.T
@@ -354,7 +356,7 @@ class _Arm:
 
 
 def _encoder_noise(robot: Any, X: Any, smooth: Array) -> Array:
-    """What smoothing takes from the logged positions, rad or m, shape (n_joints,)."""
+    """Noise removed from the logged positions by smoothing, rad or m, shape (n_joints,)."""
     names = names_of_table(X)
     columns = resolve_columns(names, len(names), robot.joint_names, require_acceleration=False)
     logged = np.column_stack([np.asarray(X[names[k]], dtype=float) for k in columns.q])
@@ -390,7 +392,7 @@ def _name(joint: _Joint) -> _Answer | None:
     if drops[0] - drops[1] < MARGIN * drops[0]:
         if (best, other) != ("backlash", "joint_elasticity"):
             return None
-        best, other = other, best  # a gear with play is elastic, too; without is simpler
+        best, other = other, best  # a gear with play is elastic, too; one without is simpler
     if 1.0 - whole[best].mean / plain.mean < least:
         return None
     if float(np.mean(whole[best].left_out < plain.left_out)) <= LEAST_PIECES:
@@ -404,7 +406,7 @@ def _name(joint: _Joint) -> _Answer | None:
 
 
 def _given(model: Any, joint: int) -> dict[str, float]:
-    """Viscous and dry friction of the model, where the fit starts."""
+    """Viscous and dry friction of the model, as initial values of the fit."""
     return {
         term.kind: float(c[0])
         for term, c in model.effect_coefficients_.items()

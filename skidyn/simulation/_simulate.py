@@ -45,8 +45,8 @@ def simulate(
     horizon : float, s, optional
         Length of the pieces; None simulates every trajectory as a whole.
     engine : {"own", "mujoco"}, default="own"
-        ``"mujoco"`` steps MuJoCo with the model's MJCF (extra ``mujoco``), where this format holds
-        every effect.
+        ``"mujoco"`` steps MuJoCo with the model's MJCF (extra ``mujoco``), if this format can
+        represent every effect.
     step : float, default=0.002
         Longest step of the integrator, s; never longer than that of the log.
 
@@ -64,7 +64,7 @@ def simulate(
 
     See Also
     --------
-    skidyn.simulation.simulation_errors : How far it is from the log.
+    skidyn.simulation.simulation_errors : Deviation from the log.
 
     Examples
     --------
@@ -91,7 +91,7 @@ def simulate(
 
 
 def _on_rows(X: Any, model: RBDRegressor, task: Task, q: Array, dq: Array) -> Any:
-    """The table with the simulated motion; where pieces meet, the end of the earlier one counts."""
+    """The table with the simulated motion; where pieces meet, the earlier one is used."""
     windows, n = task.windows, model.robot_.n_joints
     names = column_names(X) or []
     columns = resolve_columns(

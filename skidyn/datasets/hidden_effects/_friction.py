@@ -19,7 +19,7 @@ def rms(values: Array) -> Array:
 
 
 def scaled(world: World, joints: Sequence[int], form: Array, size: float) -> tuple[Array, Array]:
-    """Coefficients that give each form (.., len(joints)) the wanted size, and the torque."""
+    """Coefficients that give each form (.., len(joints)) the desired size, and the torque."""
     coefficient = size * world.scale[list(joints)] / np.maximum(rms(form), 1e-12)
     torque = world.zeros()
     torque[..., list(joints)] = coefficient * form
@@ -51,7 +51,7 @@ def stribeck(world: World, joints: Sequence[int], size: float) -> Outcome:
 
 
 def asymmetric_friction(world: World, joints: Sequence[int], size: float) -> Outcome:
-    """Another viscous and dry friction in one direction than in the other."""
+    """Viscous and dry friction that differ between the directions."""
     j = list(joints)
     dFv, torque = scaled(world, j, np.abs(world.motion.dq[..., j]), size)
     dFc = 0.3 * size * world.scale[j]
@@ -79,7 +79,7 @@ def temperature_friction(world: World, joints: Sequence[int], size: float) -> Ou
     """Viscous friction that falls exponentially as the joint warms up, dry friction linearly."""
     j = list(joints)
     warm = world.temperature[..., j] - 30.0
-    # at least +-20 % of friction over the session, whatever the size asked for
+    # at least +-20 % of friction over the session, for any requested size
     level = 4 * size * world.scale[j]
     dq, sign = world.motion.dq[..., j], world.sign[..., j]
     Fv = level / np.maximum(rms(dq), 1e-12)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Simulated pre-sliding friction: states integrated along the motion at fine steps.
 
-All three take the place of the dry friction that the joint has anyway.
+All three replace the usual dry friction of the joint.
 """
 
 from __future__ import annotations

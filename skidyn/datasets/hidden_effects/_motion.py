@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from skidyn.robots import Robot
 
 Array = NDArray[np.float64]
-#: Order in which trajectories take their kind, so that few of them already differ.
+#: Order of the kinds of trajectories, so that even few of them differ.
 KINDS = ("medium", "fast", "slow", "point_to_point", "medium", "slow", "fast", "point_to_point")
 #: Largest speed relative to :attr:`Ranges.speed`, and base frequency in Hz, of each multi-sine.
 SINES = {"slow": (0.15, 0.06), "medium": (0.5, 0.1), "fast": (1.0, 0.16)}
@@ -35,18 +35,18 @@ class Motion:
     ddq: Array
 
     def every(self, stride: int) -> Motion:
-        """The motion on every ``stride``-th step."""
+        """The motion at every ``stride``-th step."""
         return Motion(self.q[:, ::stride], self.dq[:, ::stride], self.ddq[:, ::stride])
 
 
 @dataclass(frozen=True)
 class Ranges:
-    """Where each joint may move and how fast.
+    """Range of positions and speeds of each joint.
 
     Attributes
     ----------
     centre, reach : ndarray of shape (n_joints,), rad or m
-        Middle of the motion and the most that it may depart from it.
+        Middle of the motion and the largest distance from it.
     speed : ndarray of shape (n_joints,), rad/s or m/s
         Largest velocity.
     """
@@ -62,7 +62,8 @@ def motion_ranges(robot: Robot) -> Ranges:
     Parameters
     ----------
     robot : Robot
-        Its limits are kept; joints without limits turn by up to 1.3 rad, slide by up to 0.1 m.
+        Robot, whose limits are kept; joints without limits turn by up to 1.3 rad or slide by up to
+        0.1 m.
     """
     sliding = np.array([kind == "prismatic" for kind in robot.joint_types])
     low, high = np.asarray(robot.position_limits, dtype=float).T
@@ -83,7 +84,7 @@ def plan_motion(
     Parameters
     ----------
     robot : Robot
-        Whose limits are kept.
+        Robot, whose limits are kept.
     n_trajectories : int
         Number of trajectories; kinds alternate.
     step : float, s
@@ -108,7 +109,7 @@ def plan_motion(
 def _multi_sine(
     ranges: Ranges, time: Array, speed: float, frequency: float, rng: np.random.Generator
 ) -> tuple[Array, Array, Array]:
-    """Sum of harmonics per joint, as fast as asked and within reach."""
+    """Sum of harmonics per joint with the requested speed and within the range."""
     n = len(ranges.centre)
     harmonics = np.arange(1, N_HARMONICS + 1)
     omega = 2 * np.pi * frequency * rng.uniform(0.8, 1.25, (n, 1)) * harmonics

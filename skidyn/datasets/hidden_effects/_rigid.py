@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 def payload(world: World, joints: Sequence[int], size: float) -> Outcome:
-    """A body of its own fixed to the last link in some trajectories."""
+    """An additional body fixed to the last link in some trajectories."""
     com = world.rng.uniform(-0.03, 0.03, 3) + np.array([0.0, 0.0, 0.08])
     added = np.zeros_like(world.parameters)
     added[-1] = point_body(1.0, com, radius=0.05)
@@ -31,7 +31,7 @@ def payload(world: World, joints: Sequence[int], size: float) -> Outcome:
 
 
 def base_tilt(world: World, joints: Sequence[int], size: float) -> Outcome:
-    """Gravity in another direction than in the URDF."""
+    """Gravity in a different direction than in the URDF."""
     tilt = np.deg2rad(float(np.clip(20 * size, 0.0, 60.0)))
     heading = world.rng.uniform(-np.pi, np.pi)
     nominal = np.asarray(world.robot.gravity, dtype=float)
@@ -101,7 +101,7 @@ def _tool_torque(world: World, force: Array) -> Array:
 
 
 def _strongest(world: World, per_unit: Array, size: float) -> float:
-    """Magnitude at which the loaded joint that feels it most has the wanted size."""
+    """Magnitude at which the most affected loaded joint has the desired size."""
     loaded = world.scale > LOADED_SHARE * world.scale.max()
     share = np.where(loaded, rms(per_unit) / world.scale, 0.0)
     if not share.max() > 0:

@@ -18,7 +18,7 @@ def torque_gain(world: World, joints: Sequence[int], size: float) -> Outcome:
 
 
 def time_delay(world: World, joints: Sequence[int], size: float) -> Outcome:
-    """Logged torque late against the positions."""
+    """Logged torque delayed relative to the positions."""
     delay = 0.08 * size
     formula = "tau_logged(t)=tau(t-delay), relative to the positions"
     return Outcome(list(joints), {"delay": delay}, formula, delay=delay)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What sensors do to signals: noise, quantisation, and the derivative a user takes afterwards."""
+"""Effects of sensors on signals: noise, quantisation, and a user's derivatives."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def quantise(values: Array, resolution: Array | float) -> Array:
 
 
 def filtered_derivative(velocity: Array, step: float, cutoff: float = 10.0) -> Array:
-    """Acceleration from measured velocity, as a user derives it.
+    """Acceleration from measured velocity, as derived by a user.
 
     Parameters
     ----------

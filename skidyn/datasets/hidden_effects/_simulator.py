@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Logs of a simulated robot that hides a physical effect which its nominal model lacks."""
+"""Logs of a simulated robot with a physical effect that its nominal model lacks."""
 
 from __future__ import annotations
 
@@ -37,7 +37,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 EffectSpec = str | Sequence[str] | Mapping[str, Mapping[str, Any] | None] | None
 
-#: Everything that can be hidden. Transmissions stand first: the others act on the motor's motion.
+#: All effects that can be hidden. Transmissions are first, since the others act on the motor's
+#: motion.
 SIMULATED: dict[str, Simulate] = TRANSMISSION | FRICTION | HYSTERESIS | TORQUE | RIGID | SENSOR
 #: Size of an effect relative to the spread of the joint's rigid-body torque, at magnitude 1.
 SIZE = 0.25
@@ -161,7 +162,7 @@ def hidden_effect_kinds() -> tuple[str, ...]:
 def _effect_specs(
     effect: EffectSpec, joints: Sequence[int] | None, magnitude: float | None
 ) -> dict[str, dict[str, Any]]:
-    """Joints and magnitude of each effect that was asked for."""
+    """Joints and magnitude of each requested effect."""
     common = {"joints": joints, "magnitude": 1.0 if magnitude is None else float(magnitude)}
     if effect is None:
         return {}
@@ -230,7 +231,7 @@ def _make_world(
     )
     rigid = world.torque()
     scale = np.asarray(rigid.reshape(-1, robot.n_joints).std(axis=0))
-    # joints that carry next to nothing still have friction worth speaking of
+    # joints with very little load still have a relevant friction
     return replace(world, rigid=rigid, scale=np.maximum(scale, 0.02 * scale.max()))
 
 
@@ -242,7 +243,7 @@ def _warm_up(time: Array, n_joints: int, rng: np.random.Generator) -> Array:
 
 
 def _choose_joints(kind: str, joints: Sequence[int] | None, world: World) -> list[int]:
-    """Joints from 0: those asked for, or ones on which the effect can show."""
+    """Joints from 0: the requested ones, or ones on which the effect is visible."""
     n = world.n_joints
     if joints is not None:
         wrong = [j for j in joints if not 1 <= j <= n]
@@ -260,7 +261,7 @@ def _choose_joints(kind: str, joints: Sequence[int] | None, world: World) -> lis
     if kind in LOADED:
         return [int(np.argmax(world.scale))]
     usual = world.scale > LOADED_SHARE * world.scale.max()
-    if kind == "backlash":  # shows where the load changes its side
+    if kind == "backlash":  # visible where the load changes its sign
         mean = np.abs(world.rigid.reshape(-1, n).mean(axis=0))
         return [int(np.argmin(np.where(usual, mean / world.scale, np.inf)))]
     if kind == "rotor_inertia" and usual[1:].any():
@@ -269,7 +270,7 @@ def _choose_joints(kind: str, joints: Sequence[int] | None, world: World) -> lis
 
 
 def _with_motor(world: World, deflection: Array, rate: Array) -> World:
-    """The world as seen from the motors, which is what encoders log."""
+    """The world with the motion of the motors, which the encoders log."""
     fine = Motion(world.fine.q + deflection, world.fine.dq + rate, world.fine.ddq)
     sampled = fine.every(world.stride)
     n = world.n_samples
@@ -278,7 +279,7 @@ def _with_motor(world: World, deflection: Array, rate: Array) -> World:
 
 
 def _total_torque(world: World, base: Sequence[str], outcomes: Sequence[Outcome]) -> Array:
-    """True torque of the motors: rigid body, what the user knows of, and what is hidden."""
+    """True torque of the motors: rigid body, known effects and hidden effects."""
     torque = world.rigid.copy()
     replaced = sorted({j for o in outcomes if o.replaces_coulomb for j in o.joints})
     for kind in base:
@@ -306,7 +307,7 @@ def _record(
     base: tuple[str, ...],
     rng: np.random.Generator,
 ) -> Bunch:
-    """What sensors make of the motion and the torque."""
+    """Motion and torque with the errors of the sensors."""
     level = NOISE[noise] if isinstance(noise, str) else float(noise)
     n = world.n_joints
     noise_std = level * torque.reshape(-1, n).std(axis=0)

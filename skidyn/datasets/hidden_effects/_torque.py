@@ -136,7 +136,7 @@ def cable(world: World, joints: Sequence[int], size: float) -> Outcome:
 
 
 def clock_torque(world: World, joints: Sequence[int], size: float) -> Outcome:
-    """Unknown: a torque periodic in time, whatever the robot does."""
+    """Unknown: a torque periodic in time, independent of the motion."""
     j = list(joints)
     frequency = float(world.rng.uniform(0.5, 0.9))
     form = np.sin(2 * np.pi * frequency * world.time)[..., None]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Simulated play and elasticity between motor and link.
 
-Positions are logged on the motor side, so the torque belongs to a link that is elsewhere.
+Positions are logged on the motor side, and the link has another position.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def joint_elasticity(world: World, joints: Sequence[int], size: float) -> Outcom
 
     j = list(joints)
     load = world.rigid[..., j]
-    # a deflection that a stiff gear would not show: 0.12 rad at the usual size of 0.25
+    # a large deflection, not that of a stiff gear: 0.12 rad at the usual size of 0.25
     K = np.sqrt(np.mean(load**2, axis=(0, 1))) / (0.12 * size * world.unit[j])
     sample_time = world.step * world.stride * np.arange(world.n_samples)
     fine_time = world.step * np.arange(world.fine.q.shape[1])
@@ -76,7 +76,7 @@ def _contact(world: World, demand: Array, gap: float) -> tuple[Array, Array]:
     """``delta`` and its acceleration on the clock of the log, for a demanded acceleration.
 
     The contact force per inertia is ``w^2 depth (1 + c delta')`` on either side of the gap
-    [1]_: its damping grows with the depth, so it neither jumps at the touch nor pulls.
+    [1]_: its damping grows with the depth, so the force neither jumps at contact nor pulls.
 
     References
     ----------

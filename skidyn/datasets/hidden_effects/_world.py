@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     from skidyn.robots import Robot
 
 Array = NDArray[np.float64]
-#: Travel (rad, m) over which dry friction turns round: less than an encoder sees, so that it is a
-#: sign that a joint at rest keeps.
+#: Travel (rad, m) over which dry friction changes its sign: less than the resolution of an encoder,
+#: so it acts as a sign that a joint at rest keeps.
 SLIP = 1e-6
-#: A joint whose torque spreads less than this share of the largest spread carries next to nothing.
+#: A joint whose spread of torque is less than this share of the largest one counts as unloaded.
 LOADED_SHARE = 0.05
 
 
@@ -52,7 +52,7 @@ class World:
     rigid : ndarray, N m or N
         Torque of the rigid body.
     scale : ndarray of shape (n_joints,), N m or N
-        Size of the torque of each joint: what effects are measured by.
+        Size of the torque of each joint, the unit of the effects.
     rng : Generator
         Source of chance for the effects.
     """
@@ -81,7 +81,7 @@ class World:
 
     @cached_property
     def prismatic(self) -> NDArray[np.bool_]:
-        """Which joints slide."""
+        """Mask of prismatic joints."""
         return np.array([kind == "prismatic" for kind in self.robot.joint_types])
 
     @cached_property
@@ -112,26 +112,26 @@ class World:
         return self.robot.inverse_dynamics(*flat, **arguments).reshape(m.q.shape)
 
     def zeros(self) -> Array:
-        """Torque of nothing."""
+        """Zero torque."""
         return np.zeros_like(self.rigid)
 
 
 @dataclass
 class Outcome:
-    """What an effect does to a log.
+    """Influence of an effect on a log.
 
     Attributes
     ----------
     joints : list of int
-        Joints it acts on, from 0.
+        Joints on which it acts, from 0.
     parameters : dict
         True parameters in SI units; lists hold one value per joint.
     formula : str
-        What was simulated.
+        Formula of the simulated effect.
     torque : ndarray or None
         Torque that it adds.
     variables : tuple of str
-        For unknown effects: the signals it depends on.
+        For unknown effects: the signals on which it depends.
     gain : float
         Factor on the logged torque of its joints.
     delay : float, s
@@ -139,9 +139,9 @@ class Outcome:
     limit : ndarray or None
         Limit of the logged torque of its joints.
     uses_temperature : bool
-        Whether the log holds temperatures.
+        Whether the log contains temperatures.
     replaces_coulomb : bool
-        Whether it takes the place of the dry friction that its joints have anyway.
+        Whether it replaces the usual dry friction of its joints.
     motor : tuple of ndarray or None
         Departure of the fine motor position and velocity from those of the links (transmissions).
     """
@@ -177,7 +177,7 @@ def slip(travel: Array) -> Array:
     """
     moved = np.moveaxis(travel, 1, 0)
     states = np.empty((len(moved) + 1, *moved.shape[1:]))
-    # the direction in which it first slips, so that no transient is left at the start
+    # the direction in which it first slips, to avoid a transient at the start
     total = np.cumsum(moved, axis=0)
     first = np.argmax(np.abs(total) > 1, axis=0)
     states[0] = np.sign(np.take_along_axis(total, first[None], axis=0)[0])

@@ -33,10 +33,10 @@ TIERS: dict[str, tuple[tuple[float, float], str]] = {
     "short": ((0.6, 1.0), "low"),
     "rough": ((0.6, 1.2), "low"),
 }
-#: What every robot has beside the effects, and what a user's model contains.
+#: Usual effects of every robot, and effects of a user's model.
 BASE = ("rigid_body", "viscous", "coulomb", "rotor_inertia")
 RATES = (100, 125, 200)
-#: Rates of logs that can show the kind; the other kinds show at any of ``RATES``.
+#: Rates of logs that can show the kind; other kinds are visible at any of ``RATES``.
 FAST = {
     "backlash": (250, 500),
     "joint_elasticity": (250, 500),
@@ -51,7 +51,7 @@ SHORT_PACES = ("points", "points", "medium", "points", "slow", "points")
 
 
 def simulate(case: SuiteCase) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
-    """Columns of the log, what a tool may know, and the truth."""
+    """Columns of the log, information for the tool, and the truth."""
     motion_rng, robot_rng, effect_rng, sensor_rng = np.random.default_rng([*case.entropy, 1]).spawn(
         4
     )

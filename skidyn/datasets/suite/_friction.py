@@ -24,7 +24,7 @@ def coulomb(s: Setting) -> Hidden:
 
 def _lacking(s: Setting, kind: str, name: str, sizes: Array, formula: str) -> Hidden:
     """Friction that all joints have and the base model lacks."""
-    s.some(s.n_joints)  # drawn for nothing, so that the numbers drawn after it stay frozen
+    s.some(s.n_joints)  # unused, so that later random numbers do not change
     j = list(range(s.n_joints))
     return Hidden(kind, j, {name: sizes}, formula, (name,), missing_from_base=kind)
 
@@ -69,7 +69,7 @@ def nonlinear_viscous(s: Setting) -> Hidden:
         v = m.dq[j]
         if power >= 1:
             out[j] += c * np.sign(v) * np.abs(v) ** power
-        else:  # a root has no slope at rest that an integrator could follow
+        else:  # a root has an infinite slope at rest, which an integrator cannot follow
             out[j] += c * v / (np.abs(v) + 0.01) ** (1 - power)
 
     parameters = {"c": c, "power": power}

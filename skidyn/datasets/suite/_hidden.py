@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a hidden effect is, and what it may look at."""
+"""Hidden effects, and the state on which they may depend."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Setting:
 
     @property
     def low_speed(self) -> Array:
-        """Speed below which dry friction's details show; sliders are in metres."""
+        """Speed below which details of dry friction are visible; m/s for sliders."""
         return np.where(self.sliders, 0.1, 1.0)
 
     def some(self, most: int = 3, pool: Sequence[int] | None = None) -> list[int]:
@@ -93,10 +93,10 @@ class Setting:
 
 @dataclass
 class Moment:
-    """State of the simulated robot at one step, as effects see it.
+    """State of the simulated robot at one step, for effects.
 
     ``clock`` counts seconds since the first recording, ``since`` since the trajectory's start;
-    ``load`` is what each joint carried at the last step.
+    ``load`` is the load of each joint at the last step.
     """
 
     trajectory: int
@@ -116,10 +116,10 @@ Adds = Callable[[Moment, Array], None]
 
 @dataclass
 class Hidden:
-    """An effect: what changes in the plant or in the log, and the truth about it.
+    """An effect: its influence on the plant or the log, and its truth.
 
-    Torques count as the actuator feels them: ``tau = rigid body + friction + torque``. Joints
-    and trajectories are numbered from 0 here and from 1 in the truth.
+    Torques have the sign of the actuator's: ``tau = rigid body + friction + torque``. Joints and
+    trajectories are numbered from 0 here and from 1 in the truth.
     """
 
     kind: str
@@ -150,7 +150,7 @@ class Hidden:
     missing_from_base: str | None = None
 
     def truth(self) -> dict[str, Any]:
-        """What the answer is compared with; joints and trajectories counted from 1."""
+        """Truth for the comparison with answers; joints and trajectories counted from 1."""
         out: dict[str, Any] = {
             "kind": self.kind,
             "joints": [j + 1 for j in self.joints],
@@ -181,7 +181,7 @@ Maker = Callable[[Setting], Hidden]
 
 
 def plain(value: Any) -> Any:
-    """The value as JSON knows it."""
+    """The value in a JSON type."""
     if isinstance(value, dict):
         return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, list | tuple | np.ndarray):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Hidden effects of drives and sensors, and forces from outside."""
+"""Hidden effects of drives and sensors, and external forces."""
 
 from __future__ import annotations
 

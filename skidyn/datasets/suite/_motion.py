@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Motions that a commissioning engineer would let a robot make."""
+"""Typical motions of the commissioning of a robot."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def _points(drives: Drives, duration: float, rng: np.random.Generator) -> Motion
     while clock < duration + 1:
         goal = centre + stroke * rng.uniform(-0.85, 0.85, len(centre))
         way = np.abs(goal - here)
-        # a quintic's peaks are 1.875 times the mean speed and 5.77 way/time^2
+        # a quintic's peaks are 1.875 times the mean speed and 5.77 distance/time^2
         took = max(0.3, (2.4 * way / speed).max(), np.sqrt(5.8 * way / acceleration).max())
         moves.append((clock, took, here, goal))
         clock += took + rng.uniform(0.15, 0.5)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Hidden torques that no catalogue holds: the right answer is ``unknown``, with joints and signals.
+"""Hidden torques outside the catalogue: the right answer is ``unknown``, with joints and signals.
 
-``x`` stands for a position from the joint's centre, in units of its stroke.
+``x`` is the distance of a position from the joint's centre, in units of its stroke.
 """
 
 from __future__ import annotations

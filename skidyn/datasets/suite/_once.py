@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Hidden effects that are there in one trajectory only."""
+"""Hidden effects in one trajectory only."""
 
 from __future__ import annotations
 

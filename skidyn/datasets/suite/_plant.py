@@ -29,7 +29,7 @@ def rigid_model(robot: str) -> Any:
     """The nominal robot without friction, limits or contacts; ``inverse`` ignores its rotors."""
     spec = engine().MjSpec.from_string(urdf_of(robot))
     for joint in spec.joints:
-        joint.armature = 1.0  # wrists of a few grams have no inertia that MuJoCo could divide by
+        joint.armature = 1.0  # the inertia of wrists of a few grams is too small for MuJoCo
     return _bare(spec.compile())
 
 
@@ -39,7 +39,7 @@ def _bare(model: Any) -> Any:
     model.dof_frictionloss[:] = 0
     model.jnt_limited[:] = 0
     model.opt.timestep = STEP
-    # shortcuts that the compiler took for the nominal bodies do not hold for other ones
+    # simplifications of the compiler for the nominal bodies are not valid for others
     model.body_sameframe[:] = 0
     model.body_simple[:] = 0
     model.dof_simplenum[:] = 0
@@ -67,7 +67,7 @@ def plant(
 ) -> tuple[Any, Array]:
     """The true robot, and the degrees of freedom of its motors.
 
-    ``drives`` holds ``viscous``, ``coulomb`` and ``rotor``. A payload is there if ``loaded``.
+    ``drives`` holds ``viscous``, ``coulomb`` and ``rotor``. With ``loaded`` there is a payload.
     """
     mujoco = engine()
     spec = mujoco.MjSpec.from_string(urdf_of(robot))
@@ -133,7 +133,7 @@ def _attach(model: Any, body: int, mass: float, com: Array, inertia: Array) -> N
     for m, arm in zip(masses, arms, strict=True):
         tensors[0] += m * (arm @ arm * np.eye(3) - np.outer(arm, arm))
     moments, directions = np.linalg.eigh(tensors.sum(axis=0))
-    directions[:, 0] *= np.sign(np.linalg.det(directions))  # a rotation, no reflection
+    directions[:, 0] *= np.sign(np.linalg.det(directions))  # a rotation, not a reflection
     quaternion = np.empty(4)
     engine().mju_mat2Quat(quaternion, directions.ravel())
     model.body_mass[body], model.body_ipos[body] = masses.sum(), middle

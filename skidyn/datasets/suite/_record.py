@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What sensors and a logger make of a simulated motion, and the truth about the log."""
+"""Sensors and logger for a simulated motion, and the truth about the log."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ Array = NDArray[np.float64]
 #: Torque noise relative to the largest torque; share of it that is coloured, and its time in s.
 LEVEL = {"low": (0.004, 0.007), "high": (0.018, 0.028)}
 COLOURED, COLOUR_TIME = {"low": 0.0, "high": 0.4}, 0.03
-#: An effect counts as detectable from so many standard errors.
+#: Number of standard errors from which an effect counts as detectable.
 DETECTABLE = 12.0
 
 
 @dataclass(frozen=True)
 class Sensors:
-    """How a log is taken."""
+    """Settings of the logger."""
 
     rate: float
     noise: str
@@ -42,7 +42,7 @@ def sample(
     delay: dict[int, float],
     rng: np.random.Generator,
 ) -> dict[str, Array]:
-    """Rows of the log without noise: what perfect sensors would have said."""
+    """Rows of the log without noise, as from perfect sensors."""
     parts: dict[str, list[Array]] = {
         name: [] for name in ("time", "trajectory", "q", "dq", "ddq", "tau", "temperature")
     }
@@ -77,7 +77,7 @@ def measure(
     sliders: Array,
     rng: np.random.Generator,
 ) -> dict[str, Array]:
-    """Columns of the log, with noise, steps of encoders and converters, and a clock's jitter."""
+    """Columns of the log, with noise, steps of encoders and converters, and jitter of the clock."""
     n = rows["q"].shape[1]
     step = np.where(sliders, 1e-6 * 2.0 ** (20 - sensors.bits), 2 * np.pi / 2**sensors.bits)
     q = np.round(rows["q"] / step) * step
@@ -122,10 +122,10 @@ def _noise(length: int, n: int, sensors: Sensors, rng: np.random.Generator) -> A
 def left_by_base(
     robot: str, rows: dict[str, Array], base: Sequence[str], noise_std: Array, sliders: Array
 ) -> tuple[Array, Array]:
-    """RMS torque that the refitted base model leaves of the noise-free log, per joint.
+    """RMS residual of the refitted base model on the noise-free log, per joint.
 
-    Rows at rest are left out: dry friction there is no function of the motion. Also returns the
-    share of such rows.
+    Rows at rest are left out, because dry friction there is not a function of the motion. Also
+    returns the share of such rows.
     """
     every = max(1, len(rows["q"]) // 700)
     q, dq, ddq, tau = (rows[name][::every] for name in ("q", "dq", "ddq", "tau"))
@@ -147,7 +147,7 @@ def left_by_base(
 def truth_of(
     hidden: Sequence[Hidden], left: Array, noise_std: Array, n_rows: int, sensors: Sensors
 ) -> dict[str, Any]:
-    """Effects, and how far they stand out of the noise."""
+    """Effects, and their sizes relative to the noise."""
     share, keep = COLOURED[sensors.noise], np.exp(-1 / (sensors.rate * COLOUR_TIME))
     inflation = 1 - share + share * (1 + keep) / (1 - keep)
     ratio = left / noise_std

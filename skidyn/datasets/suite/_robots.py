@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Robots of the suite: what their drives and motions are like."""
+"""Robots of the suite with their drives and motions."""
 
 from __future__ import annotations
 
@@ -117,5 +117,5 @@ DRIVES: dict[str, Drives] = {
 
 @cache
 def urdf_of(name: str) -> str:
-    """Text of the embedded URDF: the robot as its user knows it."""
+    """Text of the embedded URDF, which is given to the user."""
     return resources.files("skidyn.datasets").joinpath("robots", f"{name}.urdf").read_text("utf-8")

@@ -42,8 +42,8 @@ def score_answers(
         One per case: ``{"case": "case_017", "verdict": "complete" | "missing" | "unknown",
         "effects": [{"kind": .., "joints": [from 1], "parameters": {..}, "variables": ["q1", ..],
         "trajectories": [..], "confidence": ..}, ..]}``, most important first; ``parameters``,
-        ``variables``, ``trajectories`` and ``confidence`` where they apply. A case without an
-        answer counts as silent.
+        ``variables``, ``trajectories`` and ``confidence`` if they apply. A case without an answer
+        counts as silent.
 
     Returns
     -------
@@ -165,7 +165,7 @@ def _score(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> dict[str, Any
 
 
 def _together(claims: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Claims of one kind on single joints as one claim; nameless ones only with common signals."""
+    """Claims of one kind on single joints as one claim; unknown ones only with common signals."""
     out: list[dict[str, Any]] = []
     for claim in claims:
         joints, signals = list(claim.get("joints") or ()), list(claim.get("variables") or ())

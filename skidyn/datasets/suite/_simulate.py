@@ -36,7 +36,7 @@ class Recording:
 
 @dataclass
 class Robotics:
-    """What the simulation needs of the robot: drives as arrays, and its true bodies."""
+    """Data of the robot for the simulation: drives as arrays, and its true bodies."""
 
     name: str
     drives: dict[str, Array]
@@ -152,7 +152,7 @@ class _Run:
         return np.asarray(rigid + drives["viscous"] * dq + dry + drives["rotor"] * ddq)
 
     def _gain(self, q: Array) -> Array:
-        """Inertia that the controller counts with; behind a soft joint only the motor's."""
+        """Inertia in the controller; for a soft joint only that of the motor."""
         rotor = self.robot.drives["rotor"]
         matrix = inertia_matrix(self.nominal, self.scratch, q) + np.diag(rotor)
         for j in self.soft:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The suite: logs drawn by seed, what each hides, and how hard it is."""
+"""The suite: logs drawn by seed, with their hidden effects and tiers."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from skidyn.datasets.suite._robots import DRIVES, urdf_of
 if TYPE_CHECKING:
     from sklearn.utils import Bunch
 
-#: What a log can hide, with its share of the suite.
+#: Hidden contents of a log, with their shares of the suite.
 CONTENTS = {"nothing": 0.2, "one": 0.48, "two": 0.1, "nameless": 0.14, "once": 0.08}
 POOLS: dict[str, dict[str, Maker]] = {
     "one": NAMED,
@@ -29,14 +29,14 @@ POOLS: dict[str, dict[str, Maker]] = {
     "nameless": NAMELESS,
     "once": ONCE,
 }
-#: Two of one set are one thing to any tool.
+#: Two effects of one set cannot be separated by any tool.
 RIVALS = (
     {"dahl", "lugre", "maxwell_slip"},
     {"backlash", "joint_elasticity"},
     {"friction_drift", "temperature_friction", "temperature_offset"},
     {"external_wrench", "payload"},
 )
-#: What takes an arm in space, or three joints.
+#: Effects that need an arm in space, or three joints.
 SPATIAL = {"base_tilt", "environment_contact", "external_wrench", "payload"}
 SPATIAL |= {"field_around_a_point", "one_cause_on_three", "pushes", "sum_of_positions"}
 
@@ -82,8 +82,8 @@ class SuiteCase:
         -------
         Bunch
             ``frame``: DataFrame with ``time, trajectory, q1 .., dq1 .., [ddq1 ..], tau1 ..,
-            [temp1 ..]`` in SI units; ``urdf``: text of the nominal robot; ``meta``: what a tool
-            may know (``base_model``, rate, resolution); ``truth``: what it must find.
+            [temp1 ..]`` in SI units; ``urdf``: text of the nominal robot; ``meta``: information for
+            the tool (``base_model``, rate, resolution); ``truth``: the hidden effects.
 
         Raises
         ------
@@ -106,7 +106,7 @@ class SuiteCase:
     def write(self, folder: str | Path) -> Path:
         """Simulate the log into ``folder/name``: ``log.parquet``, ``robot.urdf``, ``meta.json``.
 
-        The truth is not written beside them, so that a folder can be given to any tool.
+        The truth is not written into this folder, so that it can be given to any tool.
 
         Parameters
         ----------
@@ -185,7 +185,7 @@ def hidden_effect_suite(
 
 
 def _pick(pool: list[str], count: int, rng: np.random.Generator) -> list[str]:
-    """Kinds that can be told apart when both are there."""
+    """Kinds that can be separated if both are present."""
     while True:
         names = [str(name) for name in rng.choice(pool, count, replace=False)]
         if not any(len(rivals.intersection(names)) > 1 for rivals in RIVALS):

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Pages as a row of pictures: each is a module of its page's folder with a template beside it."""
+"""Pages as lists of pictures: each is a module in the folder of its page, with a template."""

@@ -9,7 +9,7 @@ from skidyn.report._picture import Canvas, Picture, Summary
 
 
 class Coefficients(Picture):
-    """Effects first: their names are short and their numbers mean something by themselves."""
+    """Effects first: their names are short and their numbers have a direct meaning."""
 
     place, title = 50, "Coefficients"
 

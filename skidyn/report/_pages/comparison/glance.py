@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The first screen of a comparison: what differs, both errors over noise, the clearest curve."""
+"""The first screen of a comparison: differences, both errors over noise, the clearest curve."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from skidyn.report._picture import Canvas, Picture, Summary
 
 
 class Glance(Picture):
-    """What differs, and on which joint one sees it."""
+    """Differences, and the joint that shows them best."""
 
     place = 0
 
@@ -33,7 +33,7 @@ class Glance(Picture):
 
 
 def _quiet(rows: list[dict[str, Any]]) -> str:
-    """One sentence on the joints that are alike in both."""
+    """One sentence on the joints without a difference."""
     silent = [row for row in rows if not row["speaks"]]
     if not silent:
         return ""

@@ -17,7 +17,7 @@ FIRST = 2
 
 
 class Residuals(Picture):
-    """Medians and quartiles; the joints on which the two part most come first."""
+    """Medians and quartiles; the joints with the largest difference are first."""
 
     place, title = 40, "Residuals"
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Time(Picture):
-    """What the script ``panels.js`` draws."""
+    """Data for the script ``panels.js``."""
 
     place, title = 30, "Over time"
 
@@ -24,7 +24,7 @@ class Time(Picture):
         return time_tables(subject.diagnoses, subject.report["same_log"])
 
     def show(self, summary: Summary, canvas: Canvas) -> dict[str, Any]:
-        """Hand the panels to the script."""
+        """Pass the panels to the script."""
         report, times = summary["report"], summary["time"]
         canvas.numbers["panels"] = {
             "joints": [_panel(report, j, tables) for j, tables in enumerate(times["joints"])],

@@ -7,6 +7,6 @@ from skidyn.report._picture import Picture
 
 
 class What(Picture):
-    """Which effect is missing in which of the two, and how large it is there."""
+    """Effects that are missing in either of the two, with their sizes."""
 
     place, title = 20, "What is missing"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The error falling step by step, and what the squared error consists of."""
+"""The error after each step, and the causes of the squared error."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class Adding(Picture):
-    """Held-out errors as given and after every step."""
+    """Held-out errors of the given model and after every step."""
 
     place, title = 40, "Error by step"
 

@@ -11,7 +11,7 @@ from skidyn.report._picture import Canvas, Picture, Summary
 
 
 class Glance(Picture):
-    """Where, what and how sure, before anything is scrolled."""
+    """Location, effect and confidence, visible without scrolling."""
 
     place = 0
 
@@ -26,7 +26,7 @@ class Glance(Picture):
 
 
 def _hero(summary: Summary, canvas: Canvas) -> dict[str, Any] | None:
-    """The effect on the joint whose error is worst."""
+    """The effect on the joint with the largest error."""
     rows = summary["story"]["joints"]
     charts = [
         {**chart, "title": finding["title"]}

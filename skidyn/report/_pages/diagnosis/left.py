@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the completed model leaves, what it is made of, and when it acts."""
+"""Remaining error of the completed model, its causes, and when it occurs."""
 
 from __future__ import annotations
 
@@ -17,9 +17,10 @@ class Left(Picture):
     place, title = 50, "Remaining error"
 
     def read(self, subject: Diagnosis) -> list[dict[str, Any]]:
-        """Parts of the error that is left: noise of the torque sensor and of the positions.
+        """Parts of the remaining error: noise of the torque sensor and of the positions.
 
-        ``predictable`` is what the signals still tell, ``remainder`` what is neither; N m or N.
+        ``predictable`` is the part that the signals still explain, ``remainder`` the rest; N m or
+        N.
         """
         parts = subject.parts
         if parts is None:

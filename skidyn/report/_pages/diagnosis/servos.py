@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the motion of position servos names, each joint simulated along its command."""
+"""Effects identified from the motion of position servos, each joint simulated alone."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How far the simulated motion is from the log, without and with the findings."""
+"""Error of the simulated motion, without and with the findings."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from skidyn.report._picture import Canvas, Picture, Summary
 
 
 class Simulated(Picture):
-    """Errors of position and velocity of every joint, where a simulation was asked for."""
+    """Errors of position and velocity of every joint, if a simulation was requested."""
 
     place, title = 45, "Simulated motion"
 
     def show(self, summary: Summary, canvas: Canvas) -> dict[str, Any] | None:
-        """Bars of the position error over that of the model as given, and the numbers."""
+        """Bars of the position error relative to that of the given model, and the numbers."""
         motion = summary["story"]["simulation"]
         if motion is None:
             return None

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class Time(Picture):
-    """What the script ``panels.js`` draws, and the errors of every trajectory as numbers."""
+    """Data for the script ``panels.js``, and the errors of every trajectory as numbers."""
 
     place, title = 20, "Over time"
 
@@ -23,7 +23,7 @@ class Time(Picture):
         return {"traces": traces(subject), "errors": subject.comparison.table()}
 
     def show(self, summary: Summary, canvas: Canvas) -> dict[str, Any]:
-        """Hand the panels to the script."""
+        """Pass the panels to the script."""
         lines = [row["joints"] for row in summary["story"]["findings"]]
         found = [joint - 1 for joints in lines for joint in joints]
         failing = [failure["joint"] - 1 for failure in summary["where"]["failures"]]
@@ -34,7 +34,7 @@ class Time(Picture):
             ],
             "starts": own["traces"][0]["starts"],
             "end": max(trace["time"][-1] for trace in own["traces"]),
-            # the first joints a reader wants to see
+            # the most important joints for a reader
             "shown": list(dict.fromkeys(failing + found))[:2] or [0],
         }
         return {"errors": own["errors"]}
@@ -68,7 +68,7 @@ def _panel(summary: Summary, j: int, trace: dict[str, Any], added: bool) -> dict
 
 
 def _cut(frame: dict[str, Any], unit: str) -> str:
-    """A note on the peaks that the axis of the residual leaves out."""
+    """A note on the peaks outside the axis of the residual."""
     if not frame["cut"]:
         return ""
     peaks = "One sample lies" if frame["cut"] == 1 else f"{frame['cut']:,} samples lie"

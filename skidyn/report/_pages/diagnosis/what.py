@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is missing: a card for every finding."""
+"""Missing effects: a card for every finding."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class What(Picture):
 
     def read(self, subject: Diagnosis) -> list[dict[str, Any]]:
         """Every finding with its curves and maps."""
-        from skidyn.diagnosis import notes  # not paid for by who only writes a page
+        from skidyn.diagnosis import notes  # not needed to write a page
 
         return [
             {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where the model fails: joints, regimes, and what happens at rest."""
+"""Where the model fails: joints, regimes, and errors at rest."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Where(Picture):
     place, title = 10, "Where the model fails"
 
     def read(self, subject: Diagnosis) -> dict[str, Any]:
-        """Failures in words, the error map, and what dry friction allows at rest."""
+        """Failures in words, the error map, and errors at rest compared with dry friction."""
         return {
             "failures": [asdict(failure) for failure in subject.failures],
             "rest_errors": [asdict(error) for error in subject.rest_errors],

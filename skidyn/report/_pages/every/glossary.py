@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Terms of the page and what they mean."""
+"""Terms of the page with their meanings."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from skidyn.report._picture import Canvas, Picture, Summary
 
 
 class Glossary(Picture):
-    """The words that are explained on hover too."""
+    """The terms that are also explained on hover."""
 
     place, title = 90, "Terms"
 
     def show(self, summary: Summary, canvas: Canvas) -> dict[str, Any]:
-        """All meanings; those of its own words on the page of a fleet."""
+        """All meanings; for the page of a fleet, those of its own terms."""
         of_fleet = summary["report"]["schema"].startswith("skidyn.fleet/")
         return {"glossary": FLEET_MEANINGS if of_fleet else MEANINGS}

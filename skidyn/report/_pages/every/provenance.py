@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where the numbers come from."""
+"""Provenance of the numbers."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The first screen of a fleet: which robots deviate, and how far the clearest stands out."""
+"""The first screen of a fleet: robots that deviate, and the largest deviation."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from skidyn.report._picture import Canvas, Picture, Summary
 if TYPE_CHECKING:
     from skidyn.report._fleet import Fleet
 
-#: Robots with a bar, and scatters at which a bar ends at least.
+#: Number of robots with a bar, and least deviation, in scatters, at the end of a bar.
 SHOWN, REACH = 12, 6.0
 
 
 class Glance(Picture):
-    """Bars of the robots that stand out most, and all robots in the clearest coefficient."""
+    """Bars of the robots that deviate most, and all robots in the clearest coefficient."""
 
     place = 0
 

@@ -39,7 +39,7 @@ class Since(Picture):
         return curves
 
     def show(self, summary: Summary, canvas: Canvas) -> dict[str, Any] | None:
-        """Figures with bands; nothing where no robot was watched."""
+        """Figures with bands; nothing if no robot was monitored."""
         curves = []
         for curve in summary["since"]:
             middle = [

@@ -7,6 +7,6 @@ from skidyn.report._picture import Picture
 
 
 class What(Picture):
-    """Coefficient, common value, deviation and how sure it is."""
+    """Coefficient, common value, deviation and its significance."""
 
     place, title = 20, "Deviating effects"
