@@ -633,9 +633,9 @@ ROWS_A_DIRECTION = 2.0
 def own_noise(design: Array, target: Array, count: float, rows: float | None = None) -> float:
     """Residual of a joint fitted alone, so that errors of other joints have no influence.
 
-    The rows may be a triangular factor; ``rows`` is their true number, and ``count``, by default the
-    same, that by which the squared residual is divided. With too few rows to determine the noise, the
-    torque itself is its bound.
+    The rows may be a triangular factor; ``rows`` is their true number, and ``count``, by default
+    the same, that by which the squared residual is divided. With too few rows to determine the
+    noise, the torque itself is its bound.
     """
     rows = count if rows is None else rows
     if not count:
