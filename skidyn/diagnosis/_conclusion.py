@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from skidyn._progress import track
 from skidyn._signals import Array
-from skidyn._text import joints_told
+from skidyn._text import joints_told, listed
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._comparison import Comparison
 from skidyn.diagnosis._confidence import confidence, mostly_stays
@@ -145,7 +145,7 @@ def conclude(
         parts.noise,
         _unexplained(findings, unknowns, parts, rmse),
         limits,
-        remarks + _fold_notes(problem),
+        remarks + _joint_notes(problem, parts, rmse) + _fold_notes(problem),
         model,
         data,
         problem,
@@ -540,6 +540,27 @@ def _unexplained(
     share = float(np.mean(parts.left[joints] ** 2 / rmse[joints] ** 2))
     numbers = [int(j) + 1 for j in joints]
     return {"joints": numbers, "variables": [], "share": share, "torques": [], "when": []}
+
+
+def _joint_notes(problem: Problem, parts: Remainder, errors: Array) -> list[str]:
+    """Notes on joints that slide too little to be judged, or to be judged on new motion."""
+    robot, extrapolated = problem.robot, parts.extrapolated
+    if robot is None:
+        return []
+    names = [f"joint {j + 1} ({name})" for j, name in enumerate(robot.joint_names)]
+    resting = [names[j] for j in np.flatnonzero(problem.rows.counts == 0)]
+    notes = []
+    if resting:
+        notes.append(
+            f"The torque of {listed(resting)} was not judged: too few samples are left in which "
+            "the joint slides, away from rest and reversals."
+        )
+    return notes + [
+        f"The error of {names[j]} on recordings that were left out, {errors[j]:.3g}, is due to "
+        "extrapolation: the joint slides in few recordings, and fitted to all of them the model "
+        "explains its torque up to noise. Record more motion of this joint."
+        for j in np.flatnonzero(extrapolated if extrapolated is not None else [])
+    ]
 
 
 def _fold_notes(problem: Problem) -> list[str]:

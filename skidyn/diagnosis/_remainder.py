@@ -25,6 +25,7 @@ from skidyn.diagnosis._rule import (
     REMAINDER_SLOW_SHARE_OF_RANGE,
     REMAINDER_SLOW_TIMES_NOISE,
     REMAINDER_TIMES_NOISE,
+    SELDOM_SHARE_OF_FOLDS,
     variance_inflation,
 )
 from skidyn.evidence import Fit, Problem, smooth_motion
@@ -60,6 +61,9 @@ class Remainder:
     coloured : bool
         Whether the error exceeds the fast noise by a similar factor on all joints, as noise that is
         correlated in time does; a missing torque is larger on some joints than on others.
+    extrapolated : ndarray of shape (n_joints,) of bool or None
+        Joints that slide in few recordings only and whose torque the model, fitted to all
+        recordings, explains up to noise: their held-out error is due to extrapolation.
 
     Examples
     --------
@@ -74,6 +78,7 @@ class Remainder:
     inflation: Array
     material: NDArray[np.bool_]
     coloured: bool = False
+    extrapolated: NDArray[np.bool_] | None = None
 
     @property
     def noise(self) -> Array:
@@ -134,7 +139,18 @@ def find_remainder(
     if coloured:
         material[:] = False
     material |= (predictable > noise) & (predictable > REMAINDER_PREDICTABLE_SHARE * span)
-    return Remainder(sensor, position, predictable, left, inflation, material, coloured)
+    extrapolated = material & _seldom(problem) & (rows <= REMAINDER_TIMES_NOISE * noise)
+    material &= ~extrapolated
+    return Remainder(
+        sensor, position, predictable, left, inflation, material, coloured, extrapolated
+    )
+
+
+def _seldom(problem: Problem) -> NDArray[np.bool_]:
+    """Joints most of whose rows lie in a few of the folds."""
+    shares = [np.bincount(f, minlength=problem.n_folds) / max(len(f), 1) for f in problem.fold]
+    folds = np.array([1 / max(float(np.sum(s**2)), 1e-12) for s in shares])
+    return np.asarray(folds < SELDOM_SHARE_OF_FOLDS * problem.n_folds)
 
 
 def _is_alike(rmse: Array, noise: Array) -> bool:

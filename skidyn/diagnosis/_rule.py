@@ -101,6 +101,9 @@ REMAINDER_TIMES_NOISE, REMAINDER_SHARE_OF_RANGE = 2.0, 0.02
 #: torque more than that of coloured noise; and they reach this share of the range.
 REMAINDER_SLOW_TIMES_NOISE, REMAINDER_CORRELATED = 3.0, 2.2
 REMAINDER_SLOW_SHARE_OF_RANGE = 0.01
+#: A joint whose rows lie in effectively fewer than this share of the folds has to be extrapolated
+#: where one of these is left out: its remainder is that of the fit to all folds.
+SELDOM_SHARE_OF_FOLDS = 0.5
 #: Errors that are at most this multiple of the fast noise on every joint, and equal within this
 #: factor on all of at least this many joints, are noise that is correlated in time.
 COLOURED_MOST, COLOURED_ALIKE, COLOURED_FEWEST_JOINTS = 4.0, 1.5, 3
