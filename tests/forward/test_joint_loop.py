@@ -31,9 +31,9 @@ def loop_of(servo):
 FRICTION = {"viscous": np.array([0.03]), "coulomb": np.array([0.06])}
 
 
-@pytest.mark.parametrize("limit", [np.inf, 1.0])
-def test_a_joint_follows_the_whole_model(limit):
-    loop = loop_of(Controller((200.0, 12.0), (12.0, 0.6), limit=limit, follows_velocity=False))
+@pytest.mark.parametrize("words", [{}, {"limit": 1.0}, {"limit": 1.5, "no_load_speed": 6.0}])
+def test_a_joint_follows_the_whole_model(words):
+    loop = loop_of(Controller((200.0, 12.0), (12.0, 0.6), follows_velocity=False, **words))
     error = loop.errors(FRICTION)[0]
     assert np.sqrt(np.mean(error[loop.valid] ** 2)) < 3e-4
     without = loop.errors({k: 0 * v for k, v in FRICTION.items()})[0]
