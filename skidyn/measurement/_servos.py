@@ -48,10 +48,10 @@ STALLS, SPEEDS = np.linspace(0.9, 2.5, 17), np.linspace(0.6, 3.0, 13)
 STEPS = 80
 #: Rows at a limit, share of their squared error that it must remove, and share of the squared error
 #: of all rows that it may leave.
-ROWS, DROP, LEFT = 5, 0.8, 0.75
+ROWS, DROP, LEFT = 5, 0.95, 0.75
 #: Share of rows that must be below the limit, and share of the variance of their torque that bodies
 #: and friction may leave there: what they do not explain below it says nothing beyond it.
-FREE, UNEXPLAINED = 0.5, 0.1
+FREE, UNEXPLAINED = 0.5, 0.05
 #: Share of the error with a limit of the current that one of the voltage may leave.
 FALLS = 0.7
 #: Share of the largest torque below which a limit is other than the stated one.
