@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from skidyn.measurement._delay import Delay
     from skidyn.measurement._fits import Fits
     from skidyn.measurement._readings import Change
-    from skidyn.measurement._servos import Servo
+    from skidyn.measurement._servo_limits import Servo
     from skidyn.robots import Robot
 
 
