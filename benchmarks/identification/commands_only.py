@@ -12,6 +12,10 @@ coordinate of its own here. The user knows the servo's gains: the torque is its 
 looks at the motion of joints that got no name, and what it names takes the place of what was said
 there without a name or of hysteresis. Counted is a log whose effect is named on its joint, and one
 without in which nothing is claimed.
+
+In ``--servos`` more logs the servo of one joint is not as stated: its current or its voltage limits
+the torque in some per cent of the motion, or its position gain is another one. Counted is a log of
+which a check says that, and only that, of this joint.
 """
 
 from __future__ import annotations
@@ -19,7 +23,7 @@ from __future__ import annotations
 import argparse
 import tempfile
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import mujoco
@@ -41,6 +45,12 @@ KINDS = {
     "stiction": {"stribeck"},
     "load friction": {"load_dependent_friction"},
 }
+#: What the servo of one joint is other than stated, and the checks that say so.
+SERVO_KINDS = {
+    "current limit": {"servo_current"},
+    "voltage limit": {"servo_voltage"},
+    "position gain": {"servo_gain"},
+}
 STEP, RATE, SECONDS, RECORDINGS = 5e-4, 100, 6.0, 8
 #: Encoder of 14 bits, rad (a slider's has the same number for a metre).
 ENCODER = 2 * np.pi / 2**14
@@ -55,6 +65,8 @@ class Servo:
     viscous: np.ndarray
     armature: np.ndarray
     gains: Controller
+    #: Joint whose torque falls with the speed, torque at rest, speed at which nothing is left.
+    voltage: tuple[int, float, float] | None = None
 
 
 def servo_of(robot, rng):
@@ -81,8 +93,27 @@ def reference(rng, n, t):
     return wave * np.minimum(1.0, t / 0.5)[:, None]
 
 
+def other_than_stated(world, servo, kind, j, rng):
+    """The servo as it is, where it is not what the user states of joint j."""
+    gains = servo.gains.checked(world.nv)
+    if kind == "position gain":
+        gains.stiffness[j] *= rng.uniform(1.3, 1.6) ** rng.choice([-1, 1])
+        return replace(servo, gains=gains)
+    _, _, positions, torques = recording(world, servo, {}, rng)  # what the motion takes
+    speed = np.abs(np.gradient(positions[:, j], 1 / RATE))
+    torque, share = np.abs(torques[:, j]), rng.uniform(0.03, 0.1)
+    if kind == "current limit":
+        # below what is stated, which some joints reach as they are
+        gains.limit[j] = min(np.quantile(torque, 1 - share), 0.7 * gains.limit[j])
+        return replace(servo, gains=gains)
+    stall = rng.uniform(1.0, 1.3) * torque.max()
+    drives = torques[:, j] * np.gradient(positions[:, j]) > 0
+    fastest = np.quantile(np.where(drives, speed / (1 - 0.99 * torque / stall), 0), 1 - share)
+    return replace(servo, voltage=(j, stall, fastest))
+
+
 def recording(world, servo, hidden, rng):
-    """One recording as arrays: command and encoder at the rate of the log.
+    """One recording as arrays: command, encoder and torque at the rate of the log.
 
     ``hidden`` has for joints, counted from 0, what they hide; a delay is that of all commands.
     """
@@ -102,12 +133,17 @@ def recording(world, servo, hidden, rng):
     for j in gears:  # armature and friction are those of the motor
         world.dof_frictionloss[j] = world.dof_damping[j] = world.dof_armature[j] = 0.0
     motor, speed, carried = np.zeros(n), np.zeros(n), np.zeros(n)
-    positions = np.zeros((len(t), n))
+    positions, driven = np.zeros((2, len(t), n))
     for k in range(len(t)):
         q, dq = data.qpos.copy(), data.qvel.copy()
         q[gears], dq[gears] = motor[gears], speed[gears]
         positions[k] = q
         torque = gains.torque(q[None], dq[None], commanded[k][None], 0 * q[None])[0]
+        if servo.voltage is not None:
+            j, stall, fastest = servo.voltage
+            most = stall * (1 - np.array([-1, 1]) * dq[j] / fastest)
+            torque[j] = np.clip(torque[j], -most[0], most[1])
+        driven[k] = torque
         for j, kind in hidden.items():
             if kind == "stiction":
                 slow = np.exp(-((dq[j] / 0.08) ** 2))
@@ -131,7 +167,7 @@ def recording(world, servo, hidden, rng):
         torques = data.qfrc_applied + data.qfrc_passive + data.qfrc_constraint
         carried = torques - world.dof_armature * data.qacc
     every = round(1 / RATE / STEP)
-    return t[::every], wanted[::every], positions[::every]
+    return t[::every], wanted[::every], positions[::every], driven[::every]
 
 
 def make_log(robot, kind, seed, second=None):
@@ -143,7 +179,7 @@ def make_log(robot, kind, seed, second=None):
         j = int(np.argmax(robot.inverse_dynamics(q, 0 * q, 0 * q).std(axis=0) / servo.scale))
     else:
         j = int(rng.integers(robot.n_joints))
-    hidden = {} if kind == "nothing" else {j: kind}
+    hidden = {j: kind} if kind in KINDS else {}
     if second is not None:
         other = (j + 1 + int(rng.integers(robot.n_joints - 1))) % robot.n_joints
         hidden[other] = second
@@ -153,9 +189,10 @@ def make_log(robot, kind, seed, second=None):
     world.opt.timestep = STEP
     world.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
     world.jnt_limited[:] = 0
+    true = other_than_stated(world, servo, kind, j, rng) if kind in SERVO_KINDS else servo
     frames = []
     for k in range(RECORDINGS):
-        t, wanted, q = recording(world, servo, hidden, rng)
+        t, wanted, q, _ = recording(world, true, hidden, rng)
         q = np.round(q / ENCODER) * ENCODER
         names = range(1, robot.n_joints + 1)
         frames.append(
@@ -176,7 +213,7 @@ def said(robot, log, servo):
     diagnosis = diagnose(model, log, controller=servo.gains)
     found = [(f.kind, tuple(f.joints)) for f in diagnosis.findings]
     named = [(f.kind, (f.joint,)) for f in diagnosis.explain_servo_motion()]
-    return found + named, [check.check for check in diagnosis.checks]
+    return found + named, [(check.check, check.joints) for check in diagnosis.checks]
 
 
 def main():
@@ -184,23 +221,33 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--logs", type=int, default=40)
     parser.add_argument("--without", type=int, default=20)
+    parser.add_argument("--servos", type=int, default=0, help="logs whose servo is not as stated")
     options = parser.parse_args()
     warnings.filterwarnings("ignore")  # remarks on the data
-    hits = {kind: [] for kind in (*KINDS, "nothing")}
-    beside = []
+    hits = {kind: [] for kind in (*KINDS, *SERVO_KINDS, "nothing")}
+    beside, other = [], 0
     wanted = [list(KINDS)[k % len(KINDS)] for k in range(options.logs)]
-    for number, kind in enumerate([*wanted, *["nothing"] * options.without]):
+    wanted += ["nothing"] * options.without
+    wanted += [list(SERVO_KINDS)[k % len(SERVO_KINDS)] for k in range(options.servos)]
+    for number, kind in enumerate(wanted):
         robot = ROBOTS[number // len(KINDS) % len(ROBOTS)]()
         log, servo, (joint,) = make_log(robot, kind, options.seed * 1000 + number)
         found, doubts = said(robot, log, servo)
+        of_servo = {k for names in SERVO_KINDS.values() for k in names}
+        claimed = {k for k, _ in doubts} & of_servo
         if kind == "nothing":
-            hit = not found
+            hit = not found and not claimed
+        elif kind in SERVO_KINDS:
+            hit = {(k, where) for k, where in doubts if k in of_servo} == {
+                (k, (joint,)) for k in SERVO_KINDS[kind]
+            }
         elif kind == "delay":
-            hit = any(k in KINDS[kind] for k, _ in found) or any("delay" in d for d in doubts)
+            hit = any(k in KINDS[kind] for k, _ in found) or any("delay" in k for k, _ in doubts)
         else:
             hit = any(k in KINDS[kind] and joint in joints for k, joints in found)
         hits[kind].append(hit)
-        if kind != "nothing":
+        if kind in KINDS:
+            other += bool(claimed)
             own = [k in KINDS[kind] and (kind == "delay" or joint in where) for k, where in found]
             named = [k != "unknown" for k, _ in found]
             beside.append(any(n and not o for n, o in zip(named, own, strict=True)))
@@ -210,6 +257,7 @@ def main():
         if marks:
             print(f"| {kind} | {sum(marks)} | {len(marks)} |")
     print(f"another name beside it: {sum(beside)} of {len(beside)}")
+    print(f"a servo that is as stated is said to be otherwise in {other} of {len(beside)}")
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ import numpy as np
 import pandas as pd
 from scipy.io import loadmat
 
+from skidyn.effects import Term
 from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
 from skidyn.simulation import judge_by_simulation, simulate
@@ -32,7 +33,13 @@ MODELS = {
     "direction-dependent friction": ("viscous", "coulomb", "asymmetric_friction"),
     "Stribeck friction": (*SYMMETRIC, "stribeck"),
     "Dahl friction": ("viscous", "dahl", "offset"),
-    "friction along the travel": (*SYMMETRIC, "position_dependent_friction"),
+    "a wave along the travel": (
+        *SYMMETRIC,
+        # of 15, 30 and 60 rad/m, the waves of the catalogue, that with the smallest error of the
+        # free run of the recording that is fitted
+        Term("position_dependent_friction", (1,), {"n": 15.0}),
+    ),
+    "a wave with overtone": (*SYMMETRIC, "position_dependent_friction"),
 }
 SKIPPED = 20
 COLUMNS = ["time", "q1", "dq1"]

@@ -26,7 +26,7 @@ from skidyn.diagnosis._unknown import UnknownTorque
 from skidyn.effects import Term, get_effect, make_terms
 from skidyn.evidence import Problem
 from skidyn.identification import RBDRegressor
-from skidyn.measurement import Suspicion
+from skidyn.measurement import SERVO_CHECKS, Suspicion
 from skidyn.simulation import (
     HORIZON,
     LAWS,
@@ -314,10 +314,11 @@ class Diagnosis:
         A torque computed from the position error of a servo hides effects that last hundredths of a
         second. Joints are simulated in their loops (:func:`skidyn.simulation.explain_servo_motion`)
         with the findings that the simulation supports, and without unknown functions, hysteresis,
-        offsets and saturation by the controller; joints with other findings are left out. The
-        effects found replace unknown functions and hysteresis on their joints; :attr:`findings`
-        are not changed. They are stored in :attr:`servo_motion` and shown in the report and on the
-        page, and a diagnosis without any other finding is no longer ``"complete"``.
+        offsets and saturation by the controller; joints with other findings, and those whose servo
+        is not as stated, are left out. The effects found replace unknown functions and hysteresis
+        on their joints; :attr:`findings` are not changed. They are stored in :attr:`servo_motion`
+        and shown in the report and on the page, and a diagnosis without any other finding is no
+        longer ``"complete"``.
 
         Parameters
         ----------
@@ -347,7 +348,8 @@ class Diagnosis:
             raise SkidynError(
                 "controller is missing: give the gains of the servos as Controller(...)"
             )
-        named: set[int] = set()
+        # A loop with other settings than those of the servo says nothing.
+        named = {j for s in self.checks if s.check in SERVO_CHECKS for j in s.joints}
         known: list[tuple[str, int]] = []
         # A known limit of the controller is simulated and is not an effect.
         limited = np.isfinite(controller.checked(len(self.joint_names)).limit)

@@ -18,7 +18,7 @@ class Controller:
     r"""Proportional-derivative control of the joints.
 
     .. math:: \tau = \mathrm{clip}\left(k\,(q_\mathrm{ref} - q)
-        + d\,(\dot q_\mathrm{ref} - \dot q) + \tau_0,\ \pm L\right)
+        + d\,(\dot q_\mathrm{ref} - \dot q) + \tau_0,\ \pm L - L\,\dot q / \omega_0\right)
 
     Parameters
     ----------
@@ -28,6 +28,9 @@ class Controller:
         Gain of the velocity error, N m s/rad (N s/m).
     limit : float or array-like of shape (n_joints,), default=inf
         Largest torque of the drive, N m (N): a current limit.
+    no_load_speed : float or array-like of shape (n_joints,), default=inf
+        Speed at which the voltage is used up, rad/s (m/s): the largest torque falls linearly from
+        ``limit`` at rest to nothing there. Infinite for a limit of the current alone.
     delay : float, default=0.0
         Delay with which the reference reaches the controller, s.
     deadband : float or array-like of shape (n_joints,), default=0.0
@@ -52,6 +55,7 @@ class Controller:
     deadband: Any = 0.0
     offset: Any = 0.0
     follows_velocity: bool = True
+    no_load_speed: Any = np.inf
 
     def checked(self, n_joints: int) -> Controller:
         """Controller with one number for each joint.
@@ -69,10 +73,11 @@ class Controller:
         Raises
         ------
         SkidynError
-            A gain is negative or does not have one number for each joint.
+            A gain is negative or does not have one number for each joint, or a torque without limit
+            is to fall with the speed.
         """
         values: dict[str, Any] = {}
-        for name in ("stiffness", "damping", "limit", "deadband", "offset"):
+        for name in ("stiffness", "damping", "limit", "deadband", "offset", "no_load_speed"):
             value = np.asarray(getattr(self, name), dtype=float)
             signed = name == "offset"
             if value.shape not in ((), (n_joints,)) or not (signed or np.all(value >= 0)):
@@ -81,6 +86,12 @@ class Controller:
                     f"least 0, or one for each of the {n_joints} joints"
                 )
             values[name] = np.broadcast_to(value, (n_joints,)).copy()
+        falls = np.isfinite(values["no_load_speed"])
+        if np.any(falls & (~np.isfinite(values["limit"]) | (values["no_load_speed"] == 0))):
+            raise SkidynError(
+                f"no_load_speed of the controller is {self.no_load_speed!r}, with the limit "
+                f"{self.limit!r}; expected a speed above 0, and as limit the torque at rest"
+            )
         return Controller(**values, delay=float(self.delay), follows_velocity=self.follows_velocity)
 
     def torque(self, q: Array, dq: Array, q_ref: Array, dq_ref: Array) -> Array:
@@ -102,7 +113,15 @@ class Controller:
         error = np.sign(error) * np.maximum(np.abs(error) - self.deadband, 0.0)
         wanted = dq_ref if self.follows_velocity else 0.0
         torque = self.stiffness * error + self.damping * (wanted - dq) + self.offset
-        return np.asarray(np.clip(torque, -self.limit, self.limit))
+        beyond = self.fall * dq
+        return np.asarray(np.clip(torque, -self.limit - beyond, self.limit - beyond))
+
+    @property
+    def fall(self) -> Any:
+        """By how much the limit falls with the speed, N m s/rad (N s/m)."""
+        speed = np.asarray(self.no_load_speed, dtype=float)
+        falls = np.isfinite(speed)
+        return np.where(falls, self.limit, 0.0) / np.where(falls, speed, 1.0)
 
 
 def fit_controller(log: Any, torque: Any, *, follows_velocity: bool | None = None) -> Controller:

@@ -76,6 +76,7 @@ class JointLoop:
     stiffness: float
     damping: float
     limit: float
+    fall: float
     deadband: float
     delay: float
 
@@ -99,8 +100,8 @@ class JointLoop:
         if not controller.follows_velocity:
             rate = np.zeros_like(rate)
         gains = [float(np.atleast_1d(getattr(controller, name))[joint]) for name in
-                 ("stiffness", "damping", "limit", "deadband", "offset")]  # fmt: skip
-        stiffness, damping, limit, deadband, offset = gains
+                 ("stiffness", "damping", "limit", "fall", "deadband", "offset")]  # fmt: skip
+        stiffness, damping, limit, fall, deadband, offset = gains
         q, dq = signals.q[:, joint], signals.dq[:, joint]
         # The limit is found from the log, with the command as received by the servo.
         arrived = wanted.copy()
@@ -108,8 +109,8 @@ class JointLoop:
             clock = signals.clock[own]
             arrived[own] = np.interp(clock - controller.delay, clock, wanted[own])
         torque = stiffness * (arrived - q) + damping * (rate - dq)
-        beyond = np.abs(torque) > AT_LIMIT * limit
-        torque = np.clip(torque, -limit, limit)
+        beyond = np.abs(torque + fall * dq) > AT_LIMIT * limit
+        torque = np.clip(torque, -limit - fall * dq, limit - fall * dq)
         rows = windows.rows
         beyond = maximum_filter1d(beyond[rows].T.astype(np.uint8), 5, axis=0) > 0
         steps = np.diff(windows.time, axis=1)
@@ -138,6 +139,7 @@ class JointLoop:
             stiffness=stiffness,
             damping=damping,
             limit=limit,
+            fall=fall,
             deadband=deadband,
             delay=float(controller.delay),
         )
@@ -208,7 +210,7 @@ class JointLoop:
         result = np.empty((n_samples, n_models, n_pieces))
         behind = np.empty(result.shape if gear is not None else (0, n_models, 0))
         servo_of = _Servo(self, p)
-        limit, limited = self.limit, bool(np.isfinite(self.limit))
+        limit, limited, fall = self.limit, bool(np.isfinite(self.limit)), self.fall
         dry_of = _Dry(self, p)
         heavier, squares = 1 + p["weight"], bool(p["square"].any())
         offset, brake = 2 * p["offset"], np.maximum(p["coulomb"], TINY)
@@ -239,7 +241,7 @@ class JointLoop:
                 drag = p["viscous"] + p["square"] * np.abs(v) if squares else p["viscous"]
                 servo = servo_of.torque(r0 - q) + self.damping * (d0 - v)
                 if limited:
-                    servo = np.minimum(np.maximum(servo, -limit), limit)
+                    servo = np.minimum(np.maximum(servo, -limit - fall * v), limit - fall * v)
                 drive = servo - drag * v + offset
                 if gear is None:
                     push, mass = m * v + half * (drive - bias), m + half * drag
@@ -261,10 +263,11 @@ class JointLoop:
                 new = _held(pull, dry) / (mass + stiffer)
                 if limited:
                     servo = servo_of.torque(error - half * new) + self.damping * (d1 - new)
-                    beyond = np.abs(servo) > limit
+                    beyond = np.abs(servo + fall * new) > limit
                     if beyond.any():
                         most = np.clip(servo, -limit, limit)
-                        new = np.where(beyond, _held(push + half * most, dry) / mass, new)
+                        slower = mass + half * fall
+                        new = np.where(beyond, _held(push + half * most, dry) / slower, new)
                 if gear is not None:
                     gear.move(half, new)
                 way = half * (v + new)

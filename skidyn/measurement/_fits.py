@@ -449,6 +449,10 @@ class Fits:
             targets.append(read[j][1] * y[use])
         return [read[j][0] for j in joints], designs, places, targets
 
+    def felt(self, joint: int) -> tuple[Array, NDArray[np.int64]]:
+        """Mean columns of what a joint feels of bodies that are identified, and their places."""
+        return self._felt_columns(Reading())[joint]
+
     def _felt_columns(self, motion: Reading) -> list[tuple[Array, NDArray[np.int64]]]:
         """Mean columns that act on every joint, and the indices of their coefficients.
 

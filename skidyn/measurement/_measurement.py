@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from skidyn.measurement._delay import Delay
     from skidyn.measurement._fits import Fits
     from skidyn.measurement._readings import Change
+    from skidyn.measurement._servo_limits import Servo
     from skidyn.robots import Robot
 
 
@@ -56,7 +57,7 @@ class Measurement:
     same_stamps : int, optional
         Rows that had the time stamp of the previous row although joints moved; ``signals`` then
         have an even clock.
-    unsigned, changes, delay, copies, late_position, readable, stale, lost, odd : optional
+    unsigned, changes, delay, copies, servos, late_position, readable, stale, lost, odd : optional
         Results of checks that are used by other checks; set by them.
     scaled, smoothed, computed, frictionless : bool, optional
         Results of checks that are used by other checks; set by them.
@@ -86,6 +87,7 @@ class Measurement:
     changes: list[Change] | None = field(default=None, repr=False)
     delay: Delay | None = field(default=None, repr=False)
     copies: list[tuple[int, str, int]] | None = field(default=None, repr=False)
+    servos: dict[int, Servo] | None = field(default=None, repr=False)
     late_position: float = field(default=0.0, repr=False)
     readable: bool = field(default=True, repr=False)
     stale: bool = field(default=False, repr=False)

@@ -1,5 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A model that follows the reference of a controller."""
+"""A model that follows the reference of a controller, with the friction of the regressor.
+
+Instruments need the motion of the equations whose columns they make: dry friction there is a
+continuous function of the velocity. The steps of ``skidyn.forward`` have set-valued friction, which
+makes other velocities at reversals (by some 0.01 rad/s), and no accelerations that fulfil these
+equations; on motion without friction both agree (``tests/simulation/test_closed_loop.py``).
+"""
 
 from __future__ import annotations
 

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.exceptions import SkidynError
 from skidyn.identification import RBDRegressor
 from skidyn.simulation import Controller, fit_controller, simulation_errors
 
@@ -35,3 +36,19 @@ def test_controller_is_found_from_a_log_and_closes_the_loop(log, models):
     gains = Controller(stiffness=2000.0, damping=100.0)
     errors = simulation_errors(models[1], frame, controller=gains)
     assert errors.position.max() < 0.05
+
+
+def test_a_voltage_lets_the_torque_fall_with_the_speed():
+    servo = Controller(10.0, 0.0, limit=(2.0, 2.0), no_load_speed=(4.0, np.inf)).checked(2)
+    speeds = np.array([[0.0, 0.0], [2.0, 2.0], [-2.0, -2.0], [6.0, 6.0]])
+    ahead = np.full_like(speeds, 5.0)
+    torque = servo.torque(0 * speeds, speeds, ahead, 0 * speeds)
+    np.testing.assert_allclose(torque[:, 0], [2.0, 1.0, 3.0, -1.0])
+    np.testing.assert_allclose(torque[:, 1], 2.0)
+    np.testing.assert_allclose(servo.torque(0 * speeds, speeds, -ahead, 0 * speeds)[1], [-3, -2])
+
+
+@pytest.mark.parametrize("words", [{}, {"limit": 2.0, "no_load_speed": 0.0}])
+def test_a_torque_without_limit_cannot_fall(words):
+    with pytest.raises(SkidynError, match="as limit the torque at rest"):
+        Controller(10.0, **({"no_load_speed": 4.0} | words)).checked(1)

@@ -15,9 +15,9 @@ SIZES = {"viscous": (0.4, 0.03), "coulomb": (0.8, 0.06)}
 
 
 @cache
-def loop_of(limit):
+def loop_of(**limits):
     """Joint 2 of a planar arm whose motion is that of the model, and its positions."""
-    servo = Controller((200.0, 12.0), (12.0, 0.6), limit=limit, follows_velocity=False)
+    servo = Controller((200.0, 12.0), (12.0, 0.6), follows_velocity=False, **limits)
     log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=2, duration=2.0)
     model = RBDRegressor(log.robot, ("viscous", "coulomb"), "nominal").fit(log.X, log.y)
     for term in model.effect_terms_:
@@ -35,9 +35,9 @@ def loop_of(limit):
 FRICTION = {"viscous": np.array([0.03]), "coulomb": np.array([0.06])}
 
 
-@pytest.mark.parametrize("limit", [np.inf, 1.0])
-def test_a_joint_follows_the_whole_model(limit):
-    loop = loop_of(limit)
+@pytest.mark.parametrize("words", [{}, {"limit": 1.0}, {"limit": 1.5, "no_load_speed": 6.0}])
+def test_a_joint_follows_the_whole_model(words):
+    loop = loop_of(**words)
     error = loop.errors(FRICTION)[0]
     assert np.sqrt(np.mean(error[loop.valid] ** 2)) < 3e-4
     without = loop.errors({k: 0 * v for k, v in FRICTION.items()})[0]
@@ -45,7 +45,7 @@ def test_a_joint_follows_the_whole_model(limit):
 
 
 def test_a_stiff_gear_is_none_and_play_moves_the_motor():
-    loop = loop_of(np.inf)
+    loop = loop_of()
     plain = loop.run(FRICTION)[0]
     gear = {**FRICTION, "compliance": np.array([1e-4]), "motor": np.array([0.3])}
     np.testing.assert_allclose(loop.run(gear)[0][loop.valid], plain[loop.valid], atol=5e-4)
@@ -54,7 +54,7 @@ def test_a_stiff_gear_is_none_and_play_moves_the_motor():
 
 
 def test_models_side_by_side_are_those_one_by_one():
-    loop = loop_of(np.inf)
+    loop = loop_of()
     values = {
         "viscous": np.array([0.03, 0.05]),
         "coulomb": np.array([0.06, 0.01]),

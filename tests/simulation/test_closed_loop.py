@@ -11,7 +11,7 @@ from skidyn.datasets import load_planar_arm
 from skidyn.effects import Signals
 from skidyn.exceptions import ColumnError, SkidynError
 from skidyn.identification import RBDRegressor
-from skidyn.simulation import simulate_closed_loop
+from skidyn.simulation import Controller, simulate, simulate_closed_loop
 
 ROBOT = load_planar_arm()
 MOTION = [f"{s}{j}" for s in ("q", "dq", "ddq") for j in (1, 2)]
@@ -66,6 +66,17 @@ def test_motion_is_that_of_the_controlled_model(truth, compensated):
     moved = np.cumsum((dq[1:] + dq[:-1]) / 2 * 0.002, axis=0)
     np.testing.assert_allclose(q[1:] - q[0], moved, atol=1e-3)
     assert list(motion.columns) == [*reference.columns, "ddq1", "ddq2"]
+
+
+def test_both_integrators_agree_without_dry_friction():
+    X = pd.DataFrame(np.random.default_rng(0).uniform(-2, 2, (400, 6)), columns=MOTION)
+    y = ROBOT.inverse_dynamics(*X.to_numpy().reshape(-1, 3, 2).transpose(1, 0, 2))
+    smooth = RBDRegressor(ROBOT, ("viscous",)).fit(X, y + 0.5 * X[["dq1", "dq2"]].to_numpy())
+    reference = make_reference(2.0)
+    one = simulate_closed_loop(smooth, reference, STIFFNESS, DAMPING, gravity_compensation=False)
+    wanted = reference.assign(ddq1=0.0, ddq2=0.0, q_ref1=reference["q1"], q_ref2=reference["q2"])
+    other = simulate(smooth, wanted, controller=Controller(STIFFNESS, DAMPING))
+    np.testing.assert_allclose(one[["q1", "q2"]], other[["q1", "q2"]], atol=2e-4)
 
 
 def test_it_makes_the_instruments_that_undo_the_bias_of_noise(truth):
