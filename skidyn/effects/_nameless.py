@@ -275,6 +275,10 @@ class FunctionOfSignals(NamelessEffect):
         )
 
 
+#: Range of a signal that is more than rounding, as a share of its values.
+LEAST_RANGE = 1e-9
+
+
 def splines(x: Array, low: float, high: float, count: int) -> Array:
     """Cubic B-splines on a range, continued beyond it, shape (n_samples, count).
 
@@ -285,8 +289,8 @@ def splines(x: Array, low: float, high: float, count: int) -> Array:
     ----------
     .. [1] L. Piegl, W. Tiller (1997), The NURBS book, 2nd ed., Springer, algorithm A2.2.
     """
-    if not high > low:
-        return np.zeros((len(x), count))
+    if not high - low > LEAST_RANGE * max(abs(low), abs(high)):
+        return np.zeros((len(x), count))  # a joint at one place, but for rounding
     degree = 3
     n_pieces = count - degree
     knots = np.r_[[low] * degree, np.linspace(low, high, n_pieces + 1), [high] * degree]

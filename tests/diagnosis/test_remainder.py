@@ -2,6 +2,7 @@
 """What is left and nothing that was logged predicts is told where it is slow, as noise is not."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.signal import lfilter
 
@@ -97,3 +98,26 @@ def test_noise_of_positions_is_felt_by_rotors():
     heavy = diagnose(model, X, with_rotors)
 
     assert np.all(heavy.parts.position_noise > light.parts.position_noise)
+
+
+def test_a_joint_that_slides_in_few_recordings_is_extrapolated_where_one_is_left_out():
+    arm, rng = load_planar_arm(), np.random.default_rng(0)
+    t, tables = np.arange(0, 4, 0.01), []
+    for run in range(9):
+        slides = run in (0, 6)
+        size = np.array([0.12 * slides, 0.9])
+        phase, rate = np.column_stack([1.2 * t, 1.7 * t + run]), np.array([1.2, 1.7])
+        q = size * np.sin(phase) + [0.5 * run * slides - 1.0, 0.0]
+        dq, ddq = size * rate * np.cos(phase), -size * rate**2 * np.sin(phase)
+        torque = arm.inverse_dynamics(q, dq, ddq) + 0.8 * dq + 1.5 * np.sign(dq)
+        torque += rng.normal(0, 0.05, q.shape)
+        tables.append(np.column_stack([t + 10 * run, np.full(len(t), run), q, dq, torque]))
+    names = ["time", "trajectory", "q1", "q2", "dq1", "dq2", "tau1", "tau2"]
+    log = pd.DataFrame(np.vstack(tables), columns=names)
+
+    found = diagnose(RBDRegressor(arm), log, log[["tau1", "tau2"]])
+
+    assert found.rmse_after[0] > 20 * found.noise[0]
+    assert found.verdict == "complete" and found.findings == []
+    (note,) = found.warnings
+    assert "joint 1" in note and "extrapolation" in note
