@@ -12,14 +12,12 @@ from skidyn.evidence import broken_notes
 from skidyn.measurement._around_zero import dead_bands
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._measures import is_held, position_step
+from skidyn.measurement._measures import COARSE, is_held, position_step
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import cut_columns
 
 #: Share of rows at the extreme torque from which it is reported.
 CLIPPED = 0.002
-#: Least step of a coarse position, rad: a turn in 13 bits.
-COARSE = 0.9 * 2 * np.pi / 2**13
 #: Fourth differences of a torque relative to its spread above which it has noise; joints of
 #: recordings with noise are never below 4e-4.
 NOISELESS, ENOUGH = 1e-5, 200

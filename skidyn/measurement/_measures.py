@@ -7,6 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+#: Least step of a coarse position, rad: a turn in 13 bits.
+COARSE = 0.9 * 2 * np.pi / 2**13
 #: Windows over which velocity is compared with differentiated position, s.
 WINDOW = 0.05
 #: Least share of rows that hold all torques to be reported, and of those that hold any.

@@ -15,7 +15,7 @@ from skidyn.measurement._delay import Delay, RunDelay, find_delay, refined_lag
 from skidyn.measurement._fits import Fits, Reading, fit_admissible, friction
 from skidyn.measurement._lowpass import lowpass_of_torque, suspect_lowpass
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._measures import reversals
+from skidyn.measurement._measures import COARSE, position_step, reversals
 from skidyn.measurement._overflow import overflowed_columns
 from skidyn.measurement._readings import DECISIVE, HALF, Change, find_changes
 from skidyn.measurement._suspicion import Certainty, Suspicion
@@ -35,6 +35,8 @@ UNITS = {1e3: "Nmm", 1e2: "Ncm", 1e-3: "kNm"}
 #: Smallest delay that is reported, s, how many standard errors it must have, and how far the lag of
 #: a joint may be from it.
 SMALLEST, ERRORS, ALIKE = 0.004, 5.0, 0.006
+#: The same with positions in coarse steps.
+SMALLEST_COARSE = 0.01
 #: How many standard errors lags in the halves of recordings must differ by: that there is a lag is
 #: known then.
 DRIFTING = 3.0
@@ -427,7 +429,7 @@ class TorqueDelay(Check):
         if early and abs(found.common + early) < max(ALIKE, 0.3 * early):
             return
         if (
-            abs(found.common) > max(SMALLEST, ERRORS * found.error)
+            abs(found.common) > max(_least_lag(measurement), ERRORS * found.error)
             and found.gain > LEAST
             and alike.sum() > measurement.n_joints / 2
             and (alike.mean() >= AGREEING or weight[alike].sum() >= AGREEING)
@@ -505,6 +507,13 @@ def _lowpass(fits: Fits, lag: float, late: Sequence[int]) -> float | None:
         return None
     constant, gain = lowpass_of_torque(fits, lag, late)
     return constant if gain > LIKELIER else None
+
+
+def _least_lag(measurement: Measurement) -> float:
+    """Smallest lag of the torque that is reported, s: derivatives of coarse positions have some."""
+    s = measurement.signals
+    steps = [position_step(s.q[:, k]) for k in np.flatnonzero(~s.prismatic)]
+    return SMALLEST_COARSE if any(step > COARSE for step in steps) else SMALLEST
 
 
 def _whole(measurement: Measurement, lag: float) -> float:
