@@ -28,6 +28,9 @@ WANDERING = 1.0
 #: Log-likelihood gain of the torque by even steps from which jitter is harmful; error of stamps, as
 #: a share of a step, that is harmful if there is no robot to test it.
 HARM, OFF = 15.0, 0.02
+#: How many times as closely positions must follow from their neighbours with even steps for stamps
+#: without influence on the torque to be suspected.
+CLOSER = 1.1
 #: Share of long steps from which stamps may be rounded, and largest distance of rounded stamps from
 #: even ones, in steps; lost rows make the distance larger.
 MISSING, ROUNDED = 0.05, 1.5
@@ -268,12 +271,13 @@ class ClockJitter(Check):
                 + ("" if harmful else ", so that the influence of the stamps is small")
             )
             sure = harmful and found.margin > CERTAIN and found.ratio > 1.2
+            closer = found.ratio > CLOSER
             yield self.suspicion(
                 "the time stamps jitter, but the samples were taken at even steps",
                 f"the stamps lie {size} around even steps of {1e3 * step:.4g} ms, and with even "
                 f"steps a position follows from its neighbours up to {found.ratio:.3g} times as "
                 f"closely{says}",
-                "certain" if sure else "suspected",
+                "certain" if sure else "suspected" if harmful or closer else "noted",
                 remedy=("--clock regular", "clock='regular'"),
             )
         elif measurement.jitter > 0.25:
