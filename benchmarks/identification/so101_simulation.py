@@ -9,16 +9,19 @@ with viscous and dry friction, rotor inertia and offset.
 
     python benchmarks/identification/so101_simulation.py FOLDER
 
-``--gains`` prints only the gain and the delay fitted to each motion alone.
+``--gains`` prints only the gain and the delay fitted to each motion alone, and what the checks of
+the servos report with these.
 """
 
 import argparse
 import ast
+import warnings
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
+from skidyn.diagnosis import diagnose
 from skidyn.exceptions import SkidynError
 from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
@@ -47,6 +50,7 @@ def main():
     parser.add_argument("folder", type=Path)
     parser.add_argument("--gains", action="store_true", help="gain and delay by motion")
     options = parser.parse_args()
+    warnings.filterwarnings("ignore")  # remarks on the data
     folder = options.folder
     robot = Robot.from_urdf(folder / "so101.urdf")
     names = sorted(path.name for path in folder.iterdir() if path.is_dir())
@@ -58,7 +62,13 @@ def main():
             except SkidynError:
                 print(f"{name:20s} shows no gain")
                 continue
-            print(f"{name:20s} {servo.stiffness[0]:8.1f} N m/rad {1e3 * servo.delay:6.0f} ms")
+            model = RBDRegressor(robot, EFFECTS)
+            found = diagnose(
+                model, log[log["trajectory"] == k], controller=servo, effects=(), force=True
+            )
+            told = [c.check for c in found.checks if c.check.startswith("servo_")] or ["-"]
+            gain, delay = float(servo.stiffness[0]), 1e3 * servo.delay
+            print(f"{name:20s} {gain:8.1f} N m/rad {delay:6.0f} ms  {', '.join(told)}", flush=True)
         return
     X = log[[c for c in log if "ref" not in c]]
     print(f"{'held-out motion':20s} {'before, mrad':>12s} {'after, mrad':>12s} {'N m/rad':>8s}")
