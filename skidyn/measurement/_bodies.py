@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.measurement._check import Check
-from skidyn.measurement._fits import Fits, Outcome, Reading, fit_admissible, friction
+from skidyn.measurement._fits import Fits, Outcome, Reading, friction
 from skidyn.measurement._gains import Scales, refined_scales
 from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._robust import fit_admissible
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import asked_changes, readable_fits
 

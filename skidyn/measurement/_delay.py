@@ -10,15 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import SIGN_BLUR, Array, Signals
-from skidyn.measurement._fits import (
-    FEWEST,
-    SAMPLES,
-    Fits,
-    Reading,
-    RobustFit,
-    fit_together,
-    friction,
-)
+from skidyn.measurement._fits import SAMPLES, Fits, Reading, friction
+from skidyn.measurement._robust import FEWEST, RobustFit, fit_together
 from skidyn.robots import base_parameter_index, with_whole_turns
 
 #: Lags that are tried, s, and number of groups of rows that are left out in turn.

@@ -11,7 +11,8 @@ import numpy as np
 from skidyn._signals import Array
 from skidyn.measurement._check import Check
 from skidyn.measurement._delay import NEAR, JointFit
-from skidyn.measurement._fits import Fits, robust_likelihood
+from skidyn.measurement._fits import Fits
+from skidyn.measurement._robust import robust_likelihood
 from skidyn.measurement._suspicion import Suspicion
 
 #: Time constants that are tried, in lags that a delay in its place has; steps of their logarithm

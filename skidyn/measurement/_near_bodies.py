@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from skidyn._signals import Array
-from skidyn.measurement._fits import FREEDOM, Fits, Reading, friction, student
+from skidyn.measurement._fits import Fits, Reading, friction
+from skidyn.measurement._robust import FREEDOM, student
 from skidyn.robots import Robot
 
 #: Shares of a body's mass, times its length and its square for first and second moments, to which a

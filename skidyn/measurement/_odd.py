@@ -14,8 +14,9 @@ from skidyn._signals import Array
 from skidyn.measurement._bodies import USUAL, Explained, explained
 from skidyn.measurement._check import Check
 from skidyn.measurement._duel import left_by_effects
-from skidyn.measurement._fits import SAMPLES, Fits, Reading, robust_likelihood, student
+from skidyn.measurement._fits import SAMPLES, Fits, Reading
 from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._robust import robust_likelihood, student
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import asked_changes
 

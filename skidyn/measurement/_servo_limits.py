@@ -27,8 +27,9 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from skidyn._signals import Array
-from skidyn.measurement._fits import FREEDOM, ROUNDS, SAMPLES, Fits, Reading
+from skidyn.measurement._fits import SAMPLES, Fits, Reading
 from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._robust import FREEDOM, ROUNDS
 from skidyn.measurement._torque import readable_fits
 
 #: Share of rows that are certainly below a limit at first, and share of a limit that is later.

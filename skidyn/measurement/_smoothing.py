@@ -21,8 +21,9 @@ from skidyn._signals import Array, Signals
 from skidyn.effects import get_effect
 from skidyn.evidence import column_step, smooth_motion
 from skidyn.measurement._check import Check
-from skidyn.measurement._fits import running_mean, student
+from skidyn.measurement._fits import running_mean
 from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._robust import student
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import measured_delay
 

@@ -12,12 +12,13 @@ from skidyn._signals import Array
 from skidyn.measurement._check import Check
 from skidyn.measurement._copies import copied_columns
 from skidyn.measurement._delay import Delay, RunDelay, find_delay, refined_lag
-from skidyn.measurement._fits import Fits, Reading, fit_admissible, friction
+from skidyn.measurement._fits import Fits, Reading, friction
 from skidyn.measurement._lowpass import lowpass_of_torque, suspect_lowpass
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import COARSE, position_step, reversals
 from skidyn.measurement._overflow import overflowed_columns
 from skidyn.measurement._readings import DECISIVE, HALF, Change, find_changes
+from skidyn.measurement._robust import fit_admissible
 from skidyn.measurement._suspicion import Certainty, Suspicion
 
 #: Share of the largest torque below zero that a magnitude may reach, and reversals it must see.

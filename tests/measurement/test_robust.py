@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from skidyn.measurement._fits import fit_admissible, fit_at_once
+from skidyn.measurement._robust import fit_admissible, fit_at_once
 
 
 @pytest.mark.parametrize("seed", range(3))
