@@ -28,9 +28,6 @@ class Controller:
         Gain of the velocity error, N m s/rad (N s/m).
     limit : float or array-like of shape (n_joints,), default=inf
         Largest torque of the drive, N m (N): a current limit.
-    no_load_speed : float or array-like of shape (n_joints,), default=inf
-        Speed at which the voltage is used up, rad/s (m/s): the largest torque falls linearly from
-        ``limit`` at rest to nothing there. Infinite for a limit of the current alone.
     delay : float, default=0.0
         Delay of the reference at the controller, s.
     deadband : float or array-like of shape (n_joints,), default=0.0
@@ -40,6 +37,9 @@ class Controller:
     follows_velocity : bool, default=True
         Whether the velocity of the reference is fed forward; False is damping of the velocity
         itself, as in position servos.
+    no_load_speed : float or array-like of shape (n_joints,), default=inf
+        Speed at which the voltage is used up, rad/s (m/s): the largest torque falls linearly from
+        ``limit`` at rest to nothing there. Infinite for a limit of the current alone.
 
     Examples
     --------
