@@ -513,7 +513,7 @@ def motion_rows(signals: Signals, reversals: Sequence[int], window: float = WIND
     few = rows.counts < FEWEST_ROWS
     if not (few & (rows.counts > 0)).any():
         return rows
-    use = use & ~few  # a joint that slides for a moment now and then counts as one at rest
+    use = use & ~few  # a joint that slides for a moment only is treated as one at rest
     return window_rows(signals, use, window, step)
 
 

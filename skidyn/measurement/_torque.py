@@ -511,7 +511,7 @@ def _lowpass(fits: Fits, lag: float, late: Sequence[int]) -> float | None:
 
 
 def _least_lag(measurement: Measurement) -> float:
-    """Smallest lag of the torque that is reported, s: derivatives of coarse positions have some."""
+    """Smallest lag of the torque that is reported, s; coarse positions cause lags of their own."""
     s = measurement.signals
     steps = [position_step(s.q[:, k]) for k in np.flatnonzero(~s.prismatic)]
     return SMALLEST_COARSE if any(step > COARSE for step in steps) else SMALLEST
