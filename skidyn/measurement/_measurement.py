@@ -266,6 +266,13 @@ class Measurement:
         return {} if len(self.leaps) else stuck_positions(self.signals)
 
     @cached_property
+    def overflowed(self) -> dict[int, int]:
+        """Joints whose torque overflows, from 0, and how often it jumps."""
+        from skidyn.measurement._overflow import overflowed_columns
+
+        return overflowed_columns(self.signals, self.torque)
+
+    @cached_property
     def idle(self) -> NDArray[np.bool_]:
         """Rows at the ends of recordings in which torque was not measured."""
         s = self.signals

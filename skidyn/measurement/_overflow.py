@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn._signals import Array
+from skidyn._signals import Array, Signals
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._suspicion import Suspicion
@@ -28,7 +28,7 @@ class OverflowedTorque(Check):
     misnames = True
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
-        for k, jumps in overflowed_columns(measurement).items():
+        for k, jumps in measurement.overflowed.items():
             torque = measurement.torque[:, k]
             yield self.suspicion(
                 f"the torque of {measurement.joint(k)} overflows",
@@ -40,13 +40,18 @@ class OverflowedTorque(Check):
             )
 
 
-def overflowed_columns(measurement: Measurement) -> dict[int, int]:
-    """Joints whose torque overflows, from 0, and how often it jumps."""
-    s = measurement.signals
+def overflowed_columns(s: Signals, torques: Array) -> dict[int, int]:
+    """Joints whose torque overflows, from 0, and how often it jumps.
+
+    Parameters
+    ----------
+    s : Signals
+        Recorded motion.
+    torques : ndarray of shape (n_samples, n_joints), N m or N
+        Recorded torque.
+    """
     together = s.trajectory[1:] == s.trajectory[:-1]
-    jumps = {
-        k: _overflows(torque, s.dq[:, k], together) for k, torque in enumerate(measurement.torque.T)
-    }
+    jumps = {k: _overflows(torque, s.dq[:, k], together) for k, torque in enumerate(torques.T)}
     return {k: count for k, count in jumps.items() if count >= OVERFLOWS}
 
 
@@ -59,10 +64,12 @@ def _overflows(torque: Array, velocity: Array, together: NDArray[np.bool_]) -> i
     # from one end to the other, and not to the zero of a lost sample
     near = np.minimum(torque - torque.min(), torque.max() - torque) < END * span
     far &= near[1:] & near[:-1]
+    if not far.any():
+        return 0
     usual = float(np.quantile(np.abs(change[~far & together]), 0.99)) if np.any(~far) else span
     # dry friction that is all of a torque jumps likewise, but where the joint turns
     one_way = np.sign(velocity[1:]) == np.sign(velocity[:-1])
     one_way &= np.minimum(*np.abs([velocity[1:], velocity[:-1]])) > SLOW * np.abs(velocity).max()
-    if not far.any() or usual > SMALL * span or np.mean(one_way[far]) < MOSTLY:
+    if usual > SMALL * span or np.mean(one_way[far]) < MOSTLY:
         return 0
     return int(far.sum())

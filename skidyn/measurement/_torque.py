@@ -16,7 +16,6 @@ from skidyn.measurement._fits import Fits, Reading, friction
 from skidyn.measurement._lowpass import lowpass_of_torque, suspect_lowpass
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import COARSE, position_step, reversals
-from skidyn.measurement._overflow import overflowed_columns
 from skidyn.measurement._readings import DECISIVE, HALF, Change, find_changes
 from skidyn.measurement._robust import fit_admissible
 from skidyn.measurement._suspicion import Certainty, Suspicion
@@ -377,8 +376,8 @@ def _lost_columns(measurement: Measurement) -> list[int]:
     copies = copied_columns(measurement)
     copied = [k for k, _, _ in copies]
     originals = [j for _, what, j in copies if what == "torque"]  # either may be the copy
-    overflowed = overflowed_columns(measurement)
-    return [*unsigned, *cut_columns(measurement), *copied, *originals, *overflowed]
+    lost = [*unsigned, *cut_columns(measurement), *measurement.overflowed]
+    return [*lost, *copied, *originals]
 
 
 class TorqueDelay(Check):
@@ -430,10 +429,11 @@ class TorqueDelay(Check):
         if early and abs(found.common + early) < max(ALIKE, 0.3 * early):
             return
         if (
-            abs(found.common) > max(_least_lag(measurement), ERRORS * found.error)
+            abs(found.common) > max(SMALLEST, ERRORS * found.error)
             and found.gain > LEAST
             and alike.sum() > measurement.n_joints / 2
             and (alike.mean() >= AGREEING or weight[alike].sum() >= AGREEING)
+            and abs(found.common) > _least_lag(measurement)
         ):
             every = range(fits.n_joints)
             lag = refined_lag(fits, found.common, found.error, every)
