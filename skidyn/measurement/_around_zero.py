@@ -54,7 +54,7 @@ class DeadBand(Check):
 
 def dead_bands(measurement: Measurement) -> dict[int, float]:
     """Joints whose torque has a dead band, from 0, and the share of rows in which it is zero."""
-    told = set(cut_columns(measurement))
+    told = set(cut_columns(measurement)) | set(np.flatnonzero(measurement.missing.any(axis=0)))
     moving = np.flatnonzero(measurement.excited).tolist()
     shares = {k: _zeros(measurement, k) for k in moving if k not in told}
     return {k: share for k, share in shares.items() if share > BAND}
@@ -65,7 +65,7 @@ def _zeros(measurement: Measurement, k: int) -> float:
     torque, speed = measurement.torque[:, k], np.abs(measurement.signals.dq[:, k])
     if torque.min() >= 0 or torque.max() <= 0 or len(np.unique(torque)) < FINE:
         return 0.0
-    zero = (torque == 0) & ~measurement.idle & ~measurement.missing
+    zero = (torque == 0) & ~measurement.idle
     edges = np.flatnonzero(np.diff(np.r_[0, zero.astype(int), 0]))
     lengths = edges[1::2] - edges[::2]
     moves = np.r_[0, np.cumsum(speed > FAST * speed.max())]

@@ -33,7 +33,7 @@ from skidyn.measurement._clock import (
 )
 from skidyn.measurement._copies import CopiedTorque, RepeatedRecordings
 from skidyn.measurement._elapsed import LostRows
-from skidyn.measurement._held import HeldPosition, HeldTorque, MissingTorque
+from skidyn.measurement._held import HeldPosition, HeldTorque, MissingTorque, StuckTorque
 from skidyn.measurement._lengths import Lengths
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._odd import OddRecording
@@ -79,6 +79,7 @@ CHECKS: tuple[Check, ...] = (
     VelocityDelay(),
     Acceleration(),
     HeldTorque(),
+    StuckTorque(),
     ComputedTorque(),
     SmoothedTorque(),
     TorqueDelay(),

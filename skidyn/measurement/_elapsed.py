@@ -78,7 +78,7 @@ def elapsed_steps(measurement: Measurement) -> Elapsed | None:
     together &= time > 0
     if len(used) < 2 or together.sum() < 200:
         return None
-    q, dq, time = s.q[:, used], s.dq[:, used], time[together]
+    q, dq, time = measurement.unwrapped[:, used], s.dq[:, used], time[together]
     moved = np.diff(q, axis=0)[together] / spread[used]
     expected = ((dq[1:] + dq[:-1]) / 2)[together] * time[:, None] / spread[used]
     product = np.sum(moved * expected, axis=1)

@@ -15,6 +15,11 @@ from skidyn.measurement._torque import cut_columns
 
 #: Least share of rows with the torque of the previous row, for a torque that is not coarse.
 HELD = 0.3
+#: Least length of a stuck part in rows, and as a multiple of the longest other part of one value;
+#: most stuck parts of a joint; least motion in it, as a share of the range of the joint.
+LONG, LONGER, MOST_STUCK, STUCK_WAY = 40, 5, 8, 0.1
+#: Share of rows with missing torques that is certain to be harmful.
+MANY_MISSING = 0.01
 
 
 class HeldTorque(Check):
@@ -61,6 +66,46 @@ class HeldTorque(Check):
             )
 
 
+class StuckTorque(Check):
+    """A torque that holds one value for a part of a recording in which its joint moves."""
+
+    name = "stuck_torque"
+    of_sensor = True
+    suspects = "torque that holds one value for a part of a recording"
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        s = measurement.signals
+        for k in range(measurement.n_joints):
+            for a, b in stuck_parts(measurement, k):
+                yield self.suspicion(
+                    f"the torque of {measurement.joint(k)} is stuck in a part of trajectory "
+                    f"{int(s.trajectory[a])}",
+                    f"from {s.clock[a]:.4g} s to {s.clock[b - 1]:.4g} s it is "
+                    f"{measurement.torque[a, k]:.4g} although the joint moves; leave this part out",
+                    "suspected",
+                    [k],
+                )
+
+
+def stuck_parts(measurement: Measurement, k: int) -> list[tuple[int, int]]:
+    """First rows of parts in which the torque of a joint, from 0, is stuck, and those after them.
+
+    Constant parts of a coarse torque, of a torque at its limit, or of zeros are not among them.
+    """
+    s, torque = measurement.signals, measurement.torque[:, k]
+    if np.ptp(torque) == 0 or measurement.idle.any():
+        return []
+    new = np.r_[True, (torque[1:] != torque[:-1]) | (s.trajectory[1:] != s.trajectory[:-1])]
+    begins = np.flatnonzero(new)
+    lengths = np.diff(np.append(begins, len(torque)))
+    others = np.sort(lengths)[: max(len(lengths) - MOST_STUCK, 1)]
+    long = np.flatnonzero(lengths >= max(LONG, LONGER * others[-1]))
+    far = STUCK_WAY * float(np.ptp(s.q[:, k]))
+    parts = [(int(begins[i]), int(begins[i] + lengths[i])) for i in long]
+    limits = (torque.min(), torque.max(), 0.0)
+    return [(a, b) for a, b in parts if torque[a] not in limits and np.ptp(s.q[a:b, k]) > far]
+
+
 class HeldPosition(Check):
     """Positions of single joints that hold their last value while the joints move on."""
 
@@ -89,13 +134,17 @@ class MissingTorque(Check):
     suspects = "zeros in the place of missing torques"
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
-        rows = measurement.missing
-        if rows.any():
+        missing = measurement.missing
+        joints = np.flatnonzero(missing.any(axis=0)).tolist()
+        if joints:
+            rows = missing.any(axis=1)
+            names = ", ".join(measurement.joint(k) for k in joints)
             yield self.suspicion(
-                "missing torques were replaced by zero",
+                f"missing torques of {names} were replaced by zero",
                 f"in {int(rows.sum())} rows, {rows.mean():.1%} (the first in row "
-                f"{int(np.argmax(rows))}), all torques are zero at once, but not close to zero in "
-                "the rows beside them; write missing values as empty cells, and read the log with "
-                "missing='drop', or leave these rows out",
-                "certain",
+                f"{int(np.argmax(rows))}), they are zero, but not close to zero in the rows beside "
+                "them; write missing values as empty cells, and read the log with missing='drop', "
+                "or leave these rows out",
+                "certain" if rows.mean() > MANY_MISSING else "suspected",
+                joints,
             )

@@ -19,7 +19,7 @@ from skidyn.measurement._measures import (
     idle_rows,
     is_repeated,
     longest_plateau_share,
-    missing_rows,
+    missing_values,
     velocity_consistency,
 )
 
@@ -294,5 +294,5 @@ class Measurement:
 
     @cached_property
     def missing(self) -> NDArray[np.bool_]:
-        """Rows with zeros in the place of missing torques."""
-        return missing_rows(self.torque, self.idle)
+        """Zeros in the place of missing torques, as a mask of rows and joints."""
+        return missing_values(self.torque, self.idle)

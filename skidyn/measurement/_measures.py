@@ -202,8 +202,8 @@ def idle_rows(
     return idle
 
 
-def missing_rows(torque: np.ndarray, idle: np.ndarray) -> np.ndarray:
-    """Rows in which all torques are zero, but not close to zero in the rows beside them.
+def missing_values(torque: np.ndarray, idle: np.ndarray) -> np.ndarray:
+    """Zeros beside which the torque is not small, as a mask of shape (n_samples, n_joints).
 
     Parameters
     ----------
@@ -211,26 +211,23 @@ def missing_rows(torque: np.ndarray, idle: np.ndarray) -> np.ndarray:
         Recorded torque.
     idle : ndarray of shape (n_samples,) of bool
         Rows that do not count.
-
-    Returns
-    -------
-    ndarray of shape (n_samples,) of bool
-        Empty if zeros are usual.
     """
-    none = np.zeros(len(torque), dtype=bool)
-    torque = torque[:, np.ptp(torque, axis=0) > 0]
-    if torque.shape[1] < 2:
-        return none
-    zero = np.all(torque == 0, axis=1) & ~idle
-    edges = np.flatnonzero(np.diff(np.r_[0, zero.astype(int), 0]))
-    begins, ends = edges[::2], edges[1::2]
-    inside = (begins > 0) & (ends < len(torque))
-    if zero.sum() < FEWEST_MISSING or not inside.any():
-        return none
-    beside = np.abs(np.vstack([torque[begins[inside] - 1], torque[ends[inside]]]))
-    usual = np.median(np.abs(torque[~zero]), axis=0)
-    jumps = np.median(beside, axis=0) > JUMPS * usual
-    return zero if jumps.mean() > 0.5 else none
+    missing = np.zeros(torque.shape, dtype=bool)
+    for k, values in enumerate(np.abs(torque.T)):
+        zero = (values == 0) & ~idle
+        edges = np.flatnonzero(np.diff(np.r_[0, zero.astype(int), 0]))
+        begins, ends = edges[::2], edges[1::2]
+        inside = (begins > 0) & (ends < len(values))
+        begins, ends = begins[inside], ends[inside]
+        if not len(begins):
+            continue
+        beside = np.minimum(values[begins - 1], values[ends])
+        jump = beside > JUMPS * float(np.median(values[~zero]))
+        for a, b in zip(begins[jump], ends[jump], strict=True):
+            missing[a:b, k] = True
+        if missing[:, k].sum() < max(FEWEST_MISSING, 0.5 * zero.sum()):
+            missing[:, k] = False  # zeros are usual
+    return missing
 
 
 def rest_share(velocity: np.ndarray) -> float:

@@ -31,6 +31,8 @@ from skidyn.measurement._units import (
 
 #: Range of a position, rad or m, and spread of a velocity, that are those of a joint that moves.
 LEAST_MOTION, LEAST_SPEED = 0.02, 0.02
+#: Rows in which the position of a joint does not change before it jumps.
+STUCK = 10
 #: Velocity of a joint that moves while another one jumps, as a share of its largest, and share of
 #: the jumps at which some joint does.
 MOVING, MOST_MOVE = 0.05, 0.5
@@ -464,6 +466,16 @@ def _lowpass(signals: Signals, lags: Mapping[int, float]) -> float | None:
     return middle if alike else None
 
 
+def _was_held(measurement: Measurement, joint: int) -> bool:
+    """Whether the position of a joint, from 0, was constant before most jumps."""
+    q, rows = measurement.signals.q[:, joint], measurement.leaps
+    rows = rows[rows > STUCK]
+    held = [np.ptp(q[row - STUCK : row]) == 0 and q[row] != q[row - 1] for row in rows]
+    others = np.delete(measurement.signals.q, joint, axis=1)
+    move = [np.ptp(others[row - STUCK : row], axis=0).any() for row in rows]
+    return bool(held) and min(np.mean(held), np.mean(move)) >= MOST_MOVE
+
+
 def _of_one_joint(measurement: Measurement, joint: int) -> bool:
     """Whether a joint, from 0, jumps alone while others move; joined recordings differ in all."""
     s, rows = measurement.signals, measurement.leaps
@@ -493,6 +505,15 @@ class JoinedRecordings(Check):
         if len(rows):
             shown = ", ".join(str(int(row)) for row in rows[:6]) + (" .." if len(rows) > 6 else "")
             joint = int(np.argmax(np.abs(s.q[rows[0]] - s.q[rows[0] - 1])))
+            if _was_held(measurement, joint):
+                yield self.suspicion(
+                    f"the position of {measurement.joint(joint)} is stuck in parts of recordings",
+                    f"it does not change in {STUCK} rows or more before it jumps in {len(rows)} "
+                    f"place(s) (rows {shown}); leave these parts out",
+                    "certain",
+                    [joint],
+                )
+                return
             if _of_one_joint(measurement, joint):
                 yield self.suspicion(
                     f"the zero of the position of {measurement.joint(joint)} changes within "
