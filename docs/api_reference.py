@@ -195,19 +195,15 @@ PAGES: tuple[Page, ...] = (
     ),
     Page(
         "skidyn.report",
-        "A diagnosis, or two compared, as JSON and as one HTML page.",
+        "A diagnosis, two compared, or a fleet, as JSON and as one HTML page.",
         (
             Section(
                 "Functions",
                 (
-                    "render_comparison",
-                    "render_fleet",
                     "render_html",
                     "summarize",
                     "summarize_comparison",
                     "summarize_fleet",
-                    "write_comparison",
-                    "write_fleet",
                     "write_html",
                     "write_json",
                 ),

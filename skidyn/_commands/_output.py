@@ -85,11 +85,10 @@ def _torque_told(controller: Controller, n_joints: int) -> str:
     )
 
 
-def write_page(diagnosis: Diagnosis, html: str | None, provenance: dict[str, Any]) -> None:
-    if html:
-        from skidyn.report import summarize, write_html
+def write_page(diagnosis: Diagnosis, html: str, provenance: dict[str, Any]) -> None:
+    from skidyn.report import summarize, write_html
 
-        write_html(html, summarize(diagnosis, provenance=provenance))
+    write_html(html, summarize(diagnosis, provenance=provenance))
 
 
 def write_table(frame: pd.DataFrame, path: str) -> None:

@@ -30,15 +30,7 @@ NORMAL = 1.96
 
 @dataclass(frozen=True)
 class Pair:
-    """Two diagnoses side by side, and the result of their comparison.
-
-    Attributes
-    ----------
-    diagnoses : tuple of two Diagnosis
-        Of robots with the same joints.
-    report : dict
-        Schema ``skidyn.comparison/1``.
-    """
+    """Two diagnoses of robots with the same joints, and the ``report`` of their comparison."""
 
     diagnoses: tuple[Diagnosis, Diagnosis]
     report: dict[str, Any]

@@ -1,5 +1,4 @@
 # SPDX-License-Identifier: BSD-3-Clause
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +8,7 @@ from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import Settings, diagnose
 from skidyn.exceptions import SkidynError
 from skidyn.identification import RBDRegressor
-from skidyn.report import summarize_comparison, write_comparison
+from skidyn.report import summarize_comparison
 
 
 def two_models(fakes):
@@ -50,14 +49,6 @@ def test_names_and_joints_must_fit(fakes):
     other = fakes.make_diagnosis(joint_names=("a", "b", "c"))
     with pytest.raises(SkidynError, match="same joints"):
         summarize_comparison(first, other)
-
-
-def test_numbers_lie_beside_the_page(fakes, tmp_path):
-    summary = summarize_comparison(*two_logs(fakes))
-    page, numbers = write_comparison(tmp_path / "wear.html", summary)
-    assert json.loads(numbers.read_text()) == summary["report"]
-    with pytest.raises(SkidynError, match="another suffix"):
-        write_comparison(tmp_path / "wear.json", summary)
 
 
 @pytest.fixture(scope="module")

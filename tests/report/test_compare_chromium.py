@@ -1,11 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The page of a comparison in a real browser."""
 
-import json
-
 import pytest
 
-from skidyn.report import summarize_comparison, write_comparison
+from skidyn.report import summarize_comparison, write_html
 
 
 @pytest.fixture
@@ -13,8 +11,7 @@ def compared(open_file, fakes, tmp_path):
     """Page and numbers of two recordings of different length, with names that hold markup."""
     pair = fakes.make_diagnosis(), fakes.make_diagnosis("unknown", n_samples=1500)
     summary = summarize_comparison(*pair, names=(fakes.HOSTILE, "worn"))
-    page, numbers = write_comparison(tmp_path / "wear.html", summary)
-    return open_file(page), json.loads(numbers.read_text()), summary
+    return open_file(write_html(tmp_path / "wear.html", summary)), summary["report"], summary
 
 
 def test_numbers_are_those_of_the_file(compared):

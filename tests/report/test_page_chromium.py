@@ -116,6 +116,7 @@ def test_a_name_in_the_legend_hides_its_curve(open_page, fakes):
 def test_hover_shows_the_numbers_of_the_summary(open_page, fakes):
     diagnosis = fakes.make_diagnosis()
     trace = summarize(diagnosis)["time"]["traces"][0]
+    torque = trace["columns"]
     page = open_page(diagnosis)
     x, y, width, _ = over(page)
     page.mouse.move(x + 0.4 * width, y + 60)
@@ -127,8 +128,8 @@ def test_hover_shows_the_numbers_of_the_summary(open_page, fakes):
     start = next(s["time"] for s in trace["starts"] if s["trajectory"] == int(trajectory))
     k = min(range(len(trace["time"])), key=lambda i: abs(trace["time"][i] - start - float(time)))
     shown = [value(text) for _, text in said[4:7]]
-    assert shown == pytest.approx([trace[key][k] for key in ("measured", "before", "after")], 1e-3)
-    residuals = [trace["measured"][k] - trace[key][k] for key in ("before", "after")]
+    assert shown == pytest.approx([torque[key][k] for key in ("measured", "before", "after")], 1e-3)
+    residuals = [torque["measured"][k] - torque[key][k] for key in ("before", "after")]
     assert [value(text) for _, text in said[1:3]] == pytest.approx(residuals, rel=1e-3, abs=1e-6)
 
 
