@@ -15,17 +15,9 @@ if TYPE_CHECKING:
 
 
 def evaluate_torch(program: Program, inputs: dict[str, torch.Tensor]) -> torch.Tensor:
-    """Outputs of a program for a batch.
+    """Outputs of a program for a batch, shape (N, *program.shape).
 
-    Parameters
-    ----------
-    program : Program
-    inputs : dict of str to Tensor
-        Signals of shape (N, n); ``"parameter"`` has shape (n,).
-
-    Returns
-    -------
-    Tensor of shape (N, *program.shape)
+    Signals are of shape (N, n); ``"parameter"`` has shape (n,).
     """
     import torch
 

@@ -34,22 +34,9 @@ LONGEST_BODY = 2**16
 class Explorer:
     """Answer requests of the page one at a time; the report is made in a separate thread.
 
-    Parameters
-    ----------
-    session : Session
-        Model and log.
-    folder : path
-        Where results are saved.
-    logs : sequence of str
-        Files of the log, for the script.
-    urdf : str
-        Description of the robot, for the script.
-    joints : sequence of str, optional
-        Joints the log covers, for the script.
-    reading : mapping, optional
-        Further arguments with which the log was read, for the script.
-    controller : Controller, optional
-        Position servos whose torque was computed from their commands, for the script.
+    Results are saved in the folder. The other arguments are for the script: files of the log,
+    description of the robot, joints that the log covers, further arguments with which it was read,
+    and servos whose torque was computed from their commands.
     """
 
     def __init__(
@@ -201,13 +188,7 @@ class Explorer:
 
 
 def page() -> str:
-    """The page as one file.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """The page as one HTML file."""
     folder = files("skidyn.explorer").joinpath("static")
     text = folder.joinpath("explorer.html").read_text("utf-8")
     for name in ("uPlot.css", "uPlot.js"):
@@ -251,15 +232,7 @@ def _refuse_constant(name: str) -> float:
 
 
 def make_app(explorer: Explorer, port: int) -> Any:
-    """The web application.
-
-    Parameters
-    ----------
-    explorer : Explorer
-        Object that answers the requests.
-    port : int
-        Port of this machine; requests for any other host are refused.
-    """
+    """The web application; requests for a host other than this machine at this port are refused."""
     import_optional("starlette", extra="explore")
     from starlette.applications import Starlette
     from starlette.requests import Request

@@ -28,10 +28,7 @@ class CentralInertia:
 def central_inertia(parameters: np.ndarray, body: str) -> CentralInertia | None:
     """Inertia about the center of mass; None for a body without mass.
 
-    Raises
-    ------
-    SkidynError
-        The parameters are physically impossible, so neither format can represent them.
+    A SkidynError is raised if the parameters are impossible: neither format can represent them.
     """
     mass, moment, inertia = inertial_parts(parameters)
     if not np.any(parameters):
@@ -66,16 +63,9 @@ def about_origin(mass: float, center: np.ndarray, central: np.ndarray) -> np.nda
 class Description:
     """Parts of a model that a description of bodies and joints can represent.
 
-    Attributes
-    ----------
-    robot : Robot
-        The robot.
-    parameters : ndarray of shape (n_bodies, 10)
-        Inertial parameters, with a permanent payload as part of the last body.
-    joints : dict of str to ndarray of shape (n_joints, n_coefficients)
-        Coefficients of the kinds for which the format has fields.
-    left : list of Term
-        Effects for which the format has no fields.
+    Inertial ``parameters`` have a permanent payload as part of the last body. ``joints`` are
+    coefficients, (n_joints, n_coefficients), of the kinds for which the format has fields; ``left``
+    are effects for which it has none.
     """
 
     robot: Robot

@@ -26,16 +26,7 @@ _SAMPLES, _ROUNDING = 64, 1e-9
 class StaticModel:
     """Parts of a model that are a function of q, dq and ddq, and the other parts.
 
-    Attributes
-    ----------
-    robot : Robot
-        The robot.
-    program : Program
-        Torques of all joints.
-    held : list of Term
-        Effects in the program.
-    left : list of Term
-        Effects with a memory, or that depend on time, temperature or the recording.
+    ``left`` are effects with a memory, or that depend on time, temperature or the recording.
     """
 
     robot: Robot

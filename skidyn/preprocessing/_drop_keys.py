@@ -63,23 +63,11 @@ class DropKeys(SignalTransformer):
 
 
 def without_keys_inside(learner: Any, keys: Keys) -> Any:
-    """A learner whose parts without support for key columns do not get them.
+    """The learner, or a copy, whose parts without support for key columns do not get them.
 
     Steps of a ``Pipeline`` after the last one that supports key columns, and members of stackings
     and votings that do not support them, get a :class:`DropKeys`, unless there is one already. (A
     learner without any part that supports key columns never gets them: ``Keys.for_learner``.)
-
-    Parameters
-    ----------
-    learner : estimator
-        Not fitted.
-    keys : Keys
-        Key columns of the table to which the learner is fitted.
-
-    Returns
-    -------
-    estimator
-        The learner itself, or a copy.
     """
     if (keys.trajectory is None and keys.time is None) or not knows_keys(learner):
         return learner

@@ -54,18 +54,9 @@ class Assembly:
 
 
 def assemble(description: Description, selected: Sequence[str] | None) -> Assembly:
-    """Tree of moving bodies, depth first in the order of the file.
+    """Tree of moving bodies, depth first in the order of the file; other joints stay at zero.
 
-    Parameters
-    ----------
-    description : Description
-    selected : sequence of str or None
-        Joints that move; None means all. The others stay at zero.
-
-    Raises
-    ------
-    RobotDescriptionError
-        The links and joints do not form a tree, or a name is unknown.
+    A RobotDescriptionError is raised if links and joints form no tree or a name is unknown.
     """
     root = _root_of(description)
     following = _resolve_mimics(description)

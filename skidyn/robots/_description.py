@@ -140,10 +140,7 @@ def link_of(
 ) -> Link:
     """Link of a mass and of an inertia about the center of mass, in the frame of the rotation.
 
-    Raises
-    ------
-    RobotDescriptionError
-        The mass is negative, or mass or inertia is not a number.
+    A RobotDescriptionError is raised if the mass is negative, or mass or inertia is not a number.
     """
     what = f"link {name!r}"
     if mass < 0:
@@ -170,13 +167,7 @@ def symmetric(xx: float, xy: float, xz: float, yy: float, yz: float, zz: float) 
 
 
 def unit_axis(axis: np.ndarray, what: str) -> np.ndarray:
-    """The axis with length one.
-
-    Raises
-    ------
-    RobotDescriptionError
-        The axis is zero.
-    """
+    """The axis with length one; a RobotDescriptionError if it is zero."""
     largest = float(np.abs(axis).max())
     # scaled to entries up to one: the squares of 1e200 and of 1e-200 overflow or vanish
     axis = axis / largest if largest > 0 else axis
@@ -187,13 +178,7 @@ def unit_axis(axis: np.ndarray, what: str) -> np.ndarray:
 
 
 def check_limits(lower: float, upper: float, what: str) -> tuple[float, float]:
-    """Lower and upper position limit.
-
-    Raises
-    ------
-    RobotDescriptionError
-        The lower limit is above the upper one.
-    """
+    """Lower and upper position limit; a RobotDescriptionError if they are in the wrong order."""
     if lower > upper:
         raise RobotDescriptionError(
             f"The {what} has its lower limit {lower:g} above its upper limit {upper:g}."

@@ -16,20 +16,8 @@ def sensor_noise(
 ) -> Array:
     """White noise plus first-order coloured noise, per trajectory.
 
-    Parameters
-    ----------
-    shape : tuple of int
-        ``(n_trajectories, n_samples, n_joints)``.
-    std : ndarray of shape (n_joints,)
-        Standard deviation of the sum.
-    step : float, s
-        Time between samples.
-    rng : Generator
-        Source of chance.
-
-    Returns
-    -------
-    ndarray of shape ``shape``
+    The shape is (n_trajectories, n_samples, n_joints), samples are ``step`` s apart, and ``std`` is
+    the standard deviation of the sum by joint.
     """
     from scipy.signal import lfilter  # a second of imports: only where a log is made
 
@@ -51,18 +39,7 @@ def quantise(values: Array, resolution: Array | float) -> Array:
 def filtered_derivative(velocity: Array, step: float, cutoff: float = 10.0) -> Array:
     """Acceleration from measured velocity, as derived by a user.
 
-    Parameters
-    ----------
-    velocity : ndarray of shape (n_trajectories, n_samples, n_joints)
-        Measured velocity.
-    step : float, s
-        Time between samples.
-    cutoff : float, default=10.0, Hz
-        Cut-off of the zero-phase Butterworth low-pass.
-
-    Returns
-    -------
-    ndarray of the same shape
+    Samples are ``step`` s apart; the zero-phase Butterworth low-pass has a cut-off in Hz.
     """
     from scipy.signal import butter, sosfiltfilt
 
