@@ -255,12 +255,7 @@ PAGES: tuple[Page, ...] = (
             Section(
                 "Functions",
                 (
-                    "fetch_double_pendulum",
-                    "fetch_emps",
-                    "fetch_panda_exciting",
-                    "fetch_panda_gaz",
-                    "fetch_screw_drive",
-                    "fetch_xl330",
+                    "fetch_recording",
                     "hidden_effect_kinds",
                     "hidden_effect_suite",
                     "load_demo_log",

@@ -27,7 +27,7 @@ class Seen(State):
     """Numbers and curves of the given and of the present model."""
 
     def sizes(self) -> list[str]:
-        """Parameters of every addition with half their 95 % intervals, as ``"k = 3.5 ± 0.4 N m"``."""
+        """Parameters of every addition with half their 95 % intervals."""
         if not self.added:
             return []
         rest = [t for t in self.terms if not is_fine(t)]

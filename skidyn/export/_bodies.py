@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from typing import Any
 
@@ -51,6 +52,29 @@ def central_inertia(parameters: np.ndarray, body: str) -> CentralInertia | None:
             "command line --consistent."
         )
     return CentralInertia(mass, center, (central + central.T) / 2)
+
+
+def urdf_inertial(central: CentralInertia) -> ElementTree.Element:
+    """The ``<inertial>`` of a link, in its frame."""
+    element = ElementTree.Element("inertial")
+    ElementTree.SubElement(element, "origin", xyz=numbers(central.center), rpy="0 0 0")
+    ElementTree.SubElement(element, "mass", value=numbers(central.mass))
+    names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    entries = central.inertia[np.triu_indices(3)]
+    moments = {key: numbers(x) for key, x in zip(names, entries, strict=True)}
+    ElementTree.SubElement(element, "inertia", moments)
+    return element
+
+
+def mjcf_inertial(central: CentralInertia) -> ElementTree.Element:
+    """The ``<inertial>`` of a body, in its frame."""
+    I = central.inertia
+    return ElementTree.Element(
+        "inertial",
+        pos=numbers(central.center),
+        mass=numbers(central.mass),
+        fullinertia=numbers([I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]]),
+    )
 
 
 def about_origin(mass: float, center: np.ndarray, central: np.ndarray) -> np.ndarray:

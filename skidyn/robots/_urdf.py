@@ -29,7 +29,7 @@ from skidyn.robots._xml import numbers, only, required, word
 
 
 def parse_urdf(root: ElementTree.Element) -> Description:
-    """Description of the robot in a ``<robot>`` element; a wrong part raises RobotDescriptionError."""
+    """Description of the robot in a ``<robot>`` element; RobotDescriptionError for a wrong one."""
     refuse_repeated_names(root.iter("link"))
     refuse_repeated_names(root.iter("joint"))
     links = [_link(element) for element in root.findall("link")]
