@@ -395,7 +395,7 @@ def _number_of_joints(match: NameMatch) -> int:
     return max(numbers, default=0)
 
 
-def _listed(names: Iterable[str], limit: int = 12) -> str:
+def _listed(names: Iterable[str]) -> str:
     names = [str(name) for name in names]
-    more = f", ... ({len(names)} in all)" if len(names) > limit else ""
-    return ", ".join(names[:limit]) + more
+    more = f", ... ({len(names)} in all)" if len(names) > 12 else ""
+    return ", ".join(names[:12]) + more

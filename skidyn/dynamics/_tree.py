@@ -84,6 +84,14 @@ def inertial_parts(parameters: np.ndarray) -> tuple[float, np.ndarray, np.ndarra
     return float(parameters[0]), np.asarray(parameters[1:4], dtype=float), inertia
 
 
+def central_parts(parameters: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+    """Mass, center of mass (3,) and inertia matrix (3, 3) about it; at the origin without mass."""
+    mass, moment, inertia = inertial_parts(parameters)
+    center = moment / mass if mass > 0 else np.zeros(3)
+    arm = skew(center)
+    return mass, center, inertia + mass * arm @ arm
+
+
 def transform_inertial(
     parameters: np.ndarray, rotation: np.ndarray, translation: np.ndarray
 ) -> np.ndarray:

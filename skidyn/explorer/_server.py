@@ -34,45 +34,17 @@ LONGEST_BODY = 2**16
 class Explorer:
     """Answer requests of the page one at a time; the report is made in a separate thread.
 
-    Results are saved in the folder. The other arguments are for the script: files of the log,
-    description of the robot, joints that the log covers, further arguments with which it was read,
-    and servos whose torque was computed from their commands.
+    Results are saved in the folder; the other arguments are those of ``session.script``.
     """
 
-    def __init__(
-        self,
-        session: Session,
-        folder: Path,
-        logs: Sequence[str] = (),
-        urdf: str = "robot.urdf",
-        joints: Sequence[str] | None = None,
-        reading: Mapping[str, Any] | None = None,
-        controller: Controller | None = None,
-    ) -> None:
-        self.controller = controller
-        self.session, self.folder = session, Path(folder)
-        self.logs, self.urdf = list(logs) or ["log.csv"], urdf
-        self.joints, self.reading = joints, reading
+    def __init__(self, session: Session, folder: Path, **script: Any) -> None:
+        self.session, self.folder, self.script = session, Path(folder), script
         self.token = secrets.token_urlsafe(24)
         self._saved: RBDRegressor | None = None
         self._told: dict[str, Any] = {"text": "", "share": None}
 
     def answer(self, question: str, words: dict[str, Any]) -> dict[str, Any]:
-        """Answer a request of the page.
-
-        Parameters
-        ----------
-        question : {"state", "curves", "ranked", "add", "refine", "undo", "remove", "sizes", \
-                "save", "report", "progress"}
-            Kind of request.
-        words : dict
-            Its arguments.
-
-        Returns
-        -------
-        dict
-            JSON types only.
-        """
+        """Answer a request of the page with its arguments, in JSON types only."""
         known: dict[str, Callable[..., dict[str, Any]]] = {
             "state": self._state,
             "curves": self._curves,
@@ -155,16 +127,9 @@ class Explorer:
         self.session.refine()
         self.folder.mkdir(parents=True, exist_ok=True)
         self._saved = self.session.fitted_model()
-        text = self.session.script(
-            self.logs,
-            self.urdf,
-            joints=self.joints,
-            reading=self.reading,
-            controller=self.controller,
-        )
         files = [
             save_model(self.folder / "model.skops", self._saved),
-            write_text(self.folder / "explored.py", text),
+            write_text(self.folder / "explored.py", self.session.script(**self.script)),
         ]
         return {"saved": [str(file) for file in files]}
 
@@ -347,7 +312,8 @@ def serve(
     http://127.0.0.1:54321/?token=...
     """
     uvicorn = import_optional("uvicorn", extra="explore")
-    explorer = Explorer(session, Path(folder), logs, urdf, joints, reading, controller)
+    told = {"joints": joints, "reading": reading, "controller": controller}
+    explorer = Explorer(session, Path(folder), logs=logs or ("log.csv",), urdf=urdf, **told)
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     listener.bind((HOST, port))

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from skidyn._exceptions import SkidynError
-from skidyn.dynamics import inertial_parts, skew
+from skidyn.dynamics import central_parts
 from skidyn.effects import Term, get_effect
 from skidyn.export._model import check_model, is_carried
 from skidyn.identification import RBDRegressor
@@ -31,7 +31,7 @@ def central_inertia(parameters: np.ndarray, body: str) -> CentralInertia | None:
 
     A SkidynError is raised if the parameters are impossible: neither format can represent them.
     """
-    mass, moment, inertia = inertial_parts(parameters)
+    mass, center, central = central_parts(parameters)
     if not np.any(parameters):
         return None
     if mass <= 0.0:
@@ -40,9 +40,6 @@ def central_inertia(parameters: np.ndarray, body: str) -> CentralInertia | None:
             "physically consistent parameters: RBDRegressor(..., consistent=True), on the command "
             "line --consistent."
         )
-    center = moment / mass
-    arm = skew(center)
-    central = inertia + mass * arm @ arm
     moments = np.linalg.eigvalsh(central)
     if moments[0] < -1e-9 * max(abs(moments[-1]), 1e-9):
         raise SkidynError(

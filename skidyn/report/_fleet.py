@@ -84,7 +84,7 @@ def summarize_fleet(
         "deviating": deviating,
         "alarms": alarms,
         "false_discovery_rate": false_discovery_rate,
-        "versions": {k: v for k, v in versions().items() if k != "executable"},
+        "versions": versions(),
     }
     document: dict[str, Any] = plain(
         {

@@ -11,7 +11,7 @@ import numpy as np
 
 from skidyn._exceptions import RobotDescriptionError
 from skidyn._text import suggest
-from skidyn.dynamics import inertial_parts, skew
+from skidyn.dynamics import central_parts
 from skidyn.robots._description import (
     Description,
     Joint,
@@ -182,8 +182,6 @@ def links_of(inertials: Mapping[str, Any]) -> dict[str, Link]:
                 f"The inertia of link {name!r} has to be ten finite numbers: m, mcx, mcy, mcz, "
                 "Ixx, Ixy, Ixz, Iyy, Iyz, Izz."
             )
-        mass, moment, inertia = inertial_parts(parameters)
-        center = moment / mass if mass > 0 else np.zeros(3)
-        arm = skew(center)
-        links[name] = link_of(name, float(mass), inertia + mass * arm @ arm, np.eye(3), center)
+        mass, center, inertia = central_parts(parameters)
+        links[name] = link_of(name, mass, inertia, np.eye(3), center)
     return links
