@@ -138,6 +138,11 @@ def interval_factor(n_folds: int) -> float:
     return float(student_t.ppf(0.975, max(1, n_folds - 1)))
 
 
+def triangle(rows: Array) -> Array:
+    """Triangular factor of rows."""
+    return np.asarray(np.linalg.qr(rows, mode="r"))
+
+
 def open_columns(design: Array, columns: Sequence[int]) -> NDArray[np.bool_]:
     """Columns that are nearly combinations of all others of a design or triangular factor."""
     size = np.linalg.norm(design, axis=0)
