@@ -33,7 +33,7 @@ from typing import Any
 import numpy as np
 
 from skidyn.dynamics._tape import Scalar, Tape
-from skidyn.dynamics._tree import KinematicTree, transform_inertial
+from skidyn.dynamics._tree import KinematicTree, skew, transform_inertial
 
 #: Terms below this fraction of the largest term of a sum do not change the sum.
 _BELOW_ROUNDING = 1e-18
@@ -109,14 +109,12 @@ class _Rotation:
 
     def _about(self, tape: Tape, axis: np.ndarray) -> Matrix:
         """Rodrigues' formula about a skew axis."""
-        outer = np.outer(axis, axis)
-        x, y, z = axis
-        skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        outer, cross = np.outer(axis, axis), skew(axis)
         return [
             [
                 tape.constant(outer[i, j])
                 + tape.constant(float(i == j) - outer[i, j]) * self._cos
-                + tape.constant(skew[i, j]) * self._sin
+                + tape.constant(cross[i, j]) * self._sin
                 for j in range(3)
             ]
             for i in range(3)

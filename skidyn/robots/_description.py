@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from skidyn._exceptions import RobotDescriptionError, RobotDescriptionWarning
-from skidyn.dynamics import inertial_vector, transform_inertial
+from skidyn.dynamics import inertial_vector, skew, transform_inertial
 
 MOVING_TYPES = ("revolute", "continuous", "prismatic")
 
@@ -98,8 +98,7 @@ def _without_dust(matrix: np.ndarray) -> np.ndarray:
 
 
 def rotation_about(axis: np.ndarray, angle: float) -> np.ndarray:
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    cross = skew(axis)
     matrix = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
     return _without_dust(matrix)
 
