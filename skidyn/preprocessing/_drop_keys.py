@@ -11,7 +11,7 @@ from sklearn.base import clone
 from sklearn.pipeline import Pipeline, make_pipeline
 
 from skidyn._columns import ColumnSpec
-from skidyn._keys import Keys, knows_keys
+from skidyn._keys import Keys, fitted_keys, knows_keys
 from skidyn.preprocessing._signals import SignalTransformer
 
 Array = NDArray[np.float64]
@@ -53,13 +53,13 @@ class DropKeys(SignalTransformer):
         self.time = time
 
     def _learn(self, X: Array) -> None:
-        self._keys()  # raises an error for missing columns
+        fitted_keys(self)  # raises an error for missing columns
 
     def _changed(self, X: Array) -> Array:
-        return X[:, list(self._keys().features)]
+        return X[:, list(fitted_keys(self).features)]
 
     def _renamed(self, names: NDArray[Any]) -> NDArray[Any]:
-        return names[list(self._keys().features)]
+        return names[list(fitted_keys(self).features)]
 
 
 def without_keys_inside(learner: Any, keys: Keys) -> Any:
