@@ -169,7 +169,7 @@ class SequenceRegressor(
             The fitted regressor.
         """
         X, y = validate_data(self, X, y, multi_output=True, y_numeric=True, dtype=np.float64)
-        keys = fitted_keys(self)
+        keys = self._keys()
         rng = check_random_state(self.random_state)
         weight = np.ones(len(X))
         if sample_weight is not None:
@@ -255,6 +255,9 @@ class SequenceRegressor(
         own = {k: v for k, v in self._skorch().items() if not k.startswith("module__")}
         return Plan(self.window, self.stride, settings | own)
 
+    def _keys(self) -> Keys:
+        return fitted_keys(self)
+
     # ---- predict ----
 
     def predict(self, X: Any) -> Array:
@@ -275,7 +278,7 @@ class SequenceRegressor(
         """
         check_is_fitted(self)
         X = validate_data(self, X, reset=False, dtype=np.float64)
-        order = time_order(X, fitted_keys(self))
+        order = time_order(X, self._keys())
         if order is None:
             return self._predict_array(X)
         torque: Array = self._predict_array(X[order])[np.argsort(order)]
@@ -287,7 +290,7 @@ class SequenceRegressor(
 
     def _output(self, X: Array) -> Array:
         """Output of the networks in physical units, (n_samples, n_outputs)."""
-        keys = fitted_keys(self)
+        keys = self._keys()
         inputs = (self._inputs(X, keys) - self.input_offset_) / self.input_scale_
         module, segments = self.net_.module_, keys.segments(X)
         parts = [

@@ -21,7 +21,7 @@ from torch import nn
 
 from skidyn._columns import Columns, column_names, resolve_columns
 from skidyn._compat import HasMethods, Interval, StrOptions
-from skidyn._keys import Keys, fitted_keys
+from skidyn._keys import Keys
 from skidyn._order import taken, time_order
 from skidyn.hybrid import TrainingRange, distances, fade, learned_weights
 from skidyn.identification import RBDRegressor
@@ -227,13 +227,13 @@ class SDLRegressor(SequenceRegressor):
         folds: Any = None
         if not isinstance(self.cv, Integral):
             folds = list(check_cv(self.cv).split(table, target, groups))
-        order = time_order(array, fitted_keys(self))
+        order = time_order(array, self._keys())
         if order is not None:
             place = np.argsort(order)
             folds = folds and [(np.sort(place[a]), np.sort(place[b])) for a, b in folds]
             array, table, target, counts = (taken(t, order) for t in (array, table, target, counts))
         torque = target.reshape(len(array), -1)
-        trajectories = fitted_keys(self).trajectories(array)
+        trajectories = self._keys().trajectories(array)
         folds = folds or held_out_folds(trajectories, int(self.cv), guard=8)
         residual, learned = np.zeros(torque.shape), np.zeros(torque.shape)
         unit = np.zeros(len(array), dtype=int)
@@ -418,7 +418,7 @@ class SDLRegressor(SequenceRegressor):
         """
         check_is_fitted(self)
         X = validate_data(self, X, reset=False, dtype=np.float64)
-        return self._novelty(self._inputs(X, fitted_keys(self))) > 1.0
+        return self._novelty(self._inputs(X, self._keys())) > 1.0
 
     def _novelty(self, features: Array) -> Array:
         return distances(features, self._scale, self._reference) / self.radius_
@@ -434,7 +434,7 @@ class SDLRegressor(SequenceRegressor):
         return torque[0], torque[-1]
 
     def _output(self, X: Array) -> Array:
-        keys = fitted_keys(self)
+        keys = self._keys()
         features, (rigid_body, last_resort) = self._inputs(X, keys), self._rigid_body(X)
         scaled = np.c_[
             (features - self.input_offset_) / self.input_scale_,

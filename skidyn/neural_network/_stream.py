@@ -9,8 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.utils.validation import validate_data
 
-from skidyn._keys import fitted_keys
-
 if TYPE_CHECKING:
     from skidyn.neural_network._base import SequenceRegressor
 
@@ -58,7 +56,7 @@ class TorqueStream:
         new = validate_data(estimator, X, reset=False, dtype=np.float64)
         log = np.concatenate([self._past, new])
         torque = estimator._predict_array(log)[len(self._past) :]
-        last = fitted_keys(estimator).segments(log)[-1]
+        last = estimator._keys().segments(log)[-1]
         # the current piece and the history before it; cut at the edge of a piece to keep the grid
         window, stride = estimator.window, estimator.stride
         n_pieces = (last.stop - last.start) // stride - -(-window // stride)
