@@ -134,6 +134,7 @@ def reading(options: argparse.Namespace) -> dict[str, Any]:
         "summed": pairs("summed", said.get("summed")),
         **{name: pairs(name, said.get(name), numbers=True) for name in NUMBERS},
         **{name: said.get(name) for name in AS_GIVEN},
+        "derive": listed(said.get("derive")),
     }
     # defaults are left to read_log, so that a script made from this contains only given options
     always = ("columns", "units", "drive_gains", "rate")
