@@ -63,26 +63,10 @@ class Remedies:
 def mend_columns(
     table: pd.DataFrame, n: int, joints: Sequence[str], remedies: Remedies, notes: list[str]
 ) -> pd.DataFrame:
-    """Order, sign, scale, sums and zero of columns.
+    """Order, sign, scale, sums and zero of columns; what was done is appended to ``notes``.
 
-    Parameters
-    ----------
-    table : DataFrame
-        Columns of a log.
-    n : int
-        Number of joints.
-    joints : sequence of str
-        Their names.
-    remedies : Remedies
-        What was asked for.
-    notes : list of str
-        What was done is appended here.
-
-    Raises
-    ------
-    LogError
-        A joint or column does not exist, an order is invalid, a gain is zero or not finite, a
-        position includes itself, or there are no commanded positions for the sign.
+    A LogError is raised if a joint or column does not exist, an order is invalid, a gain is zero or
+    not finite, a position includes itself, or there are no commanded positions for the sign.
     """
     table = table.copy()
     if remedies.order is not None:
@@ -123,19 +107,7 @@ def mend_columns(
 def restore_gravity(table: pd.DataFrame, robot: Robot | None, notes: list[str]) -> pd.DataFrame:
     """Add the gravity torque of the described bodies, which a driver had subtracted.
 
-    Parameters
-    ----------
-    table : DataFrame
-        Columns of a log.
-    robot : Robot or None
-        As described.
-    notes : list of str
-        What was done is appended here.
-
-    Raises
-    ------
-    LogError
-        There is no robot, or it has no gravity torque.
+    A LogError is raised without a robot or gravity torque; what was done is appended to ``notes``.
     """
     if robot is None:
         raise LogError("restore_gravity adds the gravity torque of a robot; give robot=.")
@@ -155,21 +127,8 @@ def restore_gravity(table: pd.DataFrame, robot: Robot | None, notes: list[str]) 
 def mend_rows(table: pd.DataFrame, n: int, remedies: Remedies, notes: list[str]) -> pd.DataFrame:
     """Clock, repeated rows, delay and wrapped positions of a log in order of time.
 
-    Parameters
-    ----------
-    table : DataFrame
-        Columns of a log with ``time`` and ``trajectory``.
-    n : int
-        Number of joints.
-    remedies : Remedies
-        What was asked for.
-    notes : list of str
-        What was done is appended here.
-
-    Raises
-    ------
-    LogError
-        The name of the clock is unknown, or a channel does not exist.
+    What was done is appended to ``notes``. A LogError is raised if the name of the clock is unknown
+    or a channel does not exist.
     """
     names = [f"q{k + 1}" for k in range(n)]
     if remedies.unwrap:
