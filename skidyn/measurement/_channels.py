@@ -75,9 +75,9 @@ class CoarsePosition(Check):
 
 def _is_short(values: Array) -> bool:
     """Whether all values are numbers of half precision, eleven binary digits."""
-    if np.abs(values).max() > 6e4 or len(np.unique(values)) < 50:
+    if np.abs(values).max() > 6e4 or np.any(values != values.astype(np.float16)):
         return False
-    return bool(np.all(values == values.astype(np.float16)))
+    return len(np.unique(values)) >= 50
 
 
 class ConstantTorque(Check):
@@ -204,11 +204,11 @@ class HeldTorque(Check):
         shares, lost = np.zeros(measurement.n_joints), cut_columns(measurement)
         for k in range(measurement.n_joints):
             torque = measurement.torque[:, k]
+            share = np.mean(torque[1:][moved] == torque[:-1][moved])
             # equal steps are due to a coarse sensor, not a slow one
-            fine = len(np.unique(torque)) > 0.1 * len(torque) and np.isnan(position_step(torque))
-            if k not in lost and fine:
-                shares[k] = np.mean(torque[1:][moved] == torque[:-1][moved])
-        held = np.flatnonzero(shares > HELD)
+            if k not in lost and share > HELD and len(np.unique(torque)) > 0.1 * len(torque):
+                shares[k] = share if np.isnan(position_step(torque)) else 0.0
+        held = np.flatnonzero(shares)
         if len(held):
             yield self.suspicion(
                 f"the torque of {', '.join(measurement.joint(int(k)) for k in held)} holds its "
