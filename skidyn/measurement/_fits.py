@@ -247,12 +247,13 @@ class Fits:
     def torque_at(self, lag: float) -> Array:
         """Torque that was recorded a lag (s) after the motion of every sample."""
         source = self.recorded
-        later = np.empty_like(source.torque)
+        later = np.empty((len(source.picked), self.n_joints))
         for rows in source.segments:
-            clock = source.clock[rows]
+            own = (source.picked >= rows.start) & (source.picked < rows.stop)
+            at, clock = source.clock[source.picked[own]] + lag, source.clock[rows]
             for k in range(self.n_joints):
-                later[rows, k] = np.interp(clock + lag, clock, source.torque[rows, k])
-        return np.asarray(later[source.picked])
+                later[own, k] = np.interp(at, clock, source.torque[rows, k])
+        return later
 
     def mean_torque(self, column: int) -> tuple[Array, NDArray[np.bool_]]:
         """Torque of a column in rows, and which rows count."""
