@@ -192,7 +192,8 @@ class Screen:
         cross = np.zeros((*model.cross.shape, len(pick) * k))
         for j in group.joints:
             rows = [self.candidates[i].rows[j] for i in group.index[pick]]
-            block = np.hstack(rows) / self.sigma[j]
+            block = np.hstack(rows)
+            block /= self.sigma[j]
             felt = model.felt[j]
             for f, here in enumerate(self.folds[j]):
                 part = block[here]

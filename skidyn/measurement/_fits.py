@@ -229,13 +229,15 @@ class Fits:
         size = np.full(self.n_joints, reading.size)
         if reading.sized is not None:
             size[[j for j in range(self.n_joints) if j not in reading.sized]] = 1.0
-        apart = np.eye(self.n_joints)
-        for joint, before in reading.summed:
-            apart[joint - 1, joint] = -before
         q, dq, ddq = (
-            (values[:, order] * (sign * faster**k / size)) @ apart
+            values[:, order] * (sign * faster**k / size)
             for k, values in enumerate((s.q, s.dq, s.ddq))
         )
+        if reading.summed:
+            apart = np.eye(self.n_joints)
+            for joint, before in reading.summed:
+                apart[joint - 1, joint] = -before
+            q, dq, ddq = q @ apart, dq @ apart, ddq @ apart
         return s.with_(q=q - zero, dq=dq, ddq=ddq)
 
     def torque_column(self, reading: Reading, joint: int) -> tuple[int, float]:
