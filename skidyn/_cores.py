@@ -30,6 +30,8 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 _CORES: ContextVar[int] = ContextVar("skidyn_cores", default=1)
+#: Processes of :func:`aside` whose results may not be there yet.
+_ASIDE: ContextVar[tuple[_Child[Any], ...]] = ContextVar("skidyn_aside", default=())
 #: Most processes: starting one takes some 20 ms, which more processes would not save.
 MOST_PROCESSES = 8
 #: Number of task numbers that fit into a pipe; processes read them one after another.
@@ -70,32 +72,40 @@ def each(function: Callable[[Item], Result], items: Iterable[Item], text: str = 
     """Results of a function for every item, in their order; its exceptions are raised.
 
     A result is pickled if another process computed it, and side effects there are lost; items need
-    not be picklable. ``text`` describes the task for progress reports.
+    not be picklable. ``text`` describes the task for progress reports. A process of :func:`aside`
+    takes one of the cores until it has its result.
     """
     items = list(items)
     size = -(-len(items) // MOST_PIECES)
     pieces = [range(k, min(k + size, len(items))) for k in range(0, len(items), max(1, size))]
-    count = min(_CORES.get(), len(pieces))
-    if count < 2:
+    count = _CORES.get()
+    if min(count, len(pieces)) < 2:
         return [function(item) for item in (track(items, text) if text else items)]
     left, filled = os.pipe()
     os.write(filled, b"".join(_NUMBER.pack(k) for k in range(len(pieces))))
     os.close(filled)  # a process that finds the pipe empty is done
 
-    def work() -> dict[int, Result]:
+    children: list[_Child[dict[int, Result]]] = []
+
+    def start() -> None:
+        """Start a process for every free core; one of :func:`aside` may end meanwhile."""
+        free = count - sum(child.busy for child in _ASIDE.get())
+        while 1 + len(children) < min(free, len(pieces)) and (child := _started(work)):
+            children.append(child)
+
+    def work(before: Callable[[], None] = lambda: None) -> dict[int, Result]:
         done: dict[int, Result] = {}
         while number := os.read(left, _NUMBER.size):
+            before()
             (k,) = _NUMBER.unpack(number)
             if text:
                 tell(text, k / len(pieces))
             done.update((i, function(items[i])) for i in pieces[k])
         return done
 
-    started = (_started(work) for _ in range(count - 1))
-    children = [child for child in started if child is not None]
     token = _CORES.set(1)
     try:
-        done = work()
+        done = work(start)
         for child in children:
             done |= child.result() or {}
         if text:
@@ -122,6 +132,7 @@ def aside(function: Callable[[], Result]) -> Iterator[Callable[[], Result]]:
         value = function()
         yield lambda: value
         return
+    token = _ASIDE.set((*_ASIDE.get(), child))
     try:
         kept: list[Result] = []
 
@@ -133,6 +144,7 @@ def aside(function: Callable[[], Result]) -> Iterator[Callable[[], Result]]:
 
         yield result
     finally:
+        _ASIDE.reset(token)
         child.end()
 
 
@@ -162,6 +174,11 @@ class _Child(Generic[Result]):
             raise
         finally:
             into.close()
+
+    @property
+    def busy(self) -> bool:
+        """Whether its result is not there yet."""
+        return not self._pipe.poll()
 
     def result(self) -> Result | None:
         """The result; None if the process ended without one."""

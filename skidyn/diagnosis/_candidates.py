@@ -83,7 +83,7 @@ class Candidate:
         short = (self.lowest - coefficients)[bounded] * size[bounded]
         return not np.any(short > nothing)
 
-    @property
+    @cached_property
     def joints(self) -> tuple[int, ...]:
         """Joints of the term, from 0."""
         return self.term.places
@@ -91,7 +91,7 @@ class Candidate:
     @cached_property
     def site(self) -> tuple[str, tuple[int, ...]]:
         """Kind and joints, which can be added once."""
-        return self.kind, self.term.places
+        return self.kind, self.joints
 
 
 def rows_together(candidates: Sequence[Candidate], counts: NDArray[np.int64]) -> dict[int, Array]:

@@ -18,7 +18,7 @@ from scipy.linalg import cho_factor, cho_solve
 from skidyn._cores import each
 from skidyn._signals import Array
 from skidyn.diagnosis._variables import average_at_rows
-from skidyn.evidence import Problem
+from skidyn.evidence import Problem, fold_slices
 
 FEATURES = 200
 #: Lengths over which the learned function varies, in standard deviations of its inputs.
@@ -75,8 +75,9 @@ def _inputs(problem: Problem, joint: int) -> Array:
 
 def _held_out_share(features: Array, r: Array, fold: NDArray[np.int64], n_folds: int) -> float:
     """Best share over ridges, with errors summed over the held-out folds."""
-    grams = np.array([features[fold == f].T @ features[fold == f] for f in range(n_folds)])
-    cross = np.array([features[fold == f].T @ r[fold == f] for f in range(n_folds)])
+    parts = [(features[rows], r[rows]) for rows in fold_slices(fold, n_folds)]
+    grams = np.array([x.T @ x for x, _ in parts])
+    cross = np.array([x.T @ y for x, y in parts])
     total, right = grams.sum(0), cross.sum(0)
     best, behind = 0.0, 0
     for ridge in RIDGES[::-1]:

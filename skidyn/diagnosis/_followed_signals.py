@@ -208,10 +208,11 @@ def _by_trees(
     if not _predictable(_by_fold(y**2, fold), _by_fold(left, fold)):
         return []
     for out, learner in zip(parts, trees, strict=True):
-        for i in range(len(names)):
-            shuffled = X[out]
-            shuffled[:, i] = rng.permutation(shuffled[:, i])
-            cost[i] += np.sum((y[out] - learner.predict(shuffled)) ** 2)
+        shuffled = np.repeat(X[None, out], len(names), axis=0)
+        for i, one in enumerate(shuffled):
+            one[:, i] = rng.permutation(one[:, i])
+        predicted = learner.predict(shuffled.reshape(-1, len(names)))
+        cost += np.sum((y[out] - predicted.reshape(len(names), -1)) ** 2, axis=1)
     cost -= left.sum()
     order = [i for i in np.argsort(-cost) if cost[i] > COUNTS * cost.max()][:MOST_SIGNALS]
     return [tuple(names[i] for i in order[: n + 1]) for n in range(len(order))]

@@ -239,6 +239,8 @@ class RankingSearch(SearchState):
 
     def _finals(self, rough: list[list[Candidate]], refined: int | None = None) -> list[Hypothesis]:
         """Compare the best kinds with re-estimated noise, the first of them with refined shapes."""
+        if not rough:
+            return []
         refined = self.settings.refined if refined is None else refined
         before = {
             within: profile_error(self.problem, self.blocks, self.sigma, self.target, within=within)

@@ -120,7 +120,8 @@ def _zeroed_anew(
         own = [c for c in candidates if c.joints == joints and len(c.term.trajectories or ()) == 1]
         if not 1 < len(own) <= MOST_TERMS or own[0].width > 1:
             continue
-        together, alone = tester.test_each(rows_together(own, tester.problem.rows.counts))
+        rows = rows_together(own, tester.problem.rows.counts)
+        together, alone = tester.test_each(rows, significant)
         if not significant(together.chance):
             continue
         # One that explains nearly all of it is significant alone.

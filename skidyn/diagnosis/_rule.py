@@ -31,7 +31,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 
@@ -380,13 +380,17 @@ class Tester:
         alone = self._test(own, [part[:, 1:] for part in parts], [part[:, 0] for part in parts])
         return replace(test, chance=max(test.chance, alone.chance))
 
-    def test_each(self, rows: dict[int, Array]) -> tuple[Test, Iterator[Test]]:
+    def test_each(
+        self, rows: dict[int, Array], significant: Callable[[float], bool]
+    ) -> tuple[Test, Iterator[Test]]:
         """Test some columns together and, if requested, each column alone.
 
         Parameters
         ----------
         rows : dict of int to ndarray of shape (n_rows_j, n_coefficients)
             Averaged columns, per joint they reach.
+        significant : callable
+            Function that returns whether a p-value is small enough. Larger ones are not exact.
         """
         new = self._swept(rows)
         alone = (
@@ -394,12 +398,19 @@ class Tester:
                 {j: block[:, [c]] for j, block in rows.items()},
                 [z[:, [c]] for z in new],
                 self.residual,
+                significant,
             )
             for c in range(new[0].shape[1])
         )
-        return self._test(rows, new, self.residual), alone
+        return self._test(rows, new, self.residual, significant), alone
 
-    def _test(self, rows: dict[int, Array], new: list[Array], residual: Sequence[Array]) -> Test:
+    def _test(
+        self,
+        rows: dict[int, Array],
+        new: list[Array],
+        residual: Sequence[Array],
+        significant: Callable[[float], bool] = lambda _: True,
+    ) -> Test:
         """Test columns from which the part that the model can represent has been removed."""
         k = next(iter(rows.values())).shape[1]
         own = np.asarray(sum(np.sum((b / self.sigma[j]) ** 2, axis=0) for j, b in rows.items()))
@@ -415,7 +426,9 @@ class Tester:
         b = np.linalg.solve(gram + RIDGE * np.eye(k), score)
         left = [e - z @ b for e, z in zip(residual, new, strict=True)]
         drop = float(score @ b)
-        chance = max(self._stationary(new, left, drop, k), self._by_blocks(rows, new, left, score))
+        chance = self._stationary(new, left, drop, k)
+        if significant(chance):  # blocks can only raise it
+            chance = max(chance, self._by_blocks(rows, new, left, score))
         coefficients = np.zeros(len(told))
         coefficients[told] = b / size
         return Test(chance, coefficients, drop)

@@ -11,12 +11,14 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from skidyn._cores import each
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._held_out import told_alone
@@ -151,27 +153,36 @@ class Screen:
         impossible coefficients.
         """
         errors = np.full((len(self.candidates), self.n_folds), np.inf)
-        for some in self._in_parts(wanted):
-            parts = [self._products_of(model, group, pick) for group, pick in some]
-            ends = np.cumsum([part.cross.shape[2] for part in parts])
-            swept = _Swept.of(model, np.concatenate([part.cross for part in parts], axis=2))
-            bent = np.matmul(model.bends, swept.rest)
-            for (group, pick), part, end in zip(some, parts, ends.tolist(), strict=True):
-                own, target = part.own, part.target
-                place = slice(end - part.cross.shape[2], end)
-                ridge = np.einsum("fckk->ck", own).max(1, keepdims=True) * group.soft[pick, None]
-                ridge = np.broadcast_to(ridge, (len(pick), group.width))
-                beside = swept.part(place)
-                found = beside.errors(model, own, target, ridge, bent[:, :, place])
-                errors[group.index[pick]] = found.T
-                lowest, limits = group.lowest[pick], group.limits[pick]
-                if np.isfinite(lowest).any() or np.isfinite(limits).any():
-                    gain = _Swept.whole(model, beside.cross).gain(
-                        own.sum(0, keepdims=True), target.sum(0, keepdims=True), ridge
-                    )[0]
-                    forbidden = (gain < lowest) | (np.abs(gain) > limits)
-                    errors[group.index[pick[forbidden.any(axis=1)]]] = np.inf
+        found = each(partial(self._errors, model, model.bends), self._in_parts(wanted))
+        for index, own in chain.from_iterable(found):
+            errors[index] = own
         return errors
+
+    def _errors(
+        self, model: Model, bends: Array, some: list[_Wanted]
+    ) -> list[tuple[NDArray[np.int64], Array]]:
+        """Some candidates of each group, and their held-out errors, (n_candidates, n_folds)."""
+        parts = [self._products_of(model, group, pick) for group, pick in some]
+        ends = np.cumsum([part.cross.shape[2] for part in parts])
+        swept = _Swept.of(model, np.concatenate([part.cross for part in parts], axis=2))
+        bent = np.matmul(bends, swept.rest)
+        found = []
+        for (group, pick), part, end in zip(some, parts, ends.tolist(), strict=True):
+            own, target = part.own, part.target
+            place = slice(end - part.cross.shape[2], end)
+            ridge = np.einsum("fckk->ck", own).max(1, keepdims=True) * group.soft[pick, None]
+            ridge = np.broadcast_to(ridge, (len(pick), group.width))
+            beside = swept.part(place)
+            errors = beside.errors(model, own, target, ridge, bent[:, :, place]).T
+            lowest, limits = group.lowest[pick], group.limits[pick]
+            if np.isfinite(lowest).any() or np.isfinite(limits).any():
+                gain = _Swept.whole(model, beside.cross).gain(
+                    own.sum(0, keepdims=True), target.sum(0, keepdims=True), ridge
+                )[0]
+                forbidden = (gain < lowest) | (np.abs(gain) > limits)
+                errors[forbidden.any(axis=1)] = np.inf
+            found.append((group.index[pick], errors))
+        return found
 
     def _products_of(self, model: Model, group: _Group, pick: NDArray[np.int64]) -> _Columns:
         """Products of some candidates' columns, which are stacked only temporarily."""
@@ -181,7 +192,8 @@ class Screen:
         cross = np.zeros((*model.cross.shape, len(pick) * k))
         for j in group.joints:
             rows = [self.candidates[i].rows[j] for i in group.index[pick]]
-            block = np.hstack(rows) / self.sigma[j]
+            block = np.hstack(rows)
+            block /= self.sigma[j]
             felt = model.felt[j]
             for f, here in enumerate(self.folds[j]):
                 part = block[here]

@@ -63,7 +63,7 @@ def dead_bands(measurement: Measurement) -> dict[int, float]:
 def _zeros(measurement: Measurement, k: int) -> float:
     """Share of rows in which the torque of a moving joint is exactly zero for a while."""
     torque, speed = measurement.torque[:, k], np.abs(measurement.signals.dq[:, k])
-    if torque.min() >= 0 or torque.max() <= 0 or len(np.unique(torque)) < FINE:
+    if torque.min() >= 0 or torque.max() <= 0:
         return 0.0
     zero = (torque == 0) & ~measurement.idle
     edges = np.flatnonzero(np.diff(np.r_[0, zero.astype(int), 0]))
@@ -71,7 +71,7 @@ def _zeros(measurement: Measurement, k: int) -> float:
     moves = np.r_[0, np.cumsum(speed > FAST * speed.max())]
     moving = moves[edges[1::2]] - moves[edges[::2]] > lengths / 2
     passes = lengths[(lengths >= RUN) & moving]
-    if len(passes) < PASSES:
+    if len(passes) < PASSES or len(np.unique(torque)) < FINE:
         return 0.0
     share = float(passes.sum()) / len(torque)
     step = position_step(torque)

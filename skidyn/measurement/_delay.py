@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from skidyn._signals import SIGN_BLUR, Array, Signals
 from skidyn.measurement._fits import SAMPLES, Fits, Reading, friction
 from skidyn.measurement._robust import FEWEST, RobustFit, fit_together
-from skidyn.robots import base_parameter_index, with_whole_turns
+from skidyn.robots import base_parameter_index
 
 #: Lags that are tried, s, and those if the best is beyond them; number of groups of rows that are
 #: left out in turn.
@@ -134,9 +134,12 @@ def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int]:
     beyond, middle = 0, len(lags_tried) // 2
     own_errors, own_gains, halves = np.full(n, np.nan), np.zeros(n), np.full((n, 2), np.nan)
     drifts = np.full(n, np.nan)
-    unknown = Delay(np.nan, np.nan, np.full(n, np.nan), own_errors, 0.0, own_gains, halves)
+    unknown = Delay(
+        np.nan, np.nan, np.full(n, np.nan), own_errors, 0.0, own_gains, halves, drifts=drifts
+    )
     s = fits.motion(Reading())
-    regressor = fits.average(with_whole_turns(fits.robot).torque_regressor(s.q, s.dq, s.ddq))
+    every = np.arange(10 * fits.robot.n_bodies)
+    regressor = fits.mean_regressor(fits.robot, s, every)
     shifted = [fits.average(fits.torque_at(lag)) for lag in lags_tried]
     tables, firsts, lags = [], [], np.full(n, np.nan)
     squares: dict[int, list[Array]] = {}

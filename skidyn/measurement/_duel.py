@@ -93,9 +93,11 @@ def duel_of(
     duel = Duel(gain, gain)
     for effect, columns, cost in _likely(here, joints, but=but):
         with_it = here.fit(columns).posterior
-        rival, beside = with_it - cost - plain, there.fit(columns).posterior - with_it
-        # an effect that explains something else does not reduce the gain of the reading
-        if rival > 0 and beside < duel.beside:
+        rival = with_it - cost - plain
+        if rival <= 0:
+            continue  # it does not reduce the gain of the reading
+        beside = there.fit(columns).posterior - with_it
+        if beside < duel.beside:
             duel = Duel(gain, beside, rival, effect.title)
     return duel
 

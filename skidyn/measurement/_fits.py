@@ -229,13 +229,15 @@ class Fits:
         size = np.full(self.n_joints, reading.size)
         if reading.sized is not None:
             size[[j for j in range(self.n_joints) if j not in reading.sized]] = 1.0
-        apart = np.eye(self.n_joints)
-        for joint, before in reading.summed:
-            apart[joint - 1, joint] = -before
         q, dq, ddq = (
-            (values[:, order] * (sign * faster**k / size)) @ apart
+            values[:, order] * (sign * faster**k / size)
             for k, values in enumerate((s.q, s.dq, s.ddq))
         )
+        if reading.summed:
+            apart = np.eye(self.n_joints)
+            for joint, before in reading.summed:
+                apart[joint - 1, joint] = -before
+            q, dq, ddq = q @ apart, dq @ apart, ddq @ apart
         return s.with_(q=q - zero, dq=dq, ddq=ddq)
 
     def torque_column(self, reading: Reading, joint: int) -> tuple[int, float]:
@@ -247,12 +249,13 @@ class Fits:
     def torque_at(self, lag: float) -> Array:
         """Torque that was recorded a lag (s) after the motion of every sample."""
         source = self.recorded
-        later = np.empty_like(source.torque)
+        later = np.empty((len(source.picked), self.n_joints))
         for rows in source.segments:
-            clock = source.clock[rows]
+            own = (source.picked >= rows.start) & (source.picked < rows.stop)
+            at, clock = source.clock[source.picked[own]] + lag, source.clock[rows]
             for k in range(self.n_joints):
-                later[rows, k] = np.interp(clock + lag, clock, source.torque[rows, k])
-        return np.asarray(later[source.picked])
+                later[own, k] = np.interp(at, clock, source.torque[rows, k])
+        return later
 
     def mean_torque(self, column: int) -> tuple[Array, NDArray[np.bool_]]:
         """Torque of a column in rows, and which rows count."""

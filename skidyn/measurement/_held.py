@@ -50,11 +50,11 @@ class HeldTorque(Check):
         shares, lost = np.zeros(measurement.n_joints), cut_columns(measurement)
         for k in range(measurement.n_joints):
             torque = measurement.torque[:, k]
+            share = np.mean(torque[1:][moved] == torque[:-1][moved])
             # equal steps are due to a coarse sensor, not a slow one
-            fine = len(np.unique(torque)) > 0.1 * len(torque) and np.isnan(position_step(torque))
-            if k not in lost and fine:
-                shares[k] = np.mean(torque[1:][moved] == torque[:-1][moved])
-        held = np.flatnonzero(shares > HELD)
+            if k not in lost and share > HELD and len(np.unique(torque)) > 0.1 * len(torque):
+                shares[k] = share if np.isnan(position_step(torque)) else 0.0
+        held = np.flatnonzero(shares)
         if len(held):
             yield self.suspicion(
                 f"the torque of {', '.join(measurement.joint(int(k)) for k in held)} holds its "

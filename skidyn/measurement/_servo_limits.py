@@ -24,7 +24,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 
 from skidyn._signals import Array
 from skidyn.measurement._fits import SAMPLES, Fits, Reading
@@ -176,6 +175,8 @@ class _Error:
 
     def least(self, start: Array) -> Array:
         """The best limit near one."""
+        from scipy.optimize import minimize  # half a second of imports that few logs need
+
         size = self(start) + 1e-300
         found = minimize(
             lambda x: self(x * start) / size,
