@@ -115,7 +115,7 @@ def covariance(
     size = search.size  # parameters have very different units
     flat = (slope * size[:, None, None]).reshape(len(size), -1)
     sums = [np.bincount(block.ravel(), x * errors[0].ravel()) for x in flat]
-    score: Array = np.array(sums)[:, np.unique(block)]
+    score: Array = np.array(sums, dtype=np.float64)[:, np.unique(block)]
     n, p = score.shape[1], len(size)
     inverse = np.linalg.pinv(flat @ flat.T, rcond=1e-10, hermitian=True)
     spread = inverse @ (score @ score.T) @ inverse * n / max(n - p, 1)
