@@ -81,8 +81,9 @@ def settings_of(path: str) -> list[Setting]:
 
     settings = {kind: get_effect(kind) for kind in list_effects() if get_effect(kind).of_servo}
     report = json.loads(Path(path).read_text(encoding="utf-8"))
+    effects = report.get("effects")
     found = []
-    for entry in report.get("effects", ()):
+    for entry in effects if isinstance(effects, list) else ():
         try:
             if entry["kind"] not in settings:
                 continue
