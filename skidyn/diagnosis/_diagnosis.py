@@ -39,7 +39,7 @@ from skidyn.diagnosis._servo_settings import (
     with_settings,
 )
 from skidyn.diagnosis._swift import look_at_swift
-from skidyn.effects import Term, list_effects, make_terms
+from skidyn.effects import Term, get_effect, list_effects, make_terms
 from skidyn.evidence import Fit, Problem, make_problem
 from skidyn.measurement import (
     Measurement,
@@ -247,8 +247,9 @@ def _diagnose(
     of_servos = settings_found(measured(), servos, settings_tried)
     if servos is not None and of_servos:
         tau = torque = servos.with_findings(of_servos, robot.n_joints).torque
-        if any("limit" in finding.parameters for finding in of_servos):
-            kinds = [kind for kind in kinds if kind != "saturation"]
+        # what is left of a setting that is known within an error would have their name
+        alike = {rival for f in of_servos for rival in get_effect(f.kind).rivals}
+        kinds = [kind for kind in kinds if kind not in alike]
     measurement = measured()
     once = ~copied_rows(signals, torque)
     judged, kept_weight = torque, weight

@@ -39,6 +39,7 @@ class ServoGain(ServoEffect):
     title = "Different position gain of the servo"
     formula = r"k\,(q_\mathrm{ref} - q)"
     coefficients = (Coefficient("stiffness", "N m/rad", sign=1),)
+    rivals = ("torque_gain",)
     separating_motion = "the joint holding a known load at rest"
     caveat = "wrong bodies of the description look like another gain"
 
@@ -50,7 +51,7 @@ class ServoCurrent(ServoEffect):
     title = "Current limit of the servo"
     formula = r"\mathrm{clip}(\tau,\ \pm L)"
     coefficients = (Coefficient("limit", "N m", sign=1),)
-    rivals = ("servo_voltage",)
+    rivals = ("servo_voltage", "saturation", "torque_gain")
     separating_motion = "large loads at low and at high speed"
     caveat = "a joint that is blocked, such as a gripper that holds something, looks alike"
 
@@ -69,7 +70,7 @@ class ServoVoltage(ServoEffect):
         Coefficient("limit", "N m", sign=1),
         Coefficient("no_load_speed", "rad/s", sign=1),
     )
-    rivals = ("servo_current",)
+    rivals = ("servo_current", "saturation", "torque_gain")
     separating_motion = "large loads at low and at high speed"
     caveat = ServoCurrent.caveat
 
