@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Boosted trees on what the base model leaves, with permutation importance."""
+"""Boosted trees on the residual of the base model, with permutation importance."""
 
 from _answers import by_signals
 from sklearn.ensemble import HistGradientBoostingRegressor

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""figaroh: base parameters with all that it knows of drives, least squares weighted joint by joint.
+"""figaroh: base and drive parameters by least squares with one weight per joint.
 
-figaroh knows viscous and dry friction, rotor inertia and an offset of each joint. Of those that the
-model lacks, it claims what stands out: a relative standard deviation, computed as figaroh does,
-below 10 %, the limit that is usual in its field. Samples of a joint at rest are left out, where
-dry friction may hold any torque.
+figaroh models viscous and dry friction, rotor inertia and an offset of each joint. Those that the
+base model lacks are claimed if their relative standard deviation, computed as in figaroh, is below
+10 %, the usual limit in the field. Samples of a joint at rest are left out, because dry friction
+may have any value there.
 """
 
 from types import SimpleNamespace
@@ -15,19 +15,19 @@ from figaroh.tools.qrdecomposition import QRDecomposer
 from figaroh.tools.regressor import build_regressor_basic
 
 PACKAGE = "figaroh"
-#: In figaroh's order of its columns beside the rigid body.
+#: Columns other than those of rigid bodies, in figaroh's order.
 KINDS = ("viscous", "coulomb", "rotor_inertia", "offset")
 VALUES = dict(zip(KINDS, ("Fv", "Fc", "Ia", "tau0"), strict=True))
 SAMPLES = 4000
 LIMIT = 10.0
-#: A joint rests below this share of the speed that it exceeds in 5 % of the log.
+#: A joint is at rest below this share of the speed that it exceeds in 5 % of the log.
 REST = 0.05
-#: Mass, moments and inertia in the order that the suite asks for, of pinocchio's ten.
+#: Indices of mass, moments and inertia, in the suite's order, in pinocchio's ten parameters.
 BODY = [0, 1, 2, 3, 4, 5, 7, 6, 8, 9]
 
 
 def regressor(model, q, dq, ddq) -> np.ndarray:
-    """Columns of figaroh, rows joint by joint."""
+    """Columns of figaroh; the rows of one joint follow those of the previous one."""
     robot = SimpleNamespace(model=model, data=model.createData())
     settings = {"act_idxv": list(range(model.nv)), "is_joint_torques": True}
     more = ("has_friction", "has_actuator_inertia", "has_joint_offset")
@@ -37,7 +37,7 @@ def regressor(model, q, dq, ddq) -> np.ndarray:
 def identify(
     model, motion, use, rest=REST
 ) -> tuple[np.ndarray, dict[tuple[str, int], tuple[float, float]]]:
-    """All parameters (zero where others stand for them); those of drives with their deviation."""
+    """All parameters, zero if not identifiable, and deviations of those of drives."""
     n = model.nv
     some = np.flatnonzero(use)[:: max(1, int(use.sum()) // SAMPLES)]
     speed = np.abs(motion["dq"][some])
@@ -67,7 +67,7 @@ def identify(
 
 
 def as_numbers(whole: np.ndarray, n: int) -> dict[str, list]:
-    """The parameters as the suite's simulation takes them."""
+    """Convert the parameters to the form of the suite's simulation."""
     bodies, drives = np.split(whole, [10 * n])
     values = dict(zip(KINDS, drives.reshape(4, n).tolist(), strict=True))
     return {"bodies": bodies.reshape(n, 10)[:, BODY].tolist()} | values

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A Gaussian process on what the base model leaves: one length per signal, noise fitted with it.
+"""A Gaussian process on the residual of the base model, with a length scale for each signal.
 
-Fitted to 250 rows of each joint, as exact inference takes the cube of their number.
+It is fitted to 250 rows of each joint, since the time of exact inference is cubic in the number of
+rows; the noise is fitted too.
 """
 
 from _answers import by_signals
@@ -15,7 +16,7 @@ ROWS = 250
 
 
 class Process:
-    """Standardised signals, a length for each."""
+    """Gaussian process of standardised signals, with a length scale for each."""
 
     def fit(self, X, y):
         kernel = ConstantKernel(0.5) * RBF([5.0] * X.shape[1], (0.3, 1e3)) + WhiteKernel(0.5)

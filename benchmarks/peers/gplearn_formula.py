@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""gplearn: a formula for what the base model leaves, grown by genetic programming."""
+"""gplearn: a formula for the residual of the base model, found by genetic programming."""
 
 import numpy as np
 from _answers import by_signals
@@ -22,7 +22,7 @@ def make() -> SymbolicRegressor:
 
 
 class Formula:
-    """Signals in units of their spread."""
+    """Formula of signals in units of their standard deviation."""
 
     def fit(self, X, y):
         self.spread = np.maximum(X.std(axis=0), 1e-9)

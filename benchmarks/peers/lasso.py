@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""LassoCV on skidyn's columns; the penalty of the least error over held-out trajectories."""
+"""LassoCV on skidyn's columns; the penalty has the least error on held-out trajectories."""
 
 import numpy as np
 from _answers import by_columns

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""PySINDy's STLSQ on bootstraps of trajectories; columns that 60 % of the models keep."""
+"""PySINDy's STLSQ on bootstraps of trajectories; columns that 60 % of the models contain."""
 
 import numpy as np
 import pysindy

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """PySINDy's sequentially thresholded least squares on skidyn's columns.
 
-Columns and torque have unit size, so that the default threshold of 0.1 drops what takes less than
-one percent of the square.
+Columns and torque have unit size, so that the default threshold of 0.1 removes columns that explain
+less than one percent of the squared torque.
 """
 
 import numpy as np

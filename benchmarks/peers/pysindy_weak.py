@@ -2,8 +2,8 @@
 """PySINDy's STLSQ on the weak form of skidyn's columns.
 
 Columns and torque are integrated against bumps of half a second that overlap by half, as PySINDy's
-weak libraries do with derivatives; its own libraries want one grid of time, which logs of several
-recordings with rests left out do not have.
+weak libraries do with derivatives. Its own libraries need one uniform time grid, which logs of
+several recordings without rows at rest do not have.
 """
 
 from dataclasses import replace

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Says that nothing is missing, always: what a score is worth."""
+"""Always reports that nothing is missing; the score of this answer is the reference for others."""
 
 PACKAGE = "numpy"
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``skidyn.diagnosis.diagnose`` with default options; clocks as the check of the log advises."""
+"""``skidyn.diagnosis.diagnose`` with default options and the clock that the check recommends."""
 
 import numpy as np
 from _prepare import read_as_told

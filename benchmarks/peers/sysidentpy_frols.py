@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""SysIdentPy: polynomial terms of the signals by FROLS, their number by its Bayesian criterion.
+"""SysIdentPy: polynomial terms of the signals by FROLS, their number by a Bayesian criterion.
 
-What the base model leaves depends on the present signals, so the model is a static one (NFIR,
-second degree, no lags). Rows and signals are thinned to what FROLS orders in seconds.
+The residual of the base model depends on the present signals, so the model is static (NFIR, second
+degree, no lags). The numbers of rows and signals are reduced so that FROLS takes seconds.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ PACKAGE = "sysidentpy"
 
 
 class Terms:
-    """Standardised signals; the model is linear in its terms."""
+    """Polynomial terms of standardised signals."""
 
     def fit(self, X, y):
         self.middle, self.spread = X.mean(axis=0), np.maximum(X.std(axis=0), 1e-9)
@@ -36,7 +36,7 @@ class Terms:
         return np.ravel(told)[1:]
 
     def _late(self, X):
-        """A lag of one row is the least there is: signals are moved one row up."""
+        """Signals moved up by one row, since the smallest lag of SysIdentPy is one row."""
         Z = (X - self.middle) / self.spread
         return np.vstack([Z, Z[-1:]])
 

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How soon a report page of a long log is there, in headless Chromium.
+"""Loading time of the report page of a long log in headless Chromium.
 
-A Panda with a hidden hysteresis is simulated, 300,000 rows of seven joints, and diagnosed; the page
-is opened from disk in a fresh tab each time. Milliseconds from the start of the navigation: first
-paint, the end of loading, and the moments at which every plot that the window shows, and every plot
-of the page, is drawn. The processor time of the page's thread, all of it and scripts alone, is what
-a free core needs. Medians, with the least and the most.
+A Panda with a hidden hysteresis (300,000 rows of seven joints) is simulated and diagnosed, and its
+page is opened from disk in a new tab each time. Printed are milliseconds from the start of the
+navigation to the first paint, to the end of loading, and until every visible plot and every plot of
+the page is drawn; and the processor time of the page's thread, in total and of scripts alone. All
+are medians with minimum and maximum.
 
     python benchmarks/report/page_load.py [--rows 300000] [--loads 5]
 """
@@ -27,7 +27,7 @@ from skidyn.identification import RBDRegressor
 from skidyn.report import summarize, write_html
 
 TRAJECTORIES, RATE = 30, 100.0
-#: A frame that is painted after the end of loading holds the plots that are drawn while loading.
+#: The first frame after the end of loading contains the plots that are drawn while loading.
 DRAWN = """() => new Promise((done) => {
   const painted = () => performance.getEntriesByName("first-contentful-paint").length;
   const ask = () => requestAnimationFrame(() => painted() ? done(performance.now()) : ask());
@@ -58,7 +58,7 @@ def main() -> None:
         browser = playwright.chromium.launch(
             executable_path=shutil.which("chromium"), args=["--no-sandbox", "--disable-gpu"]
         )
-        loaded(browser, page)  # the browser itself is warm from now on
+        loaded(browser, page)  # the browser is warm from here on
         runs = [loaded(browser, page) for _ in range(options.loads)]
         for name in runs[0]:
             values = [run[name] for run in runs]
@@ -69,7 +69,7 @@ def main() -> None:
 
 
 def write_page(path: Path, rows: int) -> Path:
-    """Report of a simulated log."""
+    """Write the report of a simulated log."""
     log = make_hidden_effect_log(
         load_panda(), "dahl", n_trajectories=TRAJECTORIES, duration=rows / TRAJECTORIES / RATE
     )
@@ -80,7 +80,7 @@ def write_page(path: Path, rows: int) -> Path:
 
 
 def loaded(browser: Browser, path: Path) -> dict[str, float]:
-    """Times of one load in a fresh tab."""
+    """Times of one load in a new tab."""
     context = browser.new_context(viewport={"width": 1280, "height": 900})
     page = context.new_page()
     inside = context.new_cdp_session(page)
@@ -90,7 +90,9 @@ def loaded(browser: Browser, path: Path) -> dict[str, float]:
     drawn = page.evaluate(DRAWN)
     times = page.evaluate(TIMES)
     assert page.evaluate(BLANK) == 0, "a plot in the window is blank"
-    page.wait_for_selector("html[data-drawn]")  # the plots below, drawn while nothing is asked
+    page.wait_for_selector(
+        "html[data-drawn]"
+    )  # plots below the window, which are drawn while the page is idle
     rest = page.evaluate("performance.now()")
     after = measured(inside)
     context.close()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Parquet tiles of simulated motion, fast: sums of sines with exact derivatives, and friction."""
+"""Parquet files of simulated motion: sums of sines with exact derivatives, and friction."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ RATE, DURATION, HARMONICS = 100.0, 10.0, 5
 
 
 def motion(robot: Robot, rng: np.random.Generator) -> tuple[np.ndarray, ...]:
-    """Time and exact q, dq, ddq of one trajectory."""
+    """Time and exact positions, velocities and accelerations of one trajectory."""
     time = np.arange(int(RATE * DURATION)) / RATE
     frequency = rng.uniform(0.1, 1.0, (HARMONICS, robot.n_joints)) * 2 * np.pi
     phase = rng.uniform(0, 2 * np.pi, frequency.shape)
@@ -40,7 +40,7 @@ def torque(
 
 
 def write_tile(path: Path, robot: Robot, rows: int = 100_000, seed: int = 0) -> None:
-    """A file of as many trajectories of 1,000 rows as the rows make."""
+    """Write a file of ``rows`` rows, in trajectories of 1,000 rows each."""
     rng, tables = np.random.default_rng(seed), []
     friction = np.array([np.full(robot.n_joints, 2.0), np.full(robot.n_joints, 3.0)])
     for k in range(rows // int(RATE * DURATION)):

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A simulated fleet of 1,000 SCARAs with 10 trajectories each: who is worn, and since when.
+"""Find the worn robots, and when the wear began, in a simulated fleet of 1,000 SCARA robots.
+
+Every robot has 10 trajectories.
 
 Usage: python benchmarks/scale/fleet.py [--robots 1000]
 """
@@ -21,7 +23,7 @@ TRAJECTORIES, WORN_SHARE, WEAR, SPREAD, NATURE = 10, 0.02, 1.4, 0.05, 3.0
 
 
 def evidence(robot, friction, rng, n):
-    """Evidence of n trajectories; friction gives the coefficients of the k-th."""
+    """Evidence of ``n`` trajectories; ``friction(k)`` is the friction of the k-th."""
     terms = linear_terms(("viscous", "coulomb"), robot.n_joints)
     total = None
     for k in range(n):

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Damaged and hostile inputs for every reader: each is read, or refused by an error of skidyn.
+"""Damaged and hostile inputs for every reader, which must read them or raise an error of skidyn.
 
 Usage: python benchmarks/scale/fuzz.py [--inputs 2000] [--seed 0] [--only urdf csv ...]
        python benchmarks/scale/fuzz.py --seconds 600       ten minutes for every reader
        python benchmarks/scale/fuzz.py --atheris --only formula --seconds 300
 
-The last form lets coverage of skidyn's own code guide the damage; it ends at the first crash,
-after the seconds, or never, and libFuzzer prints how many inputs it tried.
+With ``--atheris``, the coverage of skidyn's own code guides the damage. The run ends at the first
+crash or after ``--seconds``, and libFuzzer prints the number of inputs.
 
-An input counts as a crash if anything but a skidyn error is raised, or if it takes over 10 s of
-this process's own time or 10 min by the clock.
+An input counts as a crash if an error is raised that is not skidyn's, or if it takes more than 10 s
+of processor time or 10 min of wall time.
 """
 
 from __future__ import annotations
@@ -233,7 +233,7 @@ def seeds(name: str) -> list[bytes]:
 
 
 def damage(data: bytes, rng: random.Random) -> bytes:
-    """Damage an input, or what it holds where checksums would tell of damage to the whole."""
+    """Damage an input, or the content of an archive if its checksum would reveal the damage."""
     if data.startswith(b"PK") and rng.random() < 0.7:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = {name: archive.read(name) for name in archive.namelist()}
@@ -249,7 +249,7 @@ def damage(data: bytes, rng: random.Random) -> bytes:
 
 
 def _damaged(data: bytes, rng: random.Random) -> bytes:
-    """One to six changes: bytes flipped, pieces put in, cut out, repeated, or the end lost."""
+    """Apply one to six changes: flipped, inserted, removed or repeated bytes, or a lost end."""
     out = bytearray(data)
     for _ in range(rng.randint(1, 6)):
         at = rng.randrange(len(out) + 1)
@@ -272,7 +272,7 @@ def _damaged(data: bytes, rng: random.Random) -> bytes:
 
 
 class _TooSlow(BaseException):
-    """Not an Exception: readers tell those of their decoders as damage."""
+    """Not an Exception, because readers report exceptions of their decoders as damage."""
 
 
 def _alarm(*_):
@@ -282,7 +282,7 @@ def _alarm(*_):
 def try_inputs(
     name: str, count: int, seed: int = 0, seconds: float = 0.0
 ) -> tuple[int, int, list[tuple[bytes, str]]]:
-    """How many damaged inputs were tried, were read nevertheless, and those that crashed."""
+    """Number of damaged inputs, number of those that were read, and the inputs that crashed."""
     rng, crashes, accepted = random.Random(f"{name} {seed}"), [], 0
     good = seeds(name)
     end = time.monotonic() + seconds if seconds else None
@@ -319,7 +319,7 @@ def guided(name: str, seconds: int) -> None:
     for k, data in enumerate(seeds(name)):
         (corpus / f"{k}").write_bytes(data)
     for module in [m for m in sys.modules if m.startswith("skidyn")]:
-        del sys.modules[module]  # imported anew, with the counters of coverage
+        del sys.modules[module]  # imported again, instrumented for coverage
     with atheris.instrument_imports(include=["skidyn"]):
         for data in seeds(name):
             try:
@@ -343,7 +343,7 @@ def guided(name: str, seconds: int) -> None:
 
 
 def _processor_time() -> float:
-    """Of this process and of those that it started, s."""
+    """Processor time of this process and its children, s."""
     times = os.times()
     return sum(times[:4])
 

@@ -5,11 +5,11 @@ Usage: python benchmarks/scale/out_of_core.py [--rows 1e5 1e6] [--robot planar_a
        [--how plain processes dask diagnosis] [--workers 1 2]
 
 ``plain``, ``processes`` and ``dask`` identify rigid body, viscous and Coulomb friction;
-``diagnosis`` asks what a model without Coulomb friction lacks, ``memory`` the same of all rows in
-memory. The tiles (100,000 rows each, ten of them, read again and again) lie in a temporary folder
-that is deleted. Every measurement runs in a process of its own. Processor time is user and system
-time of it and its workers, without their start; it is what to compare on a machine that others
-use. Peak memory is that of the largest process.
+``diagnosis`` diagnoses a model without Coulomb friction out of core, ``memory`` does the same with
+all rows in memory. Ten files of 100,000 rows each are read repeatedly; they are in a temporary
+folder that is deleted at the end. Every measurement runs in a separate process. Processor time is
+user and system time of this process and its workers, without their start; compare it on a machine
+that is shared with others. Peak memory is that of the largest process.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from pathlib import Path
 import psutil
 
 TILE, TILES = 100_000, 10
-#: Without Dask's profiler of all workers, and with an allocator that keeps its memory: by default
-#: Dask's workers return every freed array to the operating system, and ask for it again.
+#: Dask's profiler is switched off, and the allocator keeps freed memory: by default
+#: Dask's workers return every freed array to the operating system and allocate it again.
 QUIET = {
     "distributed.worker.profile.enabled": False,
     "distributed.nanny.pre-spawn-environ": {
@@ -52,7 +52,7 @@ def evidence_of(files):
 
 
 def answer(how: str, files: list[Path], client=None, workers: int = 1) -> str:
-    """Do the work; what comes out, in a word."""
+    """Do the work and return a short description of the result."""
     import pandas as pd
 
     from skidyn.diagnosis import diagnose, diagnose_parquet
@@ -78,7 +78,7 @@ def answer(how: str, files: list[Path], client=None, workers: int = 1) -> str:
 
 
 def processor_seconds() -> float:
-    """User and system time of this process and its living descendants."""
+    """User and system time of this process and its running descendants, s."""
     own = psutil.Process()
     times = [p.cpu_times() for p in [own, *own.children(recursive=True)]]
     return sum(t.user + t.system for t in times)
@@ -104,7 +104,7 @@ def measure(how: str, workers: int, files: list[Path]) -> dict:
             cluster = LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None)
             client = stack.enter_context(Client(stack.enter_context(cluster)))
         prepare()
-        # Every worker has imported and compiled before the clock starts.
+        # Every worker has imported and compiled the modules before the clock starts.
         if how == "processes":
             answer(how, files[:1] * workers, workers=workers)
         elif client is not None:

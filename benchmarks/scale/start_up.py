@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Time until skidyn answers: imports, the first robot, the first line of ``skidyn check``.
+"""Time of imports, of the first robot, and to the first line of ``skidyn check``.
 
 Usage: python benchmarks/scale/start_up.py [--old CHECKOUT] [--repeats 5]
 
-Every case runs in fresh processes; the least CPU time of the repeats is printed, the start of
-Python included, with modules that were compiled before, as after an installation. ``--old`` names
-the root of another version (``git worktree add`` makes one) that is run in turn with this one, for
-the ratio.
+Every case runs in new processes. The least CPU time of the repeats is printed, including the start
+of Python, with modules compiled before, as after an installation. ``--old`` is the root of another
+version (a checkout by ``git worktree add``) that is run alternately with this one for the ratio.
 """
 
 from __future__ import annotations
@@ -38,7 +37,7 @@ CASES = {
 
 
 def cpu_seconds(code: str, root: Path) -> float:
-    """User and system time of a fresh interpreter."""
+    """User and system time of a new interpreter, s."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     environment = os.environ | {
         "PYTHONPATH": str(root),
@@ -64,7 +63,7 @@ def main() -> None:
         for name, code in CASES.items():
             code = code.replace("{log!r}", repr(log))
             now, old = [], []
-            for _ in range(options.repeats + 1):  # the first one compiles the modules
+            for _ in range(options.repeats + 1):  # the first run compiles the modules
                 now.append(cpu_seconds(code, HERE))
                 if options.old:
                     old.append(cpu_seconds(code, options.old.resolve()))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Answers of methods that know no robots: columns that they choose, or what they learn."""
+"""Answers of general methods: the columns that they choose, or the signals that they need."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from _log import Log, Rows
 CLEAR = 0.1
 #: A signal counts if it matters at least this share of the most important one.
 MATTERS = 0.25
-#: A joint with fewer averaged rows hardly moves, and nothing is asked of it.
+#: A joint with fewer averaged rows hardly moves and is left out.
 FEWEST = 30
 
 
 def by_columns(log: Log, choose: Callable[[Rows], dict[int, float]]) -> dict:
-    """Every kind with a chosen column, by the share of the torque that it takes.
+    """Kinds with a chosen column, in order of the share of the torque that they explain.
 
-    ``choose`` gives the coefficients of the chosen columns. Columns and torque have unit size, so
-    that a coefficient's square is about the share that its column explains.
+    ``choose`` returns the coefficients of the chosen columns. Columns and torque have unit size, so
+    that the square of a coefficient is about the share that its column explains.
     """
     weights = [choose(rows) if len(rows.torque) >= FEWEST else {} for rows in log.joints]
     size: dict[tuple[str, tuple[int, ...]], float] = {}
@@ -44,10 +44,10 @@ def by_columns(log: Log, choose: Callable[[Rows], dict[int, float]]) -> dict:
 
 
 def by_signals(log: Log, make: Callable[[], Any], most: int = 4000) -> dict:
-    """A torque without a name on every joint where a learner predicts it, with its signals.
+    """An unknown torque on every joint where a learner predicts it, with its signals.
 
-    Fitted to two thirds of the trajectories and judged on the others, by the share of the square
-    that is predicted; signals by how much shuffling them harms (permutation importance).
+    The learner is fitted to two thirds of the trajectories and judged on the others by the share of
+    the square that it predicts; signals are judged by permutation importance.
     """
     found: list[tuple[float, dict]] = []
     models: list[Any] = []

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One peer, many cases, in the peer's environment.
+"""Answers of one peer to many cases, in the peer's environment.
 
     python _ask.py PEER.py {answers,errors} SECONDS CASE ...
 
-``answers`` are to whole logs; ``errors`` need a second fit, without the last two trajectories.
+``answers`` uses whole logs; ``errors`` needs a second fit without the last two trajectories.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def load(file: Path):
 
 
 def held_out_error(fitted: dict, test: Log) -> float:
-    """Error on trajectories left out over the base model's, root mean square over joints."""
+    """Ratio of the held-out error to the base model's, root mean square over joints."""
     said = fitted["predict"](test)
     ratios = [
         np.mean((r.torque - s) ** 2) / np.mean(r.torque**2)
@@ -44,8 +44,8 @@ def held_out_error(fitted: dict, test: Log) -> float:
 def ask(peer, case: Path, seconds: float) -> dict:
     """The peer's answer to the whole log; ``error_held_out`` is null where it can be measured.
 
-    A peer that fails or takes more than ``seconds`` of the processor counts as silent, with the
-    reason.
+    The answer of a peer that fails or takes more than ``seconds`` of processor time is that nothing
+    is missing, with the reason.
     """
     whole, _, _ = read(case)
     said = {"case": case.name, "verdict": "complete", "effects": []}
@@ -54,7 +54,7 @@ def ask(peer, case: Path, seconds: float) -> dict:
     try:
         with _limit(seconds):
             said |= peer.answer(whole, whole.urdf)
-    except Exception as error:  # a peer's fault must not end the comparison
+    except Exception as error:  # a failure of a peer must not end the comparison
         said["fault"] = f"{type(error).__name__}: {error}"
     said.pop("model", None)  # of the whole log
     if said.pop("predict", None) is not None:
@@ -63,7 +63,7 @@ def ask(peer, case: Path, seconds: float) -> dict:
 
 
 def judge(peer, case: Path, out: Path, seconds: float) -> dict:
-    """The answer in a file, with its error on trajectories left out if it came in time."""
+    """Add the error on held-out trajectories to the answer in a file, unless the peer failed."""
     said = json.loads(out.read_text())
     _, train, test = read(case)
     start = time.process_time()
@@ -72,14 +72,14 @@ def judge(peer, case: Path, out: Path, seconds: float) -> dict:
             fitted = peer.answer(train, train.urdf)
             said["error_held_out"] = held_out_error(fitted, test)
         keep_model(fitted.get("model"), case.parents[1] / "models" / peer.__name__ / case.name)
-    except Exception as error:  # a peer's fault must not end the comparison
+    except Exception as error:  # a failure of a peer must not end the comparison
         del said["error_held_out"]
         said["fault_again"] = f"{type(error).__name__}: {error}"
     return said | {"seconds_again": time.process_time() - start}
 
 
 def keep_model(model, name: Path) -> None:
-    """The model that answers, for its simulation: numbers as JSON, or a model of skidyn's."""
+    """Keep the model of an answer for its simulation: numbers as JSON, or a model of skidyn."""
     if model is None:
         return
     name.parent.mkdir(parents=True, exist_ok=True)

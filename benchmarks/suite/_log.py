@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a peer is given: a log as recorded, and rows that a method without robots can choose from.
+"""Input of a peer: the log as recorded, and rows with columns for methods without a robot model.
 
-Needs numpy, scipy and pandas alone, so that a peer can live in an environment without skidyn.
+Needs only numpy, scipy and pandas, so that a peer can run in an environment without skidyn.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_matrix
 
-#: Trajectories at the end that no peer sees where its error is judged.
+#: Number of trajectories at the end that are held out to measure the errors of peers.
 HELD_OUT = 2
 
 
 @dataclass
 class Rows:
-    """Averaged rows of one joint, with the base model fitted and swept out.
+    """Averaged rows of one joint, from which the fitted base model is projected out.
 
-    ``torque`` is what the base model leaves, in units of ``scale`` (N m or N); ``columns`` are
+    ``torque`` is the residual of the base model, in units of ``scale`` (N m or N); ``columns`` are
     those of skidyn's whole catalogue, of unit size, named ``(kind, joints from 1)``; ``signals``
-    are positions, velocities, accelerations, clocks and temperatures by ``signal_names``.
+    are positions, velocities, accelerations, times and temperatures, named by ``signal_names``.
     """
 
     names: list[tuple[str, tuple[int, ...]]]
@@ -39,7 +39,7 @@ class Rows:
 
     @property
     def gain(self) -> np.ndarray:
-        """Rows are weighted by their precision: factor of every one, about 1 in the mean."""
+        """Weight of every row by its precision, about 1 on average."""
         total = np.asarray(self.weights.sum(axis=1)).ravel()
         return total / total.mean()
 
@@ -88,7 +88,7 @@ class Log:
 
 
 def read(folder: Path) -> tuple[Log, Log, Log]:
-    """The whole log; and a part to fit to with the held-out one, both less a model of the first."""
+    """Read the whole log, and its parts for fitting and testing, without the base model."""
     meta = json.loads((folder / "meta.json").read_text())
     store = np.load(folder.parents[1] / "prepared" / f"{folder.name}.npz")
     motion = {k: store[k] for k in ("q", "dq", "ddq", "tau", "trajectory", "time")}

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Rows of a log for methods that know no robots: columns of skidyn's whole catalogue, and signals.
+"""Rows of a log for methods without a robot model: columns of skidyn's catalogue, and signals.
 
-They are given what skidyn itself chooses from, the base model swept out, so that only the choice
-differs.
+They get the columns from which skidyn itself chooses, with the base model projected out, so that
+only the choice differs.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from skidyn.evidence import make_problem
 from skidyn.logs import check_log, read_log
 from skidyn.robots import Robot
 
-#: Directions of the base model that the log shows less than this stay as in the description.
+#: Directions of the base model that the log excites less than this stay as in the URDF.
 OPEN = 1e-3
 
 
 def read_as_told(case: Path, robot: Robot):
-    """The log, read with the remedy that its own check names, as a user would do who is refused.
+    """Read the log with the remedy that its check names, as a user would do after a refusal.
 
-    Clocks are the only thing that the suite spoils with certainty.
+    Clocks are the only mistake of the suite's logs that is certain enough for a refusal.
     """
     file = [str(case / "log.parquet")]
     frame = read_log(file, robot=robot)
@@ -91,7 +91,7 @@ def prepare(case: Path) -> Path:
 
 
 def _swept(matrix: np.ndarray, base: np.ndarray, use: np.ndarray, kinds: list) -> dict:
-    """Columns and torque less their share in the base model, in units of their size where used."""
+    """Columns and torque without the base model, in units of their size in the used rows."""
     base = base / np.maximum(np.linalg.norm(base[use], axis=0), 1e-12)
     mimic = np.linalg.lstsq(base[use], matrix[use], rcond=OPEN)[0]
     swept = matrix - base @ mimic
@@ -109,7 +109,7 @@ def _swept(matrix: np.ndarray, base: np.ndarray, use: np.ndarray, kinds: list) -
 
 
 def _signals(signals) -> tuple[list[str], np.ndarray]:
-    """Names and values of what a learner may look at, (n_samples, n_signals)."""
+    """Names and values of the signals for learners, (n_samples, n_signals)."""
     parts = {"q": signals.q, "dq": signals.dq, "ddq": signals.ddq}
     if signals.temperature is not None:
         parts["temp"] = signals.temperature

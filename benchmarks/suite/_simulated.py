@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Error of the simulated motion of models that can be run forward, over the base model's.
+"""Ratio of the errors of simulated motion of models to the base model's.
 
     python _simulated.py FOLDER CASE ...
 
-A peer that can be simulated leaves its model of all but the last two trajectories beside its
-answer: ``case_017.json`` in ``models/PEER``, with ``bodies`` (a row for each joint: mass, its three
+A peer that can be simulated writes its model of all but the last two trajectories to
+``models/PEER/case_017.json``, with ``bodies`` (a row for each joint: mass, its three
 moments, and the inertia xx, xy, xz, yy, yz, zz about the joint's frame) and values of drives for
-each joint (``viscous``, ``coulomb``, ``rotor_inertia``, ``offset``), or a model of skidyn's,
+each joint (``viscous``, ``coulomb``, ``rotor_inertia``, ``offset``), or a model of skidyn,
 ``case_017.skops``. Every model starts on the last two trajectories every quarter of a second, with
 the state of the log, under the torque of the log; one integrator runs them all.
 """
@@ -29,19 +29,19 @@ from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
 from skidyn.simulation import judge_by_simulation
 
-#: Seconds after which a model is put back on the log.
+#: Time after which a model is set back to the state of the log, s.
 PIECE = 0.25
 DRIVES = ("viscous", "coulomb", "rotor_inertia", "offset")
 
 
 def models(folder: Path, case: str) -> dict[str, Path]:
-    """Files of the models that peers left of a case."""
+    """Files of the models of peers for a case."""
     found = sorted((folder / "models").glob(f"*/{case}.*"))
     return {file.parent.name: file for file in found}
 
 
 def compare(folder: Path, case: str) -> dict[str, Any]:
-    """Ratio of the errors of every model's motion and the base model's; a sentence where none."""
+    """Ratio of the error of every model's motion to the base model's, or why there is none."""
     place = folder / "cases" / case
     _, train, test = read(place)
     robot = Robot.from_urdf(place / "robot.urdf")
@@ -62,7 +62,7 @@ def compare(folder: Path, case: str) -> dict[str, Any]:
 
 
 def _model(file: Path, robot: Robot, X: Any, y: Any) -> RBDRegressor:
-    """The model in a file; numbers of a rigid body with drives take the place of fitted ones."""
+    """Read a model from a file; stored numbers of bodies and drives replace the fitted ones."""
     if file.suffix == ".skops":
         return skidyn.load_model(file)
     numbers = json.loads(file.read_text())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Make the suite, let every peer answer the same logs, print who is right.
+"""Generate the suite, run every peer on the same logs, and print the scores.
 
     python benchmarks/suite/run.py FOLDER [--seed 2026] [--logs 60] [--jobs 2] [--peers NAMES]
     python benchmarks/suite/run.py --table benchmarks/suite/results.json

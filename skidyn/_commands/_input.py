@@ -113,6 +113,7 @@ def reading(options: argparse.Namespace) -> dict[str, Any]:
         "drop_repeated": said.get("drop_repeated"),
         "split_leaps": said.get("split_leaps"),
         "restore_gravity": said.get("restore_gravity"),
+        "derive": listed(said.get("derive")),
     }
     # defaults are left to read_log, so that a script made from this contains only given options
     always = ("columns", "units", "drive_gains", "rate")

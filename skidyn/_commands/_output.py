@@ -145,7 +145,7 @@ RECORDED: dict[str, tuple[type, ...]] = {
     "rate": (float, int, type(None)),
     **dict.fromkeys(("columns", "units", "drive_gains", "joints", "effects"), (str, type(None))),
     **dict.fromkeys(("gravity", "flip", "order", "gain", "summed"), (str, type(None))),
-    **dict.fromkeys(("zero", "late", "lowpass"), (str, type(None))),
+    **dict.fromkeys(("zero", "late", "lowpass", "derive"), (str, type(None))),
     **dict.fromkeys(("torque_sign", "clock"), (str, type(None))),
     **dict.fromkeys(
         ("unwrap", "drop_repeated", "split_leaps", "restore_gravity", "force"), (bool, type(None))

@@ -273,7 +273,9 @@ def told_briefly(
     if trajectories is not None:
         many = "y" if len(trajectories) == 1 else "ies"
         where += f" in trajector{many} {', '.join(map(str, trajectories))}"
-    what = next((_value(name, row) for name, row in parameters.items()), "")
+    # of the components of a vector, one that is not zero
+    rows = sorted(parameters.items(), key=lambda item: _may_be_zero(item[1]))
+    what = next((_value(name, row) for name, row in rows), "")
     return f"{title} on {where}{what}"
 
 
@@ -284,8 +286,14 @@ def _fall_told(drop: float) -> str:
     return f"Adding it removes {share} of the held-out squared error."
 
 
+def _may_be_zero(row: dict[str, Any]) -> bool:
+    """Whether the interval of a parameter contains zero."""
+    value, low, high = row["value"], row["low"], row["high"]
+    return isinstance(value, float) and low is not None and bool(low <= 0 <= high)
+
+
 def _value(name: str, row: dict[str, Any]) -> str:
-    """Text of the first parameter of a finding."""
+    """Text of a parameter of a finding."""
     value, unit = row["value"], "" if row["unit"] == "1" else f" {row['unit']}".rstrip()
     if isinstance(value, float) and row["low"] is not None:
         return f": {name} = {give_or_take(value, (row['high'] - row['low']) / 2)}{unit}"

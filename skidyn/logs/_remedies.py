@@ -36,6 +36,7 @@ REMEDIES = (
     "torque_sign:",
     "split_leaps:",
     "restore_gravity:",
+    "derive:",
 )
 
 
@@ -56,6 +57,7 @@ class Remedies:
     lowpass: Mapping[str, float] | None = None
     split_leaps: bool = False
     restore_gravity: bool = False
+    derive: Sequence[str] = ()
 
 
 def mend_columns(
@@ -106,9 +108,12 @@ def mend_columns(
     for name, value in _each(remedies.zero, table, "zero"):
         if not np.isfinite(value):
             raise LogError(f"zero: {name} has the value {value} at zero; expected a number.")
-        if not re.fullmatch(r"q\d+", name):
-            raise LogError(f"zero: {name} is not a position; expected q1 .. q{n}.")
-        for column in (name, name.replace("q", "cmd")):
+        if not re.fullmatch(r"d?q\d+", name):
+            raise LogError(
+                f"zero: {name} is neither a position nor a velocity; expected q1 .. q{n} or "
+                f"dq1 .. dq{n}."
+            )
+        for column in {name, re.sub("^q", "cmd", name)}:
             if column in table.columns:
                 table[column] = table[column] - value
         notes.append(f"zero: {value:g} was subtracted from {name} in {_all(table)} rows")
@@ -205,6 +210,8 @@ def mend_rows(table: pd.DataFrame, n: int, remedies: Remedies, notes: list[str])
             f"late: {told} removed; {before - len(table)} of {before} rows at the ends of "
             "continuous parts left out"
         )
+    if remedies.derive:
+        table = _with_derived(table, remedies.derive, notes)
     return table
 
 
@@ -307,6 +314,24 @@ def _each(
         columns = [name] if name in table.columns else joints
         told += [(column, float(value)) for column in columns]
     return told
+
+
+def _with_derived(table: pd.DataFrame, asked: Sequence[str], notes: list[str]) -> pd.DataFrame:
+    """Differentiated positions in the place of recorded velocities."""
+    from skidyn.logs._clock import derive_velocity
+
+    time, number = table["time"].to_numpy(), table["trajectory"].to_numpy()
+    columns = [name for name, _ in _each(dict.fromkeys(asked, 0.0), table, "derive")]
+    for name in columns:
+        if not re.fullmatch(r"dq\d+", name):
+            raise LogError(f"derive: {name} is not a velocity; expected dq, or dq1, dq2, ...")
+    q = table[[name[1:] for name in columns]].to_numpy(dtype=float)
+    derived = derive_velocity(q, time, number)
+    notes.append(
+        f"derive: {', '.join(columns)} were replaced by central differences of the positions in "
+        f"{_all(table)} rows"
+    )
+    return table.assign(**{name: derived[:, k] for k, name in enumerate(columns)})
 
 
 def _sign_from_command(table: pd.DataFrame, n: int, notes: list[str]) -> None:

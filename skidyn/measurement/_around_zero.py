@@ -65,7 +65,7 @@ def _zeros(measurement: Measurement, k: int) -> float:
     torque, speed = measurement.torque[:, k], np.abs(measurement.signals.dq[:, k])
     if torque.min() >= 0 or torque.max() <= 0 or len(np.unique(torque)) < FINE:
         return 0.0
-    zero = (torque == 0) & ~measurement.idle
+    zero = (torque == 0) & ~measurement.idle & ~measurement.missing
     edges = np.flatnonzero(np.diff(np.r_[0, zero.astype(int), 0]))
     lengths = edges[1::2] - edges[::2]
     moves = np.r_[0, np.cumsum(speed > FAST * speed.max())]

@@ -30,6 +30,7 @@ RIVALS = 0.2
 #: opposite sign or gravity that points up or is absent, so that these gain little.
 NEEDED = {
     **dict.fromkeys(("motion_sign", "joint_sign", "order", "torque_order", "summed", "zero"), 10.0),
+    "convention": 10.0,
     **dict.fromkeys(("torque_sign", "gravity"), -3.0),
 }
 #: Least gain of a change relative to the largest one, as a share.
@@ -46,6 +47,8 @@ UPRIGHT = 0.995
 PARALLEL = 0.999
 #: Offsets of a position that are tried, rad.
 OFFSETS = np.deg2rad([-135, -90, -45, -15, 15, 45, 90, 135, 180])
+#: Those tried for a joint that also counts in the opposite direction, rad.
+QUARTERS = np.deg2rad([-90, 90, 180])
 #: Alternative of a reading that gains little over bodies near those of the description.
 OTHER_BODIES = "bodies that differ from the description"
 #: Rounds of the fits for ranking, and number of changes that are examined in detail.
@@ -62,7 +65,8 @@ class Change:
     ----------
     kind : str
         ``"torque_sign"``, ``"motion_sign"``, ``"joint_sign"`` (both), ``"order"``,
-        ``"torque_order"``, ``"summed"``, ``"gravity"``, ``"no_gravity"`` or ``"zero"``.
+        ``"torque_order"``, ``"summed"``, ``"gravity"``, ``"no_gravity"`` or ``"zero"``; during the
+        comparison also ``"convention"``, a joint sign with a zero.
     joints : tuple of int
         Joints concerned, from 0.
     reading : Reading
@@ -113,7 +117,8 @@ def find_changes(fits: Fits) -> list[Change]:
             break
         # a more extensive exchange replaces the previous one
         found = [c for c in found if not (best.kind == c.kind and "order" in c.kind)]
-        found.append(best)
+        both = ("joint_sign", "zero") if best.kind == "convention" else (best.kind,)
+        found += [replace(best, kind=kind) for kind in both]
         reading = best.reading
     return found
 
@@ -129,16 +134,11 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
         (float(few.nominal(change.reading, SCREENED).margin(rough).sum()), change)
         for change in _alternatives(fits, reading, here)
     ]
-    screened = sorted(screened, key=lambda pair: -pair[0])[:FINALISTS]
     judged = []
-    refined: set[tuple[int, ...]] = set()
-    for rough_gain, change in screened:
-        if change.kind == "zero":
-            if rough_gain <= 0 or change.joints in refined:
-                continue  # another angle of the same joint
-            refined.add(change.joints)
-            change = _refined(fits, change)
+    for rough_gain, change in _distinct(screened)[:FINALISTS]:
         if rough_gain > 0:
+            if change.kind == "zero":
+                change = _refined(fits, change)
             there = fits.nominal(change.reading)
             gain = float(there.margin(here).sum())
             drop = _drop(here, there)
@@ -190,6 +190,29 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
             return _sharpened(fits, held) if held.kind == "zero" else held
         accepted.remove(best)
     return None
+
+
+def _distinct(screened: list[tuple[float, Change]]) -> list[tuple[float, Change]]:
+    """Changes with their gains, the largest first, with one angle for every joint.
+
+    A joint sign with a zero is two changes, and must gain more than either of them.
+    """
+    best: dict[tuple[str, tuple[int, ...]], float] = {}
+    kept = []
+    for gain, change in sorted(screened, key=lambda pair: -pair[0]):
+        place = (change.kind, change.joints)
+        if change.kind not in ("zero", "convention") or place not in best:
+            kept.append((gain, change))
+        best.setdefault(place, gain)
+
+    def alone(change: Change) -> float:
+        return max(best.get((kind, change.joints), 0.0) for kind in ("joint_sign", "zero"))
+
+    return [
+        (gain, change)
+        for gain, change in kept
+        if change.kind != "convention" or gain > alone(change) + max(TIED, RIVALS * gain)
+    ]
 
 
 def _first(accepted: list[Change]) -> Change:
@@ -337,8 +360,17 @@ def _alternatives(fits: Fits, reading: Reading, here: Outcome) -> Iterator[Chang
     for j in np.flatnonzero(~fits.signals.prismatic).tolist():
         for offset in OFFSETS:
             if j not in found:
-                shifted = replace(reading, zero=(*reading.zero, (int(j), float(offset))))
-                yield Change("zero", (int(j),), shifted)
+                shifted = replace(reading, zero=(*reading.zero, (j, float(offset))))
+                yield Change("zero", (j,), shifted)
+        for offset in QUARTERS:
+            if j not in found:
+                both = replace(
+                    reading,
+                    flip_torque=reading.flip_torque ^ {j},
+                    flip_motion=reading.flip_motion ^ {j},
+                    zero=(*reading.zero, (j, float(offset))),
+                )
+                yield Change("convention", (j,), both)
 
 
 def _parallel(robot: Robot) -> Iterator[tuple[int, int]]:

@@ -46,6 +46,8 @@ AGREEING = 0.75
 #: How far the lag of one joint must be from those of others, s, and how nearly it must be the same
 #: in its slower and its faster rows, as a share of it.
 APART, SAME = 0.008, 0.3
+#: Fewest other joints of known lag to compare with it, in robots that have as many.
+FEWEST_SURE = 2
 
 
 #: Share of the recordings that may be late by themselves, and log-likelihood that they must gain:
@@ -250,7 +252,7 @@ class Columns(Check):
             remedy = (f"--flip {','.join(columns)}", f"flip={columns}")
         elif kind == "joint_sign":
             columns = [f"{q}{j + 1}" for j in joints for q in ("q", "tau")]
-            what = f"{names} count in the opposite direction to the robot's description"
+            what = f"the direction of {names} is opposite to that of the robot's description"
             remedy = (f"--flip {','.join(columns)}", f"flip={columns}")
         elif kind in ORDERS:
             what, remedy = _ordered(measurement, final)
@@ -323,6 +325,7 @@ _RIVALS = {
     "torque_sign": "the torque with the opposite sign",
     "motion_sign": "the position with the opposite sign",
     "joint_sign": "position and torque with the opposite sign",
+    "convention": "a position that counts in the opposite direction from another zero",
     "order": "a different order of all columns",
     "torque_order": "a different order of the torques",
     "summed": "a position relative to another link",
@@ -555,7 +558,7 @@ def late_joints(found: Delay) -> list[int]:
     for k, lag in enumerate(found.joints):
         others = np.delete(found.joints, k)
         sure = others[np.isfinite(others) & (np.delete(found.errors, k) < SMALLEST)]
-        if not np.isfinite(lag) or not len(sure) or len(sure) < len(others) / 2:
+        if not np.isfinite(lag) or len(sure) < min(FEWEST_SURE, len(others)):
             continue
         common = float(np.median(sure))
         apart = abs(lag - common) > max(APART, ERRORS * found.errors[k]) and abs(common) < SMALLEST

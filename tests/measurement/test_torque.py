@@ -58,6 +58,13 @@ def test_zero_of_a_joint(signals, torque, found):
     assert name == "--zero q2" and float(value) == pytest.approx(1.0, abs=0.02)
 
 
+def test_a_joint_that_counts_the_other_way_from_another_zero(signals, torque, found):
+    sign, zero = np.array([1, -1]), np.array([0, np.pi / 2])
+    turned = signals.with_(q=zero + sign * signals.q, dq=sign * signals.dq, ddq=sign * signals.ddq)
+    told = [s for s in found(turned, sign * torque) if s.certainty != "noted"]
+    assert [s.remedy.option for s in told] == ["--flip q2,tau2", "--zero q2=-1.5708"]
+
+
 def test_torque_cut_at_zero(signals, torque, found):
     cut = torque.copy()
     cut[:, 1] = np.maximum(cut[:, 1], 0)
