@@ -287,7 +287,8 @@ def _with_derived(table: pd.DataFrame, asked: Sequence[str], notes: list[str]) -
     q = table[[name[1:] for name in columns]].to_numpy(dtype=float)
     derived = derive_velocity(q, time, number)
     notes.append(
-        f"derive: {', '.join(columns)} were replaced by central differences of the positions in "
+        f"derive: {', '.join(columns)} {'was' if len(columns) == 1 else 'were'} replaced by "
+        "differences of the positions in "
         f"{_all(table)} rows"
     )
     return table.assign(**{name: derived[:, k] for k, name in enumerate(columns)})

@@ -3,6 +3,8 @@
 
 import numpy as np
 
+from skidyn.effects import get_effect
+
 
 def test_it_is_the_size_of_the_load_against_the_motion(signals, columns_of):
     column = columns_of("load_dependent_friction", signals)[:, 0]
@@ -47,3 +49,12 @@ def test_one_flank_feels_load_of_one_sign(signals, columns_of):
     found = [columns_of("load_dependent_friction", signals, side=s)[:, 0] for s in (1.0, -1.0)]
     np.testing.assert_allclose(sum(found), columns_of("load_dependent_friction", signals)[:, 0])
     assert np.all(found[0][load < 0] == 0) and np.all(found[1][load > 0] == 0)
+
+
+def test_its_own_friction_needs_a_load_that_moves_the_joint(signals):
+    effect, shape = get_effect("load_dependent_friction"), {"friction": 0.4, "damping": 0.2}
+    heavy = signals.with_(load=10.0 * np.ones_like(signals.q))
+    light = signals.with_(load=0.1 * np.ones_like(signals.q))
+
+    assert effect.admissible(heavy, [0], shape) and effect.admissible(light, [0], {})
+    assert not effect.admissible(light, [0], shape)

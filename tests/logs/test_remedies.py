@@ -115,6 +115,16 @@ def test_a_low_pass_is_undone_within_recordings(read):
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
+def test_velocities_are_derived_on_request(read):
+    frame = read(LOG.assign(dq2=LOG["dq2"].abs()), derive=["dq2"])
+    steps = np.gradient(frame["q2"][:50], frame["time"][:50])
+    np.testing.assert_allclose(frame["dq2"][:49], steps[:49], atol=1e-9)
+    np.testing.assert_array_equal(frame["dq1"], read(LOG)["dq1"])
+    assert any("dq2 was replaced by differences" in note for note in frame.attrs["notes"])
+    with pytest.raises(LogError, match="derive: q2 is not a velocity"):
+        read(LOG, derive=["q2"])
+
+
 def test_sign_from_the_command(read):
     command = {f"cmd{k}": LOG[f"q{k}"] + 0.01 * LOG[f"tau{k}"] for k in (1, 2)}
     unsigned = LOG.assign(tau1=LOG["tau1"].abs(), tau2=LOG["tau2"].abs(), **command)

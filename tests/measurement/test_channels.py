@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Single channels: still, coarse, held, cut off, not enabled, without noise."""
+"""Single channels: still, coarse, cut off, not enabled, without noise."""
 
 import numpy as np
 import pytest
@@ -20,9 +20,12 @@ def test_still_joint(signals, torque, found):
     assert told["still_joint"].joints == (2,) and "elbow" in str(told["still_joint"])
 
 
-def test_torques_that_are_held(signals, torque, found, only):
-    held = torque[np.arange(len(torque)) // 4 * 4]
-    only(found(signals, held), "held_torque", "certain", "--drop-repeated")
+def test_torque_in_coarse_steps(signals, torque, found):
+    step = 0.8 * torque[:, 0].std()
+    coarse = np.column_stack([np.round(torque[:, 0] / step) * step, torque[:, 1]])
+    told = {s.check: s for s in found(signals, coarse)}
+    assert told["coarse_torque"].joints == (1,) and told["coarse_torque"].certainty == "suspected"
+    assert "clipped_torque" not in told
 
 
 def test_torque_without_noise(arm, signals, found):

@@ -56,3 +56,8 @@ def test_one_recording_that_is_late():
     assert told.suspicion.startswith(f"in trajectory {run} torque is late by about ")
     assert float(words[words.index("ms") - 1]) == pytest.approx(30, abs=4)
     assert told.certainty == "suspected" and told.remedy is None
+
+
+def test_torque_that_is_late_by_more_than_the_usual_lags():
+    (told,) = late(lambda t: np.full_like(t, 0.11))
+    assert float(told.remedy.option.partition("=")[2]) == pytest.approx(0.11, abs=0.01)

@@ -50,3 +50,13 @@ def test_rows_that_were_lost_under_an_even_clock():
 def test_rows_that_the_clock_says_are_missing():
     kept = FRAME[np.random.default_rng(2).random(len(FRAME)) > 0.05]
     assert "lost_rows" not in told_of(kept.reset_index(drop=True))
+
+
+def test_rows_that_are_exchanged_with_their_neighbours():
+    order = np.arange(len(FRAME))
+    for row in np.random.default_rng(3).choice(len(FRAME) - 4, len(FRAME) // 20, replace=False):
+        order[[row, row + 3]] = order[[row + 3, row]]
+    signals = [c for c in FRAME if c not in ("time", "trajectory")]
+    frame = FRAME.copy()
+    frame[signals] = FRAME[signals].to_numpy()[order]
+    assert "exchanged with others" in told_of(frame)["lost_rows"].suspicion

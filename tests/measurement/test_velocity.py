@@ -59,3 +59,28 @@ def test_an_encoder_that_is_stuck_in_one_recording(recorded, told_of):
     frame.loc[frame["trajectory"] == run, "q2"] = 0.4
     told = told_of(frame)["velocity"]
     assert told.joints == (2,) and told.evidence.startswith(f"in {run};")
+
+
+def test_an_encoder_that_loses_steps(signals, torque, found):
+    q = signals.q.copy()
+    for row in (500, 900, 1300):
+        q[row:, 1] += 0.3
+    told = {s.check: s for s in found(signals.with_(q=q), torque)}["joined"]
+    assert told.joints == (2,) and "loses steps" in told.suspicion and told.remedy is None
+
+
+def test_a_position_that_is_stuck_before_it_jumps(signals, torque, found):
+    q = signals.q.copy()
+    for row in (500, 1300):
+        q[row : row + 60, 1] = q[row, 1]
+    told = {s.check: s for s in found(signals.with_(q=q), torque)}["joined"]
+    assert told.joints == (2,) and "stuck in parts" in told.suspicion
+
+
+def test_a_filtered_velocity_has_no_other_unit(signals, torque, found):
+    from scipy.signal import lfilter
+
+    share = 0.01 / (0.25 + 0.01)
+    slow = lfilter([share], [1, share - 1], signals.dq, axis=0)
+    told = [s.check for s in found(signals.with_(dq=slow), torque) if s.certainty == "certain"]
+    assert "clock_unit" not in told

@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Positions and torques that hold their last value, and zeros for missing torques."""
+
+import numpy as np
+
+
+def test_torques_that_are_held(signals, torque, found, only):
+    held = torque[np.arange(len(torque)) // 4 * 4]
+    only(found(signals, held), "held_torque", "certain", "--drop-repeated")
+
+
+def test_a_position_that_is_reported_less_often(signals, torque, found):
+    slow = signals.q.copy()
+    slow[:, 1] = slow[np.arange(len(slow)) // 8 * 8, 1]
+    told = {s.check: s for s in found(signals.with_(q=slow), torque)}
+    assert told["held_position"].joints == (2,)
+    assert told["held_position"].remedy.option.startswith("--resample 1")
+    assert "lost_rows" not in told
+
+
+def test_a_torque_that_is_stuck_for_a_while(signals, torque, found):
+    stuck = torque.copy()
+    stuck[700:900, 0] = stuck[700, 0]
+    told = [s for s in found(signals, stuck) if s.check == "stuck_torque"]
+    assert [s.joints for s in told] == [(1,)]
+    assert "from 7 s to 8.99 s" in told[0].evidence
+
+
+def test_missing_torques_that_were_replaced_by_zero(signals, torque, found):
+    lost = np.random.default_rng(0).choice(len(torque) - 10, 60, replace=False)
+    holes = torque.copy()
+    for start in lost:
+        holes[start : start + 5] = 0.0
+    told = {s.check: s for s in found(signals, holes)}
+    assert told["missing_torque"].joints == (1, 2)
+    assert "dead_band" not in told
+
+
+def test_zeros_of_one_joint(signals, torque, found):
+    holes = torque.copy()
+    holes[np.random.default_rng(1).choice(len(torque), 40, replace=False), 0] = 0.0
+    told = {s.check: s for s in found(signals, holes)}
+    assert told["missing_torque"].joints == (1,)
