@@ -22,7 +22,7 @@ CONSTANT, MARGIN, CORRELATED, REMOVED = 2.9, 1.8, -1.1, 1.8
 #: Weights of an unknown effect on the same joints, of folds that are blocks of time and not
 #: recordings, of an equally good kind on other joints, and of an equally good but less simple one
 #: on the same joints.
-NAMELESS, BLOCKS, ALIKE, EQUALLED = -1.3, -0.5, -2.4, -0.5
+NAMELESS, BLOCKS, ALIKE, EQUALLED = -1.3, -0.5, -2.4, -1.0
 #: Weight of an effect in few recordings only, of which only the plain form was tried.
 FEW = -0.6
 #: Weight of an error that mostly remains on the joint where it was largest: more than this share of
@@ -37,7 +37,7 @@ COLOURED, LEAST, ENOUGH = 1.7, 0.003, 0.3
 MOST = 0.98
 #: Highest confidence of an unknown effect, which may be a known one with another formula, and of an
 #: effect that leaves most of the error.
-MOST_NAMELESS = 0.93
+MOST_NAMELESS = 0.88
 
 
 def confidence(
@@ -81,7 +81,7 @@ def confidence(
     Returns
     -------
     float
-        Between 0 and 0.98, or 0.93 for an unknown effect or if most of the error remains.
+        Between 0 and 0.98, or 0.88 for an unknown effect or if most of the error remains.
     """
     logit = CONSTANT + MARGIN * min(max(margin, 0.0), 1.0)
     logit += CORRELATED * float(np.log(max(inflation / COLOURED, 1.0)))
