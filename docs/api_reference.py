@@ -195,19 +195,15 @@ PAGES: tuple[Page, ...] = (
     ),
     Page(
         "skidyn.report",
-        "A diagnosis, or two compared, as JSON and as one HTML page.",
+        "A diagnosis, two compared, or a fleet, as JSON and as one HTML page.",
         (
             Section(
                 "Functions",
                 (
-                    "render_comparison",
-                    "render_fleet",
                     "render_html",
                     "summarize",
                     "summarize_comparison",
                     "summarize_fleet",
-                    "write_comparison",
-                    "write_fleet",
                     "write_html",
                     "write_json",
                 ),
@@ -259,12 +255,7 @@ PAGES: tuple[Page, ...] = (
             Section(
                 "Functions",
                 (
-                    "fetch_double_pendulum",
-                    "fetch_emps",
-                    "fetch_panda_exciting",
-                    "fetch_panda_gaz",
-                    "fetch_screw_drive",
-                    "fetch_xl330",
+                    "fetch_recording",
                     "hidden_effect_kinds",
                     "hidden_effect_suite",
                     "load_demo_log",

@@ -25,7 +25,7 @@ from playwright.sync_api import Browser, Page, sync_playwright
 from skidyn.datasets import load_demo_log, load_ur5, make_hidden_effect_log
 from skidyn.diagnosis import Diagnosis, diagnose
 from skidyn.identification import RBDRegressor
-from skidyn.report import summarize, summarize_comparison, write_comparison, write_html
+from skidyn.report import summarize, summarize_comparison, write_html
 
 OUT = Path(__file__).parent / "_static" / "pictures"
 
@@ -47,7 +47,7 @@ def comparison(folder: Path) -> Path:
     summary = summarize_comparison(
         recorded(None, 1), recorded("load_dependent_friction", 1), names=("new", "worn")
     )
-    return write_comparison(folder / "wear.html", summary)[0]
+    return write_html(folder / "wear.html", summary)
 
 
 @contextlib.contextmanager

@@ -7,11 +7,5 @@ from importlib.resources import files
 
 
 def bundled(name: str) -> str:
-    """Text of a file that skidyn ships for its pages.
-
-    Parameters
-    ----------
-    name : {"uPlot.js", "uPlot.css", "uPlot.LICENSE.txt"}
-        File in ``skidyn/static``.
-    """
+    """Text of a file in ``skidyn/static`` that skidyn ships for its pages."""
     return files("skidyn").joinpath("static", name).read_text("utf-8")

@@ -32,17 +32,8 @@ def warn_about_log(message: str) -> None:
 def count_joints(frame: pd.DataFrame, source: str = "the log") -> int:
     """Number of joints of a log from its columns ``q1 .. qn``.
 
-    Parameters
-    ----------
-    frame : DataFrame
-        Table with columns ``q1 .. qn``.
-    source : str, default="the log"
-        Name for messages.
-
-    Raises
-    ------
-    LogError
-        There are no positions, a joint has none, or a column occurs twice.
+    A LogError, with the name ``source``, is raised if there are no positions, a joint has none, or
+    a column occurs twice.
     """
     refuse_duplicates([str(name) for name in frame.columns], source)
     numbers = sorted(
@@ -69,24 +60,7 @@ def require_columns(
     quantities: Sequence[str] = ("q", "tau"),
     source: str = "the log",
 ) -> None:
-    """Raise unless the quantities are present for every joint and for no others.
-
-    Parameters
-    ----------
-    frame : DataFrame
-        The log.
-    n_joints : int
-        Number of joints of the robot.
-    quantities : sequence of str
-        Required quantities.
-    source : str, default="the log"
-        Name for messages.
-
-    Raises
-    ------
-    LogError
-        Columns are missing, or belong to a joint without position.
-    """
+    """Raise a LogError unless the quantities are present for every joint and for no others."""
     names = [str(name) for name in frame.columns]
     present = {hit[1] for name in names if (hit := SIGNAL_COLUMN.fullmatch(name))}
     for quantity in dict.fromkeys([*quantities, *sorted(present)]):
@@ -124,22 +98,7 @@ def refuse_duplicates(names: Sequence[str], source: str) -> None:
 
 
 def as_numbers(frame: pd.DataFrame, names: Sequence[str], source: str = "the log") -> pd.DataFrame:
-    """Copy with the named columns as float64.
-
-    Parameters
-    ----------
-    frame : DataFrame
-        The log.
-    names : sequence of str
-        Columns that must hold numbers.
-    source : str, default="the log"
-        Name for messages.
-
-    Raises
-    ------
-    LogError
-        A cell is not a number; the message states column, row and content.
-    """
+    """Copy with the named columns as float64; a LogError states a cell that is not a number."""
     import pandas as pd
 
     # All at once: the time for one column after another grows as the square of their number.
@@ -175,21 +134,7 @@ def handle_missing(
 ) -> pd.DataFrame:
     """Refuse rows with NaN or infinite values, or drop them and report their number.
 
-    Parameters
-    ----------
-    frame : DataFrame
-        The log.
-    names : sequence of str
-        Columns that must be finite.
-    missing : {"error", "drop"}
-        Treatment of rows that are not.
-    source : str, default="the log"
-        Name for messages.
-
-    Raises
-    ------
-    LogError
-        Rows are not finite and ``missing="error"``, or none is left.
+    A LogError is raised if such rows are not to be dropped, or no row is left.
     """
     finite = np.isfinite(frame[list(names)].to_numpy())
     bad = ~finite.all(axis=1)
@@ -219,24 +164,8 @@ def check_time_order(
 ) -> np.ndarray:
     """Rows to keep so that time increases strictly within each trajectory.
 
-    Parameters
-    ----------
-    time : ndarray of shape (n_samples,), s
-        Time of each row.
-    trajectory : ndarray of shape (n_samples,)
-        Trajectory of each row.
-    source : str, default="the log"
-        Name for messages.
-
-    Returns
-    -------
-    ndarray of shape (n_samples,) of bool
-        False for a row with the time of the previous row.
-
-    Raises
-    ------
-    LogError
-        Time goes backwards inside a trajectory.
+    A row with the time of the previous row is left out; a LogError is raised if time goes
+    backwards.
     """
     same = trajectory[1:] == trajectory[:-1]
     steps = np.diff(time)

@@ -71,28 +71,12 @@ def resolve_columns(
     time: ColumnSpec = "auto",
     require_acceleration: bool = True,
 ) -> Columns:
-    """Find the signals of the X contract among the columns of X.
+    """Find the signals of the X contract among the columns of X; names are None for an array.
 
-    Parameters
-    ----------
-    names : sequence of str or None
-        Column names of X, None for an array.
-    n_features : int
-        Number of columns of X.
-    joint_names : sequence of str
-        Joint names in the order of the robot.
-    trajectory, time : int, str or None, default="auto"
-        Key columns; ``"auto"`` takes the column of that name if X has names and such a column.
-    require_acceleration : bool, default=True
-        Whether accelerations are required; without names they always are.
+    ``"auto"`` takes the key column of that name if X has names and such a column. Without names,
+    accelerations are always required. A ColumnError is raised if a column is missing or given
+    twice, or the number of columns does not fit.
 
-    Raises
-    ------
-    ColumnError
-        A column is missing, given twice or the number of columns does not fit.
-
-    Examples
-    --------
     >>> resolve_columns(None, 7, ["a", "b"], trajectory=0).dq
     (3, 4)
     """
@@ -138,10 +122,7 @@ def key_columns(
 ) -> tuple[int | None, int | None]:
     """Positions of the trajectory number and of the time, None if there is no such column.
 
-    Raises
-    ------
-    ColumnError
-        A column does not exist, or both are the same.
+    A ColumnError is raised if a column does not exist or both are the same.
     """
     found = (
         _key_column("trajectory", trajectory, names, n_features),
@@ -207,13 +188,7 @@ def column_names(X: Any) -> list[str] | None:
 
 
 def names_of_table(X: Any, columns: str = "time, q1.., dq1..") -> list[str]:
-    """Column names of a table.
-
-    Raises
-    ------
-    ColumnError
-        X has no column names; the message states the expected ``columns``.
-    """
+    """Column names of a table; the ColumnError for one without states the expected ``columns``."""
     names = column_names(X)
     if names is None:
         raise ColumnError(f"X is not a table; give a DataFrame with the columns {columns}")
@@ -221,28 +196,10 @@ def names_of_table(X: Any, columns: str = "time, q1.., dq1..") -> list[str]:
 
 
 def command_columns(names: Sequence[str], joint_names: Sequence[str]) -> list[str]:
-    """Names of the columns with the commanded positions.
+    """Names of the columns with the commanded positions, one for each joint.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Columns of a log.
-    joint_names : sequence of str
-        Joints.
+    A ColumnError is raised if a joint has none.
 
-    Returns
-    -------
-    list of str
-        One for each joint.
-
-    Raises
-    ------
-    ColumnError
-        A joint has none.
-
-    Examples
-    --------
-    >>> from skidyn._columns import command_columns
     >>> command_columns(["time", "q1", "cmd1"], ["elbow"])
     ['cmd1']
     """

@@ -38,14 +38,7 @@ __all__ = [
 class FitProgress:
     """Report the progress of a fit to scikit-learn's callbacks, for example a progress bar.
 
-    Parameters
-    ----------
-    estimator : estimator
-        The estimator that is being fitted.
-    context : object or None
-        Its callback context; None if scikit-learn has no callbacks.
-    task_name : str, default="epoch"
-        What a step is.
+    The context is None if scikit-learn has no callbacks; ``task_name`` tells what a step is.
     """
 
     def __init__(self, estimator: Any, context: Any, task_name: str = "epoch") -> None:
@@ -73,21 +66,8 @@ def fit_progress(
 ) -> Iterator[FitProgress]:
     """Progress of one fit; ``fit`` must be decorated with :func:`fit_context`.
 
-    Parameters
-    ----------
-    estimator : estimator
-        Derives from ``CallbackSupportMixin``.
-    n_steps : int
-        Most steps.
-    X, y : array-like
-        Data of the fit, passed to the callbacks.
-    task_name : str, default="epoch"
-        What a step is.
-
-    Yields
-    ------
-    FitProgress
-        Its methods mark the steps.
+    The estimator derives from ``CallbackSupportMixin``; X and y are passed to the callbacks, and
+    the methods of the result mark the steps.
     """
     if not hasattr(estimator, "_init_callback_context"):
         yield FitProgress(estimator, None)

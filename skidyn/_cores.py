@@ -43,19 +43,9 @@ _NUMBER = struct.Struct("=I")
 def cores(n_jobs: int | None) -> Iterator[None]:
     """Use several processes for :func:`each` and :func:`aside` inside the ``with`` block.
 
-    Parameters
-    ----------
-    n_jobs : int or None
-        Processes as joblib counts them: None is 1 unless set by a ``joblib.parallel_config``, -1
-        all cores; 1 inside a process of joblib. No more than 8 are used.
+    Processes are counted as joblib does: None is 1 unless set by a ``joblib.parallel_config``, -1
+    all cores; 1 inside a process of joblib. No more than 8 are used. A ValueError is raised for 0.
 
-    Raises
-    ------
-    ValueError
-        ``n_jobs`` is 0.
-
-    Examples
-    --------
     >>> with cores(2):
     ...     each(lambda x: x**2, range(4))
     [0, 1, 4, 9]
@@ -79,28 +69,11 @@ def alone() -> bool:
 
 
 def each(function: Callable[[Item], Result], items: Iterable[Item], text: str = "") -> list[Result]:
-    """Results of a function for every item, in their order.
+    """Results of a function for every item, in their order; its exceptions are raised.
 
-    A process of :func:`aside` takes one of the cores until it has its result.
-
-    Parameters
-    ----------
-    function : callable
-        Function of one item. Its result is pickled if another process computed it; its side effects
-        there are lost.
-    items : iterable
-        Items; they need not be picklable.
-    text : str, default=""
-        Description of the task for progress reports.
-
-    Returns
-    -------
-    list
-
-    Raises
-    ------
-    Exception
-        The exception of the function.
+    A result is pickled if another process computed it, and side effects there are lost; items need
+    not be picklable. ``text`` describes the task for progress reports. A process of :func:`aside`
+    takes one of the cores until it has its result.
     """
     items = list(items)
     size = -(-len(items) // MOST_PIECES)
@@ -148,19 +121,11 @@ def each(function: Callable[[Item], Result], items: Iterable[Item], text: str = 
 
 @contextmanager
 def aside(function: Callable[[], Result]) -> Iterator[Callable[[], Result]]:
-    """Compute a function in parallel with the ``with`` block.
+    """Compute a function without arguments in parallel with the ``with`` block.
 
-    With one core it is computed at once, before the block.
-
-    Parameters
-    ----------
-    function : callable
-        Function without arguments. Its result must be picklable, and its side effects are lost.
-
-    Yields
-    ------
-    callable
-        Function that waits for the result and returns it, or raises the exception of the function.
+    The block gets a function that waits for the result and returns it, or raises its exception. The
+    result must be picklable, and side effects are lost. With one core it is computed at once,
+    before the block.
     """
     child = None if alone() else _started(lambda: _Boxed(function()))
     if child is None:

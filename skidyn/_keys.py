@@ -17,15 +17,7 @@ from skidyn._signals import find_segments
 
 @dataclass(frozen=True)
 class Keys:
-    """Positions of the key columns and of the features.
-
-    Attributes
-    ----------
-    trajectory, time : int or None
-        Key columns.
-    features : tuple of int
-        All other columns.
-    """
+    """Positions of the key columns of X, if it has them, and of all other columns."""
 
     trajectory: int | None
     time: int | None
@@ -43,20 +35,8 @@ class Keys:
     def for_learner(self, X: Any, learner: Any) -> Any:
         """The columns for a learner: without key columns, unless it has parameters for them.
 
-        A learner without parameters for trajectory and time would use them as features and memorise
-        the log.
-
-        Parameters
-        ----------
-        X : DataFrame or array of shape (n_samples, n_features)
-            Table with key columns.
-        learner : estimator
-            Learner, whose parameters, or those of its parts, may specify key columns.
-
-        Returns
-        -------
-        DataFrame or array
-            ``X`` itself, or its features.
+        A learner, or its parts, without parameters for trajectory and time would use them as
+        features and memorise the log.
         """
         if knows_keys(learner):
             return X
@@ -80,19 +60,8 @@ def resolve_keys(
     trajectory: ColumnSpec = "auto",
     time: ColumnSpec = "auto",
 ) -> Keys:
-    """Find the key columns; all others are features.
+    """Find the key columns; all others are features. Names are None for an array.
 
-    Parameters
-    ----------
-    names : sequence of str or None
-        Column names, None for an array.
-    n_features : int
-        Number of columns.
-    trajectory, time : int, str or None, default="auto"
-        ``"auto"`` takes the column of that name if there is one.
-
-    Examples
-    --------
     >>> resolve_keys(["time", "q1", "dq1"], 3)
     Keys(trajectory=None, time=0, features=(1, 2))
     """
@@ -108,13 +77,7 @@ def resolve_keys(
 
 
 def fitted_keys(estimator: Any) -> Keys:
-    """Key columns of the table of a fitted estimator, by its ``trajectory`` and ``time``.
-
-    Parameters
-    ----------
-    estimator : estimator
-        Fitted, at least as far as ``n_features_in_``.
-    """
+    """Key columns of the table of an estimator that is fitted as far as ``n_features_in_``."""
     names = getattr(estimator, "feature_names_in_", None)
     return resolve_keys(
         None if names is None else [str(name) for name in names],

@@ -19,26 +19,11 @@ ORDERS = (0, 1, 2)
 
 
 def local_polynomial(values: Array, width: int, order: int, step: float) -> tuple[Array, ...]:
-    """Smoothed values and their first two derivatives along the first axis.
+    """Smoothed values and their first two derivatives (per s, per s^2) along the first axis.
 
-    At the edges the polynomial of the outermost window is used up to the end, as
-    ``savgol_filter(mode="interp")`` does.
-
-    Parameters
-    ----------
-    values : ndarray of shape (n_samples,) or (n_samples, n_columns)
-        At even steps; at least ``width`` samples.
-    width : int
-        Samples of a window, odd.
-    order : int
-        Order of the polynomial, below ``width``.
-    step : float, s
-        Between samples.
-
-    Returns
-    -------
-    smoothed, first, second : ndarray of the same shape
-        Derivatives per s and per s^2.
+    Values are ``step`` s apart. ``width`` is the odd number of samples of a window, which the
+    values have at least; ``order`` is below it. At the edges the polynomial of the outermost window
+    is used up to the end, as ``savgol_filter(mode="interp")`` does.
     """
     inside, start, end = _weights(width, order)
     table = values.reshape(len(values), -1)
@@ -58,10 +43,7 @@ def local_polynomial(values: Array, width: int, order: int, step: float) -> tupl
 def _weights(width: int, order: int) -> tuple[Array, Array, Array]:
     """Weights of the middle of a window, and of the places before and after it, for unit steps.
 
-    Returns
-    -------
-    inside : ndarray of shape (3, width)
-    start, end : ndarray of shape (3, width // 2, width)
+    Shapes are (3, width), and (3, width // 2, width) at either end.
     """
     half = width // 2
     place = np.arange(-half, half + 1) / half

@@ -75,25 +75,12 @@ def match_names(
     columns: Mapping[str, str | int | Sequence[str | int]] | None = None,
     source: str = "the log",
 ) -> NameMatch:
-    """Assign columns to signals.
+    """Assign the unique columns of a source to signals, in the order of the robot's joints.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Unique column names of the source.
-    robot_joints : sequence of str, optional
-        Joint names of the robot; columns are put in this order.
-    columns : mapping, optional
-        Assignment by the user, which has priority over any guess: ``{"q1": "pos_a"}``, ``{"q":
-        ["pos_a", "pos_b"]}``, ``{"q": "pos_{joint}"}`` or ``{"q": "pos_{i}"}`` (from 0 or 1, as the
-        columns are); a number is the position of a column.
-    source : str
-        Name of the file for messages.
-
-    Raises
-    ------
-    LogError
-        A column of ``columns`` is absent, or joints do not match the robot.
+    ``columns`` are the user's, which have priority over any guess: ``{"q1": "pos_a"}``, ``{"q":
+    ["pos_a", "pos_b"]}``, ``{"q": "pos_{joint}"}`` or ``{"q": "pos_{i}"}`` (from 0 or 1, as the
+    columns are); a number is the position of a column. A LogError is raised if one is absent, or
+    joints do not match the robot.
     """
     _refuse_too_many(names, source)
     match = NameMatch()
@@ -408,7 +395,7 @@ def _number_of_joints(match: NameMatch) -> int:
     return max(numbers, default=0)
 
 
-def _listed(names: Iterable[str], limit: int = 12) -> str:
+def _listed(names: Iterable[str]) -> str:
     names = [str(name) for name in names]
-    more = f", ... ({len(names)} in all)" if len(names) > limit else ""
-    return ", ".join(names[:limit]) + more
+    more = f", ... ({len(names)} in all)" if len(names) > 12 else ""
+    return ", ".join(names[:12]) + more

@@ -6,28 +6,10 @@ from types import ModuleType
 
 
 def import_optional(name: str, *, extra: str) -> ModuleType:
-    """Import an optional package, or raise an error that states how to install it.
+    """Import an optional package, or raise an ImportError that states the extra to install.
 
-    Parameters
-    ----------
-    name : str
-        Module to import, such as ``"matplotlib.pyplot"``.
-    extra : str
-        The extra of skidyn that installs it, such as ``"plot"``.
+    For a dotted name the innermost module is returned.
 
-    Returns
-    -------
-    module : module
-        The imported module; for a dotted name the innermost one.
-
-    Raises
-    ------
-    ImportError
-        If the package is not installed. The message states the extra.
-
-    Examples
-    --------
-    >>> from skidyn._optional import import_optional
     >>> import_optional("json", extra="io").__name__
     'json'
     """

@@ -19,22 +19,10 @@ SHUFFLED = 0.1
 
 
 def order_in_time(trajectory: NDArray[Any], time: Array | None) -> NDArray[np.intp] | None:
-    """Order of shuffled rows by trajectory and time.
+    """Order of shuffled rows by trajectory and time (s); None if they already are in order.
 
     A log has as many borders as recordings, or a few more if clocks restart. In shuffled rows about
-    every second step goes back.
-
-    Parameters
-    ----------
-    trajectory : ndarray of shape (n_samples,)
-        Trajectory number of every row.
-    time : ndarray of shape (n_samples,), s, or None
-        Time; without it no order can be known.
-
-    Returns
-    -------
-    ndarray of shape (n_samples,) of int or None
-        Rows in order of time; None if they already are in order.
+    every second step goes back. Without time no order can be known.
     """
     if time is None or len(time) < 3:
         return None
@@ -48,17 +36,7 @@ def order_in_time(trajectory: NDArray[Any], time: Array | None) -> NDArray[np.in
 
 
 def refuse_shuffled(what: str, trajectory: NDArray[Any], time: Array | None) -> None:
-    """Raise a LogError if rows are shuffled and ``what`` needs their order.
-
-    Parameters
-    ----------
-    what : str
-        The operation that needs it, as the subject of the message.
-    trajectory : ndarray of shape (n_samples,)
-        Trajectory number of every row.
-    time : ndarray of shape (n_samples,), s, or None
-        Time; without it no order can be known.
-    """
+    """Raise a LogError if rows are shuffled and ``what``, its subject, needs their order."""
     if order_in_time(trajectory, time) is not None:
         raise LogError(
             f"{what} depends on preceding rows, but the rows of X are not in the order of time, "

@@ -14,13 +14,6 @@ import numpy as np
 def plain(value: Any) -> Any:
     """Copy of a nested value in the types of JSON; numbers that are not finite become None.
 
-    Parameters
-    ----------
-    value : object
-        Mappings, sequences, NumPy arrays and scalars, strings, numbers.
-
-    Examples
-    --------
     >>> import numpy as np
     >>> plain({"a": np.array([1.0, np.nan]), 2: (True, None)})
     {'a': [1.0, None], '2': [True, None]}

@@ -20,15 +20,7 @@ _LISTENER: ContextVar[Listener | None] = ContextVar("skidyn_progress", default=N
 
 
 def tell(text: str, share: float | None = None) -> None:
-    """Report the progress of a task.
-
-    Parameters
-    ----------
-    text : str
-        Description of the task.
-    share : float, optional
-        Finished share, 0 to 1.
-    """
+    """Report the progress of a task, and its finished share from 0 to 1 if it is known."""
     listener = _LISTENER.get()
     if listener is not None:
         listener(text, share)

@@ -26,20 +26,10 @@ GAP_STEPS = 5.0
 
 
 def find_segments(trajectory: NDArray[Any], time: Array | None = None) -> list[slice]:
-    """Contiguous runs of rows of the same trajectory without a gap in time.
+    """Contiguous runs of rows of the same trajectory without a gap in time, in row order.
 
-    Parameters
-    ----------
-    trajectory : ndarray of shape (n_samples,)
-        Trajectory number of every row.
-    time : ndarray of shape (n_samples,), s, optional
-        A step that is negative or longer than 5 median steps of its trajectory starts a new
-        segment.
-
-    Returns
-    -------
-    list of slice
-        In row order, covering every row once.
+    A step of time (s) that is negative or longer than 5 median steps of its trajectory starts a new
+    segment.
     """
     n = len(trajectory)
     if n == 0:
@@ -167,21 +157,10 @@ class Signals:
         ]
 
     def once(self, name: Hashable, make: Callable[[], Any]) -> Any:
-        """Result of ``make`` for these signals, computed at the first call and cached.
+        """Result of ``make`` for these signals, computed at the first call; it must not be changed.
 
-        Effects are tried at many shapes; quantities independent of the shape are computed once.
-
-        Parameters
-        ----------
-        name : hashable
-            Key, which must contain everything on which ``make`` depends other than the signals.
-        make : callable
-            Without arguments.
-
-        Returns
-        -------
-        object
-            The same object at every call; it must not be changed.
+        Effects are tried at many shapes; quantities independent of the shape are computed once. The
+        name must contain everything on which ``make`` depends other than the signals.
         """
         kept = self.__dict__.setdefault("_kept", {})
         if name not in kept:
@@ -218,19 +197,9 @@ class Signals:
         return replace(self, **taken)
 
     def thinned(self, step: int) -> tuple[NDArray[np.int64], Signals]:
-        """The middle one of every few successive samples, segment by segment.
+        """The middle one of every few (an odd number) successive samples, segment by segment.
 
-        Parameters
-        ----------
-        step : int
-            Number of samples per kept sample, odd.
-
-        Returns
-        -------
-        index : ndarray of shape (n,) of int
-            The samples that are kept.
-        signals : Signals
-            Signals with the segments of these signals, so that no gap is closed.
+        Their rows, and signals that keep the segments of these, so that no gap is closed.
         """
         parts = [np.arange(rows.start + step // 2, rows.stop, step) for rows in self.segments]
         parts = [part for part in parts if len(part)]
@@ -246,17 +215,8 @@ def signals_from(
 ) -> Signals:
     """Read the signals from the columns of X.
 
-    Parameters
-    ----------
-    X : ndarray of shape (n_samples, n_features)
-        Table of numbers.
-    columns : Columns
-        From :func:`skidyn._columns.resolve_columns`.
-    robot : Robot, optional
-        Robot, whose joint types are used.
-    to_derive : bool, default=False
-        Whether accelerations may be missing, to be derived from the positions; they are zero until
-        then.
+    The robot gives the joint types. With ``to_derive`` accelerations may be missing, to be derived
+    from the positions; they are zero until then.
     """
     if columns.ddq is None and not to_derive:
         raise ValueError("the columns hold no accelerations; derive them first")
@@ -286,34 +246,11 @@ def read_signals(
     rate: float | None = None,
     to_derive: bool = True,
 ) -> tuple[Signals, Array]:
-    """Signals and torque of a table that follows the X contract, checked.
+    """Signals and torque (N m or N) of a table that follows the X contract, checked.
 
-    Parameters
-    ----------
-    X : DataFrame or array of shape (n_samples, n_features)
-        Motion; if the columns have names, accelerations may be missing and are derived.
-    tau : array-like of shape (n_samples, n_joints)
-        Torque, N m or N.
-    robot : Robot
-        Robot.
-    trajectory, time : int, str or None, default="auto"
-        Key columns of X.
-    rate : float, Hz, optional
-        Sampling rate where X has no time.
-    to_derive : bool, default=True
-        As in :func:`signals_from`.
-
-    Returns
-    -------
-    signals : Signals
-    torque : ndarray of shape (n_samples, n_joints)
-
-    Raises
-    ------
-    ColumnError
-        A column is missing, or the time.
-    LogError
-        The torque has another shape, or a value is not finite.
+    If the columns have names, accelerations may be missing and are derived. ``rate``, in Hz, is
+    that of an X without time. A ColumnError is raised if a column or the time is missing, a
+    LogError if the torque has another shape or a value is not finite.
     """
     names = column_names(X)
     values = np.asarray(X.to_numpy() if hasattr(X, "to_numpy") else X)

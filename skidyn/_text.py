@@ -15,19 +15,8 @@ NAMES = ("Coulomb", "Dahl", "LuGre", "Maxwell", "Stribeck")
 
 
 def fall(before: float, after: float, noise: float, unit: str, added: bool = True) -> str:
-    """An error before and after, with its noise, such as ``"0.63 → 0.16 N m (noise 0.16)"``.
+    """An error before and after (or before only), with its noise.
 
-    Parameters
-    ----------
-    before, after, noise : float
-        Errors and noise in the same unit.
-    unit : str
-        Their unit.
-    added : bool, default=True
-        False leaves the second error out.
-
-    Examples
-    --------
     >>> fall(0.6346, 0.1620, 0.1617, "N m")
     '0.63 → 0.16 N m (noise 0.16)'
     """
@@ -94,19 +83,8 @@ def listed(parts: Sequence[str], word: str = "and") -> str:
 
 
 def measure(name: str, value: object, unit: str = "") -> str:
-    """A parameter with half its interval, such as ``"k = 3.50 ± 0.40 N m/rad"``.
+    """A parameter with half its interval, if that is known; the unit ``"1"`` means none.
 
-    Parameters
-    ----------
-    name : str
-        Symbol.
-    value : (value, low, high), float or anything else
-        Its value, with the ends of its interval if known.
-    unit : str, default=""
-        Unit; ``"1"`` for none.
-
-    Examples
-    --------
     >>> measure("k", (3.5, 3.1, 3.9), "N m/rad")
     'k = 3.50 ± 0.40 N m/rad'
     """

@@ -68,19 +68,8 @@ def refuse_stated_units(
 ) -> None:
     """Refuse columns whose header states a unit that is not SI, unless a conversion is requested.
 
-    Parameters
-    ----------
-    stated : mapping
-        Column of the source and its unit, per column of the log.
-    units : mapping of str to str
-        Requested conversions.
-    source : str
-        Name of the file for messages.
-
-    Raises
-    ------
-    LogError
-        The message contains the ``units`` to pass.
+    ``stated`` holds the column of the source and its unit; the LogError contains the ``units`` to
+    pass.
     """
     wanted: dict[str, str] = {}
     example = ""
@@ -98,28 +87,12 @@ def refuse_stated_units(
 
 
 def convert_units(frame: pd.DataFrame, units: Mapping[str, str]) -> pd.DataFrame:
-    """Convert columns of a log to SI.
+    """Convert columns of a log to SI; the result is a copy.
 
-    Parameters
-    ----------
-    frame : DataFrame
-        Columns ``time, q1 .., dq1 .., tau1 ..``.
-    units : mapping of str to str
-        Unit of a quantity (``{"q": "deg", "time": "ms"}``) or of one column (``{"q3": "mm"}``),
-        which has priority over its quantity.
+    Units are those of a quantity (``{"q": "deg", "time": "ms"}``) or of one column (``{"q3":
+    "mm"}``), which has priority. A LogError is raised if a quantity or unit is unknown, or the log
+    does not have the quantity.
 
-    Returns
-    -------
-    DataFrame
-        A copy with the columns converted.
-
-    Raises
-    ------
-    LogError
-        A quantity or unit is unknown, or the log does not have the quantity.
-
-    Examples
-    --------
     >>> import pandas as pd
     >>> convert_units(pd.DataFrame({"q1": [180.0]}), {"q": "deg"}).q1.round(4).tolist()
     [3.1416]

@@ -36,13 +36,10 @@ def package_version(package: str = "skidyn") -> str:
 def versions() -> dict[str, str]:
     """Versions of Python, the platform, skidyn, its dependencies and its optional packages.
 
-    Nothing is imported: the versions are read from the installed metadata.
+    Nothing is imported: the versions are read from the installed metadata. The path of the
+    interpreter is irrelevant for numbers and reveals the user, so it is not among them.
     """
-    environment = {
-        "python": sys.version.split()[0],
-        "platform": platform.platform(),
-        "executable": sys.executable,
-    }
+    environment = {"python": sys.version.split()[0], "platform": platform.platform()}
     return environment | {name: package_version(name) for name in (*_CORE, *_OPTIONAL)}
 
 
@@ -57,5 +54,5 @@ def show_versions() -> None:
     >>> skidyn.show_versions()  # doctest: +ELLIPSIS
     python: 3...
     """
-    for name, value in versions().items():
+    for name, value in (versions() | {"executable": sys.executable}).items():
         print(f"{name}: {value}")

@@ -61,23 +61,10 @@ def _inside(path: str) -> Iterator[str]:
 
 
 def writable(path: PathLike) -> Path:
-    """Real path of a file to be written.
+    """Real path of a file to be written, without symbolic links; it need not exist.
 
-    Parameters
-    ----------
-    path : path
-        Name of the file. A symbolic link means its target.
-
-    Returns
-    -------
-    Path
-        The file without symbolic links; it need not exist.
-
-    Raises
-    ------
-    SkidynError
-        The path is not a regular file (a folder, a device, a pipe), or is an input of the running
-        command.
+    A SkidynError is raised if it is not a regular file (a folder, a device, a pipe), or is an input
+    of the running command.
     """
     target = Path(os.path.realpath(path))
     try:
@@ -99,23 +86,9 @@ def writable(path: PathLike) -> Path:
 def replacing(path: PathLike) -> Iterator[Path]:
     """Write a file in one step: after a full disk or a killed process the old one remains.
 
-    Parameters
-    ----------
-    path : path
-        File to write; see :func:`writable`. Missing folders are created.
-
-    Yields
-    ------
-    Path
-        File with the same ending in the same folder, to be written instead; it replaces the other
-        when the block ends without an error. It has the mode of a new file.
-
-    Raises
-    ------
-    SkidynError
-        See :func:`writable`.
-    OSError
-        The file cannot be written; the error states its name.
+    The block writes a file with the same ending in the same folder, which replaces the other, with
+    the mode of a new file, when the block ends without an error. Missing folders are created.
+    Errors are those of :func:`writable`, and an OSError that states the name of the file.
     """
     target = writable(path)
     try:

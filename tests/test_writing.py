@@ -12,7 +12,7 @@ from skidyn._writing import keep, keeping_inputs, replacing, write_text
 from skidyn.datasets import load_planar_arm
 from skidyn.exceptions import SkidynError
 from skidyn.export import write_urdf
-from skidyn.report import write_comparison, write_json
+from skidyn.report import write_json
 
 WRITERS = {
     "report.json": lambda path: write_json(path, {"a": 1}),
@@ -98,13 +98,6 @@ def test_an_input_is_protected_under_every_name(tmp_path):
                 write_text(name, "a report")
     assert log.read_text() == "the recording"
     write_text(log, "no command is running")
-
-
-def test_a_page_and_its_numbers_are_written_together(tmp_path):
-    (tmp_path / "page.json").mkdir()
-    with pytest.raises(SkidynError, match=r"page\.json is not a regular file"):
-        write_comparison(tmp_path / "page.html", {})
-    assert [f.name for f in tmp_path.iterdir()] == ["page.json"]
 
 
 def test_a_description_and_what_it_lacks_are_written_together(tmp_path):

@@ -158,12 +158,21 @@ def with_remedies(parser: Any) -> None:
         metavar="q3=q2",
         help="positions that include the position of another joint: q3=q2",
     )
-    fix.add_argument("--zero", metavar="q2=1.57", help="recorded positions at the robot's zero")
+    fix.add_argument(
+        "--zero",
+        metavar="q2=1.57",
+        help="recorded positions at the robot's zero; recorded velocities at rest: dq2=0.1",
+    )
     fix.add_argument("--late", metavar="tau=0.008", help="delays in s that are removed")
     fix.add_argument(
         "--lowpass",
         metavar="tau=0.04",
         help="time constants in s of low-pass filters that are undone",
+    )
+    fix.add_argument(
+        "--derive",
+        metavar="dq2",
+        help="velocities that are replaced by differentiated positions; dq for all",
     )
     fix.add_argument("--unwrap", action="store_true", help="remove jumps by whole turns")
     fix.add_argument(

@@ -106,15 +106,18 @@ def _compare(options: argparse.Namespace) -> None:
         raise SkidynError(
             "--traces writes one model on one log: leave out --against and --against-model"
         )
-    from skidyn.report import summarize_comparison, write_comparison
+    from skidyn.report import summarize_comparison, write_html, write_json
 
-    if options.html:
-        writable(Path(options.html).with_suffix(".json"))
+    numbers = Path(options.html).with_suffix(".json") if options.html else None
+    if numbers:
+        writable(numbers)  # before the work: both files are written, or neither
     names = options.names.split(",") if options.names else _names(options, pair)
     diagnoses = _diagnosed(*pair)
     sources = [provenance(side) for side in pair]
     summary = summarize_comparison(*diagnoses, names=names, provenance=sources)
-    files = write_comparison(options.html, summary) if options.html else ()
+    files = []
+    if numbers:
+        files = [write_html(options.html, summary), write_json(numbers, summary["report"])]
     if options.json:
         print_json(summary["report"])
         return

@@ -20,7 +20,7 @@ from skidyn._commands._output import (
     run_diagnosis,
     working,
 )
-from skidyn._commands._story import answer_lines
+from skidyn._commands._story import story_lines
 from skidyn._exceptions import LogWarning, MisreadLogError
 from skidyn._writing import write_json
 
@@ -98,7 +98,7 @@ def run(options: argparse.Namespace) -> None:
     if options.json:
         print_json(answer["report"])
         return
-    for line in answer_lines(answer):
+    for line in story_lines(answer["story"], answer["failures"]):
         print(line)
     options.told = answer["told"]
     for path in filter(None, (options.out, options.html)):

@@ -27,7 +27,6 @@ run the motion slowly at first. Then run it on the robot, log it, and use skidyn
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = command(commands, "excite", run, "design a motion for identification", DESCRIPTION)
     parser.add_argument("--urdf", type=Input, required=True, help="description of the robot")
     parser.add_argument("--out", type=Motion, required=True, metavar="CSV", help="motion to write")
@@ -76,7 +75,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Run the command."""
     from skidyn.excitation import MotionLimits, design_excitation
 
     given = json_option("limits", options.limits) or {}

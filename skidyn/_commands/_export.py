@@ -53,7 +53,6 @@ INTO = ("urdf", "mjcf", "usd")
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = command(commands, "export", run, "write a fitted model for other tools", DESCRIPTION)
     with_log(parser)
     parser.add_argument(
@@ -84,7 +83,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Run the command."""
     from skidyn import export
 
     files = _files(options.format, options.out)

@@ -23,6 +23,12 @@ if TYPE_CHECKING:
     from skidyn.robots import Robot
     from skidyn.simulation import Controller
 
+#: Remedies that are numbers by column, and those that are passed on as they are.
+NUMBERS = ("gain", "zero", "late", "lowpass")
+AS_GIVEN = (
+    "unwrap", "torque_sign", "clock", "drop_repeated", "split_leaps", "restore_gravity",
+)  # fmt: skip
+
 
 def read_model_and_log(
     options: argparse.Namespace, *, check: bool = True
@@ -42,14 +48,19 @@ def read_driven(
     frame, tau, controller = _log(options, robot, check)
     if options.model.endswith(".skops"):
         return load_model(options.model), frame, tau, controller
-    kinds = [kind.strip() for kind in options.model.split(",") if kind.strip()]
+    effects = effects_option(options.model)
+    model = RBDRegressor(robot, effects, "nominal" if options.nominal else "identified")
+    return model, frame, tau, controller
+
+
+def effects_option(text: str) -> tuple[str, ...]:
+    """Effects of a model besides the rigid body."""
+    kinds = listed(text)
     if "rigid_body" not in kinds:
         raise SkidynError(
             "--model must contain rigid_body; it may also contain kinds of the catalogue"
         )
-    effects = tuple(kind for kind in kinds if kind != "rigid_body")
-    model = RBDRegressor(robot, effects, "nominal" if options.nominal else "identified")
-    return model, frame, tau, controller
+    return tuple(kind for kind in kinds if kind != "rigid_body")
 
 
 def _log(
@@ -120,17 +131,10 @@ def reading(options: argparse.Namespace) -> dict[str, Any]:
         "resample_rate": said.get("resample"),
         "order": order_option(said.get("order")),
         "flip": listed(said.get("flip")),
-        "gain": pairs("gain", said.get("gain"), numbers=True),
         "summed": pairs("summed", said.get("summed")),
-        "zero": pairs("zero", said.get("zero"), numbers=True),
-        "late": pairs("late", said.get("late"), numbers=True),
-        "lowpass": pairs("lowpass", said.get("lowpass"), numbers=True),
-        "unwrap": said.get("unwrap"),
-        "torque_sign": said.get("torque_sign"),
-        "clock": said.get("clock"),
-        "drop_repeated": said.get("drop_repeated"),
-        "split_leaps": said.get("split_leaps"),
-        "restore_gravity": said.get("restore_gravity"),
+        **{name: pairs(name, said.get(name), numbers=True) for name in NUMBERS},
+        **{name: said.get(name) for name in AS_GIVEN},
+        "derive": listed(said.get("derive")),
     }
     # defaults are left to read_log, so that a script made from this contains only given options
     always = ("columns", "units", "drive_gains", "rate")

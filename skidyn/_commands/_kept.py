@@ -53,13 +53,7 @@ def _of_the_log(caught: Iterable[warnings.WarningMessage]) -> list[str]:
 
 
 class Kept:
-    """The stored file of one answer.
-
-    Parameters
-    ----------
-    options : argparse.Namespace
-        Options of the command; with ``no_cache`` nothing is stored.
-    """
+    """The stored file of one answer; with the option ``no_cache`` nothing is stored."""
 
     def __init__(self, options: argparse.Namespace) -> None:
         self._options = options
@@ -83,7 +77,7 @@ class Kept:
         """Store an answer, unless a file has changed since the command began."""
         if self._name is None or _name(self._options) != self._name:
             return
-        body = zlib.compress(json.dumps(answer, default=_value).encode(), 1)
+        body = zlib.compress(json.dumps(answer, default=_of_numpy).encode(), 1)
         with suppress(OSError, SkidynError):
             write_bytes(self._path, hashlib.sha256(body).digest() + body)
             kept = sorted(self._path.parent.iterdir(), key=lambda path: path.stat().st_mtime)
@@ -95,7 +89,7 @@ class Kept:
         return Path(self._options.logs[0]).parent / FOLDER / f"{self._name}.answer"
 
 
-def _value(found: Any) -> Any:
+def _of_numpy(found: Any) -> Any:
     """Arrays and numbers of NumPy in JSON types; numbers that are not finite are kept."""
     return found.tolist()
 

@@ -85,11 +85,10 @@ def _torque_told(controller: Controller, n_joints: int) -> str:
     )
 
 
-def write_page(diagnosis: Diagnosis, html: str | None, provenance: dict[str, Any]) -> None:
-    if html:
-        from skidyn.report import summarize, write_html
+def write_page(diagnosis: Diagnosis, html: str, provenance: dict[str, Any]) -> None:
+    from skidyn.report import summarize, write_html
 
-        write_html(html, summarize(diagnosis, provenance=provenance))
+    write_html(html, summarize(diagnosis, provenance=provenance))
 
 
 def write_table(frame: pd.DataFrame, path: str) -> None:
@@ -146,7 +145,7 @@ RECORDED: dict[str, tuple[type, ...]] = {
     "rate": (float, int, type(None)),
     **dict.fromkeys(("columns", "units", "drive_gains", "joints", "effects"), (str, type(None))),
     **dict.fromkeys(("gravity", "flip", "order", "gain", "summed"), (str, type(None))),
-    **dict.fromkeys(("zero", "late", "lowpass"), (str, type(None))),
+    **dict.fromkeys(("zero", "late", "lowpass", "derive"), (str, type(None))),
     **dict.fromkeys(("torque_sign", "clock"), (str, type(None))),
     **dict.fromkeys(
         ("unwrap", "drop_repeated", "split_leaps", "restore_gravity", "force"), (bool, type(None))
@@ -159,11 +158,9 @@ RECORDED: dict[str, tuple[type, ...]] = {
 def provenance(options: argparse.Namespace) -> dict[str, Any]:
     from skidyn._version import versions
 
-    # the path of the interpreter is irrelevant for the numbers, but reveals the user
-    used = {name: version for name, version in versions().items() if name != "executable"}
     recorded = {name: getattr(options, name, None) for name in RECORDED}
     digests = hashes([*options.logs, options.urdf])
-    return {"versions": used, "sha256": digests, "options": recorded}
+    return {"versions": versions(), "sha256": digests, "options": recorded}
 
 
 def hashes(files: Sequence[str]) -> dict[str, str]:

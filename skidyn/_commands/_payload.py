@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from skidyn._checks import warn_about_log
 from skidyn._commands._arguments import Input, JsonFile, command, with_log_only
-from skidyn._commands._input import json_option, read_frame, read_robot
+from skidyn._commands._input import effects_option, json_option, read_frame, read_robot
 from skidyn._commands._output import print_json, working
 from skidyn._exceptions import SkidynError
 from skidyn._writing import write_json
@@ -78,19 +78,11 @@ def run(options: argparse.Namespace) -> None:
     loaded = _read(options, robot)
     options.logs = options.unloaded
     unloaded = _read(options, robot)
-    kinds = [kind.strip() for kind in options.model.split(",") if kind.strip()]
-    if "rigid_body" not in kinds:
-        raise SkidynError(
-            "--model must contain rigid_body; it may also contain kinds of the catalogue"
-        )
-    common: dict[str, Any] = {
-        "link": options.link,
-        "effects": [kind for kind in kinds if kind != "rigid_body"],
-    }
+    common: dict[str, Any] = {"link": options.link, "effects": effects_option(options.model)}
+    if options.com is not None:
+        common["com"] = _numbers(options.com)
+    found: Any
     with working("Identifying", options):
-        found: Any
-        if options.com is not None:
-            common["com"] = _numbers(options.com)
         if options.known_mass is None:
             found = identify_payload(robot, loaded, unloaded, **common)
         else:

@@ -23,7 +23,6 @@ the truth, and the output states whether both were recognised.
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = command(
         commands, "separate", run, "design a motion that separates two effects", DESCRIPTION
     )
@@ -35,7 +34,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Run the command."""
     from skidyn._writing import write_text
     from skidyn.diagnosis import design_separating_motion
 

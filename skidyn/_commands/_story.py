@@ -6,7 +6,6 @@ from __future__ import annotations
 import shutil
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from types import SimpleNamespace
 from typing import Any
 
 from skidyn._text import digits, joints_told, listed
@@ -18,21 +17,10 @@ BAR, LEAST, NAME = 24, 12, 28
 TOLD, PLACES = 3, 2
 
 
-def story_lines(story: Mapping[str, Any], failures: Sequence[Any] = ()) -> Iterator[str]:
-    """Text that ``skidyn diagnose`` prints.
-
-    Parameters
-    ----------
-    story : mapping
-        From :meth:`skidyn.diagnosis.Diagnosis.story`.
-    failures : sequence of Failure, default=()
-        Joints whose error exceeds the noise.
-
-    Yields
-    ------
-    str
-        Lines, the most important first.
-    """
+def story_lines(
+    story: Mapping[str, Any], failures: Sequence[Mapping[str, Any]] = ()
+) -> Iterator[str]:
+    """Text that ``skidyn diagnose`` prints, the most important first."""
     for doubt in story["doubts"]:
         yield f"Check the log first: {doubt}"
     yield story["headline"] + "."
@@ -55,15 +43,6 @@ def story_lines(story: Mapping[str, Any], failures: Sequence[Any] = ()) -> Itera
     if any(row["speaks"] for row in story["joints"]):
         yield ""
         yield story["left"]
-
-
-def answer_lines(answer: Mapping[str, Any]) -> Iterator[str]:
-    """The same for a stored answer, whose failures are mappings."""
-    failures = [
-        SimpleNamespace(**{**told, "places": [SimpleNamespace(**p) for p in told["places"]]})
-        for told in answer["failures"]
-    ]
-    yield from story_lines(answer["story"], failures)
 
 
 def motion_lines(motion: Mapping[str, Any] | None) -> Iterator[str]:
@@ -103,21 +82,21 @@ def servo_lines(motion: Mapping[str, Any] | None) -> Iterator[str]:
     yield f"  {motion['text']}"
 
 
-def where_lines(failures: Sequence[Any]) -> Iterator[str]:
+def where_lines(failures: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     """Part of the motion in which each joint exceeds its noise, one line each."""
     if failures:
         yield ""
         yield "Location of the error above the noise"
-    apart = [failure for failure in failures if failure.places]
+    apart = [failure for failure in failures if failure["places"]]
     for failure in apart[:TOLD]:
         places = listed(
             [
-                f"{p.share_of_excess:.0%} {p.where} ({p.share_of_time:.0%} of the time)"
-                for p in failure.places[:PLACES]
+                f"{p['share_of_excess']:.0%} {p['where']} ({p['share_of_time']:.0%} of the time)"
+                for p in failure["places"][:PLACES]
             ]
         )
-        yield f"  joint {failure.joint}: {places}"
-    even = sorted(failure.joint for failure in failures if not failure.places)
+        yield f"  joint {failure['joint']}: {places}"
+    even = sorted(failure["joint"] for failure in failures if not failure["places"])
     if even:
         yield f"  {joints_told(even)}: spread over the whole motion"
 
@@ -156,19 +135,7 @@ def _name(row: Mapping[str, Any]) -> str:
 def bar(ratios: Sequence[float], largest: float, width: int = BAR) -> str:
     """Error over noise as a bar: dark after, light before, with a mark at the noise.
 
-    Parameters
-    ----------
-    ratios : sequence of two float
-        Error before and after over the noise.
-    largest : float
-        Ratio at the end of the bar.
-    width : int, default=24
-        Columns.
-
-    Examples
-    --------
-    >>> len(bar([4.0, 1.0], 4.0))
-    24
+    ``largest`` is the ratio at the end of the bar.
     """
     try:
         "█░│".encode(sys.stdout.encoding or "ascii")

@@ -18,11 +18,6 @@ class FittingStream:
     """A terminal stream whose long lines are broken between words.
 
     Programs that read the output get unchanged lines.
-
-    Parameters
-    ----------
-    stream : text stream
-        The terminal.
     """
 
     def __init__(self, stream: TextIO) -> None:
@@ -49,23 +44,9 @@ class FittingStream:
 def fit(line: str, width: int, end: str = "") -> str:
     """A line broken between words to fit a width, without control characters.
 
-    Parameters
-    ----------
-    line : str
-        Without its line break.
-    width : int
-        Columns.
-    end : str, default=""
-        Text at the end of every line except the last.
+    Further lines begin under the last column of a table that is in the left half, or else four
+    spaces further than the first. ``end`` is at the end of every line except the last.
 
-    Returns
-    -------
-    str
-        One line or several; further ones begin under the last column of a table that is in the
-        left half, or else four spaces further than the first.
-
-    Examples
-    --------
     >>> print(fit("  one two three four five six", 24))
       one two three four
           five six

@@ -17,7 +17,7 @@ from threadpoolctl import threadpool_limits
 
 from skidyn._columns import ColumnSpec
 from skidyn._compat import Interval, StrOptions, fit_context
-from skidyn._keys import Keys, fitted_keys
+from skidyn._keys import fitted_keys
 from skidyn.preprocessing import scaling_of
 
 Array = NDArray[Any]
@@ -200,7 +200,7 @@ class ELMCommittee(MultiOutputMixin, RegressorMixin, BaseEstimator):
             weight = _check_sample_weight(sample_weight, X, dtype=np.float64)
         if not (weight > 0).any():
             raise ValueError("all sample weights are zero; at least one must be positive.")
-        inputs = X[:, list(self._keys().features)]
+        inputs = X[:, list(fitted_keys(self).features)]
         targets = y.reshape(len(y), -1)
         if first:
             self._start(inputs, targets, y.ndim == 1, weight)
@@ -288,7 +288,7 @@ class ELMCommittee(MultiOutputMixin, RegressorMixin, BaseEstimator):
         """
         check_is_fitted(self)
         X = validate_data(self, X, reset=False, dtype=np.float64)
-        scaled = self._scaled(X[:, list(self._keys().features)])
+        scaled = self._scaled(X[:, list(fitted_keys(self).features)])
         members = np.stack(
             Parallel(n_jobs=self.n_jobs, prefer="threads")(
                 delayed(self._predict_member)(k, scaled) for k in range(len(self.hidden_bias_))
@@ -318,6 +318,3 @@ class ELMCommittee(MultiOutputMixin, RegressorMixin, BaseEstimator):
         scaled = (inputs - self._offset) / self._scale
         with_constant: Array = np.c_[scaled, np.ones(len(scaled))].astype(dtype)
         return with_constant
-
-    def _keys(self) -> Keys:
-        return fitted_keys(self)

@@ -2,14 +2,7 @@
 """Robots, simulated logs with a hidden effect, and public recordings to download."""
 
 from skidyn.datasets._embedded import load_demo_log
-from skidyn.datasets._fetch import (
-    fetch_double_pendulum,
-    fetch_emps,
-    fetch_panda_exciting,
-    fetch_panda_gaz,
-    fetch_screw_drive,
-    fetch_xl330,
-)
+from skidyn.datasets._fetch import fetch_recording
 from skidyn.datasets._robots import (
     load_panda,
     load_planar_arm,
@@ -23,12 +16,7 @@ from skidyn.datasets.suite import SuiteCase, hidden_effect_suite, score_answers,
 
 __all__ = [
     "SuiteCase",
-    "fetch_double_pendulum",
-    "fetch_emps",
-    "fetch_panda_exciting",
-    "fetch_panda_gaz",
-    "fetch_screw_drive",
-    "fetch_xl330",
+    "fetch_recording",
     "hidden_effect_kinds",
     "hidden_effect_suite",
     "load_demo_log",

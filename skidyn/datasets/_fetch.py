@@ -6,8 +6,12 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import zip_longest
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,90 +24,71 @@ if TYPE_CHECKING:
     import pandas as pd
     from sklearn.utils import Bunch
 
-#: Addresses contain the commit of the files, so that their content cannot change.
-EMPS_URL = (
-    "https://raw.githubusercontent.com/forgi86/sysid-neural-continuous/"
-    "93afc131780fb1d5477472935a18ac8405683890/examples/EMPS/data/DATA_EMPS.mat"
-)
-PANDA_URL = (
-    "https://raw.githubusercontent.com/unisa-acg/inverse-dynamics-solver/"
-    "73217267f30e3aaba229b63233c8fdb628ba156b/"
-    "inverse_dynamics_interface_franka_inria/bagfiles/panda_exciting_trajectory.db3"
-)
-GAZ_URL = (
-    "https://raw.githubusercontent.com/marcocognetti/FrankaEmikaPandaDynModel/"
-    "44f1ec8a615555eb3469ca9b0abd31ef863872b5/matlab/data/Exciting_Traj/Trajectory_1/rbt_log/"
-)
-PENDULUM_URL = (
-    "https://raw.githubusercontent.com/dfki-ric-underactuated-lab/double_pendulum/"
-    "33b5db87afc0a3228b3e7ed10c83d885af73e995/"
-    "data/experiment_records/design_C.0/20220914/sys_id/"
-)
-PENDULUM_RUNS = tuple(f"trajectory_{k:02d}.csv" for k in (0, 1, 2, 3, 4, 5, 6, 12, 13))
-XL330_URL = (
-    "https://raw.githubusercontent.com/Rhoban/bam/"
-    "af2260462471ff45ac18af159b1327ea51d8db15/bam/data.bak/raw/"
-)
-XL330_RUNS = tuple(
-    f"2026-01-15_10h{moment}.json"
-    for moment in (
-        *("28m10", "28m17", "28m24", "28m32", "28m42", "28m49", "28m57", "29m04"),
-        *("29m14", "29m21", "29m29", "29m37", "29m47", "29m54", "30m02", "30m10"),
-    )
-)
-SCREW_URL = (
-    "https://raw.githubusercontent.com/RViMLab/TRO2021-Dynamic-Modelling/"
-    "a6f5ca9790b28c20bf9affc70af812c7d960d8c3/experiments/driveNo3/"
-)
 #: Speeds in rpm of the constant-speed runs, in both directions (``n`` in the names of files).
 SCREW_SPEEDS = (1, 2, 4, 6, 8, 10, 13, 17, 20, 25, 30, 40, 50, 60, 70, 80, 90, 100, 120, 140, 160)
-SCREW_RUNS = (
-    *("start_stop/10.csv", "start_stop/200.csv"),
-    *(f"steady_state/0.096kg/{way}{v}.csv" for v in SCREW_SPEEDS for way in ("", "n")),
-    *("steady_state/0.096kg/180.csv", "steady_state/0.096kg/n180.csv"),
-    *("steady_state/0.096kg/200.csv", "steady_state/0.096kg/n200.csv"),
-)
 #: Torque at 100 % in N m, nominal torque of the motor of these drives.
 SCREW_TORQUE = 9.84e-3
 #: Force per volt that the authors of EMPS identified, N/V.
 EMPS_GAIN = 35.15065188248547
 
 
-def _bunch(**fields: Any) -> Bunch:
-    from sklearn.utils import Bunch  # a second of imports that reading a robot does not need
+@dataclass(frozen=True)
+class _Recording:
+    """Files of a recording below an address, their licence, and the reader of all of them."""
 
-    return Bunch(**fields)
+    url: str
+    files: tuple[str, ...]
+    licence: str
+    read: Callable[[Sequence[Path]], pd.DataFrame]
+    known: Mapping[str, float] = field(default_factory=dict)
 
 
-def fetch_emps(
-    *, data_home: str | os.PathLike[str] | None = None, sha256: str | None = None, url: str = ""
+def fetch_recording(
+    name: str,
+    *,
+    data_home: str | os.PathLike[str] | None = None,
+    url: str = "",
+    files: Sequence[str] = (),
+    sha256: Sequence[str] = (),
 ) -> Bunch:
-    """Download the EMPS benchmark: one prismatic axis with a ball screw, 25 s at 1 kHz.
+    """Download an openly licensed recording from the place where its authors publish it.
 
-    The recording is that of [1]_ as kept in the repository forgi86/sysid-neural-continuous, whose
-    licence is Apache-2.0. It is not part of skidyn.
+    ``"emps"`` [1]_ is a prismatic axis with a ball screw, 25 s at 1 kHz; ``"panda_exciting"`` an
+    excitation of a Franka Emika Panda of the University of Salerno, 24 s at 30 Hz, which is too
+    slow for accelerations above a few hertz; ``"panda_gaz"`` [2]_ one without a hand, 28 s at 1
+    kHz. ``"double_pendulum"`` [3]_ are runs of two backdrivable joints, 200 to 690 Hz; ``"xl330"``
+    [4]_ are 16 runs of a Dynamixel servo that swings 0.49 kg at 0.1 m, about 200 Hz;
+    ``"screw_drive"`` [5]_ are a worm drive (60:1, a hanging weight of 0.096 kg) at constant speeds
+    and start-stop runs, measured at its motor. None is part of skidyn.
 
     Parameters
     ----------
+    name : str
+        One of these recordings.
     data_home : path, optional
-        Folder to keep the file in; that of scikit-learn's data sets if None.
-    sha256 : str, optional
-        Checksum that the file must have. If None, that of the first download is kept beside the
-        file and must match from then on.
+        Folder to keep the files in; that of scikit-learn's data sets if None.
     url : str, default=""
-        Another place to download from; the repository named above if empty.
+        Another folder to download from; that of the authors' repository if empty.
+    files : sequence of str, default=()
+        Names of files; all of the recording if empty.
+    sha256 : sequence of str, default=()
+        Checksums that the files must have. If empty, those of the first download are kept beside
+        the files and must match from then on.
 
     Returns
     -------
     Bunch
-        ``frame``: DataFrame ``time`` (s), ``trajectory, q1`` (m), ``dq1`` (m/s, derived from the
-        positions), ``tau1`` (N, voltage times the authors' gain of 35.15 N/V); ``licence``,
-        ``path``.
+        ``frame``: DataFrame ``time`` (s), ``trajectory, q1 ..`` (rad or m), ``dq1 ..``, and
+        ``tau1 ..`` (N m or N: joint torque sensors of the Pandas; drive readings of the pendulum;
+        at the motor of the worm drive; voltage times the authors' gain of 35.15 N/V for EMPS) or,
+        for the servo, ``i1`` (A), ``temp1`` (degrees Celsius), ``volts`` and ``enabled`` (0 while
+        the motor is off); ``licence``; ``paths``. For the servo also ``load``, the known ``m g l``
+        of 0.481 N m.
 
     Raises
     ------
     LogError
-        The checksum differs.
+        There is no such recording, a checksum differs, or a file is not of this kind.
     ImportError
         pooch is not installed (``pip install skidyn[fetch]``).
 
@@ -111,278 +96,78 @@ def fetch_emps(
     ----------
     .. [1] A. Janot, M. Gautier, M. Brunot, "Data set and reference models of EMPS", Workshop on
        Nonlinear System Identification Benchmarks, 2019.
-
-    Examples
-    --------
-    >>> from skidyn.datasets import fetch_emps
-    >>> emps = fetch_emps()  # doctest: +SKIP
-    """
-    path = _retrieve(url or EMPS_URL, "emps.mat", data_home, sha256)
-    columns = {"time": "t", "q": "qm", "i": "vir"}
-    frame = read_log(path, columns=columns, drive_gains=[EMPS_GAIN], check=False)
-    return _bunch(frame=frame, licence="Apache-2.0", path=str(path))
-
-
-def fetch_panda_exciting(
-    *, data_home: str | os.PathLike[str] | None = None, sha256: str | None = None, url: str = ""
-) -> Bunch:
-    """Download an excitation of a Franka Emika Panda: 7 joints, 24 s at 30 Hz.
-
-    The recording is a ROS 2 bag of the repository unisa-acg/inverse-dynamics-solver, whose licence
-    is BSD-3-Clause. It is not part of skidyn. It is too slow for accelerations above a few hertz.
-
-    Parameters
-    ----------
-    data_home : path, optional
-        Folder to keep the file in; that of scikit-learn's data sets if None.
-    sha256 : str, optional
-        Checksum that the file must have. If None, that of the first download is kept beside the
-        file and must match from then on.
-    url : str, default=""
-        Another place to download from; the repository named above if empty.
-
-    Returns
-    -------
-    Bunch
-        ``frame``: DataFrame ``time`` (s), ``trajectory, q1 .. q7`` (rad), ``dq1 .. dq7``,
-        ``tau1 .. tau7`` (N m, joint torque sensors); ``licence``, ``path``.
-
-    Raises
-    ------
-    LogError
-        The checksum differs.
-    ImportError
-        pooch is not installed (``pip install skidyn[fetch]``).
-
-    Examples
-    --------
-    >>> from skidyn.datasets import fetch_panda_exciting
-    >>> panda = fetch_panda_exciting()  # doctest: +SKIP
-    """
-    path = _retrieve(url or PANDA_URL, "panda_exciting.db3", data_home, sha256)
-    return _bunch(frame=read_log(path, check=False), licence="BSD-3-Clause", path=str(path))
-
-
-def fetch_double_pendulum(
-    *, data_home: str | os.PathLike[str] | None = None, url: str = "", runs: tuple[str, ...] = ()
-) -> Bunch:
-    """Download identification runs of a double pendulum: two backdrivable joints, 200 to 690 Hz.
-
-    The recordings are those of design C.0 of 14 September 2022 in the repository
-    dfki-ric-underactuated-lab/double_pendulum [1]_, whose licence is BSD-3-Clause. They are not
-    part of skidyn.
-
-    Parameters
-    ----------
-    data_home : path, optional
-        Folder to keep the files in; that of scikit-learn's data sets if None.
-    url : str, default=""
-        Another folder to download from; that of the repository if empty.
-    runs : tuple of str, default=()
-        Names of files; all nine if empty.
-
-    Returns
-    -------
-    Bunch
-        ``frame``: DataFrame ``time`` (s), ``trajectory, q1, q2`` (rad), ``dq1, dq2``,
-        ``tau1, tau2`` (N m, drive reading); ``licence``, ``paths``.
-
-    Raises
-    ------
-    LogError
-        A file's checksum is not that of its first download.
-    ImportError
-        pooch is not installed (``pip install skidyn[fetch]``).
-
-    References
-    ----------
-    .. [1] F. Wiebe et al., "Open Source Dual-Purpose Acrobot and Pendubot Platform: Benchmarking
+    .. [2] C. Gaz, M. Cognetti, A. Oliva, P. Robuffo Giordano, A. De Luca, "Dynamic identification
+       of the Franka Emika Panda robot with retrieval of feasible parameters using penalty-based
+       optimization", IEEE Robotics and Automation Letters 4(4), 2019.
+    .. [3] F. Wiebe et al., "Open Source Dual-Purpose Acrobot and Pendubot Platform: Benchmarking
        Control Algorithms for Underactuated Robotics", IEEE Robotics & Automation Magazine, 2023.
+    .. [4] M. Duclusaud et al., "Extended Friction Models for the Physics Simulation of Servo
+       Actuators", 2024.
+    .. [5] Z. Mablekos-Alexiou, L. da Cruz, C. Bergeles, "Friction-inclusive modeling of sliding
+       contact transmission systems in robotics", IEEE Transactions on Robotics 37(4), 2021.
 
     Examples
     --------
-    >>> from skidyn.datasets import fetch_double_pendulum
-    >>> pendulum = fetch_double_pendulum()  # doctest: +SKIP
+    >>> from skidyn.datasets import fetch_recording
+    >>> emps = fetch_recording("emps")  # doctest: +SKIP
     """
-    address = url or PENDULUM_URL
+    from sklearn.utils import Bunch  # a second of imports that reading a robot does not need
+
+    if name not in RECORDINGS:
+        raise LogError(f"no recording {name!r}; there are {', '.join(RECORDINGS)}")
+    recording = RECORDINGS[name]
+    address, files = (url or recording.url).rstrip("/"), files or recording.files
     paths = [
-        _retrieve(f"{address.rstrip('/')}/{run}", f"double_pendulum_{run}", data_home, None)
-        for run in runs or PENDULUM_RUNS
+        _retrieve(f"{address}/{file}", f"{name}_{file.replace('/', '_')}", data_home, checksum)
+        for file, checksum in zip_longest(files, sha256)
     ]
+    frame, told = recording.read(paths), list(map(str, paths))
+    return Bunch(frame=frame, licence=recording.licence, paths=told, **recording.known)
+
+
+def _read_emps(paths: Sequence[Path]) -> pd.DataFrame:
+    columns = {"time": "t", "q": "qm", "i": "vir"}
+    return read_log(paths, columns=columns, drive_gains=[EMPS_GAIN], check=False)
+
+
+def _read_pendulum(paths: Sequence[Path]) -> pd.DataFrame:
     columns = {
         "time": "time",
         "q": ["pos_meas1", "pos_meas2"],
         "dq": ["vel_meas1", "vel_meas2"],
         "tau": ["tau_meas1", "tau_meas2"],
     }
-    frame = read_log(paths, columns=columns, check=False)
-    return _bunch(frame=frame, licence="BSD-3-Clause", paths=[str(p) for p in paths])
+    return read_log(paths, columns=columns, check=False)
 
 
-def fetch_xl330(
-    *, data_home: str | os.PathLike[str] | None = None, url: str = "", runs: tuple[str, ...] = ()
-) -> Bunch:
-    """Download a servo that swings 0.49 kg at 0.1 m: 16 runs of a Dynamixel XL330 at about 200 Hz.
-
-    The recordings are those of [1]_ in the history of the repository Rhoban/bam, whose licence is
-    Apache-2.0. They are not part of skidyn.
-
-    Parameters
-    ----------
-    data_home : path, optional
-        Folder to keep the files in; that of scikit-learn's data sets if None.
-    url : str, default=""
-        Another folder to download from; that of the repository if empty.
-    runs : tuple of str, default=()
-        Names of files; all sixteen if empty.
-
-    Returns
-    -------
-    Bunch
-        ``frame``: DataFrame ``time`` (s), ``trajectory, q1`` (rad, zero hanging down), ``dq1``
-        (rad/s), ``i1`` (A), ``temp1`` (degrees Celsius), ``volts``, ``enabled`` (0 while the motor
-        is off); ``load``: the known ``m g l`` of 0.481 N m; ``licence``, ``paths``.
-
-    Raises
-    ------
-    LogError
-        A file's checksum is not that of its first download, or it is not a recording of this kind.
-    ImportError
-        pooch is not installed (``pip install skidyn[fetch]``).
-
-    References
-    ----------
-    .. [1] M. Duclusaud et al., "Extended Friction Models for the Physics Simulation of Servo
-       Actuators", 2024.
-
-    Examples
-    --------
-    >>> from skidyn.datasets import fetch_xl330
-    >>> servo = fetch_xl330()  # doctest: +SKIP
-    """
+def _read_gaz(paths: Sequence[Path]) -> pd.DataFrame:
     import pandas
 
-    address = url or XL330_URL
-    paths, tables = [], []
-    for number, run in enumerate(runs or XL330_RUNS, 1):
-        path = _retrieve(f"{address.rstrip('/')}/{run}", f"xl330_{run}", data_home, None)
-        paths.append(str(path))
-        tables.append(_servo_run(path).assign(trajectory=number))
-    frame = pandas.concat(tables, ignore_index=True)
-    return _bunch(frame=frame, load=0.49 * 9.81 * 0.1, licence="Apache-2.0", paths=paths)
-
-
-def fetch_panda_gaz(*, data_home: str | os.PathLike[str] | None = None, url: str = "") -> Bunch:
-    """Download an excitation of a Franka Emika Panda without a hand: 7 joints, 28 s at 1 kHz.
-
-    The recording is that of [1]_ in the repository marcocognetti/FrankaEmikaPandaDynModel, whose
-    licence is GPL-3.0. It is not part of skidyn.
-
-    Parameters
-    ----------
-    data_home : path, optional
-        Folder to keep the files in; that of scikit-learn's data sets if None.
-    url : str, default=""
-        Another folder to download from; that of the repository if empty.
-
-    Returns
-    -------
-    Bunch
-        ``frame``: DataFrame ``time`` (s), ``trajectory, q1 .. q7`` (rad), ``dq1 .. dq7``,
-        ``tau1 .. tau7`` (N m, joint torque sensors); ``licence``, ``paths``.
-
-    Raises
-    ------
-    LogError
-        A file's checksum is not that of its first download, or the files do not fit together.
-    ImportError
-        pooch is not installed (``pip install skidyn[fetch]``).
-
-    References
-    ----------
-    .. [1] C. Gaz, M. Cognetti, A. Oliva, P. Robuffo Giordano, A. De Luca, "Dynamic identification
-       of the Franka Emika Panda robot with retrieval of feasible parameters using penalty-based
-       optimization", IEEE Robotics and Automation Letters 4(4), 2019.
-
-    Examples
-    --------
-    >>> from skidyn.datasets import fetch_panda_gaz
-    >>> panda = fetch_panda_gaz()  # doctest: +SKIP
-    """
-    import pandas
-
-    address = (url or GAZ_URL).rstrip("/")
-    paths, parts = [], {}
-    for signal, name in {"q": "positions", "dq": "velocity", "tau": "torques", "": "time"}.items():
-        file = f"exciting_traj_{name}.txt"
-        path = _retrieve(f"{address}/{file}", f"panda_gaz_{name}.txt", data_home, None)
-        paths.append(str(path))
+    parts = {}
+    for signal, path in zip(("q", "dq", "tau", "time"), paths, strict=True):
         try:
             text = path.read_text(encoding="utf-8").replace(",", " ")
-            values = np.loadtxt(text.splitlines(), ndmin=2)
+            parts[signal] = np.loadtxt(text.splitlines(), ndmin=2)
         except ValueError as error:
             raise LogError(f"{path} is not a recording of this kind: {error}") from None
-        parts[signal] = values
-    time = parts.pop("")[:, 0]
+    time = parts.pop("time")[:, 0]
     for signal, values in parts.items():
         if values.shape != (len(time), 7):
             raise LogError(f"{signal} has shape {values.shape}; ({len(time)}, 7) is expected")
     columns = {f"{s}{j + 1}": v[:, j] for s, v in parts.items() for j in range(7)}
-    frame = pandas.DataFrame({"time": time, "trajectory": 1} | columns)
-    return _bunch(frame=frame, licence="GPL-3.0", paths=paths)
+    return pandas.DataFrame({"time": time, "trajectory": 1} | columns)
 
 
-def fetch_screw_drive(
-    *, data_home: str | os.PathLike[str] | None = None, url: str = "", runs: tuple[str, ...] = ()
-) -> Bunch:
-    """Download a worm drive at constant speeds and in start-stop runs, measured at its motor.
+def _each(read: Callable[[Path], pd.DataFrame]) -> Callable[[Sequence[Path]], pd.DataFrame]:
+    """Reader of several files, each of which is a trajectory."""
 
-    The recordings are those of drive 3 (worm 60:1, a hanging weight of 0.096 kg) of [1]_ in the
-    repository RViMLab/TRO2021-Dynamic-Modelling, whose licence is MIT. They are not part of skidyn.
+    def read_all(paths: Sequence[Path]) -> pd.DataFrame:
+        import pandas
 
-    Parameters
-    ----------
-    data_home : path, optional
-        Folder to keep the files in; that of scikit-learn's data sets if None.
-    url : str, default=""
-        Another folder to download from; that of the repository if empty.
-    runs : tuple of str, default=()
-        Names of files; all if empty.
+        tables = [read(path).assign(trajectory=number) for number, path in enumerate(paths, 1)]
+        return pandas.concat(tables, ignore_index=True)
 
-    Returns
-    -------
-    Bunch
-        ``frame``: DataFrame ``time`` (s), ``trajectory, q1`` (rad, integrated from the velocity),
-        ``dq1`` (rad/s), ``tau1`` (N m at the motor); ``licence``, ``paths``.
-
-    Raises
-    ------
-    LogError
-        A file's checksum is not that of its first download, or it is not a recording of this kind.
-    ImportError
-        pooch is not installed (``pip install skidyn[fetch]``).
-
-    References
-    ----------
-    .. [1] Z. Mablekos-Alexiou, L. da Cruz, C. Bergeles, "Friction-inclusive modeling of sliding
-       contact transmission systems in robotics", IEEE Transactions on Robotics 37(4), 2021.
-
-    Examples
-    --------
-    >>> from skidyn.datasets import fetch_screw_drive
-    >>> drive = fetch_screw_drive()  # doctest: +SKIP
-    """
-    import pandas
-
-    address = url or SCREW_URL
-    paths, tables = [], []
-    for number, run in enumerate(runs or SCREW_RUNS, 1):
-        name = "screw_drive_" + run.replace("/", "_")
-        path = _retrieve(f"{address.rstrip('/')}/{run}", name, data_home, None)
-        paths.append(str(path))
-        tables.append(_drive_run(path).assign(trajectory=number))
-    frame = pandas.concat(tables, ignore_index=True)
-    return _bunch(frame=frame, licence="MIT", paths=paths)
+    return read_all
 
 
 def _drive_run(path: Path) -> pd.DataFrame:
@@ -449,3 +234,63 @@ def _retrieve(
         )
     write_text(note, found)
     return file
+
+
+#: Addresses contain the commit of the files, so that their content cannot change.
+RECORDINGS = {
+    "emps": _Recording(
+        "https://raw.githubusercontent.com/forgi86/sysid-neural-continuous/"
+        "93afc131780fb1d5477472935a18ac8405683890/examples/EMPS/data",
+        ("DATA_EMPS.mat",),
+        "Apache-2.0",
+        _read_emps,
+    ),
+    "panda_exciting": _Recording(
+        "https://raw.githubusercontent.com/unisa-acg/inverse-dynamics-solver/"
+        "73217267f30e3aaba229b63233c8fdb628ba156b/inverse_dynamics_interface_franka_inria/bagfiles",
+        ("panda_exciting_trajectory.db3",),
+        "BSD-3-Clause",
+        partial(read_log, check=False),
+    ),
+    "panda_gaz": _Recording(
+        "https://raw.githubusercontent.com/marcocognetti/FrankaEmikaPandaDynModel/"
+        "44f1ec8a615555eb3469ca9b0abd31ef863872b5/matlab/data/Exciting_Traj/Trajectory_1/rbt_log",
+        tuple(f"exciting_traj_{x}.txt" for x in ("positions", "velocity", "torques", "time")),
+        "GPL-3.0",
+        _read_gaz,
+    ),
+    "double_pendulum": _Recording(
+        "https://raw.githubusercontent.com/dfki-ric-underactuated-lab/double_pendulum/"
+        "33b5db87afc0a3228b3e7ed10c83d885af73e995/"
+        "data/experiment_records/design_C.0/20220914/sys_id",
+        tuple(f"trajectory_{k:02d}.csv" for k in (0, 1, 2, 3, 4, 5, 6, 12, 13)),
+        "BSD-3-Clause",
+        _read_pendulum,
+    ),
+    "xl330": _Recording(
+        "https://raw.githubusercontent.com/Rhoban/bam/"
+        "af2260462471ff45ac18af159b1327ea51d8db15/bam/data.bak/raw",
+        tuple(
+            f"2026-01-15_10h{moment}.json"
+            for moment in (
+                *("28m10", "28m17", "28m24", "28m32", "28m42", "28m49", "28m57", "29m04"),
+                *("29m14", "29m21", "29m29", "29m37", "29m47", "29m54", "30m02", "30m10"),
+            )
+        ),
+        "Apache-2.0",
+        _each(_servo_run),
+        {"load": 0.49 * 9.81 * 0.1},
+    ),
+    "screw_drive": _Recording(
+        "https://raw.githubusercontent.com/RViMLab/TRO2021-Dynamic-Modelling/"
+        "a6f5ca9790b28c20bf9affc70af812c7d960d8c3/experiments/driveNo3",
+        (
+            *("start_stop/10.csv", "start_stop/200.csv"),
+            *(f"steady_state/0.096kg/{way}{v}.csv" for v in SCREW_SPEEDS for way in ("", "n")),
+            *("steady_state/0.096kg/180.csv", "steady_state/0.096kg/n180.csv"),
+            *("steady_state/0.096kg/200.csv", "steady_state/0.096kg/n200.csv"),
+        ),
+        "MIT",
+        _each(_drive_run),
+    ),
+}

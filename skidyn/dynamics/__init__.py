@@ -18,6 +18,7 @@ from skidyn.dynamics._tape import Scalar as Scalar, Tape as Tape, operands as op
 from skidyn.dynamics._torch import evaluate_torch as evaluate_torch
 from skidyn.dynamics._tree import (
     KinematicTree as KinematicTree,
+    central_parts as central_parts,
     inertial_parts as inertial_parts,
     inertial_vector as inertial_vector,
     skew as skew,

@@ -37,15 +37,9 @@ _DUST = 4e-16
 class CanonicalModel:
     """A tree in other frames, with the map of its inertial parameters.
 
-    Attributes
-    ----------
-    tree : KinematicTree
-        The same mechanism with the same joint coordinates.
-    base : ndarray of shape (3, 3)
-        Orientation of the new base frame in the old one.
-    kept, moved : ndarray of shape (n_bodies, 10, 10)
-        Maps from a body's parameters to those that remain with it, in its new frame, and to those
-        that are moved to its parent.
+    ``base`` is the orientation of the new base frame in the old one. ``kept`` and ``moved``, of
+    shape (n_bodies, 10, 10), map a body's parameters to those that remain with it, in its new
+    frame, and to those that are moved to its parent.
     """
 
     tree: KinematicTree

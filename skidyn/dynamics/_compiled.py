@@ -74,13 +74,7 @@ def find_compiler() -> str | None:
 
 
 def compile_library(text: str, flags: tuple[str, ...] = _FLAGS) -> ctypes.CDLL:
-    """Compile C text to a library and load it.
-
-    Raises
-    ------
-    SkidynError
-        There is no C compiler, or it does not accept the text.
-    """
+    """Compile C text to a library and load it; a SkidynError without a C compiler."""
     compiler = find_compiler()
     if compiler is None:
         raise SkidynError(
@@ -100,12 +94,8 @@ def compile_library(text: str, flags: tuple[str, ...] = _FLAGS) -> ctypes.CDLL:
 class CompiledProgram:
     """A program of one robot as machine code.
 
-    Attributes
-    ----------
-    shape : tuple of int
-        Of the outputs of one sample.
-    vanishing : ndarray of bool, of that shape
-        Outputs that are zero for every motion; they are not written.
+    Outputs of one sample have the ``shape``; those that are ``vanishing`` are zero for every motion
+    and not written.
     """
 
     def __init__(self, program: Program) -> None:

@@ -67,20 +67,7 @@ class Number:
 
 
 class Numbers:
-    """Source of the numbers of a motion, in place of a tape, which is a source of symbols.
-
-    Parameters
-    ----------
-    signals : mapping of str to ndarray of shape (n_samples, n_joints)
-        ``q``, ``dq`` and ``ddq``.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> numbers = Numbers({"q": np.array([[0.0], [1.0]])})
-    >>> (2.0 * numbers.input("q", 0) + numbers.constant(1.0)).value
-    array([1., 3.])
-    """
+    """Source of the numbers of a motion, in place of a tape, which is a source of symbols."""
 
     def __init__(self, signals: Mapping[str, np.ndarray]) -> None:
         self._signals = {name: np.ascontiguousarray(x.T) for name, x in signals.items()}

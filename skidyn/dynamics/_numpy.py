@@ -41,12 +41,9 @@ _UFUNCS: dict[str, Callable[..., Any]] = {
 class BoundProgram:
     """A program with its buffers for chunks of a fixed size.
 
-    Attributes
-    ----------
-    inputs : dict of str to ndarray of shape (n, chunk)
-        To be filled before :meth:`run`; ``"parameter"`` has shape (n, 1).
-    outputs : ndarray of shape ``program.shape + (chunk,)``
-        Filled by :meth:`run`; entries that vanish for every motion stay zero.
+    ``inputs`` of shape (n, chunk) are to be filled before :meth:`run`; ``"parameter"`` has shape
+    (n, 1). ``outputs`` of shape ``program.shape + (chunk,)`` are filled by it; entries that vanish
+    for every motion stay zero.
     """
 
     def __init__(self, program: Program, chunk: int, dtype: np.dtype) -> None:

@@ -33,7 +33,7 @@ from typing import Any
 import numpy as np
 
 from skidyn.dynamics._tape import Scalar, Tape
-from skidyn.dynamics._tree import KinematicTree, transform_inertial
+from skidyn.dynamics._tree import KinematicTree, skew, transform_inertial
 
 #: Terms below this fraction of the largest term of a sum do not change the sum.
 _BELOW_ROUNDING = 1e-18
@@ -109,14 +109,12 @@ class _Rotation:
 
     def _about(self, tape: Tape, axis: np.ndarray) -> Matrix:
         """Rodrigues' formula about a skew axis."""
-        outer = np.outer(axis, axis)
-        x, y, z = axis
-        skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        outer, cross = np.outer(axis, axis), skew(axis)
         return [
             [
                 tape.constant(outer[i, j])
                 + tape.constant(float(i == j) - outer[i, j]) * self._cos
-                + tape.constant(skew[i, j]) * self._sin
+                + tape.constant(cross[i, j]) * self._sin
                 for j in range(3)
             ]
             for i in range(3)
@@ -263,22 +261,13 @@ def trace_inverse_dynamics(
     parameters_used: np.ndarray | None = None,
     parameters: np.ndarray | None = None,
 ) -> Program:
-    """Joint torques by the recursive Newton-Euler algorithm [1]_.
+    """Joint torques by the recursive Newton-Euler algorithm [1]_, with gravity in m/s^2.
 
     Inputs are ``q``, ``dq``, ``ddq`` by joint coordinate and ``parameter`` by position in the
-    flattened (n_bodies, 10) array; outputs are keyed ``(coordinate,)``.
-
-    Parameters
-    ----------
-    tree : KinematicTree
-    gravity : sequence of 3 floats
-        Gravitational acceleration in the base frame, m/s^2.
-    with_velocity, with_acceleration : bool, default=True
-        If False, the velocity or acceleration is taken to be zero, and its terms vanish.
-    parameters_used : ndarray of shape (n_bodies, 10), bool, default=None
-        Parameters that may differ from zero; None means all.
-    parameters : ndarray of shape (n_bodies, 10), default=None
-        Values to fold into the program; None leaves them as inputs.
+    flattened (n_bodies, 10) array; outputs are keyed ``(coordinate,)``. Without velocity or
+    acceleration, these are zero and their terms vanish. Parameters that are not in
+    ``parameters_used`` are zero; given ``parameters`` are folded into the program, otherwise they
+    are inputs.
     """
     tape = Tape()
     if parameters is None:
@@ -300,24 +289,10 @@ def inverse_dynamics(
     with_velocity: bool = True,
     with_acceleration: bool = True,
 ) -> list[Any]:
-    """The recursive Newton-Euler algorithm [1]_ on symbols or numbers.
+    """Torques by the recursive Newton-Euler algorithm [1]_ on symbols or numbers.
 
-    Parameters
-    ----------
-    tape : Tape or Numbers
-        Provides ``input`` and ``constant``.
-    tree : KinematicTree
-    gravity : sequence of 3 floats
-        Gravitational acceleration in the base frame, m/s^2.
-    parameters : sequence of n_bodies sequences of 10 scalars
-        Inertial parameters of every body.
-    with_velocity, with_acceleration : bool, default=True
-        As in :func:`trace_inverse_dynamics`.
-
-    Returns
-    -------
-    list of n_joints scalars
-        Joint torques.
+    Gravity is in m/s^2, parameters are ten of every body; without velocity or acceleration these
+    are zero, as in :func:`trace_inverse_dynamics`.
     """
     joints = _joints(tape, tree)
     zeros = [tape.constant(0.0)] * tree.n_joints
@@ -402,11 +377,8 @@ def _shared_columns(tree: KinematicTree, body: int) -> list[tuple[int, int, np.n
     axis give the same torques on either side of the joint (see :mod:`skidyn.dynamics._canonical`):
     for all joints before it, their column is a combination of columns of the parent.
 
-    Returns
-    -------
-    list of (column, partner, coefficients)
-        ``column + partner = coefficients @ columns of the parent``; partner -1 means none. Only
-        combinations that are cheaper than the column itself are listed.
+    In (column, partner, coefficients), ``column + partner = coefficients @ columns of the parent``;
+    partner -1 means none. Only combinations that are cheaper than the column itself are listed.
     """
     axis = np.abs(tree.axes[body])
     if tree.prismatic[body] or tree.parents[body] < 0 or axis.max() < 1.0:

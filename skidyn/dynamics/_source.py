@@ -49,26 +49,11 @@ def statements(
 ) -> tuple[list[str], dict[tuple[int, ...], str]]:
     """Assignments that compute the outputs, and the expression of every output.
 
-    Parameters
-    ----------
-    program : Program
-    input_name : callable, default=subscript
-        Text of the input ``(name, position)``.
-    prefix, suffix : str, default=""
-        Written before and after every assignment, such as ``"double "`` and ``";"``.
-    language : mapping of str to str, default=PYTHON
-        Text of the operations.
-    given : mapping of int to str, default={}
-        Expressions of nodes of the tape that are computed elsewhere.
-    nested : int, default=0
-        Expressions that are used once are written where they are used, up to this depth, which is
-        faster to interpret but harder to read.
-
-    Returns
-    -------
-    lines : list of str
-    outputs : dict of tuple to str
-        Variable or number that holds each output.
+    ``input_name`` gives the text of the input ``(name, position)``; ``prefix`` and ``suffix`` are
+    written before and after every assignment, such as ``"double "`` and ``";"``; ``given`` are
+    expressions of nodes of the tape that are computed elsewhere. Expressions that are used once are
+    written where they are used, up to the depth ``nested``, which is faster to interpret but harder
+    to read.
     """
     nodes = program.tape.nodes
     names: dict[int, str] = {}

@@ -3,9 +3,12 @@
 
 from __future__ import annotations
 
+import math
 import operator
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from skidyn.dynamics._recursion import Program
 from skidyn.dynamics._tape import operands
@@ -15,38 +18,14 @@ if TYPE_CHECKING:
 
 
 def evaluate_torch(program: Program, inputs: dict[str, torch.Tensor]) -> torch.Tensor:
-    """Outputs of a program for a batch.
+    """Outputs of a program for a batch, shape (N, *program.shape).
 
-    Parameters
-    ----------
-    program : Program
-    inputs : dict of str to Tensor
-        Signals of shape (N, n); ``"parameter"`` has shape (n,).
-
-    Returns
-    -------
-    Tensor of shape (N, *program.shape)
+    Signals are of shape (N, n); ``"parameter"`` has shape (n,).
     """
     import torch
 
     columns = {name: tensor.unbind(-1) for name, tensor in inputs.items()}
     reference = inputs["q"]
-    functions: dict[str, Any] = {
-        "add": torch.add,
-        "sub": torch.sub,
-        "mul": torch.mul,
-        "neg": torch.neg,
-        "sin": torch.sin,
-        "cos": torch.cos,
-        "tanh": torch.tanh,
-        "exp": torch.exp,
-        "sqrt": torch.sqrt,
-        "abs": torch.abs,
-        "sign": torch.sign,
-        "div": torch.div,
-        "pow": torch.pow,
-        "max": _maximum,
-    }
     values: dict[int, torch.Tensor | float] = {}
     for index in program.tape.live(program.outputs.values()):
         node = program.tape.nodes[index]
@@ -61,13 +40,13 @@ def evaluate_torch(program: Program, inputs: dict[str, torch.Tensor]) -> torch.T
             arguments = [values[i] for i in operands(node)]
             if isinstance(arguments[0], float):
                 arguments.reverse()
-            values[index] = functions[node[0]](*arguments)
-    flat = [_position(key, program.shape) for key in program.outputs]
+            function: Any = _maximum if node[0] == "max" else getattr(torch, node[0])
+            values[index] = function(*arguments)
     zero = reference.new_zeros(reference.shape[:-1])
-    entries = [zero] * _size(program.shape)
-    for position, scalar in zip(flat, program.outputs.values(), strict=True):
-        value = values[scalar.index]
-        entries[position] = zero + value  # constants and parameters fill the batch
+    entries = [zero] * math.prod(program.shape)
+    for key, scalar in program.outputs.items():
+        # constants and parameters fill the batch
+        entries[np.ravel_multi_index(key, program.shape)] = zero + values[scalar.index]
     return torch.stack(entries, dim=-1).reshape(*reference.shape[:-1], *program.shape)
 
 
@@ -77,17 +56,3 @@ _ORDERED: dict[str, Callable[[Any, Any], Any]] = {"sub": operator.sub, "div": op
 
 def _maximum(a: torch.Tensor, b: torch.Tensor | float) -> torch.Tensor:
     return a.clamp_min(b) if isinstance(b, float) else a.maximum(b)
-
-
-def _position(key: tuple[int, ...], shape: tuple[int, ...]) -> int:
-    position = 0
-    for index, size in zip(key, shape, strict=True):
-        position = position * size + index
-    return position
-
-
-def _size(shape: tuple[int, ...]) -> int:
-    size = 1
-    for length in shape:
-        size *= length
-    return size

@@ -84,24 +84,21 @@ def inertial_parts(parameters: np.ndarray) -> tuple[float, np.ndarray, np.ndarra
     return float(parameters[0]), np.asarray(parameters[1:4], dtype=float), inertia
 
 
+def central_parts(parameters: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+    """Mass, center of mass (3,) and inertia matrix (3, 3) about it; at the origin without mass."""
+    mass, moment, inertia = inertial_parts(parameters)
+    center = moment / mass if mass > 0 else np.zeros(3)
+    arm = skew(center)
+    return mass, center, inertia + mass * arm @ arm
+
+
 def transform_inertial(
     parameters: np.ndarray, rotation: np.ndarray, translation: np.ndarray
 ) -> np.ndarray:
-    """Inertial parameters of a body seen from another frame.
+    """The ten parameters of a body about the origin of another frame, linear in the given ones.
 
-    Parameters
-    ----------
-    parameters : ndarray of shape (10,)
-        Parameters in the body frame, about its origin.
-    rotation : ndarray of shape (3, 3)
-        Orientation of the body frame in the new frame.
-    translation : ndarray of shape (3,)
-        Origin of the body frame in the new frame, m.
-
-    Returns
-    -------
-    ndarray of shape (10,)
-        Parameters in the new frame, about its origin; linear in ``parameters``.
+    ``rotation`` and ``translation`` (m) are the body frame's orientation and origin in the new
+    frame.
     """
     mass, moment, inertia = inertial_parts(parameters)
     moment = rotation @ moment

@@ -3,13 +3,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from skidyn._signals import Signals
 from skidyn.effects._base import Array, Coefficient, Effect, Shape
+
+#: Velocity of a joint that moves, as a share of its largest, and least share of these samples in
+#: which the load moves the joint.
+MOVES, DRIVEN = 0.05, 0.05
+
+
+def _carried(signals: Signals, joint: int, shape: Mapping[str, Any]) -> Array:
+    """Torque that the gear transmits, with the drive's own friction and damping."""
+    assert signals.load is not None
+    dry = shape.get("friction", 0.0) * signals.sign[:, joint]
+    viscous = shape.get("damping", 0.0) * signals.dq[:, joint]
+    return np.asarray(signals.load[:, joint] + dry + viscous)
 
 
 class LoadDependentFriction(Effect):
@@ -77,11 +89,17 @@ class LoadDependentFriction(Effect):
             found.append(form | (reference if "power" in form else {}))
         return found
 
+    def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
+        if "friction" not in shape:
+            return True
+        # if the drive always pushes, this is a gain of the torque with viscous and dry friction
+        speed = signals.dq[:, joints[0]]
+        moves = np.abs(speed) > MOVES * np.abs(speed).max(initial=0.0)
+        driven = _carried(signals, joints[0], shape) * speed < 0
+        return bool(np.mean(driven[moves]) > DRIVEN) if moves.any() else False
+
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        assert signals.load is not None
-        reference, carried = shape.get("reference", 1.0), signals.load[:, joint]
-        carried = carried + shape.get("friction", 0.0) * signals.sign[:, joint]
-        carried = carried + shape.get("damping", 0.0) * signals.dq[:, joint]
+        reference, carried = shape.get("reference", 1.0), _carried(signals, joint, shape)
         beyond = np.maximum(0.0, np.abs(carried) - shape.get("threshold", 0.0))
         if "side" in shape:
             beyond = np.where(shape["side"] * carried > 0, beyond, 0.0)

@@ -14,27 +14,11 @@ from skidyn.excitation._fourier import fourier, product, rest_window
 
 @dataclass(frozen=True)
 class FourierBasis:
-    """Sines and cosines under a window that rises and falls along quintics.
-
-    Parameters
-    ----------
-    duration : float, s
-        Length.
-    base_frequency : float, Hz
-        Frequency of the first harmonic.
-    harmonics : int
-        Number of harmonics.
-    blend : float, s
-        Time of rising and of falling.
+    """Sines and cosines under a window that rises and falls along quintics in ``blend`` s [1]_.
 
     References
     ----------
-    Swevers, Ganseman, Tukel, De Schutter, Van Brussel (1997), IEEE TRA 13(5), 730-740.
-
-    Examples
-    --------
-    >>> FourierBasis(10.0, 0.1, 5, 0.5)(np.linspace(0, 10, 101)).shape
-    (3, 101, 10)
+    .. [1] Swevers, Ganseman, Tukel, De Schutter, Van Brussel (1997), IEEE TRA 13(5), 730-740.
     """
 
     duration: float
@@ -52,26 +36,15 @@ class FourierBasis:
 
 @dataclass(frozen=True)
 class QuinticBasis:
-    """Quintics between points at even times, smooth up to the acceleration.
+    """Quintics between points at even times, smooth up to the acceleration [1]_.
 
-    The functions are position, velocity and acceleration at each point, the latter two in units of
-    the time between points.
-
-    Parameters
-    ----------
-    duration : float, s
-        Length.
-    points : int
-        Number of points between start and end.
+    The functions are position, velocity and acceleration at each of the points between start and
+    end, the latter two in units of the time between points.
 
     References
     ----------
-    Biagiotti, Melchiorri (2008), Trajectory Planning for Automatic Machines and Robots, Springer.
-
-    Examples
-    --------
-    >>> QuinticBasis(10.0, 4)(np.linspace(0, 10, 101)).shape
-    (3, 101, 12)
+    .. [1] Biagiotti, Melchiorri (2008), Trajectory Planning for Automatic Machines and Robots,
+       Springer.
     """
 
     duration: float

@@ -9,27 +9,10 @@ from skidyn._signals import Array
 
 
 def fourier(time: Array, omega: float, weights: Array) -> Array:
-    """A Fourier series and its two derivatives.
+    """A Fourier series and its two derivatives, shape (3, n_samples).
 
-    The weights are those of the velocity, so that high harmonics have small strokes.
-
-    Parameters
-    ----------
-    time : ndarray of shape (n_samples,), s
-        Time.
-    omega : float, rad/s
-        Angular frequency of the first harmonic.
-    weights : ndarray of shape (2 n_harmonics,)
-        Sine and cosine weights, harmonic by harmonic.
-
-    Returns
-    -------
-    ndarray of shape (3, n_samples)
-        Value, first and second derivative.
-
-    References
-    ----------
-    Swevers, Ganseman, Tukel, De Schutter, Van Brussel (1997), IEEE TRA 13(5), 730-740.
+    Sine and cosine weights, harmonic by harmonic, are those of the velocity, so that high harmonics
+    have small strokes. ``omega`` is the angular frequency of the first harmonic, rad/s.
     """
     series = np.zeros((3, len(time)))
     for k, (a, b) in enumerate(zip(weights[::2], weights[1::2], strict=True), start=1):
@@ -44,18 +27,7 @@ def fourier(time: Array, omega: float, weights: Array) -> Array:
 def rest_window(time: Array, duration: float, blend: float) -> Array:
     """A window that rises from 0 to 1 and falls back along quintics, with two derivatives.
 
-    Parameters
-    ----------
-    time : ndarray of shape (n_samples,), s
-        Time from the start.
-    duration : float, s
-        Length of the motion.
-    blend : float, s
-        Time of rising and of falling.
-
-    Returns
-    -------
-    ndarray of shape (3, n_samples)
+    Rising and falling take ``blend`` s each; the shape is (3, n_samples).
     """
     window = np.stack([np.ones_like(time), np.zeros_like(time), np.zeros_like(time)])
     for distance, sign in ((time, 1.0), (duration - time, -1.0)):

@@ -32,16 +32,9 @@ _CHUNK, _RATE = 2048, 100.0
 class Model:
     """The model of a robot for which a motion is designed.
 
-    Attributes
-    ----------
-    robot : Robot
-        The robot.
-    columns : Program
-        Regressor of base parameters and effects, shape (n_joints, n_columns).
-    torque : Program
-        Torque, which has to stay within the limits, shape (n_joints,).
-    noise : ndarray of shape (n_joints,)
-        Unit of each joint's torque, N m or N.
+    Programs are the regressor of base parameters and effects, (n_joints, n_columns), and the
+    torque, which has to stay within the limits; ``noise`` is the unit of each joint's torque, N m
+    or N.
     """
 
     robot: Robot

@@ -28,14 +28,9 @@ LEAST = 0.02
 
 @dataclass(frozen=True)
 class Offer:
-    """An effect with the share of each joint's squared error that it removes.
+    """An effect that could be added, with the share of each joint's squared error that it removes.
 
-    Attributes
-    ----------
-    candidate : Candidate
-        Effect that could be added.
-    drop : ndarray of shape (n_joints,)
-        Share of the squared error of samples for a ripple, otherwise of averaged rows.
+    The error is that of samples for a ripple, otherwise of averaged rows.
     """
 
     candidate: Candidate
@@ -44,16 +39,10 @@ class Offer:
 
 @dataclass(frozen=True)
 class Ripple:
-    """A ripple fitted to samples.
+    """A ripple fitted to samples, N m.
 
-    Attributes
-    ----------
-    torque : ndarray of shape (n_samples,)
-        Torque of the fit that left the sample's fold out, N m.
-    left_out : ndarray of shape (n_folds, 2)
-        Coefficients of the fits without each fold, N m.
-    whole : ndarray of shape (2,)
-        Coefficients of the fit to all folds, N m.
+    ``torque`` is that of the fit that left the sample's fold out; ``left_out``, of shape (n_folds,
+    2), and ``whole`` are coefficients of the fits without each fold and to all.
     """
 
     torque: Array
@@ -64,16 +53,7 @@ class Ripple:
 def fit_ripple(problem: Problem, term: Term, residual: Array, fold: NDArray[np.int64]) -> Ripple:
     """Fit a ripple to the sliding samples of its joint, each fold left out once.
 
-    Parameters
-    ----------
-    problem : Problem
-        Motion.
-    term : Term
-        Ripple of one joint.
-    residual : ndarray of shape (n_samples, n_joints), N m
-        Residual of the model.
-    fold : ndarray of shape (n_samples,)
-        Fold of every sample.
+    The residual is of shape (n_samples, n_joints), N m; ``fold`` is that of every sample.
     """
     (joint,) = term.places
     columns = term.torque_columns(problem.signals)[joint]
@@ -86,17 +66,7 @@ def fit_ripple(problem: Problem, term: Term, residual: Array, fold: NDArray[np.i
 
 
 def ripples(problem: Problem, residual: Array, fold: NDArray[np.int64]) -> list[Offer]:
-    """The strongest ripple of every joint if it is significant.
-
-    Parameters
-    ----------
-    problem : Problem
-        Motion.
-    residual : ndarray of shape (n_samples, n_joints), N m
-        Held-out residual of the model.
-    fold : ndarray of shape (n_samples,)
-        Fold of every sample.
-    """
+    """The strongest ripple of every joint if it is significant, from the held-out residual, N m."""
     best: dict[int, Offer] = {}
     for line in find_lines(problem, residual):
         if line.chance > CHANCE:
@@ -118,21 +88,8 @@ def loads(
 ) -> list[Offer]:
     """A payload or a force at the tool in the recordings in which it is largest.
 
-    Parameters
-    ----------
-    problem : Problem
-        Rows.
-    blocks : sequence of dict
-        Columns of the model beside the rigid body.
-    sigma : ndarray of shape (n_joints,)
-        Noise of one row of each joint.
-    target : sequence of ndarray
-        Averaged torque.
-
-    Returns
-    -------
-    list of Offer
-        Effects, judged on interleaved quarters of every recording.
+    ``blocks`` are columns of the model beside the rigid body and ``sigma`` the noise of one row of
+    each joint. Effects are judged on interleaved quarters of every recording.
     """
     design = problem.design(blocks)
     offers = []

@@ -26,16 +26,10 @@ Block = dict[int, Array]
 
 @dataclass(frozen=True)
 class HeldOutRows:
-    """Held-out residual of the rows of a joint.
+    """Held-out ``residual`` of the rows of a joint, N m or N.
 
-    Attributes
-    ----------
-    residual : ndarray of shape (n_rows,)
-        Residual of the present model, N m or N.
-    index : ndarray of shape (n_candidates,)
-        Candidates that act on the joint and have physically possible coefficients.
-    then : ndarray of shape (n_rows, n_candidates)
-        Square of the residual of the model with each of them added, (N m)^2 or N^2.
+    ``then``, of shape (n_rows, n_candidates), is its square with each candidate of ``index`` added:
+    those that act on the joint and have physically possible coefficients.
     """
 
     residual: Array
@@ -53,21 +47,9 @@ class HeldOutRows:
 class FoldedModel:
     """A model fitted to all folds, and without each.
 
-    Attributes
-    ----------
-    blocks : list of dict
-        Columns beside the rigid body.
-    design : list of ndarray of shape (n_rows_j, p)
-        All columns of every joint.
-    weight : ndarray of shape (n_joints,)
-        Weight of a row of every joint.
-    fits : list
-        Fits without each fold.
-    whole : object
-        Fit to all.
-    own : ndarray of shape (p,) of bool
-        Coefficients that can be identified from a single recording only, and are not held out with
-        it.
+    ``blocks`` are columns beside the rigid body, ``design`` all columns of every joint, and
+    ``weight`` that of a row of every joint. Coefficients that can be identified from a single
+    recording only (``own``) are not held out with it.
     """
 
     blocks: list[Block]
@@ -79,17 +61,7 @@ class FoldedModel:
 
 
 class Ranking:
-    """Held-out error of a joint with each candidate.
-
-    Parameters
-    ----------
-    problem : Problem
-        Rows and folds.
-    candidates : sequence of Candidate
-        Effects that could be added.
-    target : sequence of ndarray
-        Averaged torque of every joint.
-    """
+    """Held-out error of a joint with each candidate; the target is the averaged torque."""
 
     def __init__(
         self, problem: Problem, candidates: Sequence[Candidate], target: Sequence[Array]
@@ -122,14 +94,8 @@ class Ranking:
     ) -> FoldedModel:
         """Fit a model to all folds and without each fold.
 
-        Parameters
-        ----------
-        blocks : sequence of dict
-            Columns beside the rigid body.
-        sigma : ndarray of shape (n_joints,)
-            Noise of one row of every joint.
-        own : ndarray of shape (p,) of bool, optional
-            Coefficients that can be identified from a single recording only; none by default.
+        ``own`` are coefficients that can be identified from a single recording only; none by
+        default.
         """
         design = self.problem.design(blocks)
         weight = 1 / np.asarray(sigma) ** 2
@@ -156,15 +122,7 @@ class Ranking:
         return np.array([np.sqrt(np.mean(r**2)) + 1e-100 if len(r) else 1.0 for r in residuals])
 
     def held_out(self, model: FoldedModel, joint: int) -> HeldOutRows:
-        """Held-out residual of a joint's rows, now and with every candidate.
-
-        Parameters
-        ----------
-        model : FoldedModel
-            The present model.
-        joint : int
-            Joint, counted from 0.
-        """
+        """Held-out residual of a joint's rows, now and with every candidate."""
         index = np.array([i for i, c in enumerate(self.candidates) if joint in c.rows], dtype=int)
         columns = self._columns_of(index)
         parts = (self._crossed(b) for b in (self._rigid, *model.blocks))

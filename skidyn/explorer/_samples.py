@@ -16,13 +16,7 @@ MOST = 8192
 
 
 class Samples:
-    """Samples of a problem, each under the fit that left its fold out.
-
-    Parameters
-    ----------
-    problem : Problem
-        Rows, folds and torque.
-    """
+    """Samples of a problem, each under the fit that left its fold out."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
@@ -33,21 +27,11 @@ class Samples:
         self._columns: dict[Term, dict[int, Array]] = {}
 
     def residual(self, terms: Sequence[Term], coefficients: Sequence[Array], whole: Array) -> Array:
-        """Held-out residual, as in a diagnosis.
+        """Held-out residual as in a diagnosis, of shape (n_samples, n_joints), N m or N.
 
-        Parameters
-        ----------
-        terms : sequence of Term
-            Every effect of the model.
-        coefficients : sequence of ndarray of shape (n_coefficients,)
-            Coefficients of the fit without each fold: rigid body, then terms.
-        whole : ndarray of shape (n_coefficients,)
-            Coefficients of the fit to all folds, for those that can be identified from a single
-            recording only and are not held out with it.
-
-        Returns
-        -------
-        ndarray of shape (n_samples, n_joints), N m or N
+        The coefficients are those of the fit without each fold, rigid body first. ``whole`` are
+        those of the fit to all folds, for effects that can be identified from a single recording
+        only and are not held out with it.
         """
         residual = np.array(self.problem.torque)
         self._take_rigid_body(residual, coefficients)

@@ -23,24 +23,10 @@ def script(
     reading: Mapping[str, Any],
     controller: Controller | None = None,
 ) -> str:
-    """Python source that repeats the clicks.
+    """Python source that repeats the clicks: kind and joint, from 1, of every addition.
 
-    Parameters
-    ----------
-    model : RBDRegressor
-        The model at the start.
-    clicks : sequence of (str, int)
-        Kind and joint, counted from 1, of every addition.
-    logs : sequence of str
-        Files of the log.
-    urdf : str
-        Description of the robot.
-    joints : sequence of str, optional
-        Joints the log covers.
-    reading : mapping
-        Further arguments of :func:`skidyn.logs.read_log`; None where not given.
-    controller : Controller, optional
-        Position servos whose torque is computed from their commands.
+    ``reading`` are further arguments of :func:`skidyn.logs.read_log`, None where not given; the
+    torque is computed from the commands of a ``controller`` if there is one.
     """
     effects = ", ".join(_source(e) for e in model.effects)
     only = "" if joints is None else f", joints={list(joints)!r}"

@@ -27,13 +27,7 @@ class Seen(State):
     """Numbers and curves of the given and of the present model."""
 
     def sizes(self) -> list[str]:
-        """Parameters of every addition with half their 95 % intervals.
-
-        Returns
-        -------
-        list of str
-            Such as ``"k = 3.5 ± 0.4 N m/rad"``, one for each addition.
-        """
+        """Parameters of every addition with half their 95 % intervals."""
         if not self.added:
             return []
         rest = [t for t in self.terms if not is_fine(t)]
@@ -51,13 +45,10 @@ class Seen(State):
         ]
 
     def sure(self) -> list[str]:
-        """Confidence that every added effect is the right one.
+        """Confidence that every added effect is the right one, such as ``"confidence 90%"``.
 
-        Returns
-        -------
-        list of str
-            Such as ``"confidence 90%"``: as in a diagnosis, from the error that the best other
-            effect would have removed instead, and from the error that remains on its joints.
+        As in a diagnosis, it follows from the error that the best other effect would have removed
+        instead, and from the error that remains on its joints.
         """
         residual, rows = self._steps[-1].residual, self.problem.rows
         everywhere = range(self.problem.n_joints)
@@ -79,20 +70,10 @@ class Seen(State):
         return told
 
     def curves(self, joint: int, trajectory: int) -> dict[str, list[float | None]]:
-        """Measured torque, and held-out torque of the given and of the present model.
+        """Measured torque, and held-out torque of the given and of the present model, N m or N.
 
-        Parameters
-        ----------
-        joint : int
-            Joint, counted from 1.
-        trajectory : int
-            Trajectory.
-
-        Returns
-        -------
-        dict
-            ``time`` (s), ``measured``, ``given``, ``now`` (N m or N); few points, peaks kept. The
-            models are None where the joint rests or turns: these samples are not judged.
+        There are few points, with the peaks kept. The models are None where the joint, from 1,
+        rests or turns: these samples are not judged.
         """
         j = self._joint(joint)
         here = np.flatnonzero(self.problem.signals.trajectory == trajectory)
@@ -113,19 +94,9 @@ class Seen(State):
         }
 
     def residuals(self, joint: int, trajectory: int) -> dict[str, list[float | None]]:
-        """Held-out residual, averaged over the windows by which models are fitted and judged.
+        """Held-out residual of both, averaged over the windows by which models are fitted.
 
-        Parameters
-        ----------
-        joint : int
-            Joint, counted from 1.
-        trajectory : int
-            Trajectory.
-
-        Returns
-        -------
-        dict
-            ``time`` (s), ``given``, ``now`` (N m or N); None where the joint rests or turns.
+        It is in N m or N, and None where the joint, from 1, rests or turns.
         """
         j = self._joint(joint)
         self._check_trajectory(trajectory)

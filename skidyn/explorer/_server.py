@@ -34,58 +34,17 @@ LONGEST_BODY = 2**16
 class Explorer:
     """Answer requests of the page one at a time; the report is made in a separate thread.
 
-    Parameters
-    ----------
-    session : Session
-        Model and log.
-    folder : path
-        Where results are saved.
-    logs : sequence of str
-        Files of the log, for the script.
-    urdf : str
-        Description of the robot, for the script.
-    joints : sequence of str, optional
-        Joints the log covers, for the script.
-    reading : mapping, optional
-        Further arguments with which the log was read, for the script.
-    controller : Controller, optional
-        Position servos whose torque was computed from their commands, for the script.
+    Results are saved in the folder; the other arguments are those of ``session.script``.
     """
 
-    def __init__(
-        self,
-        session: Session,
-        folder: Path,
-        logs: Sequence[str] = (),
-        urdf: str = "robot.urdf",
-        joints: Sequence[str] | None = None,
-        reading: Mapping[str, Any] | None = None,
-        controller: Controller | None = None,
-    ) -> None:
-        self.controller = controller
-        self.session, self.folder = session, Path(folder)
-        self.logs, self.urdf = list(logs) or ["log.csv"], urdf
-        self.joints, self.reading = joints, reading
+    def __init__(self, session: Session, folder: Path, **script: Any) -> None:
+        self.session, self.folder, self.script = session, Path(folder), script
         self.token = secrets.token_urlsafe(24)
         self._saved: RBDRegressor | None = None
         self._told: dict[str, Any] = {"text": "", "share": None}
 
     def answer(self, question: str, words: dict[str, Any]) -> dict[str, Any]:
-        """Answer a request of the page.
-
-        Parameters
-        ----------
-        question : {"state", "curves", "ranked", "add", "refine", "undo", "remove", "sizes", \
-                "save", "report", "progress"}
-            Kind of request.
-        words : dict
-            Its arguments.
-
-        Returns
-        -------
-        dict
-            JSON types only.
-        """
+        """Answer a request of the page with its arguments, in JSON types only."""
         known: dict[str, Callable[..., dict[str, Any]]] = {
             "state": self._state,
             "curves": self._curves,
@@ -168,16 +127,9 @@ class Explorer:
         self.session.refine()
         self.folder.mkdir(parents=True, exist_ok=True)
         self._saved = self.session.fitted_model()
-        text = self.session.script(
-            self.logs,
-            self.urdf,
-            joints=self.joints,
-            reading=self.reading,
-            controller=self.controller,
-        )
         files = [
             save_model(self.folder / "model.skops", self._saved),
-            write_text(self.folder / "explored.py", text),
+            write_text(self.folder / "explored.py", self.session.script(**self.script)),
         ]
         return {"saved": [str(file) for file in files]}
 
@@ -201,13 +153,7 @@ class Explorer:
 
 
 def page() -> str:
-    """The page as one file.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """The page as one HTML file."""
     folder = files("skidyn.explorer").joinpath("static")
     text = folder.joinpath("explorer.html").read_text("utf-8")
     for name in ("uPlot.css", "uPlot.js"):
@@ -251,15 +197,7 @@ def _refuse_constant(name: str) -> float:
 
 
 def make_app(explorer: Explorer, port: int) -> Any:
-    """The web application.
-
-    Parameters
-    ----------
-    explorer : Explorer
-        Object that answers the requests.
-    port : int
-        Port of this machine; requests for any other host are refused.
-    """
+    """The web application; requests for a host other than this machine at this port are refused."""
     import_optional("starlette", extra="explore")
     from starlette.applications import Starlette
     from starlette.requests import Request
@@ -374,7 +312,8 @@ def serve(
     http://127.0.0.1:54321/?token=...
     """
     uvicorn = import_optional("uvicorn", extra="explore")
-    explorer = Explorer(session, Path(folder), logs, urdf, joints, reading, controller)
+    told = {"joints": joints, "reading": reading, "controller": controller}
+    explorer = Explorer(session, Path(folder), logs=logs or ("log.csv",), urdf=urdf, **told)
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     listener.bind((HOST, port))

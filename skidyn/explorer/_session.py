@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._exceptions import EffectError
-from skidyn.diagnosis import refine
+from skidyn.diagnosis import Candidate, refine
 from skidyn.effects import get_effect
 from skidyn.explorer._script import script
 from skidyn.explorer._seen import Seen
@@ -167,29 +167,12 @@ class Session(Seen):
                 continue
             if self._has(candidate):
                 continue
-            effect = candidate.term.effect
-            best[candidate.kind] = RankedEffect(
-                candidate.kind,
-                effect.title,
-                effect.formula,
-                tuple(k + 1 for k in candidate.joints),
-                float(drop[at]),
-                float(here[at]),
-            )
+            best[candidate.kind] = _shown(candidate, float(drop[at]), float(here[at]))
         for offer in self._offers(j):
-            effect, share = offer.candidate.term.effect, float(offer.drop[j])
-            which = offer.candidate.term.trajectories
+            share, which = float(offer.drop[j]), offer.candidate.term.trajectories
             inside = trajectory is None or which is None or trajectory in which
             if share >= LEAST_DROP and inside:
-                best[offer.candidate.kind] = RankedEffect(
-                    offer.candidate.kind,
-                    effect.title,
-                    effect.formula,
-                    tuple(k + 1 for k in offer.candidate.joints),
-                    share,
-                    share,
-                    which or (),
-                )
+                best[offer.candidate.kind] = _shown(offer.candidate, share, share)
         return sorted(best.values(), key=_order)[:RANKED]
 
     def add(self, kind: str, joint: int, *, refined: bool = True) -> dict[str, Any]:
@@ -365,6 +348,19 @@ class Session(Seen):
         if span is not None:
             inside &= (rows.time[joint] >= min(span)) & (rows.time[joint] <= max(span))
         return inside
+
+
+def _shown(candidate: Candidate, drop: float, drop_here: float) -> RankedEffect:
+    effect = candidate.term.effect
+    return RankedEffect(
+        candidate.kind,
+        effect.title,
+        effect.formula,
+        tuple(joint + 1 for joint in candidate.joints),
+        drop,
+        drop_here,
+        candidate.term.trajectories or (),
+    )
 
 
 def _order(effect: RankedEffect) -> tuple[float, int]:

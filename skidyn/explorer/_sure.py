@@ -21,14 +21,9 @@ NEAR = 0.1
 
 @dataclass(frozen=True)
 class Margin:
-    """Difference between the gains of an added effect and the best other effect.
+    """Difference between the gains of an added effect and the best other effect, the ``rival``.
 
-    Parameters
-    ----------
-    share : float
-        Share of the gain; negative if the other effect removes more error.
-    rival : str, default=""
-        Title of the other effect.
+    The share of the gain is negative if the other effect removes more error.
     """
 
     share: float = 1.0
@@ -36,15 +31,7 @@ class Margin:
 
 
 def margin(kind: str, ranked: Sequence[RankedEffect]) -> Margin:
-    """Margin of an effect among those that were ranked with it.
-
-    Parameters
-    ----------
-    kind : str
-        Kind of the added effect.
-    ranked : sequence of RankedEffect
-        Effects that would have helped the same joint, before it was added.
-    """
+    """Margin of an effect among those that would have helped the same joint before it was added."""
     gains = {e.kind: -np.log1p(-min(e.drop, 1 - 1e-12)) for e in ranked}
     titles = {e.kind: e.title for e in ranked}
     others = [other for other in gains if other != kind]
@@ -61,17 +48,8 @@ def sure_told(
     removed: float,
     whole_recordings: bool,
 ) -> str:
-    """Confidence in an added effect, in a few words.
+    """Confidence in an added effect, in a few words; see :func:`skidyn.diagnosis.confidence`.
 
-    Parameters
-    ----------
-    margin : Margin
-        Margin over the best other effect.
-    inflation, removed, whole_recordings
-        Arguments of :func:`skidyn.diagnosis.confidence`.
-
-    Examples
-    --------
     >>> sure_told(Margin(0.8, "Offset"), 1.0, 0.5, True)
     'confidence 98%'
     >>> sure_told(Margin(-0.3, "Spring"), 1.0, 0.5, True)

@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from skidyn._exceptions import SkidynError
-from skidyn.dynamics import inertial_parts, skew
+from skidyn.dynamics import central_parts
 from skidyn.effects import Term, get_effect
 from skidyn.export._model import check_model, is_carried
 from skidyn.identification import RBDRegressor
@@ -28,12 +29,9 @@ class CentralInertia:
 def central_inertia(parameters: np.ndarray, body: str) -> CentralInertia | None:
     """Inertia about the center of mass; None for a body without mass.
 
-    Raises
-    ------
-    SkidynError
-        The parameters are physically impossible, so neither format can represent them.
+    A SkidynError is raised if the parameters are impossible: neither format can represent them.
     """
-    mass, moment, inertia = inertial_parts(parameters)
+    mass, center, central = central_parts(parameters)
     if not np.any(parameters):
         return None
     if mass <= 0.0:
@@ -42,9 +40,6 @@ def central_inertia(parameters: np.ndarray, body: str) -> CentralInertia | None:
             "physically consistent parameters: RBDRegressor(..., consistent=True), on the command "
             "line --consistent."
         )
-    center = moment / mass
-    arm = skew(center)
-    central = inertia + mass * arm @ arm
     moments = np.linalg.eigvalsh(central)
     if moments[0] < -1e-9 * max(abs(moments[-1]), 1e-9):
         raise SkidynError(
@@ -54,6 +49,29 @@ def central_inertia(parameters: np.ndarray, body: str) -> CentralInertia | None:
             "command line --consistent."
         )
     return CentralInertia(mass, center, (central + central.T) / 2)
+
+
+def urdf_inertial(central: CentralInertia) -> ElementTree.Element:
+    """The ``<inertial>`` of a link, in its frame."""
+    element = ElementTree.Element("inertial")
+    ElementTree.SubElement(element, "origin", xyz=numbers(central.center), rpy="0 0 0")
+    ElementTree.SubElement(element, "mass", value=numbers(central.mass))
+    names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    entries = central.inertia[np.triu_indices(3)]
+    moments = {key: numbers(x) for key, x in zip(names, entries, strict=True)}
+    ElementTree.SubElement(element, "inertia", moments)
+    return element
+
+
+def mjcf_inertial(central: CentralInertia) -> ElementTree.Element:
+    """The ``<inertial>`` of a body, in its frame."""
+    I = central.inertia
+    return ElementTree.Element(
+        "inertial",
+        pos=numbers(central.center),
+        mass=numbers(central.mass),
+        fullinertia=numbers([I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]]),
+    )
 
 
 def about_origin(mass: float, center: np.ndarray, central: np.ndarray) -> np.ndarray:
@@ -66,16 +84,9 @@ def about_origin(mass: float, center: np.ndarray, central: np.ndarray) -> np.nda
 class Description:
     """Parts of a model that a description of bodies and joints can represent.
 
-    Attributes
-    ----------
-    robot : Robot
-        The robot.
-    parameters : ndarray of shape (n_bodies, 10)
-        Inertial parameters, with a permanent payload as part of the last body.
-    joints : dict of str to ndarray of shape (n_joints, n_coefficients)
-        Coefficients of the kinds for which the format has fields.
-    left : list of Term
-        Effects for which the format has no fields.
+    Inertial ``parameters`` have a permanent payload as part of the last body. ``joints`` are
+    coefficients, (n_joints, n_coefficients), of the kinds for which the format has fields; ``left``
+    are effects for which it has none.
     """
 
     robot: Robot

@@ -18,19 +18,7 @@ LARGEST = 64 * 2**20
 
 @dataclass
 class Element:
-    """An element and its position in the file, in bytes.
-
-    Attributes
-    ----------
-    tag : str
-        Its name.
-    attributes : dict of str to str
-        As written.
-    start, head, end : int
-        Begin and end of the start tag, and end of the whole element.
-    children : list of Element
-        In order.
-    """
+    """An element, and its position in the file in bytes: of the start tag, and its own end."""
 
     tag: str
     attributes: dict[str, str]

@@ -24,11 +24,8 @@ def write_files(
 ) -> tuple[str, ...]:
     """Write a file and ``<path>.skidyn.json`` with the omitted effects, each in one step.
 
-    Returns
-    -------
-    tuple of str
-        Names of the omitted effects. If there are none, there is no side-car, and one of an earlier
-        export is removed.
+    The names of the omitted effects are returned. If there are none, there is no side-car, and one
+    of an earlier export is removed.
     """
     beside = Path(f"{os.fspath(path)}.skidyn.json")
     writable(beside)  # both or neither

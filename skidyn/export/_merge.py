@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +17,13 @@ from skidyn._optional import import_optional
 from skidyn.dynamics import transform_inertial
 from skidyn.export._bodies import (
     MUJOCO,
-    CentralInertia,
     about_origin,
     central_inertia,
     described,
+    mjcf_inertial,
     mujoco_attributes,
     numbers,
+    urdf_inertial,
 )
 from skidyn.export._edits import Edits, Element
 from skidyn.export._files import PathLike, write_files
@@ -98,7 +100,7 @@ def merge_urdf(
         link = links[name]
         inertial = link.find("inertial")
         central = central_inertia(_urdf_inertial(inertial) + change, name)
-        text = "" if central is None else _urdf_text(central)
+        text = "" if central is None else _text(urdf_inertial(central))
         if inertial is not None:
             edits.replace(inertial, text)
         elif text:
@@ -139,14 +141,8 @@ def _urdf_inertial(element: Element | None) -> np.ndarray:
     return about_origin(mass, center, inertia)
 
 
-def _urdf_text(central: CentralInertia) -> str:
-    names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-    entries = central.inertia[np.triu_indices(3)]
-    moments = " ".join(f'{k}="{numbers(v)}"' for k, v in zip(names, entries, strict=True))
-    return (
-        f'<inertial><origin xyz="{numbers(central.center)}" rpy="0 0 0"/>'
-        f'<mass value="{numbers(central.mass)}"/><inertia {moments}/></inertial>'
-    )
+def _text(element: ElementTree.Element) -> str:
+    return ElementTree.tostring(element, "unicode").replace(" />", "/>")
 
 
 def merge_mjcf(
@@ -346,12 +342,7 @@ def _mjcf_text(parameters: np.ndarray, name: str) -> str:
         raise SkidynError(
             f"Body {name!r} would have no mass; MuJoCo refuses moving bodies without mass."
         )
-    I = central.inertia
-    full = numbers([I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]])
-    return (
-        f'<inertial pos="{numbers(central.center)}" mass="{numbers(central.mass)}" '
-        f'fullinertia="{full}"/>'
-    )
+    return _text(mjcf_inertial(central))
 
 
 def _check_loads(mujoco: Any, data: bytes, source: Path) -> None:

@@ -13,6 +13,7 @@ from skidyn.export._bodies import (
     MUJOCO,
     central_inertia,
     described,
+    mjcf_inertial,
     mujoco_attributes,
     numbers,
 )
@@ -101,14 +102,7 @@ def _add_body(
             "physically consistent parameters, RBDRegressor(..., consistent=True), on the "
             "command line --consistent."
         )
-    I = central.inertia
-    ElementTree.SubElement(
-        element,
-        "inertial",
-        pos=numbers(central.center),
-        mass=numbers(central.mass),
-        fullinertia=numbers([I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]]),
-    )
+    element.append(mjcf_inertial(central))
     j = int(tree.coordinates[body])
     own = robot.body_joints[body] == robot.joint_names[j]
     joint = ElementTree.SubElement(

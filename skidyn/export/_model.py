@@ -26,16 +26,7 @@ _SAMPLES, _ROUNDING = 64, 1e-9
 class StaticModel:
     """Parts of a model that are a function of q, dq and ddq, and the other parts.
 
-    Attributes
-    ----------
-    robot : Robot
-        The robot.
-    program : Program
-        Torques of all joints.
-    held : list of Term
-        Effects in the program.
-    left : list of Term
-        Effects with a memory, or that depend on time, temperature or the recording.
+    ``left`` are effects with a memory, or that depend on time, temperature or the recording.
     """
 
     robot: Robot
@@ -57,7 +48,8 @@ def static_model(model: RBDRegressor | Robot) -> StaticModel:
     second definition. Each effect is then compared with its own columns on random numbers.
     """
     if isinstance(model, Robot):
-        return StaticModel(model, _fixed(model, model.inertial_parameters), [], [])
+        program = model._engine.fixed_inverse_dynamics(model.inertial_parameters)
+        return StaticModel(model, program, [], [])
     check_model(model)
     held = [term for term in model.effect_terms_ if is_static(model, term)]
     if not _agrees(model, held, traced(model, held)):
@@ -78,10 +70,6 @@ def check_model(model: Any) -> None:
         )
     if not hasattr(model, "effect_terms_"):
         raise SkidynError("the model is not fitted; call its fit before exporting it.")
-
-
-def _fixed(robot: Robot, parameters: np.ndarray) -> Program:
-    return robot._engine.fixed_inverse_dynamics(parameters)
 
 
 def _with_terms(model: RBDRegressor, terms: Sequence[Term]) -> RBDRegressor:

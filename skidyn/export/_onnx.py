@@ -19,23 +19,6 @@ if TYPE_CHECKING:
 #: The oldest versions with all operators in double precision; newer runtimes read them too.
 OPSET, IR_VERSION = 17, 8
 
-_OPERATORS = {
-    "add": "Add",
-    "sub": "Sub",
-    "mul": "Mul",
-    "div": "Div",
-    "max": "Max",
-    "pow": "Pow",
-    "neg": "Neg",
-    "sin": "Sin",
-    "cos": "Cos",
-    "tanh": "Tanh",
-    "exp": "Exp",
-    "sqrt": "Sqrt",
-    "abs": "Abs",
-    "sign": "Sign",
-}
-
 
 def to_onnx(model: RBDRegressor | Robot) -> onnx.ModelProto:
     """The model as an ONNX graph in double precision.
@@ -118,7 +101,8 @@ def _proto(static: StaticModel) -> Any:
             constants.append(helper.make_tensor(names[index], double, [1], [node[1]]))
         elif node[0] != "input":
             terms = [names[i] for i in operands(node)]
-            nodes.append(helper.make_node(_OPERATORS[node[0]], terms, [names[index]]))
+            # ONNX has an operator of the same name for each operation of a tape
+            nodes.append(helper.make_node(node[0].capitalize(), terms, [names[index]]))
     for (j,), scalar in static.program.outputs.items():
         # a torque that does not depend on the motion still has one value for each sample
         nodes.append(helper.make_node("Add", ["zero", names[scalar.index]], [f"tau_{j}"]))

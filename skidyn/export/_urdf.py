@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ElementTree
 
 import numpy as np
 
-from skidyn.export._bodies import central_inertia, described, numbers
+from skidyn.export._bodies import central_inertia, described, numbers, urdf_inertial
 from skidyn.export._files import PathLike, write_files
 from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
@@ -53,26 +53,15 @@ def write_urdf(model: RBDRegressor | Robot, path: PathLike) -> tuple[str, ...]:
     for name, placement in robot.links.items():
         link = ElementTree.SubElement(root, "link", name=name)
         if placement.body >= 0 and robot.body_names[placement.body] == name:
-            _add_inertial(link, own.parameters[placement.body], name)
+            central = central_inertia(own.parameters[placement.body], name)
+            if central is not None:
+                link.append(urdf_inertial(central))
     for body in range(robot.n_bodies):
         _add_joint(root, robot, body, own.joints["viscous"][:, 0], own.joints["coulomb"][:, 0])
     _add_fixed_links(root, robot)
     ElementTree.indent(root)
     text = '<?xml version="1.0" encoding="utf-8"?>\n' + ElementTree.tostring(root, "unicode") + "\n"
     return write_files(path, text, model, own.left)
-
-
-def _add_inertial(link: ElementTree.Element, parameters: np.ndarray, name: str) -> None:
-    central = central_inertia(parameters, name)
-    if central is None:
-        return
-    inertial = ElementTree.SubElement(link, "inertial")
-    ElementTree.SubElement(inertial, "origin", xyz=numbers(central.center), rpy="0 0 0")
-    ElementTree.SubElement(inertial, "mass", value=numbers(central.mass))
-    names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-    entries = central.inertia[np.triu_indices(3)]
-    moments = {key: numbers(x) for key, x in zip(names, entries, strict=True)}
-    ElementTree.SubElement(inertial, "inertia", moments)
 
 
 def _root_link(robot: Robot) -> str:

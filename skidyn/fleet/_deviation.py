@@ -170,18 +170,7 @@ def compare_fleet(
 
 
 def merge(parts: Sequence[Evidence]) -> Evidence:
-    """Evidence of all parts, one factor per joint, so that no factor grows with their number.
-
-    Parameters
-    ----------
-    parts : sequence of Evidence
-        Evidence with equal columns.
-
-    Returns
-    -------
-    Evidence
-        All of it as trajectory 0.
-    """
+    """All evidence as trajectory 0, with one factor per joint whatever the number of parts."""
     total: Evidence | None = None
     for part in parts:
         rows = {
@@ -202,10 +191,7 @@ def merge(parts: Sequence[Evidence]) -> Evidence:
 def effect_columns(evidence: Evidence, columns: Sequence[str] | None) -> list[str]:
     """Columns that may deviate: the requested ones, else those of the effects.
 
-    Raises
-    ------
-    SkidynError
-        A column is unknown, or there are none.
+    A SkidynError is raised if a column is unknown, or there are none.
     """
     if columns is None:
         columns = [name for name in evidence.columns if "[" in name]
@@ -221,23 +207,10 @@ def effect_columns(evidence: Evidence, columns: Sequence[str] | None) -> list[st
 def deviation(
     evidence: Evidence, coefficients: Array, noise: Mapping[int, float], index: Sequence[int]
 ) -> tuple[Array, Array]:
-    """Deviation of some coefficients with all others fixed, and its standard error.
+    """Deviation of some coefficients of a robot from the common ones, and its standard error.
 
-    Parameters
-    ----------
-    evidence : Evidence
-        Evidence of one robot, or of one of its trajectories.
-    coefficients : ndarray of shape (n_columns,)
-        Common coefficients.
-    noise : mapping of int to float
-        Noise of a row of every joint, N m or N.
-    index : sequence of int
-        Columns that may deviate.
-
-    Returns
-    -------
-    deviation, standard_error : ndarray of shape (len(index),)
-        SI units; NaN for columns that the motion does not excite.
+    All other coefficients are fixed; ``noise`` is that of a row of every joint, N m or N. Both are
+    NaN for columns that the motion does not excite.
     """
     stacked = np.vstack([factor / noise[key[1]] for key, factor in evidence.factors.items()])
     a, rest = stacked[:, list(index)], stacked[:, -1] - stacked[:, :-1] @ coefficients

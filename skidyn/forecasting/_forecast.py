@@ -15,7 +15,7 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 
 from skidyn._columns import ColumnSpec
 from skidyn._compat import Interval, fit_context
-from skidyn._keys import Keys, fitted_keys
+from skidyn._keys import fitted_keys
 from skidyn._order import refuse_shuffled, taken, time_order
 from skidyn._signals import find_segments
 
@@ -65,12 +65,9 @@ class _Forecaster(MultiOutputMixin, RegressorMixin, BaseEstimator):
     trajectory: ColumnSpec
     time: ColumnSpec
 
-    def _keys(self) -> Keys:
-        return fitted_keys(self)
-
     def _past(self, X: Array) -> Array:
         """Previous sample of each row, one column per output."""
-        return X[:, list(self._keys().features)]
+        return X[:, list(fitted_keys(self).features)]
 
     def _check(self, X: Any, y: Any) -> tuple[Array, Array]:
         X, y = validate_data(self, X, y, multi_output=True, y_numeric=True, dtype=np.float64)
@@ -222,7 +219,7 @@ class AutoregressiveRegressor(_Forecaster):
             The forecaster.
         """
         X, targets = self._check(X, y)
-        keys = self._keys()
+        keys = fitted_keys(self)
         time = None if keys.time is None else X[:, keys.time]
         refuse_shuffled(type(self).__name__, keys.trajectories(X), time)
         lags = self._lags(X)
@@ -238,7 +235,7 @@ class AutoregressiveRegressor(_Forecaster):
         """Last `order` samples of every row, latest first: (n_samples, n_outputs, order)."""
         past = self._past(X)
         first = np.zeros(len(X), dtype=int)
-        for segment in self._keys().segments(X):
+        for segment in fitted_keys(self).segments(X):
             first[segment] = segment.start
         rows = np.arange(len(X))
         return np.stack([past[np.maximum(rows - k, first)] for k in range(self.order)], axis=2)
@@ -258,7 +255,7 @@ class AutoregressiveRegressor(_Forecaster):
         """
         check_is_fitted(self)
         X = validate_data(self, X, reset=False, dtype=np.float64)
-        order = time_order(X, self._keys())
+        order = time_order(X, fitted_keys(self))
         lags = self._lags(taken(X, order))
         forecast = np.einsum("njk,jk->nj", lags, self.coef_) + self.intercept_
         return self._shaped(forecast if order is None else forecast[np.argsort(order)])

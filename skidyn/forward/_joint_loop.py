@@ -82,17 +82,10 @@ class JointLoop:
 
     @classmethod
     def of(cls, task: Task, joint: int, inertia: Array, bias: Array, load: Array) -> JointLoop:
-        """Loop of a joint.
+        """Loop of a joint, from 0, along pieces of a log with a controller.
 
-        Parameters
-        ----------
-        task : Task
-            Pieces of a log with a controller.
-        joint : int
-            Joint, from 0.
-        inertia, bias, load : ndarray of shape (n_log,)
-            Inertia of motor and link, torque in addition to that of this inertia, and torque of the
-            rigid body.
+        Arrays of shape (n_log,) are the inertia of motor and link, torque in addition to that of
+        this inertia, and torque of the rigid body.
         """
         controller, windows, signals = task.controller, task.windows, task.signals
         assert controller is not None and task.reference is not None and task.rate is not None
@@ -185,10 +178,7 @@ class JointLoop:
     def twist(self, parameters: Mapping[str, float]) -> Array:
         """Motor minus link along a simulation of a gear, shape (n_samples, n_pieces), rad or m.
 
-        Parameters
-        ----------
-        parameters : dict of str to float
-            As of :meth:`run`, with ``compliance``.
+        Parameters are those of :meth:`run`, with ``compliance``.
         """
         return np.asarray(self._run({k: np.array([v]) for k, v in parameters.items()})[1][0])
 

@@ -322,14 +322,9 @@ class ForwardModel:
 
     # ------------------------------------------------------------------ many models at once
     def parameter_rows(self, parameters: Array, coefficients: Array) -> tuple[Array, Array]:
-        """Inputs of a free model from inertial parameters and coefficients, one row per model.
+        """Inputs of a free model, one row per model: inertial parameters, then coefficients.
 
-        Parameters
-        ----------
-        parameters : ndarray of shape (n_models, n_bodies, 10)
-            Inertial parameters.
-        coefficients : ndarray of shape (n_models, n_coefficients)
-            Coefficients of the effects in :attr:`inside`, in this order.
+        Coefficients are those of the effects in :attr:`inside`, in this order.
         """
         canonical = self.model.robot_._engine.canonical
         phi = np.array([np.concatenate(canonical.parameters(p)) for p in parameters])

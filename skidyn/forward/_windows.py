@@ -40,20 +40,11 @@ class Windows:
 
 
 def make_windows(signals: Signals, horizon: float | None) -> Windows:
-    """Cut a log into pieces that overlap by one sample.
+    """Cut a log into pieces of ``horizon`` s that overlap by one sample.
 
-    Parameters
-    ----------
-    signals : Signals
-        Motion with time.
-    horizon : float, s, or None
-        Length of a piece; None for the whole of every continuous stretch. A remainder shorter than
-        half of it is left out if its stretch has a whole piece.
-
-    Raises
-    ------
-    SkidynError
-        No time is logged, the horizon is not positive, or no stretch holds two samples.
+    None means the whole of every continuous stretch. A remainder shorter than half of a piece is
+    left out if its stretch has a whole piece. A SkidynError is raised if no time is logged, the
+    horizon is not positive, or no stretch holds two samples.
     """
     if signals.time is None:
         raise SkidynError("the log has no column 'time' (s); a simulation needs it")

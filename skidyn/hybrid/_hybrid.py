@@ -29,7 +29,7 @@ from skidyn._compat import (
     fit_context,
     fit_progress,
 )
-from skidyn._keys import Keys, fitted_keys
+from skidyn._keys import fitted_keys
 from skidyn.hybrid._gate import learned_weights
 from skidyn.hybrid._own_joint import OwnJointRegressor
 from skidyn.hybrid._range import TrainingRange, distances, fade
@@ -178,7 +178,7 @@ class HybridRegressor(
         weight = None
         if sample_weight is not None:
             weight = _check_sample_weight(sample_weight, array, dtype=np.float64)
-        keys = self._keys()
+        keys = fitted_keys(self)
         folds = self._folds(table, torque, keys.trajectories(array), groups)
         n_fits = len(folds) * (len(folds) + 3) // 2 + 2  # pairs of folds, folds, and all rows
         with fit_progress(self, n_fits, X, y, "model") as progress:
@@ -194,7 +194,7 @@ class HybridRegressor(
         folds: list[Any],
         progress: FitProgress,
     ) -> None:
-        keys = self._keys()
+        keys = fitted_keys(self)
         learner = self._own_joints() if self.learner is None else self.learner
         learner = without_keys_inside(learner, keys)
         physics = without_keys_inside(self.physics, keys)
@@ -248,9 +248,6 @@ class HybridRegressor(
         names = getattr(getattr(self.physics, "robot", None), "joint_names", None)
         return OwnJointRegressor(joint_names=names, trajectory=self.trajectory, time=self.time)
 
-    def _keys(self) -> Keys:
-        return fitted_keys(self)
-
     def predict(self, X: Any) -> Array:
         """Predict the torque: physics, plus the learned part if it is used.
 
@@ -267,7 +264,7 @@ class HybridRegressor(
         check_is_fitted(self)
         array = validate_data(self, X, reset=False, dtype=np.float64)
         table = _like(X, array)
-        physics = self.physics_.predict(self._keys().for_learner(table, self.physics_))
+        physics = self.physics_.predict(fitted_keys(self).for_learner(table, self.physics_))
         return self._shaped(physics) + self._learned(table, array)
 
     def learned_torque(self, X: Any) -> Array:
@@ -290,7 +287,7 @@ class HybridRegressor(
     def _learned(self, table: Any, array: Array) -> Array:
         learned = np.zeros((len(array), len(self.learned_weight_)))
         if self.learner_ is not None:
-            own = self._keys().for_learner(table, self.learner_)
+            own = fitted_keys(self).for_learner(table, self.learner_)
             learned += np.reshape(self.learner_.predict(own), learned.shape)
             learned *= self.learned_weight_ * fade(self._novelty(array))[:, None]
         return self._shaped(learned)
@@ -300,7 +297,7 @@ class HybridRegressor(
         return np.reshape(np.asarray(torque, dtype=np.float64), shape)
 
     def _novelty(self, array: Array) -> Array:
-        features = array[:, list(self._keys().features)]
+        features = array[:, list(fitted_keys(self).features)]
         return distances(features, self._scale, self._reference) / self.radius_
 
     def outside_range(self, X: Any) -> NDArray[np.bool_]:

@@ -23,7 +23,7 @@ from sklearn.utils.validation import (
 from skidyn._columns import Columns, ColumnSpec, resolve_columns
 from skidyn._compat import HasMethods, fit_context
 from skidyn._exceptions import ColumnError
-from skidyn._keys import Keys, fitted_keys
+from skidyn._keys import fitted_keys
 from skidyn._order import taken, time_order
 from skidyn.effects import dahl_state
 from skidyn.model_selection import order_of_log
@@ -129,7 +129,7 @@ class OwnJointRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, Ba
         targets = y.reshape(len(y), -1)
         self._n_outputs = targets.shape[1]
         self._columns = self._resolve(self._n_outputs)
-        order_of_log(self, X, self._keys())
+        order_of_log(self, X, fitted_keys(self))
         base = _cautious_boosting() if self.estimator is None else self.estimator
         features = self._features(X)
         weights = {}
@@ -148,7 +148,7 @@ class OwnJointRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, Ba
     def _resolve(self, n_joints: int) -> Columns | None:
         names = getattr(self, "feature_names_in_", None)
         joints = self.joint_names
-        features = self._keys().features
+        features = fitted_keys(self).features
         if names is None and joints is None and len(features) != 3 * n_joints:
             warnings.warn(
                 f"X has {len(features)} columns without names; the motion of {n_joints} joint(s) "
@@ -176,9 +176,9 @@ class OwnJointRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, Ba
     def _features(self, X: Array) -> list[Array]:
         columns = self._columns
         if columns is None:
-            return [X[:, list(self._keys().features)]] * self._n_outputs
+            return [X[:, list(fitted_keys(self).features)]] * self._n_outputs
         assert columns.ddq is not None
-        keys = self._keys()
+        keys = fitted_keys(self)
         order = time_order(X, keys)
         X = taken(X, order)
         segments = keys.segments(X)
@@ -187,9 +187,6 @@ class OwnJointRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, Ba
             states = [dahl_state(X[:, q], segments, float(way)) for way in self.presliding]
             own.append(np.column_stack([X[:, [q, dq, ddq]], *states]))
         return own if order is None else [table[np.argsort(order)] for table in own]
-
-    def _keys(self) -> Keys:
-        return fitted_keys(self)
 
     def predict(self, X: Any) -> Array:
         """Predict the torque of every row.

@@ -39,14 +39,9 @@ def distances(features: Array, scale: Array, reference: Array) -> Array:
 class TrainingRange:
     """Region around the training samples, beyond which a learned part fades out.
 
-    Attributes
-    ----------
-    scale, reference : ndarray
-        Standard deviation of the features, and reference samples divided by it.
-    radius : float
-        Distance within which held-out training samples lie.
-    held_out_novelty : ndarray of shape (n_samples,)
-        Novelty of the training samples when their fold is held out.
+    ``scale`` is the standard deviation of the features, ``reference`` are samples divided by it.
+    Held-out training samples lie within ``radius``; ``held_out_novelty`` is their distance in
+    radii.
     """
 
     def __init__(self, features: Array, folds: list[Any]) -> None:

@@ -76,19 +76,8 @@ class BodyConstraints:
 def body_constraints(known: BodyConstraints, names: Sequence[str], signs: Array) -> Linear:
     """Constraints as inequalities and equations of parameters and coefficients.
 
-    Parameters
-    ----------
-    known : BodyConstraints
-        Knowledge.
-    names : sequence of str
-        Names of the bodies.
-    signs : ndarray of shape (n_coefficients,)
-        1 for coefficients that must not be negative.
-
-    Raises
-    ------
-    ValueError
-        A body is unknown, or limits are contradictory.
+    ``signs`` are 1 for coefficients that must not be negative. A ValueError is raised if a body is
+    unknown or limits are contradictory.
     """
     n = 10 * len(names)
     width = n + len(signs)
@@ -117,23 +106,7 @@ def body_constraints(known: BodyConstraints, names: Sequence[str], signs: Array)
 def start_bodies(known: BodyConstraints, names: Sequence[str], nominal: Array) -> Array:
     """Bodies near the nominal ones that satisfy all constraints strictly.
 
-    Parameters
-    ----------
-    known : BodyConstraints
-        Knowledge.
-    names : sequence of str
-        Names of the bodies.
-    nominal : ndarray of shape (n_bodies, 10)
-        Bodies of the URDF.
-
-    Returns
-    -------
-    ndarray of shape (n_bodies, 10)
-
-    Raises
-    ------
-    ValueError
-        The constraints are contradictory.
+    A ValueError is raised if the constraints are contradictory.
     """
     bodies = existing_bodies(nominal)
     for name, axes in known.symmetry.items():

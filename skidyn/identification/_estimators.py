@@ -29,16 +29,10 @@ HUBER, DEGREES, REWEIGHTINGS = 1.345, 4.0, 15
 class Estimator:
     """An estimator of coefficients.
 
-    Attributes
-    ----------
-    solve : callable
-        ``solve(regression, prior_std)`` returns a Solution.
-    rows : bool
-        Whether single rows are needed, so that evidence is not enough.
-    whole : bool
-        Whether base parameters that the data does not determine are estimated too, from a prior.
-    simulates : bool
-        Whether the solution is refined to fit the simulated motion to the log.
+    ``solve(regression, prior_std)`` returns a Solution. ``rows``: single rows are needed, so that
+    evidence is not enough. ``whole``: base parameters that the data does not determine are
+    estimated too, from a prior. ``simulates``: the solution is refined to fit the simulated motion
+    to the log.
     """
 
     solve: Callable[[Regression, float | None], Solution]
@@ -108,13 +102,7 @@ ESTIMATORS: dict[str, Estimator] = {
 
 
 def find_estimator(name: str) -> Estimator:
-    """The estimator with a name.
-
-    Raises
-    ------
-    ValueError
-        There is none.
-    """
+    """The estimator with a name; a ValueError if there is none."""
     if not isinstance(name, str) or name not in ESTIMATORS:
         raise ValueError(f"estimator={name!r}; expected one of {', '.join(map(repr, ESTIMATORS))}")
     return ESTIMATORS[name]

@@ -32,12 +32,6 @@ def may_take_samples(terms: Iterable[Term]) -> bool:
 
 
 def predicts_better(samples: PredictionBands, averaged: PredictionBands) -> bool:
-    """Whether a fit of every sample predicts left-out folds better, and averages about as well.
-
-    Parameters
-    ----------
-    samples, averaged : PredictionBands
-        Bands of a model fitted to every sample, and of one fitted to averaged rows.
-    """
+    """Whether a fit of every sample predicts left-out folds better, and averages about as well."""
     gain, of_averages = np.log(averaged.rmse / samples.rmse).mean(axis=1)
     return bool(gain > LEAST_GAIN and of_averages > -MOST_LOSS)

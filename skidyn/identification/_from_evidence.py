@@ -104,17 +104,7 @@ def regressor_from_evidence(
 def weighted_solution(evidence: Evidence) -> tuple[Array, dict[int, float]]:
     """Coefficients with joints weighted by their noise, and that noise.
 
-    Parameters
-    ----------
-    evidence : Evidence
-        Evidence.
-
-    Returns
-    -------
-    coefficients : ndarray of shape (n_columns,)
-        Of all columns.
-    noise : dict of int to float
-        Root mean square residual of a row of every joint, N m or N.
+    The noise is the root mean square residual of a row of every joint, N m or N.
     """
     noise = None
     for _ in range(PASSES):

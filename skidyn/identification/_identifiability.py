@@ -31,10 +31,7 @@ MOST_NAMED = 4
 def condition_number(rows: Array) -> float:
     """Condition number of columns scaled to equal length; infinite if one is zero.
 
-    Parameters
-    ----------
-    rows : ndarray of shape (n_rows, n_columns)
-        Weighted rows, or their triangular factor.
+    The rows are weighted; their triangular factor is equivalent.
     """
     if rows.shape[1] == 0:
         return 1.0
@@ -50,17 +47,8 @@ def condition_number(rows: Array) -> float:
 def open_combinations(rows: Array, names: Sequence[str]) -> list[dict[str, Any]]:
     """Combinations of coefficients that the rows hardly determine, the worst first.
 
-    Parameters
-    ----------
-    rows : ndarray of shape (n_rows, n_columns)
-        Weighted rows, or their triangular factor.
-    names : sequence of str
-        Names of the columns.
-
-    Returns
-    -------
-    list of dict
-        ``combination`` (dict of name to factor), ``condition_index``, and ``sentence``.
+    The rows are weighted; their triangular factor is equivalent. ``combination`` maps names of
+    columns to factors.
     """
     size = np.linalg.norm(rows, axis=0)
     shown: list[int] = np.flatnonzero(size > 0).tolist()
@@ -127,24 +115,9 @@ def essential_parameters(
 ) -> dict[str, Any]:
     """Coefficients left when those with the largest relative standard errors are dropped in turn.
 
-    Parameters
-    ----------
-    rows : ndarray of shape (n_rows, n_columns + 1)
-        [columns | torque], weighted by the noise, or the triangular factor.
-    names : sequence of str
-        Names of the columns.
-    count : float
-        Rows of the log.
-    ratio : float
-        Dropping ends when no relative standard error is larger than this many times the smallest.
-    growth : float
-        It also ends before the error grows by more than this share.
-
-    Returns
-    -------
-    dict
-        ``parameters`` (list of dict with ``name``, ``value``, ``std``, ``relative_std``),
-        ``eliminated`` (names, in this order) and ``error_ratio``.
+    The rows are [columns | torque], weighted by the noise, or their triangular factor; ``count`` is
+    the number of rows of the log. Dropping ends when no relative standard error is larger than
+    ``ratio`` times the smallest, or before the error grows by more than the share ``growth``.
     """
     rows = np.asarray(np.linalg.qr(rows, mode="r"))
     kept: list[int] = np.flatnonzero(np.linalg.norm(rows[:, :-1], axis=0) > 0).tolist()

@@ -61,27 +61,10 @@ def instrumental(regression: Regression, prior_std: float | None = None) -> Solu
 
 
 def instrument_rows(problem: Problem, fit: Fit, signals: Signals, smooth: bool) -> list[Array]:
-    """The columns of a fit along another motion, averaged like those of the problem.
+    """The columns of a fit along another motion, averaged like those of the problem, by joint.
 
-    Parameters
-    ----------
-    problem : Problem
-        Rows of the log.
-    fit : Fit
-        Terms, and the model whose torque some of them need.
-    signals : Signals
-        The motion of the instruments.
-    smooth : bool
-        Derive velocity and acceleration from the positions.
-
-    Returns
-    -------
-    list of ndarray of shape (n_rows_j, n_coefficients)
-
-    Raises
-    ------
-    ValueError
-        The motion does not have the rows of the log.
+    With ``smooth``, velocity and acceleration are derived from the positions. A ValueError is
+    raised if the motion does not have the rows of the log.
     """
     own = problem.signals
     same = signals.n_samples == own.n_samples
@@ -104,18 +87,6 @@ def durbin_wu_hausman(difference: Array, left_out: Array) -> dict[str, Array]:
     If the noise of the columns is independent of the residual, both are consistent and differ only
     by chance. The standard error is computed from the differences without one fold each, which is
     valid under autocorrelation inside a fold.
-
-    Parameters
-    ----------
-    difference : ndarray of shape (n_coefficients,)
-        Instrumental-variable estimate minus least squares.
-    left_out : ndarray of shape (n_folds, n_coefficients)
-        The same without one fold each.
-
-    Returns
-    -------
-    dict of str to ndarray
-        ``difference``, ``std`` and ``p_value`` of every coefficient.
     """
     std = jackknife(left_out)
     statistic = np.abs(difference) / np.maximum(std, 1e-300)

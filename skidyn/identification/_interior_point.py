@@ -94,23 +94,10 @@ class _Direction:
 def solve_interior_point(
     factor: Array, target: Array, start: Array, nominal: Array, linear: Linear
 ) -> Array:
-    """Least squares over physically possible bodies.
+    """Least squares over physically possible bodies, strictly inside all limits.
 
-    Parameters
-    ----------
-    factor, target : ndarray of shape (k, n), (k,)
-        Columns and torque, of unit size.
-    start : ndarray of shape (n,)
-        Bodies and coefficients that satisfy all constraints strictly.
-    nominal : ndarray of shape (n_bodies, 10)
-        Bodies toward which undetermined directions are drawn.
-    linear : Linear
-        Limits and equations.
-
-    Returns
-    -------
-    ndarray of shape (n,)
-        Solution strictly inside all limits.
+    Columns and torque are of unit size; ``start`` are bodies and coefficients that satisfy all
+    constraints strictly, and undetermined directions are drawn toward the ``nominal`` bodies.
     """
     n, p = nominal.size, len(start)
     whole, _ = local_units(nominal, nominal)
@@ -134,21 +121,8 @@ def minimise_with_divergence(
 ) -> Array:
     """Minimum of ``|factor x - target|^2 / 2 + weight divergence(bodies, nominal)``.
 
-    Parameters
-    ----------
-    factor, target : ndarray of shape (k, n), (k,)
-        Columns and torque.
-    start : ndarray of shape (n,)
-        Bodies that exist, then coefficients.
-    nominal : ndarray of shape (n_bodies, 10)
-        Bodies that exist.
-    weight : float
-        Weight of the log-det divergence.
-
-    Returns
-    -------
-    ndarray of shape (n,)
-        Bodies that exist, then coefficients.
+    The unknowns are parameters of bodies, which exist at the start and in the result, and then
+    coefficients.
     """
     n, p = nominal.size, len(start)
     held = np.diag(np.r_[np.zeros(n), np.full(p - n, PULL)])

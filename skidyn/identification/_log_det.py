@@ -26,18 +26,11 @@ FLAT = 1e-9
 
 
 def pseudo_inertia(parameters: Array) -> Array:
-    """Pseudo-inertia matrices of bodies.
+    """Pseudo-inertia matrices of bodies, shape (n_bodies, 4, 4).
 
-    Parameters
-    ----------
-    parameters : ndarray of shape (n_bodies, 10)
-        (m, m cx, m cy, m cz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz) about the frame origin; kg, kg m,
-        kg m^2.
-
-    Returns
-    -------
-    ndarray of shape (n_bodies, 4, 4)
-        Second moments of mass (upper left, kg m^2), first moments (kg m) and mass (kg).
+    Parameters are (m, m cx, m cy, m cz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz) about the frame origin in kg,
+    kg m and kg m^2; matrices have second moments of mass (upper left, kg m^2), first moments (kg m)
+    and mass (kg).
     """
     m, hx, hy, hz, xx, xy, xz, yy, yz, zz = np.asarray(parameters, dtype=float).T
     half = (xx + yy + zz) / 2
@@ -51,17 +44,7 @@ def pseudo_inertia(parameters: Array) -> Array:
 
 
 def from_pseudo_inertia(matrices: Array) -> Array:
-    """Inertial parameters of pseudo-inertia matrices; the inverse of :func:`pseudo_inertia`.
-
-    Parameters
-    ----------
-    matrices : ndarray of shape (n_bodies, 4, 4)
-        Pseudo-inertia matrices.
-
-    Returns
-    -------
-    ndarray of shape (n_bodies, 10)
-    """
+    """Inertial parameters of pseudo-inertia matrices; the inverse of :func:`pseudo_inertia`."""
     p = np.asarray(matrices)
     xx, yy, zz = p[:, 0, 0], p[:, 1, 1], p[:, 2, 2]
     inertia = [yy + zz, -p[:, 0, 1], -p[:, 0, 2], xx + zz, -p[:, 1, 2], xx + yy]
@@ -83,17 +66,7 @@ BASIS, SYMMETRIC = pseudo_inertia(np.eye(10)), _symmetric_basis()
 
 
 def existing_bodies(parameters: Array) -> Array:
-    """The given bodies, with small spheres for impossible ones (a link without mass).
-
-    Parameters
-    ----------
-    parameters : ndarray of shape (n_bodies, 10)
-        Inertial parameters.
-
-    Returns
-    -------
-    ndarray of shape (n_bodies, 10)
-    """
+    """The given bodies, with small spheres for impossible ones (a link without mass)."""
     bodies = np.array(parameters, dtype=float)
     matrices = pseudo_inertia(bodies)
     masses = matrices[:, 3, 3]
@@ -115,13 +88,7 @@ def existing_bodies(parameters: Array) -> Array:
 
 
 def divergence(parameters: Array, nominal: Array) -> float:
-    """Log-det divergence of bodies from nominal ones; infinite for an impossible body.
-
-    Parameters
-    ----------
-    parameters, nominal : ndarray of shape (n_bodies, 10)
-        Inertial parameters.
-    """
+    """Log-det divergence of bodies from nominal ones; infinite for an impossible body."""
     try:
         own, other = (np.linalg.cholesky(pseudo_inertia(x)) for x in (parameters, nominal))
     except np.linalg.LinAlgError:
@@ -135,19 +102,8 @@ def local_units(parameters: Array, nominal: Array) -> tuple[Array, Array]:
     """Changes of bodies in which the divergence has the identity as Hessian, and its gradient.
 
     With ``P = L L'`` such a change is ``L S L'`` for the members S of an orthonormal basis of the
-    symmetric matrices.
-
-    Parameters
-    ----------
-    parameters, nominal : ndarray of shape (n_bodies, 10)
-        Inertial parameters of bodies that exist.
-
-    Returns
-    -------
-    units : ndarray of shape (n_bodies, 10, 10)
-        Columns are changes of a body's parameters.
-    gradient : ndarray of shape (n_bodies, 10)
-        Of :func:`divergence` along these changes.
+    symmetric matrices. Units are of shape (n_bodies, 10, 10); columns are changes of a body's
+    parameters.
     """
     root = np.linalg.cholesky(pseudo_inertia(parameters))
     changes = np.einsum("nij,ajk,nlk->nail", root, SYMMETRIC, root)
@@ -159,15 +115,7 @@ def local_units(parameters: Array, nominal: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Linear:
-    """Linear constraints on parameters and coefficients: ``C x <= b`` and ``E x = e``.
-
-    Attributes
-    ----------
-    C, b : ndarray of shape (n_limits, n), (n_limits,)
-        Limits.
-    E, e : ndarray of shape (n_equations, n), (n_equations,)
-        Equations.
-    """
+    """Linear constraints on parameters and coefficients: ``C x <= b`` and ``E x = e``."""
 
     C: Array
     b: Array
@@ -183,20 +131,7 @@ class Linear:
 def taken_inside(x: Array, start: Array, n: int, linear: Linear) -> Array:
     """The point nearest to x, in the direction of the start, strictly inside all limits.
 
-    Parameters
-    ----------
-    x : ndarray of shape (n_unknowns,)
-        Parameters, possibly on the border of the possible bodies, then coefficients.
-    start : ndarray of shape (n_unknowns,)
-        Point far inside the limits.
-    n : int
-        Number of parameters.
-    linear : Linear
-        Limits and equations.
-
-    Returns
-    -------
-    ndarray of shape (n_unknowns,)
+    The first n unknowns are parameters, possibly on the border of the possible bodies.
     """
     share = LEAST_SHARE
     while share < 1:

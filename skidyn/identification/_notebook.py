@@ -18,23 +18,10 @@ NORMAL = 1.96
 def model_table(
     robot: Robot, terms: Sequence[Term], stated: Mapping[str, tuple[float, float]], noise: Array
 ) -> str:
-    """One row per joint with its effects and its noise, as plain HTML.
+    """One row per joint with its effects and its noise, as HTML in which every text is escaped.
 
-    Parameters
-    ----------
-    robot : Robot
-        Robot of the model.
-    terms : sequence of Term
-        Effects of the model.
-    stated : mapping of str to (float, float)
-        Value and standard error of every coefficient by its name.
-    noise : ndarray of shape (n_joints,), N m or N
-        Standard deviation of the residual.
-
-    Returns
-    -------
-    str
-        HTML in which every text is escaped.
+    ``stated`` are value and standard error of every coefficient, ``noise`` the standard deviation
+    of the residual of every joint, N m or N.
     """
     rows = []
     for j, name in enumerate(robot.joint_names):

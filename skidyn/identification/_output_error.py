@@ -52,29 +52,9 @@ def refine_by_simulation(
 ) -> Solution:
     """Coefficients with the least error of the simulated motion, from those of a fitted model.
 
-    Parameters
-    ----------
-    model : RBDRegressor
-        Fitted by least squares.
-    regression : Regression
-        Its rows.
-    solution : Solution
-        Its coefficients.
-    signals : Signals
-        Motion with time.
-    torque : ndarray of shape (n_samples, n_joints), N m or N
-        Logged torque.
-    horizon : float, s, or None
-        Length of the pieces; None for whole trajectories.
-    controller : Controller, optional
-        Controller that drives the models toward the reference in place of the torque.
-    reference : ndarray of shape (n_samples, n_joints), rad or m, optional
-        Commanded positions.
-
-    Raises
-    ------
-    SkidynError
-        There is no time, or the model cannot be simulated.
+    Pieces of ``horizon`` s are simulated, or whole trajectories. A controller drives the models
+    toward the reference (rad or m) in place of the torque (N m or N). A SkidynError is raised if
+    there is no time or the model cannot be simulated.
     """
     if signals.time is None:
         raise SkidynError("estimator='output_error' simulates and needs the column 'time' (s) in X")

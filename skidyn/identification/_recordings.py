@@ -34,37 +34,15 @@ def named_recordings(terms: Iterable[Term]) -> set[int]:
 
 
 def remember(signals: Signals, terms: Iterable[Term]) -> Recordings:
-    """Fingerprints of the recordings in the shapes of terms.
-
-    Parameters
-    ----------
-    signals : Signals
-        Motion as logged.
-    terms : iterable of Term
-        Effects of the model.
-
-    Returns
-    -------
-    list of (int, ndarray of uint64)
-    """
+    """Fingerprints of the recordings in the shapes of terms."""
     named = sorted(named_recordings(terms))
     return [(k, np.unique(_rows(signals.q[signals.trajectory == k]))) for k in named]
 
 
 def recognise(signals: Signals, recordings: Recordings) -> Signals:
-    """The same signals with the recording numbers of the model.
+    """The same signals, of any log, with the recording numbers of the model.
 
-    Parameters
-    ----------
-    signals : Signals
-        Motion as logged, of any log.
-    recordings : list of (int, ndarray of uint64)
-        From :func:`remember`.
-
-    Returns
-    -------
-    Signals
-        Signals in which other recordings have numbers that no effect uses.
+    Other recordings get numbers that no effect uses.
     """
     labels = np.unique(signals.trajectory)
     unknown = min([0, *(k for k, _ in recordings), *labels.tolist()]) - 1

@@ -100,16 +100,8 @@ class Regression:
     ) -> Regression:
         """Triangular factors in place of rows; a trajectory is a fold.
 
-        Parameters
-        ----------
-        evidence : Evidence
-            Evidence of all base parameters or none, and of the effects.
-        robot : Robot
-            The robot.
-        terms : sequence of Term
-            Effects of the evidence.
-        whole : bool
-            Also keep the base parameters that the data does not determine.
+        The evidence is of all base parameters or none, and of the effects. With ``whole``, base
+        parameters that the data does not determine are kept too.
         """
         base = find_base_parameters(robot).index
         names = tuple(robot.parameter_names[i] for i in base)
@@ -221,15 +213,12 @@ class Regression:
     def weighted(self, weights: Sequence[Array]) -> Regression:
         """The same regression with every row weighted."""
         roots = [np.sqrt(w) for w in weights]
-        return Regression(
-            self.robot,
-            self.rigid_index,
-            self.terms,
-            [r[:, None] * a for r, a in zip(roots, self.design, strict=True)],
-            [r * y for r, y in zip(roots, self.target, strict=True)],
-            self.counts,
-            self.fold,
-            self.n_folds,
+        return replace(
+            self,
+            design=[r[:, None] * a for r, a in zip(roots, self.design, strict=True)],
+            target=[r * y for r, y in zip(roots, self.target, strict=True)],
+            fit=None,
+            instruments=None,
         )
 
 

@@ -180,22 +180,9 @@ class PredictionBands:
     ) -> PredictionBands:
         """Bands from the errors of every fold under the coefficients fitted without it.
 
-        Parameters
-        ----------
-        model : RBDRegressor
-            Model whose coefficients are stored already.
-        signals : Signals
-            Motion, smoothed.
-        torque : ndarray of shape (n_samples, n_joints), N m or N
-            Measured torque.
-        regression : Regression
-            Columns.
-        solution : Solution
-            Coefficients, also those without one fold each.
-        folds : callable
-            Fold of samples, by joint: from (k,) to (k, n_joints).
-        weight : ndarray of shape (n_samples,), optional
-            Weight of every sample in ``rmse``.
+        The coefficients of the model are stored already; the motion is smoothed. ``folds`` gives
+        the fold of samples by joint, from (k,) to (k, n_joints); ``weight`` is that of every sample
+        in ``rmse``.
         """
         terms = regression.terms
         rows = np.arange(0, signals.n_samples, -(-signals.n_samples // MOST_SAMPLES))
@@ -209,13 +196,10 @@ class PredictionBands:
         error = (torque - model._torque(signals))[rows]
         width = np.empty_like(error)
         change = left - solution.coefficients
-        place = 0
-        for part in _columns(model.robot_, signals, regression.rigid_index, terms, rows):
-            for j, block in enumerate(part):
-                here = slice(place, place + block.shape[1])
-                width[here, j] = np.linalg.norm(spread @ block, axis=0)
-                error[here, j] -= _own(block, change[fold[here, j]])
-            place += part[0].shape[1]
+        for here, j, block in _columns(model.robot_, signals, regression.rigid_index, terms, rows):
+            width[here, j] = np.linalg.norm(spread @ block, axis=0)
+            # every sample with the change of its own fold
+            error[here, j] -= np.einsum("ps,sp->s", block, change[fold[here, j]])
         scale, ratios = _distribution(error, width, _moving(signals)[rows])
         rmse = _root_mean_squares(error, signals.take(rows), weight)
         return cls(regression.rigid_index, tuple(terms), spread, scale, ratios, rmse)
@@ -225,12 +209,8 @@ class PredictionBands:
         signals = _with_load(model, self.terms, signals)
         rows = np.arange(signals.n_samples)
         width = np.empty(signals.q.shape)
-        place = 0
-        for part in _columns(model.robot_, signals, self.rigid_index, self.terms, rows):
-            for j, block in enumerate(part):
-                here = slice(place, place + block.shape[1])
-                width[here, j] = np.linalg.norm(self.spread @ block, axis=0)
-            place += part[0].shape[1]
+        for here, j, block in _columns(model.robot_, signals, self.rigid_index, self.terms, rows):
+            width[here, j] = np.linalg.norm(self.spread @ block, axis=0)
         own: Array = np.where(_moving(signals), self.scale[1], self.scale[0])
         std: Array = np.hypot(width, own)
         return std
@@ -247,10 +227,7 @@ class PredictionBands:
 def find_bands(model: Prediction) -> PredictionBands:
     """Bands of a model.
 
-    Raises
-    ------
-    SkidynError
-        There are none: the model was made from evidence, which contains no single samples.
+    A SkidynError is raised if it was made from evidence, which contains no single samples.
     """
     if not hasattr(model, "bands_"):
         raise SkidynError(
@@ -277,19 +254,14 @@ def _moving(signals: Signals) -> NDArray[np.bool_]:
     return np.asarray(np.abs(signals.dq) > REST * signals.unit)
 
 
-def _own(block: Array, coefficients: Array) -> Array:
-    """Product of every column of a block with its own coefficients."""
-    return np.asarray(np.einsum("ps,sp->s", block, coefficients))
-
-
 def _columns(
     robot: Robot,
     signals: Signals,
     rigid_index: NDArray[np.int64],
     terms: Sequence[Term],
     rows: NDArray[np.int64],
-) -> Iterator[list[Array]]:
-    """Columns of some samples, chunk by chunk: per joint (n_coefficients, n_chunk)."""
+) -> Iterator[tuple[slice, int, Array]]:
+    """Columns of some samples of a joint, (n_coefficients, n_chunk), chunk by chunk."""
     effects = [
         {j: block[rows] for j, block in term.torque_columns(signals).items()} for term in terms
     ]
@@ -301,19 +273,19 @@ def _columns(
         columns = tuple(int(i) for i in rigid_index)
         chunks = robot._engine.iter_regressor_columns(arrays, columns, spare, CHUNK)
     else:
-        edges = range(0, len(rows), CHUNK)
         chunks = (
-            (slice(a, min(a + CHUNK, len(rows))), np.empty((robot.n_joints, spare, CHUNK)))
-            for a in edges
+            (slice(a, a + CHUNK), np.empty((robot.n_joints, spare, CHUNK)))
+            for a in range(0, len(rows), CHUNK)
         )
     for where, found in chunks:
-        size = min(where.stop, len(rows)) - where.start
-        found = found[..., :size]
+        where = slice(where.start, min(where.stop, len(rows)))
+        found = found[..., : where.stop - where.start]
         found[:, n_rigid:] = 0.0
         for blocks, (_, own) in zip(effects, TermSum(terms).slices(n_rigid), strict=True):
             for j, block in blocks.items():
                 found[j, own] = block[where].T
-        yield list(found)
+        for j, block in enumerate(found):
+            yield where, j, block
 
 
 def _root_mean_squares(error: Array, signals: Signals, weight: Array | None) -> Array:

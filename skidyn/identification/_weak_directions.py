@@ -62,21 +62,10 @@ def keep_weak_directions(
 ) -> Solution:
     """Replace the weak directions of a solution by those of the URDF.
 
-    Parameters
-    ----------
-    solution : Solution
-        Solution of an estimator without a prior.
-    kept : ndarray of shape (n_rigid_kept,)
-        Indices of the rigid-body columns of ``whole`` with coefficients in the solution.
-    whole : Regression
-        Regression with the columns of all base parameters, with the row weights of the estimator.
-    trusted : bool, default=True
-        Whether the URDF is weighted against the data; else it sets only undetermined directions.
-
-    Returns
-    -------
-    Solution
-        Coefficients of all columns of ``whole``.
+    The solution is that of an estimator without a prior; ``kept`` are the rigid-body columns of
+    ``whole`` that it has. ``whole`` has the columns of all base parameters and the row weights of
+    the estimator, as has the result. If the URDF is not ``trusted`` against the data, it sets only
+    undetermined directions.
     """
     n, p = whole.n_rigid, whole.design[0].shape[1]
     if not n:

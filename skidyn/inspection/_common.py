@@ -52,13 +52,7 @@ def read_table(estimator: Any, X: Any, y: Any, robot: Robot | None) -> tuple[Sig
 
 
 def both_torques(y_true: ArrayLike, y_pred: ArrayLike) -> tuple[Array, Array]:
-    """Measured and predicted torque as two tables of one shape.
-
-    Raises
-    ------
-    ValueError
-        The shapes differ.
-    """
+    """Measured and predicted torque as two tables of one shape; a ValueError if they differ."""
     measured, predicted = (np.asarray(y, dtype=float) for y in (y_true, y_pred))
     if measured.shape != predicted.shape:
         raise ValueError(

@@ -105,13 +105,12 @@ class ErrorBudgetDisplay:
         """
         j = joint_index(joint, len(diagnosis.joint_names))
         labels = ["model as given", *(f"+ {step['added']}" for step in diagnosis.history[1:])]
-        slides = diagnosis.comparison.signals.prismatic[j]
         return cls(
             labels,
             [step["rmse"][j] for step in diagnosis.history],
             noise_floor=float(diagnosis.noise_floor[j]),
             joint=f"Joint {joint} ({diagnosis.joint_names[j]})",
-            unit="N" if slides else "N m",
+            unit=diagnosis.comparison.units[j],
         ).plot(ax)
 
     @classmethod

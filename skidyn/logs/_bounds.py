@@ -48,12 +48,7 @@ class Budget:
     def unpack(self, data: bytes | IO[bytes], compression: str) -> None:
         """Count the bytes in compressed data without storing them, since headers may be wrong.
 
-        Parameters
-        ----------
-        data : bytes or file
-            Compressed data; of a file, everything from its position on.
-        compression : {"", "none", "bz2", "lz4", "zstd"}
-            Its kind.
+        Of a file, everything from its position on is counted.
         """
         if compression == "zstd":
             zstandard = import_optional("zstandard", extra="io")
@@ -136,11 +131,8 @@ def bag_folder(folder: Path, budget: Budget) -> None:
 def database_messages(path: Path, budget: Budget) -> None:
     """Count the messages of a database, which must be what it seems.
 
-    Raises
-    ------
-    LogError
-        The messages are computed by the database (a view, a generated column), and may be without
-        end, or they are too large.
+    A LogError is raised if they are computed by the database (a view, a generated column), and may
+    be without end, or are too large.
     """
     with sqlite3.connect(f"file:{path}?mode=ro", uri=True) as database:
         try:
@@ -182,19 +174,9 @@ except MemoryError:
 def try_in_another_process(path: Path, max_bytes: int, imports: str, statement: str) -> None:
     """Decode a file in another process, since compiled readers may crash or fill the memory.
 
-    Parameters
-    ----------
-    path : Path
-        File; ``sys.argv[1]`` of the statement.
-    max_bytes : int
-        Largest size once unpacked; three times as much and 256 MiB may be used during reading.
-    imports, statement : str
-        Python of the trial.
-
-    Raises
-    ------
-    LogError
-        The reader failed, crashed, or needed more memory.
+    ``imports`` and ``statement`` are Python; the file is ``sys.argv[1]``. Unpacked it may have
+    ``max_bytes``; three times as much and 256 MiB may be used during reading. A LogError is raised
+    if the reader failed, crashed or needed more memory.
     """
     code = _TRIAL.format(imports=imports, statement=statement)
     few = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")

@@ -22,24 +22,9 @@ SLOWER = 1.75
 def seconds(table: pd.DataFrame, rate: float | None, source: str) -> np.ndarray:
     """Clock of a table as float64: its time column, or row number over rate.
 
-    Parameters
-    ----------
-    table : DataFrame
-        Columns of one channel; ``time`` may hold numbers, dates or text of either.
-    rate : float or None, Hz
-        Sampling rate where there is no time column.
-    source : str
-        Name for messages.
-
-    Returns
-    -------
-    ndarray of shape (n_samples,)
-        Numbers in the unit of the source; dates become seconds from the first row.
-
-    Raises
-    ------
-    LogError
-        There is no clock, it cannot be read, or the rate is invalid.
+    ``time`` may hold numbers, in the unit of the source, or dates, which become seconds from the
+    first row, or text of either. ``source`` is the name in the LogError for a clock that is missing
+    or cannot be read, or an invalid rate.
     """
     import pandas
 
@@ -88,32 +73,12 @@ def align_channels(
     rate: float | None,
     notes: list[str],
 ) -> pd.DataFrame:
-    """Bring channels with separate clocks to one clock.
+    """Bring channels with separate clocks, ``time`` in s, to one clock, on the rows that all cover.
 
-    The clock is that of the channel with the positions, or regular at ``rate``; other signals are
-    interpolated linearly, never beyond their first and last sample and never across a gap.
-
-    Parameters
-    ----------
-    tables : sequence of DataFrame
-        Channels with a ``time`` column in seconds.
-    names : sequence of str
-        Names of the channels for messages.
-    rate : float or None, Hz
-        Rate of the common clock.
-    notes : list of str
-        Notes on the result are appended here.
-
-    Returns
-    -------
-    DataFrame
-        One table with the rows that all channels cover.
-
-    Raises
-    ------
-    LogError
-        The rate is invalid, a signal occurs in two channels, a clock restarts in one of several
-        channels, or channels do not overlap in time.
+    The clock is that of the channel with the positions, or regular at ``rate`` in Hz; other signals
+    are interpolated linearly, never beyond their first and last sample and never across a gap.
+    Notes are appended to ``notes``. A LogError is raised if the rate is invalid, a signal occurs in
+    two channels, the clock of one of several channels restarts, or channels do not overlap in time.
     """
     import pandas
 
@@ -286,16 +251,10 @@ def _mean_around(
 
 
 def split_at_restarts(time: np.ndarray) -> tuple[np.ndarray, int]:
-    """Trajectory numbers for a log whose clock restarts with every run.
+    """Trajectory numbers for a log whose clock restarts with every run, and the number of restarts.
 
     A step back to the beginning (within 5 % of what has passed) is a new run; a smaller step back
     is left for :func:`skidyn._checks.check_time_order` to refuse.
-
-    Returns
-    -------
-    trajectory : ndarray of shape (n_samples,)
-    restarts : int
-        Number of restarts of the clock.
     """
     number = np.zeros(len(time), dtype=np.int64)
     begin = 0
@@ -314,25 +273,10 @@ def split_trajectories(
     gap: float | Literal["auto"] | None,
     dwell: float | None,
 ) -> np.ndarray:
-    """Cut trajectories at gaps in time and in the middle of long rests.
+    """Cut trajectories at gaps in time and in the middle of long rests; new numbers from 0.
 
-    Parameters
-    ----------
-    time : ndarray of shape (n_samples,), s
-        Strictly increasing within each trajectory.
-    trajectory : ndarray of shape (n_samples,)
-        Numbers so far.
-    position : ndarray of shape (n_samples, n_joints)
-        Joint positions.
-    gap : float, s, "auto" or None
-        Longest step within a trajectory; ``"auto"``: 20 median steps, at least 0.2 s.
-    dwell : float, s, or None
-        Shortest rest that is cut.
-
-    Returns
-    -------
-    ndarray of shape (n_samples,)
-        New numbers from 0 in row order.
+    Time in s increases strictly within each trajectory. ``gap`` is the longest step within one, s;
+    ``"auto"`` means 20 median steps, at least 0.2 s. ``dwell`` is the shortest rest that is cut, s.
     """
     n = len(time)
     cut = np.zeros(n, dtype=bool)
@@ -400,13 +344,7 @@ def _stays(q: np.ndarray, ends: np.ndarray, band: np.ndarray) -> np.ndarray:
 
 
 def derive_velocity(position: np.ndarray, time: np.ndarray, trajectory: np.ndarray) -> np.ndarray:
-    """Central differences of the positions, within each segment.
-
-    Raises
-    ------
-    LogError
-        A segment of a single row, which has no velocity.
-    """
+    """Central differences of the positions within each segment, which needs more than one row."""
     velocity = np.empty_like(position)
     for rows in find_segments(trajectory, time):
         if rows.stop - rows.start < 2:

@@ -195,10 +195,7 @@ def _unpacked(path: Path, most: int) -> int:
 def list_cells(column: Any, name: str, source: str) -> np.ndarray | None:
     """Block (n, joints) of a text column of lists such as ``"[0.1, 0.2]"``, or None.
 
-    Raises
-    ------
-    LogError
-        A cell is not a list, or lists differ in length.
+    A LogError is raised if a cell is not a list or lists differ in length.
     """
     if column.dtype.kind not in "OUT" or not len(column):
         return None
@@ -232,12 +229,8 @@ def read_npz_channels(path: Path, max_bytes: int) -> list[Channel]:
 def of_one_length(arrays: Mapping[str, np.ndarray], source: str) -> dict[str, np.ndarray]:
     """Numeric arrays with one row per sample: those of the most common length.
 
-    Others are constants and settings, and are left out with a warning.
-
-    Raises
-    ------
-    LogError
-        There is no numeric array of one or two dimensions, or a signal of another length.
+    Others are constants and settings, and are left out with a warning. A LogError is raised if
+    there is no array of one or two dimensions, or a signal has another length.
     """
     numeric = {k: a for k, a in arrays.items() if a.ndim in (1, 2) and a.dtype.kind in "fiub"}
     lengths = Counter(len(a) for a in numeric.values())
@@ -262,11 +255,8 @@ def of_one_length(arrays: Mapping[str, np.ndarray], source: str) -> dict[str, np
 def load_npz(path: Path, max_bytes: int = MAX_BYTES) -> dict[str, np.ndarray]:
     """All arrays of an npz file, refusing pickles and archives that unpack to too much.
 
-    Raises
-    ------
-    LogError
-        Not an archive, a pickled member, a header that promises other sizes than the member
-        holds, or more than ``max_bytes`` once unpacked.
+    A LogError is raised for what is not an archive, a pickled member, and a header that promises
+    other sizes than the member holds.
     """
     try:
         with zipfile.ZipFile(path) as archive:

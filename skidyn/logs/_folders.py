@@ -23,16 +23,9 @@ NAMES = re.compile(r".*joints?[_-]?(list|names?)?\.(txt|csv)", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class Run:
-    """Files of one recording.
+    """Files of one recording: a single one, or one per signal; with a name for messages.
 
-    Attributes
-    ----------
-    name : str
-        Path for messages.
-    files : list of Path
-        One file, or one per signal.
-    joints : list of str
-        Names of the joints, if a file in the folder lists them.
+    ``joints`` are names of the joints, if a file in the folder lists them.
     """
 
     name: str
@@ -43,20 +36,7 @@ class Run:
 def find_runs(path: str | os.PathLike[str]) -> list[Run]:
     """Recordings of a path: the file itself, the matches of a pattern, or the files of a folder.
 
-    Parameters
-    ----------
-    path : path
-        A file, a pattern such as ``"runs/*.csv"``, or a folder.
-
-    Returns
-    -------
-    list of Run
-        In the order of their names.
-
-    Raises
-    ------
-    LogError
-        A pattern has no matches, or a folder has no logs.
+    They are in the order of their names. A LogError is raised if there are none.
     """
     given = Path(path)
     if not given.exists() and glob.has_magic(str(path)):
@@ -111,22 +91,10 @@ def _lerobot_runs(folder: Path) -> list[Run]:
 
 
 def read_runs(run: Run, read: Callable[[Path], list[Channel]]) -> list[tuple[str, list[Channel]]]:
-    """Channels of every recording in the files of a run.
+    """Name and channels of every recording in the files of a run, each read by ``read``.
 
     Files with both positions and torques are separate recordings; others are channels of one
     recording, and a file named after a signal contains that signal.
-
-    Parameters
-    ----------
-    run : Run
-        Files.
-    read : callable
-        Reads the channels of one file.
-
-    Returns
-    -------
-    list of (str, list of Channel)
-        Name for messages, and channels.
     """
     channels = [[_named(c, run) for c in read(file)] for file in run.files]
     if len(run.files) == 1:

@@ -88,21 +88,10 @@ def suffix_of(path: Path) -> str:
 
 
 def decode(path: Path, topics: Sequence[str] | None, max_bytes: int) -> list[Channel]:
-    """Channels of a file.
+    """Channels of a file or of the folder of a ROS 2 bag, of all topics by default.
 
-    Parameters
-    ----------
-    path : Path
-        File, or folder of a ROS 2 bag.
-    topics : sequence of str or None
-        Channels of a container; all by default.
-    max_bytes : int
-        Largest file once unpacked.
-
-    Raises
-    ------
-    LogError
-        The file does not exist, is of an unknown kind, or is damaged.
+    A LogError is raised if it does not exist, is of an unknown kind, damaged, or larger than
+    ``max_bytes`` once unpacked.
     """
     try:
         return _decode(path, topics, max_bytes)

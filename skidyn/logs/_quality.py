@@ -10,6 +10,7 @@ import numpy as np
 
 from skidyn._checks import as_numbers, check_time_order, count_joints, require_columns
 from skidyn._exceptions import LogError
+from skidyn._plain import plain
 from skidyn._signals import Signals
 
 if TYPE_CHECKING:
@@ -147,9 +148,8 @@ class LogQuality:
             "checks": [check.to_dict() for check in self.checks],
             "warnings": list(self.warnings),
         }
-        plain = _plain(asdict(self) | told)
-        assert isinstance(plain, dict)
-        return plain
+        content: dict[str, Any] = plain(asdict(self) | told)
+        return content
 
     def __str__(self) -> str:
         lines = [
@@ -344,16 +344,6 @@ def _torque_cells(joint: JointQuality) -> str:
         f" {weak:8.2f} ..{strong:7.2f} {_percent(joint.saturated_share)}"
         f"{_percent(joint.rest_share)} {slope} {delay}"
     )
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
-    return value
 
 
 def _percent(share: float) -> str:

@@ -55,6 +55,7 @@ def read_log(
     drop_repeated: bool = False,
     split_leaps: bool = False,
     restore_gravity: bool = False,
+    derive: Sequence[str] = (),
     needs_torque: bool = True,
     check: bool = True,
     max_bytes: int = MAX_BYTES,
@@ -106,8 +107,9 @@ def read_log(
         Positions that include that of another joint, such as angles relative to the base; the
         latter is subtracted, with velocity and acceleration: ``{"q3": "q2"}``, or ``{"q3":
         "-q2"}``.
-    zero : mapping of str to float, rad or m, optional
-        Recorded positions at the robot's zero, which are subtracted: ``{"q2": 1.5708}``.
+    zero : mapping of str to float, optional
+        Recorded positions at the robot's zero (rad or m), or velocities at rest, which are
+        subtracted: ``{"q2": 1.5708}``.
     late : mapping of str to float, s, optional
         Delays of columns or quantities, which are removed: ``{"tau": 0.008}``.
     lowpass : mapping of str to float, s, optional
@@ -129,6 +131,9 @@ def read_log(
         recordings.
     restore_gravity : bool, default=False
         Add the gravity torque of ``robot`` to torque from which a driver removed it.
+    derive : sequence of str, default=()
+        Velocities that are replaced by differentiated positions: ``["dq3"]``, or ``["dq"]`` for
+        all.
     needs_torque : bool, default=True
         Refuse a log without torque. False also reads logs of commands and positions, for which the
         torque is computed from the servos (:func:`skidyn.simulation.servo_torque`).
@@ -195,6 +200,7 @@ def read_log(
             lowpass=lowpass,
             split_leaps=split_leaps,
             restore_gravity=restore_gravity,
+            derive=derive,
         ),
         needs_torque,
     )

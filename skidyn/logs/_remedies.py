@@ -36,6 +36,7 @@ REMEDIES = (
     "torque_sign:",
     "split_leaps:",
     "restore_gravity:",
+    "derive:",
 )
 
 
@@ -56,31 +57,16 @@ class Remedies:
     lowpass: Mapping[str, float] | None = None
     split_leaps: bool = False
     restore_gravity: bool = False
+    derive: Sequence[str] = ()
 
 
 def mend_columns(
     table: pd.DataFrame, n: int, joints: Sequence[str], remedies: Remedies, notes: list[str]
 ) -> pd.DataFrame:
-    """Order, sign, scale, sums and zero of columns.
+    """Order, sign, scale, sums and zero of columns; what was done is appended to ``notes``.
 
-    Parameters
-    ----------
-    table : DataFrame
-        Columns of a log.
-    n : int
-        Number of joints.
-    joints : sequence of str
-        Their names.
-    remedies : Remedies
-        What was asked for.
-    notes : list of str
-        What was done is appended here.
-
-    Raises
-    ------
-    LogError
-        A joint or column does not exist, an order is invalid, a gain is zero or not finite, a
-        position includes itself, or there are no commanded positions for the sign.
+    A LogError is raised if a joint or column does not exist, an order is invalid, a gain is zero or
+    not finite, a position includes itself, or there are no commanded positions for the sign.
     """
     table = table.copy()
     if remedies.order is not None:
@@ -106,9 +92,12 @@ def mend_columns(
     for name, value in _each(remedies.zero, table, "zero"):
         if not np.isfinite(value):
             raise LogError(f"zero: {name} has the value {value} at zero; expected a number.")
-        if not re.fullmatch(r"q\d+", name):
-            raise LogError(f"zero: {name} is not a position; expected q1 .. q{n}.")
-        for column in (name, name.replace("q", "cmd")):
+        if not re.fullmatch(r"d?q\d+", name):
+            raise LogError(
+                f"zero: {name} is neither a position nor a velocity; expected q1 .. q{n} or "
+                f"dq1 .. dq{n}."
+            )
+        for column in {name, re.sub("^q", "cmd", name)}:
             if column in table.columns:
                 table[column] = table[column] - value
         notes.append(f"zero: {value:g} was subtracted from {name} in {_all(table)} rows")
@@ -118,19 +107,7 @@ def mend_columns(
 def restore_gravity(table: pd.DataFrame, robot: Robot | None, notes: list[str]) -> pd.DataFrame:
     """Add the gravity torque of the described bodies, which a driver had subtracted.
 
-    Parameters
-    ----------
-    table : DataFrame
-        Columns of a log.
-    robot : Robot or None
-        As described.
-    notes : list of str
-        What was done is appended here.
-
-    Raises
-    ------
-    LogError
-        There is no robot, or it has no gravity torque.
+    A LogError is raised without a robot or gravity torque; what was done is appended to ``notes``.
     """
     if robot is None:
         raise LogError("restore_gravity adds the gravity torque of a robot; give robot=.")
@@ -150,21 +127,8 @@ def restore_gravity(table: pd.DataFrame, robot: Robot | None, notes: list[str]) 
 def mend_rows(table: pd.DataFrame, n: int, remedies: Remedies, notes: list[str]) -> pd.DataFrame:
     """Clock, repeated rows, delay and wrapped positions of a log in order of time.
 
-    Parameters
-    ----------
-    table : DataFrame
-        Columns of a log with ``time`` and ``trajectory``.
-    n : int
-        Number of joints.
-    remedies : Remedies
-        What was asked for.
-    notes : list of str
-        What was done is appended here.
-
-    Raises
-    ------
-    LogError
-        The name of the clock is unknown, or a channel does not exist.
+    What was done is appended to ``notes``. A LogError is raised if the name of the clock is unknown
+    or a channel does not exist.
     """
     names = [f"q{k + 1}" for k in range(n)]
     if remedies.unwrap:
@@ -205,6 +169,8 @@ def mend_rows(table: pd.DataFrame, n: int, remedies: Remedies, notes: list[str])
             f"late: {told} removed; {before - len(table)} of {before} rows at the ends of "
             "continuous parts left out"
         )
+    if remedies.derive:
+        table = _with_derived(table, remedies.derive, notes)
     return table
 
 
@@ -307,6 +273,24 @@ def _each(
         columns = [name] if name in table.columns else joints
         told += [(column, float(value)) for column in columns]
     return told
+
+
+def _with_derived(table: pd.DataFrame, asked: Sequence[str], notes: list[str]) -> pd.DataFrame:
+    """Differentiated positions in the place of recorded velocities."""
+    from skidyn.logs._clock import derive_velocity
+
+    time, number = table["time"].to_numpy(), table["trajectory"].to_numpy()
+    columns = [name for name, _ in _each(dict.fromkeys(asked, 0.0), table, "derive")]
+    for name in columns:
+        if not re.fullmatch(r"dq\d+", name):
+            raise LogError(f"derive: {name} is not a velocity; expected dq, or dq1, dq2, ...")
+    q = table[[name[1:] for name in columns]].to_numpy(dtype=float)
+    derived = derive_velocity(q, time, number)
+    notes.append(
+        f"derive: {', '.join(columns)} were replaced by central differences of the positions in "
+        f"{_all(table)} rows"
+    )
+    return table.assign(**{name: derived[:, k] for k, name in enumerate(columns)})
 
 
 def _sign_from_command(table: pd.DataFrame, n: int, notes: list[str]) -> None:

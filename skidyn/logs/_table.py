@@ -68,28 +68,10 @@ class TableOptions:
 def build_table(
     channels: Sequence[Channel], source: str, options: TableOptions
 ) -> tuple[pd.DataFrame, NameMatch]:
-    """Signals of one file, with the names that were matched on the way.
+    """Signals of one file, with the names of joints and notes that were matched on the way.
 
-    Parameters
-    ----------
-    channels : sequence of Channel
-        Channels of the file.
-    source : str
-        Name of the file for messages.
-    options : TableOptions
-        Options of the caller.
-
-    Returns
-    -------
-    table : DataFrame
-        ``time, trajectory, q1 .., dq1 .., [ddq1 ..], tau1 .., [temp1 ..]`` and further columns.
-    match : NameMatch
-        Joint names and notes.
-
-    Raises
-    ------
-    LogError
-        The log cannot be used unchanged.
+    The columns are ``time, trajectory, q1 .., dq1 .., [ddq1 ..], tau1 .., [temp1 ..]`` and further
+    ones. ``source`` is the file in the LogError for a log that cannot be used unchanged.
     """
     match = match_names(
         list(dict.fromkeys(str(name) for c in channels for name in c.table.columns)),

@@ -54,7 +54,7 @@ class DeadBand(Check):
 
 def dead_bands(measurement: Measurement) -> dict[int, float]:
     """Joints whose torque has a dead band, from 0, and the share of rows in which it is zero."""
-    told = set(cut_columns(measurement))
+    told = set(cut_columns(measurement)) | set(np.flatnonzero(measurement.missing.any(axis=0)))
     moving = np.flatnonzero(measurement.excited).tolist()
     shares = {k: _zeros(measurement, k) for k in moving if k not in told}
     return {k: share for k, share in shares.items() if share > BAND}

@@ -12,7 +12,7 @@ from skidyn.evidence import broken_notes
 from skidyn.measurement._around_zero import dead_bands
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._measures import COARSE, is_held, position_step
+from skidyn.measurement._measures import COARSE, position_step
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import cut_columns
 
@@ -21,8 +21,10 @@ CLIPPED = 0.002
 #: Fourth differences of a torque relative to its spread above which it has noise; joints of
 #: recordings with noise are never below 4e-4.
 NOISELESS, ENOUGH = 1e-5, 200
-#: Least share of rows with the torque of the previous row, for a torque that is not coarse.
-HELD = 0.3
+#: Most values of a torque that is coarse in any case; step of a torque, as a share of its spread,
+#: that is reported, and that is suspected; how many times as often as the value next to it an
+#: extreme value of a coarse torque occurs if it is clipped.
+FEW_VALUES, NOTED_STEP, LARGE_STEP, OFTENER = 64, 0.2, 0.5, 3.0
 
 
 class StillJoint(Check):
@@ -139,12 +141,50 @@ class ClippedTorque(Check):
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         for k, share in enumerate(measurement.at_limit):
             torque = measurement.torque[:, k]
-            if np.ptp(torque) > 0 and share > CLIPPED:
+            if np.ptp(torque) > 0 and share > CLIPPED and not _is_coarse_extreme(torque):
                 yield self.suspicion(
                     f"the torque of {measurement.joint(k)} stays at its extreme value",
                     f"in {100 * share:.1f} % of the rows (from {torque.min():.4g} to "
                     f"{torque.max():.4g}): it is saturated there",
                     "noted",
+                    [k],
+                )
+
+
+def torque_step(torque: Array) -> float:
+    """Step of a torque with few values, or of a coarse sensor; NaN if it is not coarse."""
+    values = np.unique(torque)
+    if 2 < len(values) <= FEW_VALUES:
+        return float(np.median(np.diff(values)))
+    return position_step(torque)
+
+
+def _is_coarse_extreme(torque: Array) -> bool:
+    """Whether the extreme values of a coarse torque are no more frequent than their neighbours."""
+    values, counts = np.unique(torque, return_counts=True)
+    if not 2 < len(values) <= FEW_VALUES:
+        return False
+    return bool(max(counts[0] / counts[1], counts[-1] / counts[-2]) < OFTENER)
+
+
+class CoarseTorque(Check):
+    """Torque in steps that are not small relative to its spread."""
+
+    name = "coarse_torque"
+    of_sensor = True
+    suspects = "torque in coarse steps"
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        for k in range(measurement.n_joints):
+            torque = measurement.torque[:, k]
+            step, spread = torque_step(torque), float(torque.std())
+            if np.isfinite(step) and step > NOTED_STEP * spread > 0:
+                unit = "N" if measurement.signals.prismatic[k] else "N m"
+                yield self.suspicion(
+                    f"the torque of {measurement.joint(k)} comes in coarse steps",
+                    f"the steps of {step:.3g} {unit} are {step / spread:.0%} of its standard "
+                    "deviation; smaller effects cannot be found on this joint",
+                    "suspected" if step > LARGE_STEP * spread else "noted",
                     [k],
                 )
 
@@ -173,50 +213,6 @@ class SmoothTorque(Check):
                 "it was filtered before it was recorded, or computed, and the ratio of the error "
                 "to this noise is not meaningful",
                 "noted",
-            )
-
-
-class HeldTorque(Check):
-    """A torque that holds its last value while joints move on."""
-
-    name = "held_torque"
-    of_sensor = True
-    suspects = "torque that holds its last value: reported less often than the positions"
-
-    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
-        s = measurement.signals
-        together = s.trajectory[1:] == s.trajectory[:-1]
-        moved = np.any(s.q[1:] != s.q[:-1], axis=1) & together
-        if moved.sum() < 50:
-            return
-        held_all = is_held(measurement.torque, moved)
-        if held_all.any():
-            measurement.stale = True
-            share = float(held_all.sum() / moved.sum())
-            yield self.suspicion(
-                "torques hold their last value",
-                f"in {share:.0%} of the rows in which positions change, all of them at once: they "
-                "are reported less often",
-                "certain",
-                remedy=("--drop-repeated", "drop_repeated=True"),
-            )
-            return
-        shares, lost = np.zeros(measurement.n_joints), cut_columns(measurement)
-        for k in range(measurement.n_joints):
-            torque = measurement.torque[:, k]
-            share = np.mean(torque[1:][moved] == torque[:-1][moved])
-            # equal steps are due to a coarse sensor, not a slow one
-            if k not in lost and share > HELD and len(np.unique(torque)) > 0.1 * len(torque):
-                shares[k] = share if np.isnan(position_step(torque)) else 0.0
-        held = np.flatnonzero(shares)
-        if len(held):
-            yield self.suspicion(
-                f"the torque of {', '.join(measurement.joint(int(k)) for k in held)} holds its "
-                "last value",
-                f"in {100 * shares[held].max():.0f} % of the rows in which positions change: it is "
-                "reported less often",
-                "suspected",
-                [int(k) for k in held],
             )
 
 

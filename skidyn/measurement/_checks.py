@@ -18,8 +18,8 @@ from skidyn.measurement._channels import (
     BrokenSamples,
     ClippedTorque,
     CoarsePosition,
+    CoarseTorque,
     ConstantTorque,
-    HeldTorque,
     SmoothTorque,
     StillJoint,
 )
@@ -33,6 +33,7 @@ from skidyn.measurement._clock import (
 )
 from skidyn.measurement._copies import CopiedTorque, RepeatedRecordings
 from skidyn.measurement._elapsed import LostRows
+from skidyn.measurement._held import HeldPosition, HeldTorque, MissingTorque, StuckTorque
 from skidyn.measurement._lengths import Lengths
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._odd import OddRecording
@@ -55,10 +56,12 @@ CHECKS: tuple[Check, ...] = (
     WrappedPosition(),
     OddMotion(),
     JoinedRecordings(),
+    HeldPosition(),
     RepeatedRows(),
     RepeatedRecordings(),
     ClockJitter(),
     InterpolatedRows(),
+    MissingTorque(),
     TARED,
     DeadBand(),
     UNSIGNED,
@@ -76,6 +79,7 @@ CHECKS: tuple[Check, ...] = (
     VelocityDelay(),
     Acceleration(),
     HeldTorque(),
+    StuckTorque(),
     ComputedTorque(),
     SmoothedTorque(),
     TorqueDelay(),
@@ -85,6 +89,7 @@ CHECKS: tuple[Check, ...] = (
     ClippedTorque(),
     SmoothTorque(),
     CoarsePosition(),
+    CoarseTorque(),
     SlowSampling(),
     Gaps(),
     StillJoint(),

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +14,12 @@ from skidyn.measurement._fits import SAMPLES, Fits, Reading, friction
 from skidyn.measurement._robust import FEWEST, RobustFit, fit_together
 from skidyn.robots import base_parameter_index
 
-#: Lags that are tried, s, and number of groups of rows that are left out in turn.
-LAGS = np.linspace(-0.06, 0.06, 13)
+#: Lags that are tried, s, and those if the best is beyond them; number of groups of rows that are
+#: left out in turn.
+LAGS, FAR_LAGS = np.linspace(-0.06, 0.06, 13), np.linspace(-0.24, 0.24, 25)
 GROUPS = 8
+#: Share of the joints whose best lag is beyond those tried from which later ones are tried.
+MOST_BEYOND = 0.5
 #: Distance of the lags of a parabola, s, and most repetitions.
 NEAR, STEPS = 2e-3, 6
 #: Fewest rows of a recording for its own lag.
@@ -86,6 +89,8 @@ class Delay:
         Standard error of their difference.
     runs : dict of int to RunDelay
         Result of every recording.
+    drifts : ndarray of shape (n_joints,), s
+        Lag of every joint in the second half of the recordings minus that in the first.
     """
 
     common: float
@@ -99,6 +104,7 @@ class Delay:
     late: float = np.nan
     drift_error: float = np.nan
     runs: Mapping[int, RunDelay] = field(default_factory=dict)
+    drifts: Array = field(default_factory=lambda: np.zeros(0))
 
 
 def find_delay(fits: Fits) -> Delay:
@@ -109,13 +115,30 @@ def find_delay(fits: Fits) -> Delay:
     fits : Fits
         Rows.
     """
+    near, beyond = _delay_within(fits, LAGS)
+    if not beyond:
+        return near
+    far, _ = _delay_within(fits, FAR_LAGS)
+    if beyond > MOST_BEYOND * fits.n_joints:
+        return replace(far, runs={})  # these lags are too far apart for single recordings
+    own = ("joints", "errors", "gains", "halves", "drifts")
+    for k in np.flatnonzero(~np.isfinite(near.joints) & np.isfinite(far.joints)).tolist():
+        for name in own:
+            getattr(near, name)[k] = getattr(far, name)[k]
+    return near
+
+
+def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int]:
+    """The best of some lags, and the number of joints whose best lag is the first or the last."""
     n = fits.n_joints
+    beyond, middle = 0, len(lags_tried) // 2
     own_errors, own_gains, halves = np.full(n, np.nan), np.zeros(n), np.full((n, 2), np.nan)
+    drifts = np.full(n, np.nan)
     unknown = Delay(np.nan, np.nan, np.full(n, np.nan), own_errors, 0.0, own_gains, halves)
     s = fits.motion(Reading())
     every = np.arange(10 * fits.robot.n_bodies)
     regressor = fits.mean_regressor(fits.robot, s, every)
-    shifted = [fits.average(fits.torque_at(lag)) for lag in LAGS]
+    shifted = [fits.average(fits.torque_at(lag)) for lag in lags_tried]
     tables, firsts, lags = [], [], np.full(n, np.nan)
     squares: dict[int, list[Array]] = {}
     counts: dict[int, int] = {}
@@ -135,18 +158,13 @@ def find_delay(fits: Fits) -> Delay:
             continue
         y = np.stack([torque[use, j] for torque in shifted], axis=1)
         rest = y - basis @ (basis.T @ y)
-        spread = float(np.sum((y[:, len(LAGS) // 2] - y[:, len(LAGS) // 2].mean()) ** 2))
+        spread = float(np.sum((y[:, middle] - y[:, middle].mean()) ** 2))
         errors = np.stack([(part**2).sum(axis=0) for part in np.array_split(rest, GROUPS)])
         total = errors.sum(axis=0)
-        if (
-            spread <= 0
-            or total.min() > LEFT * spread
-            or int(np.argmin(total))
-            in (
-                0,
-                len(LAGS) - 1,
-            )
-        ):
+        if spread <= 0 or total.min() > LEFT * spread:
+            continue
+        if int(np.argmin(total)) in (0, len(lags_tried) - 1):
+            beyond += 1
             continue
         tables.append((len(rest), errors))
         for run, cost in _run_costs(basis, y, int(np.argmin(total)), run_of[use]):
@@ -154,14 +172,16 @@ def find_delay(fits: Fits) -> Delay:
             counts[run] = counts.get(run, 0) + int(np.sum(run_of[use] == run))
         sooner = rest * first[use][:, None]
         firsts.append(np.stack([(p**2).sum(axis=0) for p in np.array_split(sooner, GROUPS)]))
-        lags[j] = _lowest(total)
-        own_errors[j] = _spread([_lowest(total - errors[g]) for g in range(GROUPS)])
+        lags[j] = _lowest(total, lags_tried)
+        sooner_total = firsts[-1].sum(axis=0)
+        drifts[j] = _lowest(total - sooner_total, lags_tried) - _lowest(sooner_total, lags_tried)
+        own_errors[j] = _spread([_lowest(total - errors[g], lags_tried) for g in range(GROUPS)])
         speed = np.abs(fits.average(s.dq[:, j])[use])
         fast = speed > np.median(speed)
-        halves[j] = [_lowest((rest[rows] ** 2).sum(axis=0)) for rows in (~fast, fast)]
-        own_gains[j] = len(rest) / 2 * np.log(total[len(LAGS) // 2] / _least(total))
+        halves[j] = [_lowest((rest[rows] ** 2).sum(axis=0), lags_tried) for rows in (~fast, fast)]
+        own_gains[j] = len(rest) / 2 * np.log(total[middle] / _least(total))
     if not tables:
-        return unknown
+        return unknown, beyond
 
     # squared errors, and not their logarithms, are a parabola of the lag
     noise = [float(e.sum(axis=0).min()) / n for n, e in tables]
@@ -169,7 +189,7 @@ def find_delay(fits: Fits) -> Delay:
     def lag(parts: list[Array], left_out: int | None = None) -> float:
         keep = [g for g in range(GROUPS) if g != left_out]
         cost = [e[keep].sum(axis=0) / (2 * s) for s, e in zip(noise, parts, strict=True)]
-        return _lowest(np.asarray(np.sum(cost, axis=0)))
+        return _lowest(np.asarray(np.sum(cost, axis=0)), lags_tried)
 
     whole_log = [errors for _, errors in tables]
     seconds = [errors - sooner for errors, sooner in zip(whole_log, firsts, strict=True)]
@@ -177,10 +197,13 @@ def find_delay(fits: Fits) -> Delay:
     error = _spread([lag(whole_log, g) for g in range(GROUPS)])
     drift = _spread([lag(seconds, g) - lag(firsts, g) for g in range(GROUPS)])
     whole = sum(n / 2 * np.log(e.sum(axis=0)) for n, e in tables)
-    gain = float(whole[len(LAGS) // 2] - _least(whole))
+    gain = float(whole[middle] - _least(whole))
     early, late = lag(firsts), lag(seconds)
-    runs = _of_runs(squares, counts)
-    return Delay(common, error, lags, own_errors, gain, own_gains, halves, early, late, drift, runs)
+    runs = _of_runs(squares, counts, lags_tried)
+    found = Delay(
+        common, error, lags, own_errors, gain, own_gains, halves, early, late, drift, runs, drifts
+    )
+    return found, beyond
 
 
 def _run_costs(
@@ -216,20 +239,24 @@ def _run_costs(
         yield run, known / (2 * noise)
 
 
-def _of_runs(squares: Mapping[int, list[Array]], counts: Mapping[int, int]) -> dict[int, RunDelay]:
+def _of_runs(
+    squares: Mapping[int, list[Array]], counts: Mapping[int, int], tried: Array
+) -> dict[int, RunDelay]:
     """Lags of single recordings, from half the squared residuals of their joints over noise."""
     if len(squares) < 3:
         return {}
     whole = {run: np.sum(parts, axis=0) for run, parts in squares.items()}
     found = {}
     for run, parts in squares.items():
-        usual = _lowest(np.sum([cost for other, cost in whole.items() if other != run], axis=0))
-        lag = _lowest(whole[run])
-        here, there = (int(np.argmin(np.abs(LAGS - x))) for x in (usual, lag))
-        if there in (0, len(LAGS) - 1):
+        usual = _lowest(
+            np.sum([cost for other, cost in whole.items() if other != run], axis=0), tried
+        )
+        lag = _lowest(whole[run], tried)
+        here, there = (int(np.argmin(np.abs(tried - x))) for x in (usual, lag))
+        if there in (0, len(tried) - 1):
             continue
         gains = np.array([part[here] - part[there] for part in parts])
-        own = np.array([_lowest(part) for part in parts])
+        own = np.array([_lowest(part, tried) for part in parts])
         weight = np.maximum(gains, 0)
         near = np.abs(own - lag) < max(NEARLY, 0.3 * abs(lag))
         total = max(float(weight.sum()), 1e-12)
@@ -372,10 +399,10 @@ def _bent_friction(signals: Signals, joint: int) -> Array:
     return np.column_stack([*falling, speed * np.abs(speed)])
 
 
-def _lowest(cost: Array) -> float:
+def _lowest(cost: Array, lags: Array) -> float:
     """Lag of least cost, interpolated by a parabola."""
     k = int(np.argmin(cost))
-    return float(LAGS[k] + float(LAGS[1] - LAGS[0]) * _bottom(cost, k))
+    return float(lags[k] + float(lags[1] - lags[0]) * _bottom(cost, k))
 
 
 def _least(cost: Array) -> float:

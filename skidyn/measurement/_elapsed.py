@@ -24,6 +24,8 @@ CLEAR = 4.0
 BACKWARDS, SKIPPED, SURELY = 0.1, 0.004, 0.02
 #: Ratio of the number of steps of two or more to that of zero, or between one and two.
 OTHERS = 3.0
+#: Share of the rows that skip others from which rows backwards in time are exchanged with them.
+EXCHANGED = 0.3
 #: Tolerance for the time of a step to be a whole number of steps of the clock.
 WHOLE = 0.25
 #: Steps from row to row, as shares of a joint's spread and of what velocities make of them, that
@@ -70,12 +72,13 @@ def elapsed_steps(measurement: Measurement) -> Elapsed | None:
     s = measurement.signals
     spread = s.q.std(axis=0)
     used = np.flatnonzero((spread > 1e-3) & (s.dq.std(axis=0) > 1e-3))
+    used = np.setdiff1d(used, list(measurement.held))  # a held position catches up in one step
     together = s.trajectory[1:] == s.trajectory[:-1]
     time = np.diff(s.clock)
     together &= time > 0
     if len(used) < 2 or together.sum() < 200:
         return None
-    q, dq, time = s.q[:, used], s.dq[:, used], time[together]
+    q, dq, time = measurement.unwrapped[:, used], s.dq[:, used], time[together]
     moved = np.diff(q, axis=0)[together] / spread[used]
     expected = ((dq[1:] + dq[:-1]) / 2)[together] * time[:, None] / spread[used]
     product = np.sum(moved * expected, axis=1)
@@ -127,6 +130,7 @@ class LostRows(Check):
         rows = found.clear & found.moving
         if rows.sum() < 200:
             return
+        back = float(np.sum(found.along & (found.steps < -WHOLE) & rows) / rows.sum())
         steps = found.steps[rows & (found.along | (found.steps == 0))]
         whole = np.abs(steps - np.round(steps)) < WHOLE
         share, usual, between, none = (
@@ -140,6 +144,15 @@ class LostRows(Check):
         )
         if share > SKIPPED and usual > 0.5 and share > OTHERS * max(between, none):
             measurement.lost = True
+            if back > max(SKIPPED, EXCHANGED * share):
+                yield self.suspicion(
+                    "rows are exchanged with others close to them in time",
+                    f"in {100 * back:.2g} % of the moving rows all joints move against their "
+                    f"velocities at once, and in {100 * share:.2g} % at least twice as far as "
+                    "these imply; sort the rows by the clock of the robot",
+                    "certain" if share > SURELY else "suspected",
+                )
+                return
             yield self.suspicion(
                 "rows are missing without a gap in the clock",
                 f"in {100 * share:.2g} % of the moving rows all joints move at least twice as far "

@@ -15,9 +15,11 @@ from skidyn._signals import Array, Signals
 from skidyn.measurement._measures import (
     excited,
     find_leaps,
+    held_share,
     idle_rows,
     is_repeated,
     longest_plateau_share,
+    missing_values,
     velocity_consistency,
 )
 
@@ -32,6 +34,8 @@ if TYPE_CHECKING:
 #: Correlation of integrated velocity with position from which its slope is a scale, and largest
 #: difference of the slopes of joints with a common one.
 ALIKE, SHARED = 0.9, 0.05
+#: Share of the steps in which the position of a single joint is held.
+HELD_BY_ONE = 0.4
 
 
 @dataclass
@@ -266,6 +270,16 @@ class Measurement:
         return {} if len(self.leaps) else stuck_positions(self.signals)
 
     @cached_property
+    def held(self) -> dict[int, float]:
+        """Joints whose position holds its last value, from 0, and in what share of their rows."""
+        s = self.signals
+        within = s.trajectory[1:] == s.trajectory[:-1]
+        shares = {k: held_share(s.q[:, k], within) for k in range(self.n_joints)}
+        free = [k for k, share in shares.items() if share < HELD_BY_ONE / 2 and self.excited[k]]
+        # if all hold, rows repeat, or the sensors are coarse
+        return {k: x for k, x in shares.items() if x > HELD_BY_ONE and self.excited[k] and free}
+
+    @cached_property
     def overflowed(self) -> dict[int, int]:
         """Joints whose torque overflows, from 0, and how often it jumps."""
         from skidyn.measurement._overflow import overflowed_columns
@@ -277,3 +291,8 @@ class Measurement:
         """Rows at the ends of recordings in which torque was not measured."""
         s = self.signals
         return idle_rows(s.q, self.torque, s.clock, s.trajectory)
+
+    @cached_property
+    def missing(self) -> NDArray[np.bool_]:
+        """Zeros in the place of missing torques, as a mask of rows and joints."""
+        return missing_values(self.torque, self.idle)

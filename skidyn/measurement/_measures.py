@@ -9,6 +9,10 @@ import numpy as np
 
 #: Least step of a coarse position, rad: a turn in 13 bits.
 COARSE = 0.9 * 2 * np.pi / 2**13
+#: Samples between positions whose differences show reversals.
+STRIDE = 10
+#: Least change, in steps of the sensor, of a position that was held for several rows.
+CATCHES = 3.0
 #: Windows over which velocity is compared with differentiated position, s.
 WINDOW = 0.05
 #: Least share of rows that hold all torques to be reported, and of those that hold any.
@@ -22,6 +26,9 @@ FARTHER, BEYOND, RANGE, PLACES = 4.0, 8.0, 1e-3, 2e-3
 MOSTLY_ZERO, IDLE_WAY = 0.3, 0.01
 #: Least rows, and time in s, at an end of a recording without changes of torque, to be reported.
 IDLE_ROWS, IDLE_TIME = 8, 0.05
+#: Fewest rows of zeros in the place of missing torques; least ratio of the torque beside them to
+#: the median torque: near a true zero it is small.
+FEWEST_MISSING, JUMPS = 5, 0.4
 #: Most steps that a position may be held before it catches up, and the share of the distance that
 #: its velocity implies by which it then moves on.
 CATCH_UP, CAUGHT = 5, 0.3
@@ -84,6 +91,39 @@ def _caught_up(
     caught = np.zeros(len(position), dtype=bool)
     caught[1:] = np.any((step > CAUGHT * usual * speed) & (speed > 0) & (step > 0), axis=1)
     return caught
+
+
+def held_share(position: np.ndarray, within: np.ndarray) -> float:
+    """Share of steps in which a moving position does not change, and then catches up.
+
+    Parameters
+    ----------
+    position : ndarray of shape (n_samples,), rad or m
+        Of one joint.
+    within : ndarray of shape (n_samples - 1,) of bool
+        Steps within a trajectory.
+
+    Returns
+    -------
+    float
+        0 for a position in coarse steps, which change one by one.
+    """
+    moved = np.abs(np.diff(position))
+    if not within.any() or np.ptp(position) == 0:
+        return 0.0
+    # motion over several steps, so that rests do not count
+    way = np.abs(position[STRIDE:] - position[:-STRIDE])
+    moves = np.zeros(len(moved), dtype=bool)
+    fast = np.flatnonzero(way > 0.25 * np.quantile(way, 0.9))
+    moves[fast + STRIDE // 2] = True
+    moves &= within
+    jumps = moved[moves & (moved > 0)]
+    if len(jumps) < 20:
+        return 0.0
+    step = position_step(position)
+    if np.isfinite(step) and np.median(jumps) < CATCHES * step:
+        return 0.0
+    return float(np.mean(moved[moves] == 0))
 
 
 def is_held(torque: np.ndarray, moved: np.ndarray) -> np.ndarray:
@@ -162,6 +202,34 @@ def idle_rows(
     return idle
 
 
+def missing_values(torque: np.ndarray, idle: np.ndarray) -> np.ndarray:
+    """Zeros beside which the torque is not small, as a mask of shape (n_samples, n_joints).
+
+    Parameters
+    ----------
+    torque : ndarray of shape (n_samples, n_joints), N m or N
+        Recorded torque.
+    idle : ndarray of shape (n_samples,) of bool
+        Rows that do not count.
+    """
+    missing = np.zeros(torque.shape, dtype=bool)
+    for k, values in enumerate(np.abs(torque.T)):
+        zero = (values == 0) & ~idle
+        edges = np.flatnonzero(np.diff(np.r_[0, zero.astype(int), 0]))
+        begins, ends = edges[::2], edges[1::2]
+        inside = (begins > 0) & (ends < len(values))
+        begins, ends = begins[inside], ends[inside]
+        if not len(begins):
+            continue
+        beside = np.minimum(values[begins - 1], values[ends])
+        jump = beside > JUMPS * float(np.median(values[~zero]))
+        for a, b in zip(begins[jump], ends[jump], strict=True):
+            missing[a:b, k] = True
+        if missing[:, k].sum() < max(FEWEST_MISSING, 0.5 * zero.sum()):
+            missing[:, k] = False  # zeros are usual
+    return missing
+
+
 def rest_share(velocity: np.ndarray) -> float:
     """Share of rows in which a joint is at rest: below 0.5 % of its largest velocity."""
     largest = np.abs(velocity).max()
@@ -201,9 +269,23 @@ def velocity_consistency(
     Both are taken over windows of 50 ms (in samples of the median step), which averages noise and
     quantisation out. NaN where the joint does not move.
     """
+    x, y, _ = way_and_area(time, position, velocity, segments)
+    if x @ x < 1e-20 or y @ y < 1e-20:
+        return np.nan, np.nan
+    return float(x @ y / (x @ x)), float(x @ y / np.sqrt((x @ x) * (y @ y)))
+
+
+def way_and_area(
+    time: np.ndarray, position: np.ndarray, velocity: np.ndarray, segments: Sequence[slice]
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Change of position and integral of velocity over windows, and the median window in s.
+
+    Empty where there are no windows.
+    """
+    nothing = np.zeros(0)
     steps = np.concatenate([np.diff(time[rows]) for rows in segments])
     if len(steps) == 0:
-        return np.nan, np.nan
+        return nothing, nothing, 0.0
     window = int(np.clip(np.round(WINDOW / np.median(steps)), 1, 50))
     change, integral = [], []
     for rows in segments:
@@ -214,18 +296,25 @@ def velocity_consistency(
         change.append(q[window:] - q[:-window])
         integral.append(area[window:] - area[:-window])
     if not change:
-        return np.nan, np.nan
-    x, y = np.concatenate(change), np.concatenate(integral)
-    if x @ x < 1e-20 or y @ y < 1e-20:
-        return np.nan, np.nan
-    return float(x @ y / (x @ x)), float(x @ y / np.sqrt((x @ x) * (y @ y)))
+        return nothing, nothing, 0.0
+    return np.concatenate(change), np.concatenate(integral), window * float(np.median(steps))
 
 
 def excited(position: np.ndarray, velocity: np.ndarray, segments: Sequence[slice]) -> bool:
     """Whether a joint moves at all: more than 100 steps of noise, in both directions."""
     span = np.ptp(position)
     noise = np.median(np.abs(np.diff(position, n=2))) if len(position) > 2 else 0.0
-    return bool(span > 1e-3 and span > 20 * noise and reversals(velocity, segments) > 0)
+    if span <= 1e-3 or span <= 20 * noise:
+        return False
+    # a velocity without its sign has no reversals
+    turns = reversals(velocity, segments)
+    if not turns:
+        parts = [np.diff(position[rows][::STRIDE]) for rows in segments]
+        ends = np.cumsum([0, *map(len, parts)])
+        pieces = [slice(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+        ways = np.concatenate(parts)
+        turns = reversals(ways, pieces) if len(ways) else 0
+    return turns > 0
 
 
 def _held_before(moved: np.ndarray) -> np.ndarray:

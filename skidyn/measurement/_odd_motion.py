@@ -14,7 +14,8 @@ from skidyn.measurement._measures import velocity_consistency
 from skidyn.measurement._suspicion import Suspicion
 
 #: Correlation of integrated velocity with position from which its slope is a scale, and below which
-#: a velocity is of something else; that of the other recordings where it is so.
+#: a velocity is of something else; that of the other recordings where it is so, and from which a
+#: slope is that of another unit.
 SCALED, UNLIKE, USUALLY = 0.9, 0.5, 0.98
 #: How far a slope must be off those of the other recordings, as a share of them, how near these are
 #: to each other, how many there are at least, and the share of recordings that are alike.
@@ -105,7 +106,8 @@ def odd_motion(signals: Signals, position: Array) -> dict[int, dict[int, float]]
             continue
         other = moves & (np.abs(likeness[:, k]) < UNLIKE)
         other &= bool(np.median(likeness[alike, k]) > USUALLY)
-        for r in np.flatnonzero((scaled & (off > FAR)) | other).tolist():
+        proportional = moves & (np.abs(likeness[:, k]) > USUALLY)
+        for r in np.flatnonzero((proportional & (off > FAR)) | other).tolist():
             slope = float(slopes[r, k]) if scaled[r] else float("nan")
             found.setdefault(int(runs[r]), {})[k] = slope
     # a difference in many is not one of single recordings

@@ -400,7 +400,11 @@ class TorqueDelay(Check):
         if measurement.stale or measurement.computed or measurement.smoothed:
             return  # held and interpolated values are always late or early
         drift = found.late - found.early
-        if abs(drift) > max(SMALLEST, DRIFTING * found.drift_error) and found.gain > LEAST:
+        if (
+            abs(drift) > max(SMALLEST, DRIFTING * found.drift_error)
+            and found.gain > LEAST
+            and _all_drift(found, drift)
+        ):
             yield self.suspicion(
                 "the clock of the torque runs at a different rate than that of the motion",
                 f"torque is late by {1e3 * found.early:.1f} ms in the first half of the "
@@ -529,6 +533,15 @@ def _whole(measurement: Measurement, lag: float) -> float:
         if abs(samples - np.round(samples)) < near
         else lag
     )
+
+
+def _all_drift(found: Delay, drift: float) -> bool:
+    """Whether the lags of most joints change alike: a clock is that of all torques."""
+    known = np.isfinite(found.drifts)
+    weight = np.maximum(found.gains[known], 0)
+    alike = np.abs(found.drifts[known] - drift) < 0.5 * abs(drift)
+    enough = alike.sum() >= min(2, known.sum())
+    return bool(enough and weight[alike].sum() >= AGREEING * max(float(weight.sum()), 1e-12))
 
 
 def late_runs(found: Delay) -> dict[int, RunDelay]:

@@ -22,6 +22,8 @@ POSITIONS = {DEGREE: "deg", 2 * np.pi: "rev"}
 NAMES = {"deg": "degrees", "rev": "turns", "min": "minutes"}
 #: How far the slope may be off a unit's factor, and off 1.
 NEAR = 0.1
+#: Least correlation of velocities with the rates of positions that differ by a scale only.
+PROPORTIONAL = 0.98
 #: How nearly a slope is that of minutes, which are but 5 % from degrees.
 MINUTES = 0.02
 #: How many times its limit a position reaches that is suspicious, and that is no position.
@@ -305,7 +307,12 @@ def _odd_runs(measurement: Measurement) -> dict[int, float]:
 def unnamed_scale(measurement: Measurement, shared: float) -> bool:
     """Whether velocities share a scale that is neither 1 nor that of a unit."""
     known = (1.0, *CLOCKS, *VELOCITIES, *POSITIONS)
-    several = sum(measurement.excited) > 1
+    moving = [
+        r
+        for (_, r), moves in zip(measurement.velocities, measurement.excited, strict=True)
+        if moves
+    ]
+    several = len(moving) > 1 and min(moving) > PROPORTIONAL  # not of a filtered velocity
     return several and shared > 0 and not any(abs(shared / f - 1) < NEAR for f in known)
 
 

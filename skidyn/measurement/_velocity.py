@@ -16,6 +16,7 @@ from skidyn.measurement._lowpass import TRIED, summit, suspect_lowpass, without_
 from skidyn.measurement._measurement import ALIKE, Measurement
 from skidyn.measurement._measures import velocity_consistency
 from skidyn.measurement._suspicion import Suspicion
+from skidyn.measurement._tachometer import Fault, find_fault
 from skidyn.measurement._units import (
     CLOCKS,
     LEAST,
@@ -30,6 +31,13 @@ from skidyn.measurement._units import (
 
 #: Range of a position, rad or m, and spread of a velocity, that are those of a joint that moves.
 LEAST_MOTION, LEAST_SPEED = 0.02, 0.02
+#: Rows in which the position of a joint does not change before it jumps.
+STUCK = 10
+#: Velocity of a joint that moves while another one jumps, as a share of its largest, and share of
+#: the jumps at which some joint does.
+MOVING, MOST_MOVE = 0.05, 0.5
+#: Correlation of a velocity with the rate of its position above which it has no fault.
+SURE = 0.995
 #: Windows over which velocities are compared with positions, at most.
 WINDOWS = 3000
 #: Lags of the velocity that are tried, s; the least that is reported, s and in time steps; the
@@ -85,16 +93,46 @@ class Velocity(Check):
         if measurement.stuck:
             return [self._held(measurement, k, runs) for k, runs in measurement.stuck.items()]
         groups: dict[str, list[int]] = {}
+        faults = []
         for k, (slope, correlation) in enumerate(measurement.velocities):
             slope /= measurement.clock
-            if not np.isfinite(slope) or not measurement.excited[k] or abs(slope - 1) < NEAR:
+            if not np.isfinite(slope) or not measurement.excited[k]:
+                continue
+            fault = _fault(measurement, k) if correlation < SURE else None
+            if fault is not None:
+                faults.append(self._faulty(measurement, k, fault))
+                continue
+            if abs(slope - 1) < NEAR:
                 continue
             if k in measurement.millimetres:
                 continue
             if measurement.clock != 1 and _cause(slope, correlation) in ("scale", "other"):
                 continue  # reported when time is in seconds
             groups.setdefault(_cause(slope, correlation), []).append(k)
-        return [self._told(measurement, cause, joints) for cause, joints in groups.items()]
+        return faults + [self._told(measurement, cause, joints) for cause, joints in groups.items()]
+
+    def _faulty(self, measurement: Measurement, k: int, fault: Fault) -> Suspicion:
+        name, column = measurement.joint(k), f"dq{k + 1}"
+        unit = "m/s" if measurement.signals.prismatic[k] else "rad/s"
+        what = {
+            "unsigned": f"the velocity of {name} has no sign",
+            "offset": f"the velocity of {name} has an offset of {fault.value:.3g} {unit}",
+            "clipped": f"the velocity of {name} is clipped at {fault.value:.3g} {unit}",
+        }[fault.kind]
+        remedy = (f"--derive {column}", f"derive=['{column}']")
+        if fault.kind == "offset":
+            remedy = (
+                f"--zero {column}={fault.value:.4g}",
+                f"zero={{'{column}': {fault.value:.4g}}}",
+            )
+        return self.suspicion(
+            what,
+            f"this explains {1 - fault.left:.0%} of the squared difference from the rate of the "
+            "position",
+            "certain" if fault.kind == "unsigned" else "suspected",
+            [k],
+            remedy,
+        )
 
     def _held(self, measurement: Measurement, k: int, runs: list[int]) -> Suspicion:
         return self.suspicion(
@@ -132,7 +170,9 @@ class Velocity(Check):
         if cause in ("scale", "other"):
             what = f"the velocity of {names} is not the derivative of the position"
             if cause == "other":
-                return self.suspicion(what, evidence, "suspected", joints)
+                columns = [f"dq{k + 1}" for k in joints]
+                derive = (f"--derive {','.join(columns)}", f"derive={columns}")
+                return self.suspicion(what, evidence, "suspected", joints, derive)
             pairs = {f"dq{k + 1}": float(f"{1 / measurement.velocities[k][0]:.4g}") for k in joints}
             words = ",".join(f"{name}={value:g}" for name, value in pairs.items())
             return self.suspicion(
@@ -149,6 +189,14 @@ class Velocity(Check):
         return self.suspicion(
             f"{what} look like {unit} on {names}", evidence, "certain", joints, unit_remedy(units)
         )
+
+
+def _fault(measurement: Measurement, k: int) -> Fault | None:
+    """Fault of the velocity of a joint, from 0; None if another relation explains it better."""
+    if measurement.clock != 1:
+        return None  # reported when time is in seconds
+    s = measurement.signals
+    return find_fault(s.clock, measurement.unwrapped[:, k], s.dq[:, k], s.segments)
 
 
 def _runs_backwards(measurement: Measurement, joints: list[int]) -> bool:
@@ -418,11 +466,38 @@ def _lowpass(signals: Signals, lags: Mapping[int, float]) -> float | None:
     return middle if alike else None
 
 
+def _was_held(measurement: Measurement, joint: int) -> bool:
+    """Whether the position of a joint, from 0, was constant before most jumps."""
+    q, rows = measurement.signals.q[:, joint], measurement.leaps
+    rows = rows[rows > STUCK]
+    held = [np.ptp(q[row - STUCK : row]) == 0 and q[row] != q[row - 1] for row in rows]
+    others = np.delete(measurement.signals.q, joint, axis=1)
+    move = [np.ptp(others[row - STUCK : row], axis=0).any() for row in rows]
+    return bool(held) and min(np.mean(held), np.mean(move)) >= MOST_MOVE
+
+
+def _of_one_joint(measurement: Measurement, joint: int) -> bool:
+    """Whether a joint, from 0, jumps alone while others move; joined recordings differ in all."""
+    s, rows = measurement.signals, measurement.leaps
+    expected = s.dq[rows] * (s.clock[rows] - s.clock[rows - 1])[:, None]
+    moved = s.q[rows] - s.q[rows - 1]
+    others = np.arange(s.n_joints) != joint
+    within = s.trajectory[1:] == s.trajectory[:-1]  # a trajectory ends before a jump
+    usual = np.abs(np.diff(s.q, axis=0))[within].max(axis=0, initial=0.0)
+    even = np.abs(moved - expected) <= usual
+    fast = np.abs(s.dq[rows]) > MOVING * np.abs(s.dq).max(axis=0)
+    alone = ~even[:, joint] & even[:, others].all(axis=1)
+    return bool(alone.all() and np.any(fast[:, others], axis=1).mean() > MOST_MOVE)
+
+
 class JoinedRecordings(Check):
     """Positions that jump and continue from there: joined recordings, or missing parts."""
 
     name = "joined"
-    suspects = "recordings that were joined into one, or from which a part was cut out"
+    suspects = (
+        "recordings that were joined into one, or from which a part was cut out; positions of a "
+        "joint whose encoder loses its zero"
+    )
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         s = measurement.signals
@@ -430,6 +505,26 @@ class JoinedRecordings(Check):
         if len(rows):
             shown = ", ".join(str(int(row)) for row in rows[:6]) + (" .." if len(rows) > 6 else "")
             joint = int(np.argmax(np.abs(s.q[rows[0]] - s.q[rows[0] - 1])))
+            if _was_held(measurement, joint):
+                yield self.suspicion(
+                    f"the position of {measurement.joint(joint)} is stuck in parts of recordings",
+                    f"it does not change in {STUCK} rows or more before it jumps in {len(rows)} "
+                    f"place(s) (rows {shown}); leave these parts out",
+                    "certain",
+                    [joint],
+                )
+                return
+            if _of_one_joint(measurement, joint):
+                yield self.suspicion(
+                    f"the zero of the position of {measurement.joint(joint)} changes within "
+                    "recordings: its encoder loses steps",
+                    f"it jumps in {len(rows)} place(s) farther than any velocity implies, and "
+                    f"continues from there (rows {shown}), while other joints move on evenly; "
+                    "home the joint again and record anew, or leave these recordings out",
+                    "certain",
+                    [joint],
+                )
+                return
             yield self.suspicion(
                 "recordings were joined, or a part was cut out of one",
                 f"positions jump in {len(rows)} place(s) farther than any velocity implies, and "

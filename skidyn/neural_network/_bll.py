@@ -240,7 +240,7 @@ class BLLRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEst
         X, y = validate_data(self, X, y, multi_output=True, y_numeric=True, dtype=np.float64)
         if sample_weight is not None:
             sample_weight = _check_sample_weight(sample_weight, X, dtype=np.float64)
-        keys = self._keys()
+        keys = fitted_keys(self)
         folds = self._given_folds(table, y, groups)
         order = order_of_log(self, X, keys)
         if order is not None:
@@ -344,9 +344,6 @@ class BLLRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEst
         guard = int(getattr(member, "window", 0))
         return held_out_folds(trajectories, int(self.cv or BLOCKS), guard=guard)
 
-    def _keys(self) -> Keys:
-        return fitted_keys(self)
-
     def predict(self, X: Any, return_std: bool = False) -> Any:
         """Predict the torque of every row.
 
@@ -366,7 +363,7 @@ class BLLRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEst
         """
         check_is_fitted(self)
         X = validate_data(self, X, reset=False, dtype=np.float64)
-        keys = self._keys()
+        keys = fitted_keys(self)
         order = time_order(X, keys)
         X = keys.for_learner(X if order is None else X[order], self.bagging_.estimator_)
         members = np.stack([member.predict(X) for member in self.bagging_.estimators_])

@@ -38,19 +38,10 @@ Network = tuple[type[nn.Module], dict[str, Any]]
 
 @dataclass(frozen=True)
 class Plan:
-    """How networks are trained.
+    """How networks are trained: ``window`` rows of history and ``stride`` targets per window.
 
-    Attributes
-    ----------
-    window, stride : int
-        Rows of history and targets per window.
-    settings : dict
-        Parameters of skorch's net.
-    slow_parameters : str
-        Name of a parameter that is trained with a tenth of the learning rate and without weight
-        decay; empty for none.
-    weight_decay : float
-        Weight decay of the default optimiser.
+    ``settings`` are parameters of skorch's net; ``slow_parameters`` is the name of a parameter that
+    is trained with a tenth of the learning rate and without weight decay, empty for none.
     """
 
     window: int
@@ -91,18 +82,9 @@ def _is_a(callback: Any, kind: type) -> bool:
 class Task:
     """One network and its training data.
 
-    Attributes
-    ----------
-    module : type
-        Maps (n_windows, window + stride, n_inputs) to (n_windows, stride, n_outputs).
-    parameters : dict
-        Constructor arguments.
-    inputs, targets : ndarray of shape (n_samples, n_inputs) and (n_samples, n_outputs)
-        Scaled.
-    weight : ndarray of shape (n_samples,)
-        Weight of each row's error; rows of weight zero still serve as history.
-    seed : int
-        Seed of the order of windows.
+    ``module`` maps (n_windows, window + stride, n_inputs) to (n_windows, stride, n_outputs). Inputs
+    and targets are scaled; rows of ``weight`` zero still serve as history. ``seed`` is that of the
+    order of windows.
     """
 
     module: type[nn.Module]
@@ -115,18 +97,10 @@ class Task:
 
 @dataclass(frozen=True)
 class Training:
-    """Result of a training.
+    """Trained net, which holds all networks, and the weights of each.
 
-    Attributes
-    ----------
-    net : NeuralNet
-        Trained net, which holds all networks.
-    weights : list of dict of str to ndarray
-        Weights of each network.
-    loss_curves : list of list of float
-        Mean squared error of each network's scaled targets after each epoch.
-    validation_curve : list of float
-        The same error on the validation rows; empty without them.
+    Curves are the mean squared error of scaled targets after each epoch: of each network in
+    training, and on the validation rows (empty without them).
     """
 
     net: NeuralNet
@@ -198,28 +172,11 @@ def make_net(
     weights: Sequence[Weights] | None = None,
     **more: Any,
 ) -> NeuralNet:
-    """Make a skorch net for networks that are trained side by side.
+    """Make a skorch net, not initialised, for networks that are trained side by side.
 
     Most of the time of a small network's step is overhead (gathering, optimiser, bookkeeping),
-    which all networks share.
-
-    Parameters
-    ----------
-    networks : sequence of (type, dict)
-        Class and constructor arguments of each network; all have one architecture.
-    plan : Plan
-        Settings.
-    callbacks : sequence
-        Callbacks before those of the plan.
-    weights : sequence of dict or None
-        Weights of each network; drawn at random if None.
-    **more : dict
-        Further parameters of the net.
-
-    Returns
-    -------
-    NeuralNet
-        Not initialised.
+    which all networks share. All have one architecture; weights are drawn at random if they are
+    None. Given callbacks come before those of the plan; ``more`` are parameters of the net.
     """
     settings = plan.settings.copy()
     if settings["optimizer"] is None:
@@ -259,18 +216,8 @@ def train(
 ) -> Training:
     """Train networks of one architecture side by side on one log.
 
-    Parameters
-    ----------
-    tasks : list of Task
-        Networks and their training data.
-    validation : ndarray of bool of shape (n_samples,) or None
-        Rows for validation only.
-    segments : list of slice
-        Rows that belong together.
-    plan : Plan
-        Settings.
-    progress : FitProgress or None
-        Receives every epoch.
+    ``validation`` marks rows for validation only, ``segments`` are rows that belong together, and
+    ``progress`` receives every epoch.
     """
     device = torch.device(plan.settings["device"])
 
@@ -338,27 +285,10 @@ def run(
     stride: int,
     device: str,
 ) -> Array:
-    """Outputs of a network for every row of a log.
+    """Outputs of a network for every row of a log, from scaled inputs.
 
     Every segment is cut at multiples of ``stride`` rows from its start, so the output of a row
     depends only on that row and earlier rows, and does not change when the log grows.
-
-    Parameters
-    ----------
-    network : Module
-        Network with its weights.
-    inputs : ndarray of shape (n_samples, n_inputs)
-        Scaled.
-    segments : list of slice
-        Rows that belong together.
-    window, stride : int
-        As in training.
-    device : str
-        Torch device.
-
-    Returns
-    -------
-    ndarray of shape (n_samples, n_outputs)
     """
     table = torch.as_tensor(inputs, dtype=torch.float32, device=device)
     rows, valid = window_rows(window_starts(segments, stride), window, stride)

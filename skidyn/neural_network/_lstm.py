@@ -116,17 +116,7 @@ class LSTMRegressor(SequenceRegressor):
 
 
 def directions(given: Any, names: Any, n_features: int) -> list[int]:
-    """Columns of velocities whose sign is an input.
-
-    Parameters
-    ----------
-    given : "auto", sequence of int or str, or None
-        Value given by the user.
-    names : sequence of str or None
-        Names of the columns.
-    n_features : int
-        Number of columns.
-    """
+    """Columns of velocities whose sign is an input, from the value given by the user."""
     columns = None if names is None else [str(name) for name in names]
     if given is None:
         return []

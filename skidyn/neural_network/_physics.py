@@ -19,15 +19,7 @@ Array = NDArray[np.float64]
 
 
 class BareRigidBody:
-    """A robot's rigid body with its own inertial parameters.
-
-    Parameters
-    ----------
-    robot : Robot
-        The robot.
-    columns : Columns
-        Meaning of the columns of X.
-    """
+    """A robot's rigid body with its own inertial parameters."""
 
     def __init__(self, robot: Robot, columns: Columns) -> None:
         self.robot = robot
@@ -55,14 +47,8 @@ class BareRigidBody:
 class IdentifiedPhysics:
     """Rigid body with effects, identified by an :class:`~skidyn.identification.RBDRegressor`.
 
-    Effects that depend on the load use the load of the identified model.
-
-    Parameters
-    ----------
-    model : RBDRegressor
-        Not fitted, or fitted by :meth:`fit`.
-    columns : Columns
-        Meaning of the columns of X.
+    Effects that depend on the load use the load of the identified model. The model is fitted
+    already or by :meth:`fit`.
     """
 
     def __init__(self, model: RBDRegressor, columns: Columns) -> None:

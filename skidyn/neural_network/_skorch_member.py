@@ -16,14 +16,8 @@ class SkorchMember(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     """A skorch net that accepts tables in double precision, and targets of one or two dimensions.
 
     skorch casts nothing. A net whose output has one column is trained wrongly, without an error, on
-    one-dimensional targets (its loss subtracts every target from every output).
-
-    Parameters
-    ----------
-    net : skorch.NeuralNet
-        Predicts (n_samples, n_outputs).
-    random_state : int, RandomState or None, default=None
-        Seed of initial weights and of the order of rows.
+    one-dimensional targets (its loss subtracts every target from every output). ``random_state`` is
+    the seed of initial weights and of the order of rows.
     """
 
     def __init__(self, net: Any, random_state: Any = None) -> None:

@@ -89,13 +89,7 @@ def _rows(*tables: torch.Tensor) -> list[tuple[torch.Tensor, ...]]:
 
 
 class StackedNetwork(nn.Module):
-    """Networks of one architecture, each with its own inputs, as one computation.
-
-    Parameters
-    ----------
-    networks : list of LSTMNetwork
-        Initialised; they are not changed.
-    """
+    """Initialised networks of one architecture, each with its own inputs, as one computation."""
 
     def __init__(self, networks: list[LSTMNetwork]) -> None:
         super().__init__()

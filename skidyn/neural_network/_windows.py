@@ -31,12 +31,7 @@ def window_rows(
 
     A window reads ``window`` rows of history and then its ``stride`` target rows. If the history
     would begin before the segment, the first row of the segment is repeated, as if the robot had
-    rested there.
-
-    Returns
-    -------
-    rows : ndarray of shape (n_windows, window + stride)
-    valid : ndarray of bool of shape (n_windows, stride)
+    rested there. Shapes are (n_windows, window + stride) and (n_windows, stride).
     """
     wanted = starts[:, :1] + np.arange(-window, stride)
     first, last = starts[:, 1:2], starts[:, 2:3]
@@ -47,16 +42,8 @@ def window_rows(
 class WindowSet(torch.utils.data.Dataset[Any]):
     """Inputs, targets and weights of a log for every member of an ensemble, cut into windows.
 
-    Parameters
-    ----------
-    inputs : tensor of shape (n_members, n_samples, n_inputs)
-        Scaled inputs.
-    targets : tensor of shape (n_members, n_samples, n_outputs + 1)
-        Scaled targets, and the weight of the row as the last column.
-    segments : list of slice
-        Rows that belong together.
-    window, stride : int
-        Rows of history and targets per window.
+    Inputs and targets are scaled, of shape (n_members, n_samples, ...); the last column of the
+    targets is the weight of the row.
     """
 
     def __init__(

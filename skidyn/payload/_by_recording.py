@@ -26,13 +26,8 @@ LARGEST_ERROR = 0.1
 class Shares:
     """Measured values of every recording relative to those expected from all others.
 
-    Attributes
-    ----------
-    names : tuple of str
-        Recordings, such as ``"loaded 1"``, in the given order.
-    values, std : ndarray of shape (n_recordings, n_joints)
-        Shares and their standard errors; NaN for the only recording of its kind, and for joints
-        that it does not move.
+    ``values`` and their standard errors ``std`` are of shape (n_recordings, n_joints), and NaN for
+    the only recording of its kind and for joints that it does not move.
     """
 
     names: tuple[str, ...]
@@ -53,19 +48,10 @@ def compare_recordings(
 ) -> Shares:
     """Measured torque or current of every recording as a share of the expected, by joint.
 
-    Parameters
-    ----------
-    runs : Runs
-        Averaged rows of all recordings.
-    predict : callable
-        Function of the left-out folds that returns the values of all rows expected from the others,
-        per joint.
-
-    Returns
-    -------
-    Shares
-        The standard error of a share includes the spread over the blocks of its recording and,
-        because the expectation comes from the others, half the usual distance between recordings.
+    ``predict`` is a function of the left-out folds that returns the values of all rows expected
+    from the others, per joint. The standard error of a share includes the spread over the blocks of
+    its recording and, because the expectation comes from the others, half the usual distance
+    between recordings.
     """
     rows, n = runs.problem.rows, len(runs.target)
     numbers = np.unique(runs.problem.signals.trajectory)

@@ -15,7 +15,15 @@ from skidyn._exceptions import SkidynError
 from skidyn._signals import Array
 from skidyn.evidence import jackknife, linear_terms, without_each
 from skidyn.payload._by_recording import Shares, compare_recordings, differing
-from skidyn.payload._runs import FRICTION, Runs, interval_factor, make_runs, open_columns, read_runs
+from skidyn.payload._runs import (
+    FRICTION,
+    Runs,
+    interval_factor,
+    make_runs,
+    open_columns,
+    read_runs,
+    triangle,
+)
 from skidyn.robots import Robot
 
 #: Number of rounds of weights, evaluations in each, and the relative change that ends them.
@@ -302,7 +310,7 @@ class _System:
     def factors(self, runs: Runs, rows: list[Array]) -> list[list[Array]]:
         """Per fold and joint, the triangular factor of its rows."""
         return [
-            [_triangle(block[fold == f]) for block, fold in zip(rows, runs.fold, strict=True)]
+            [triangle(block[fold == f]) for block, fold in zip(rows, runs.fold, strict=True)]
             for f in range(runs.n_folds)
         ]
 
@@ -366,14 +374,10 @@ class _System:
 
 
 def _merged(factors: list[list[Array]]) -> list[Array]:
-    return [_triangle(np.vstack(parts)) for parts in zip(*factors, strict=True)]
+    return [triangle(np.vstack(parts)) for parts in zip(*factors, strict=True)]
 
 
 def _merged_without(factors: list[list[Array]]) -> Iterator[list[Array]]:
     """Factors of all folds but one, each left out in turn."""
     for rows in zip(*map(without_each, zip(*factors, strict=True)), strict=True):
-        yield [_triangle(own) for own in rows]
-
-
-def _triangle(rows: Array) -> Array:
-    return np.asarray(np.linalg.qr(rows, mode="r"))
+        yield [triangle(own) for own in rows]

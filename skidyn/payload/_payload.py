@@ -25,6 +25,7 @@ from skidyn.payload._runs import (
     make_runs,
     open_columns,
     read_runs,
+    triangle,
 )
 from skidyn.robots import Robot
 
@@ -337,7 +338,7 @@ def _estimate(runs: Runs, link: str, notes: list[str], com: Array | None = None)
         solution = _solve(np.vstack(factors))
         noise = _noise(designs, runs.target, solution)
     factors = _fold_factors(designs, runs, noise)
-    whole = _triangle(np.vstack(factors))
+    whole = triangle(np.vstack(factors))
     width = free.shape[1]
     hidden = open_columns(whole[:, :-1], range(width))
     is_open: NDArray[np.bool_] = np.any(np.abs(free[:, hidden]) > 0, axis=1)
@@ -437,8 +438,8 @@ def _by_joint(runs: Runs, body: Array) -> tuple[Array, Array]:
     for own, rest, target, fold in zip(runs.body, runs.rest, runs.target, runs.fold, strict=True):
         torque = own @ body
         design = np.column_stack([torque, rest, target])
-        parts = [_triangle(design[fold == f]) for f in range(runs.n_folds)]
-        whole = _triangle(np.vstack(parts))
+        parts = [triangle(design[fold == f]) for f in range(runs.n_folds)]
+        whole = triangle(np.vstack(parts))
         if not np.any(torque) or open_columns(whole[:, :-1], [0])[0]:
             shares.append(np.nan)
             errors.append(np.nan)
@@ -475,12 +476,8 @@ def _fold_factors(designs: list[Array], runs: Runs, noise: Array) -> list[Array]
             np.column_stack([design, target])[fold == f] / s
             for design, target, fold, s in zip(designs, runs.target, runs.fold, noise, strict=True)
         ]
-        factors.append(_triangle(np.vstack(parts)))
+        factors.append(triangle(np.vstack(parts)))
     return factors
-
-
-def _triangle(rows: Array) -> Array:
-    return np.asarray(np.linalg.qr(rows, mode="r"))
 
 
 def _solve(factor: Array) -> Array:
@@ -502,13 +499,10 @@ def _consistent(whole: Array, free: Array, is_open: NDArray[np.bool_]) -> Array:
         mass, com = free[0], np.where(is_open[1:4], 0.0, free[1:4]) / free[0]
     else:
         mass, com = 0.1, np.zeros(3)
-    ball = 0.4 * mass * RADIUS**2 * np.ones(3)
-    shift = mass * (com @ com * np.eye(3) - np.outer(com, com))
-    inertia = np.diag(ball) + shift
-    start = np.r_[mass, mass * com, inertia[np.triu_indices(3)]]
+    start = _sphere(mass, com)
     n_rest = whole.shape[1] - 11
     # The other parameters have no bounds: they are eliminated, which leaves the body's own rows.
-    swapped = _triangle(np.hstack([whole[:, 10:-1], whole[:, :10], whole[:, -1:]]))
+    swapped = triangle(np.hstack([whole[:, 10:-1], whole[:, :10], whole[:, -1:]]))
     own = swapped[n_rest:]
     found, _ = make_consistent(start[None], own[:, n_rest:-1], own[:, -1], np.zeros(0), np.zeros(0))
     return np.asarray(found[0])

@@ -65,10 +65,7 @@ def read_runs(
 ) -> tuple[Signals, Array, NDArray[np.bool_], bool]:
     """Signals and torque of all runs, a mask of samples with the load, and whether to smooth.
 
-    Raises
-    ------
-    SkidynError
-        There is no run, or a run has no torque columns.
+    A SkidynError is raised without a run, or if one has no torque columns.
     """
     frames = [(frame, True) for frame in _frames(loaded, "loaded")]
     frames += [(frame, False) for frame in _frames(unloaded, "unloaded")]
@@ -121,10 +118,7 @@ def make_runs(
 def in_body(robot: Robot, link: str | None) -> tuple[int, Array]:
     """The body that carries a link, and its parameters per unit of those in the link's frame.
 
-    Raises
-    ------
-    SkidynError
-        The link does not exist, or does not move.
+    A SkidynError is raised if the link does not exist or does not move.
     """
     if link is None:
         return robot.n_bodies - 1, np.eye(10)
@@ -142,6 +136,11 @@ def in_body(robot: Robot, link: str | None) -> tuple[int, Array]:
 def interval_factor(n_folds: int) -> float:
     """Half width of a 95 % interval in standard errors for a number of folds."""
     return float(student_t.ppf(0.975, max(1, n_folds - 1)))
+
+
+def triangle(rows: Array) -> Array:
+    """Triangular factor of rows."""
+    return np.asarray(np.linalg.qr(rows, mode="r"))
 
 
 def open_columns(design: Array, columns: Sequence[int]) -> NDArray[np.bool_]:

@@ -12,17 +12,7 @@ Array = NDArray[np.float64]
 def scaling_of(values: Array, kind: str) -> tuple[Array, Array]:
     """Offset and scale of each column: to zero mean and unit variance, or to the range 0 to 1.
 
-    Parameters
-    ----------
-    values : ndarray of shape (n_samples, n_columns)
-        Values to be scaled.
-    kind : {"standard", "minmax"}
-        Which scaling.
-
-    Returns
-    -------
-    offset, scale : ndarray of shape (n_columns,)
-        ``(values - offset) / scale`` is scaled; constant columns have scale 1.
+    ``(values - offset) / scale`` is scaled; constant columns have scale 1.
     """
     if kind == "minmax":
         offset, scale = values.min(axis=0), np.ptp(values, axis=0)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from skidyn._columns import ColumnSpec, _key_column
 from skidyn._compat import Interval, StrOptions
+from skidyn._keys import fitted_keys
 from skidyn.preprocessing._signals import (
     SignalTransformer,
     _sampling_rate,
@@ -129,7 +130,7 @@ class SmoothDerivatives(SignalTransformer):
         self.time = time
 
     def _learn(self, X: Array) -> None:
-        keys, names = self._keys(), self._names()
+        keys, names = fitted_keys(self), self._names()
         velocities = [i for i, name in enumerate(names or []) if name.startswith("dq")]
         positions = [i for i, name in enumerate(names or []) if name.startswith("q")]
         if self.columns is not None:
@@ -177,7 +178,7 @@ class SmoothDerivatives(SignalTransformer):
 
     def _parts_to_judge(self, X: Array) -> list[tuple[Array, Array]]:
         """Times and values of the longest segments, few enough rows for a quick choice."""
-        keys = self._keys()
+        keys = fitted_keys(self)
         parts: list[tuple[Array, Array]] = []
         for segment in sorted(keys.segments(X), key=lambda s: int(s.start - s.stop)):
             room = CHOICE_ROWS - sum(len(times) for times, _ in parts)
@@ -188,7 +189,7 @@ class SmoothDerivatives(SignalTransformer):
         return parts
 
     def _times(self, X: Array, rows: slice) -> Array:
-        return segment_times(X, self._keys(), rows, self.rate_)
+        return segment_times(X, fitted_keys(self), rows, self.rate_)
 
     def _changed(self, X: Array) -> Array:
         smoothed = X.copy()

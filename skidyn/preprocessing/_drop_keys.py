@@ -11,7 +11,7 @@ from sklearn.base import clone
 from sklearn.pipeline import Pipeline, make_pipeline
 
 from skidyn._columns import ColumnSpec
-from skidyn._keys import Keys, knows_keys
+from skidyn._keys import Keys, fitted_keys, knows_keys
 from skidyn.preprocessing._signals import SignalTransformer
 
 Array = NDArray[np.float64]
@@ -53,33 +53,21 @@ class DropKeys(SignalTransformer):
         self.time = time
 
     def _learn(self, X: Array) -> None:
-        self._keys()  # raises an error for missing columns
+        fitted_keys(self)  # raises an error for missing columns
 
     def _changed(self, X: Array) -> Array:
-        return X[:, list(self._keys().features)]
+        return X[:, list(fitted_keys(self).features)]
 
     def _renamed(self, names: NDArray[Any]) -> NDArray[Any]:
-        return names[list(self._keys().features)]
+        return names[list(fitted_keys(self).features)]
 
 
 def without_keys_inside(learner: Any, keys: Keys) -> Any:
-    """A learner whose parts without support for key columns do not get them.
+    """The learner, or a copy, whose parts without support for key columns do not get them.
 
     Steps of a ``Pipeline`` after the last one that supports key columns, and members of stackings
     and votings that do not support them, get a :class:`DropKeys`, unless there is one already. (A
     learner without any part that supports key columns never gets them: ``Keys.for_learner``.)
-
-    Parameters
-    ----------
-    learner : estimator
-        Not fitted.
-    keys : Keys
-        Key columns of the table to which the learner is fitted.
-
-    Returns
-    -------
-    estimator
-        The learner itself, or a copy.
     """
     if (keys.trajectory is None and keys.time is None) or not knows_keys(learner):
         return learner

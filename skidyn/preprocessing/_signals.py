@@ -35,12 +35,9 @@ class SignalTransformer(LogTransformer):
         "time": [str, Integral, None],
     }
 
-    def _keys(self) -> Keys:
-        return fitted_keys(self)
-
     def _segments(self, X: Array) -> list[slice]:
         """Slices of consecutive rows."""
-        keys = self._keys()
+        keys = fitted_keys(self)
         time = None if keys.time is None else X[:, keys.time]
         refuse_shuffled(type(self).__name__, keys.trajectories(X), time)
         return keys.segments(X)
@@ -148,10 +145,10 @@ class ButterworthFilter(SignalTransformer):
         self.time = time
 
     def _learn(self, X: Array) -> None:
-        self.rate_ = _sampling_rate(X, self._keys(), self._segments(X), self.rate)
+        self.rate_ = _sampling_rate(X, fitted_keys(self), self._segments(X), self.rate)
 
     def _changed(self, X: Array) -> Array:
-        keys = self._keys()
+        keys = fitted_keys(self)
         filtered: Array = X.copy()
         features = list(keys.features)
         for segment in self._segments(X):
@@ -225,7 +222,7 @@ class TimeDerivative(SignalTransformer):
         self.time = time
 
     def _learn(self, X: Array) -> None:
-        keys, names = self._keys(), self._names()
+        keys, names = fitted_keys(self), self._names()
         velocities = [i for i, name in enumerate(names or []) if name.startswith("dq")]
         if self.columns is not None:
             found = [_key_column("columns", c, names, X.shape[1]) for c in self.columns]
@@ -238,7 +235,7 @@ class TimeDerivative(SignalTransformer):
         self.rate_ = _sampling_rate(X, keys, self._segments(X), self.rate)
 
     def _changed(self, X: Array) -> Array:
-        keys = self._keys()
+        keys = fitted_keys(self)
         derivative = np.empty((len(X), len(self.columns_)))
         for segment in self._segments(X):
             values = X[segment, self.columns_]
@@ -312,7 +309,7 @@ class SignalScaler(SignalTransformer):
     def _learn(self, X: Array) -> None:
         if self.kind not in ("minmax", "standard"):
             raise ValueError(f"kind={self.kind!r}; use 'minmax' or 'standard'.")
-        features = list(self._keys().features)
+        features = list(fitted_keys(self).features)
         self.offset_, self.scale_ = np.zeros(X.shape[1]), np.ones(X.shape[1])
         self.offset_[features], self.scale_[features] = scaling_of(X[:, features], self.kind)
 

@@ -21,14 +21,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Smoothed:
-    """Result of smoothing one segment.
+    """Result of smoothing one segment: the signal and its time derivatives, by column.
 
-    Attributes
-    ----------
-    value, first, second : ndarray of shape (n_samples, n_signals)
-        Smoothed signal and its time derivatives (unit, unit/s, unit/s^2).
-    weight : ndarray of shape (n_samples, 1)
-        Weight of each sample in its own smoothed value, 0 to 1.
+    ``weight``, of shape (n_samples, 1), is that of each sample in its own smoothed value, 0 to 1.
     """
 
     value: Array

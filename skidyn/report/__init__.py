@@ -5,24 +5,13 @@ from skidyn._writing import write_json
 from skidyn.report._compare import summarize_comparison
 from skidyn.report._fleet import summarize_fleet
 from skidyn.report._summary import summarize
-from skidyn.report._write import (
-    render_comparison,
-    render_fleet,
-    render_html,
-    write_comparison,
-    write_fleet,
-    write_html,
-)
+from skidyn.report._write import render_html, write_html
 
 __all__ = [
-    "render_comparison",
-    "render_fleet",
     "render_html",
     "summarize",
     "summarize_comparison",
     "summarize_fleet",
-    "write_comparison",
-    "write_fleet",
     "write_html",
     "write_json",
 ]

@@ -17,18 +17,7 @@ LOWEST = 0.5
 
 @dataclass(frozen=True)
 class Scale:
-    """Positions of errors over noise along a bar.
-
-    Parameters
-    ----------
-    largest : float
-        Error over noise at the end of the bar.
-
-    Examples
-    --------
-    >>> Scale(4.0).place(1.0), Scale(4.0).ticks
-    (25.0, [1, 2, 3, 4])
-    """
+    """Positions of errors over noise along a bar; ``largest`` is the error at its end."""
 
     largest: float
 
@@ -52,12 +41,6 @@ class Scale:
 
 
 def scale_of(ratios: Iterable[float | None]) -> Scale:
-    """A scale that includes all errors over noise, and the noise.
-
-    Parameters
-    ----------
-    ratios : iterable of float or None
-        Errors over noise.
-    """
+    """A scale that includes all errors over noise, and the noise."""
     known = [r for r in ratios if r is not None and isfinite(r)]
     return Scale(max([1.5, *known]) * 1.02)

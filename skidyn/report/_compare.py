@@ -30,15 +30,7 @@ NORMAL = 1.96
 
 @dataclass(frozen=True)
 class Pair:
-    """Two diagnoses side by side, and the result of their comparison.
-
-    Attributes
-    ----------
-    diagnoses : tuple of two Diagnosis
-        Of robots with the same joints.
-    report : dict
-        Schema ``skidyn.comparison/1``.
-    """
+    """Two diagnoses of robots with the same joints, and the ``report`` of their comparison."""
 
     diagnoses: tuple[Diagnosis, Diagnosis]
     report: dict[str, Any]
@@ -99,7 +91,7 @@ def summarize_comparison(
         "schema": "skidyn.comparison/1",
         "names": labels,
         "joints": list(first.joint_names),
-        "units": ["N" if slides else "N m" for slides in signals.prismatic],
+        "units": first.comparison.units,
         "same_log": same,
         "regimes": list(first.regimes),
         "sides": [
@@ -108,7 +100,7 @@ def summarize_comparison(
         "ratios": _ratios(first, second, same),
         "findings": _findings(both, labels),
         "coefficients": _coefficients(both, same),
-        "versions": {k: v for k, v in versions().items() if k != "executable"},
+        "versions": versions(),
     }
     document: dict[str, Any] = plain(
         {

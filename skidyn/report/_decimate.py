@@ -12,21 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 def rows_with_peaks(
     signals: Sequence[ArrayLike], segments: Sequence[slice], n_buckets: int
 ) -> list[NDArray[np.intp]]:
-    """Rows to draw: the extremes of every signal in every bucket, and the ends of segments.
+    """Rows to draw, by segment: the extremes of every signal in every bucket, and the ends.
 
-    Parameters
-    ----------
-    signals : sequence of array-like of shape (n_samples,)
-        Signals drawn over the same time, such as measured torque and residual.
-    segments : sequence of slice
-        Contiguous runs of rows; buckets never cross them.
-    n_buckets : int
-        Approximate number of buckets for all rows together.
-
-    Returns
-    -------
-    rows : list of ndarray of int
-        Sorted rows of each segment; all of them if they are few.
+    The signals are drawn over the same time. There are some ``n_buckets`` for all rows together,
+    and none crosses the border of a segment; if rows are few, all of them are returned.
     """
     arrays = [np.asarray(signal, dtype=float) for signal in signals]
     total = sum(s.stop - s.start for s in segments)

@@ -13,20 +13,7 @@ COLOURS = ("before", "after")
 
 
 def curve_figure(curve: dict[str, Any], unit: str) -> dict[str, Any]:
-    """Residual against a signal, with the effect's curve.
-
-    Parameters
-    ----------
-    curve : dict
-        ``x, effect, measured, low, high, variable, unit``, as in ``Finding.curves``.
-    unit : str
-        Unit of the residual.
-
-    Returns
-    -------
-    dict
-        Figure of the type ``"lines"``.
-    """
+    """Residual against a signal, with the effect's curve as in ``Finding.curves``."""
     rows = [k for k, x in enumerate(curve["x"]) if x is not None]
     column = {
         key: [curve[key][k] for k in rows] for key in ("x", "effect", "measured", "low", "high")
@@ -46,20 +33,7 @@ def curve_figure(curve: dict[str, Any], unit: str) -> dict[str, Any]:
 
 
 def overlay_figure(picture: dict[str, Any], report: dict[str, Any]) -> dict[str, Any]:
-    """Residuals of two diagnoses against one signal.
-
-    Parameters
-    ----------
-    picture : dict
-        ``joint``, ``variable``, ``unit``, ``x`` and two ``sides``.
-    report : dict
-        ``names`` of the two and ``units`` of the joints.
-
-    Returns
-    -------
-    dict
-        Figure of the type ``"lines"``.
-    """
+    """Residuals of two diagnoses against one signal, from a picture of :func:`overlays`."""
     unit = report["units"][picture["joint"] - 1]
     return {
         "type": "lines",
@@ -78,17 +52,7 @@ def overlay_figure(picture: dict[str, Any], report: dict[str, Any]) -> dict[str,
 def finding_charts(finding: dict[str, Any], units: Sequence[str]) -> list[dict[str, Any]]:
     """Pictures of a finding: the residual over two variables, or against one with its curve.
 
-    Parameters
-    ----------
-    finding : dict
-        ``maps`` and ``curves``.
-    units : sequence of str
-        Unit of the torque of every joint.
-
-    Returns
-    -------
-    list of dict
-        The curve or map with ``drawn``, its figure, and ``over``, its variables in words.
+    Each is the curve or map with ``drawn``, its figure, and ``over``, its variables in words.
     """
     maps = [
         {**table, "drawn": map_figure(table), "over": " and ".join(table["variables"])}
@@ -103,38 +67,12 @@ def finding_charts(finding: dict[str, Any], units: Sequence[str]) -> list[dict[s
 
 
 def fall_figure(errors: Sequence[Number], floor: Number, unit: str) -> dict[str, Any]:
-    """Error of one joint, decreasing step by step to its noise floor.
-
-    Parameters
-    ----------
-    errors : sequence of float or None
-        Held-out error of the first model and after every step.
-    floor : float or None
-        Noise floor.
-    unit : str
-        Unit of the error.
-
-    Returns
-    -------
-    dict
-        Figure of the type ``"bars"``.
-    """
+    """Error of one joint, decreasing step by step to its noise floor."""
     return {"type": "bars", "values": list(errors), "floor": floor, "y_label": f"error in {unit}"}
 
 
 def map_figure(table: dict[str, Any]) -> dict[str, Any]:
-    """Residual over two variables.
-
-    Parameters
-    ----------
-    table : dict
-        ``x`` and ``y`` (edges), ``table``, ``variables``, ``units``, as from the maps of a finding.
-
-    Returns
-    -------
-    dict
-        Figure of the type ``"map"`` with the largest absolute value.
-    """
+    """Residual over two variables, from a map of a finding; the largest absolute value is added."""
     values = [abs(v) for row in table["table"] for v in row if v is not None]
     (x, y) = (f"{v} in {u}" for v, u in zip(table["variables"], table["units"], strict=True))
     return {
@@ -146,19 +84,9 @@ def map_figure(table: dict[str, Any]) -> dict[str, Any]:
 def budget_bars(
     budget: Sequence[dict[str, Number]], causes: Sequence[str]
 ) -> list[list[dict[str, Any]]]:
-    """Stacked shares, one list of pieces per joint.
+    """Shares of each joint's squared error by cause, stacked: one list of pieces per joint.
 
-    Parameters
-    ----------
-    budget : sequence of dict
-        Share of each joint's squared error by cause.
-    causes : sequence of str
-        Causes in the order of their colours.
-
-    Returns
-    -------
-    list of list of dict
-        ``cause``, ``index`` of its colour and ``share``; the shares of a joint add up to one.
+    ``index`` is that of the colour of a cause; the shares of a joint add up to one.
     """
     rows = []
     for shares in budget:

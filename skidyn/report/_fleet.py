@@ -22,15 +22,7 @@ NAMED = 3
 
 @dataclass(frozen=True)
 class Fleet:
-    """Subject of the page of a fleet.
-
-    Attributes
-    ----------
-    comparison : FleetComparison
-        Every robot's deviation from the others.
-    drift : mapping of str to DriftReport
-        Drift of the robots that were monitored over time.
-    """
+    """Subject of the page of a fleet: deviations, and drift of the robots that were monitored."""
 
     comparison: FleetComparison
     drift: Mapping[str, DriftReport]
@@ -92,7 +84,7 @@ def summarize_fleet(
         "deviating": deviating,
         "alarms": alarms,
         "false_discovery_rate": false_discovery_rate,
-        "versions": {k: v for k, v in versions().items() if k != "executable"},
+        "versions": versions(),
     }
     document: dict[str, Any] = plain(
         {

@@ -52,11 +52,5 @@ FLEET_MEANINGS = {
 
 
 def meaning(word: str) -> str:
-    """Meaning of a term of a page.
-
-    Parameters
-    ----------
-    word : str
-        A key of ``MEANINGS`` or ``FLEET_MEANINGS``; its first letter may be a capital.
-    """
+    """Meaning of a term of a page; its first letter may be a capital."""
     return {**MEANINGS, **FLEET_MEANINGS}[word[:1].lower() + word[1:]]

@@ -33,21 +33,9 @@ def heat(
     noise: Sequence[float | None],
     judged: Sequence[Sequence[bool]] | None = None,
 ) -> list[list[dict[str, Any]]]:
-    """Cells of an error map; the colour is the error over the noise of the joint.
+    """Cells of an error map by joint and regime; the colour is the error over the noise.
 
-    Parameters
-    ----------
-    table : list of list of float or None
-        Errors by joint and regime.
-    noise : sequence of float or None
-        Noise of the joints.
-    judged : sequence of sequence of bool, optional
-        Whether effects are judged there, by joint and regime; everywhere by default.
-
-    Returns
-    -------
-    list of list of dict
-        ``value``, ``depth`` between 0 (noise) and 1, and ``judged``.
+    ``depth`` is between 0 (noise) and 1; ``judged`` states whether effects are judged there.
     """
     rows = []
     for j, row in enumerate(table):

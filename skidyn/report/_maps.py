@@ -20,18 +20,9 @@ TILES, FEWEST = 14, 5
 def residual_maps(diagnosis: Diagnosis, finding: Finding) -> list[dict[str, Any]]:
     """Median residual on tiles of the two variables on which an unknown effect depends.
 
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        Diagnosis, whose comparison contains the residual of the given model.
-    finding : Finding
-        Finding; only an unknown effect of two logged signals has a map.
-
-    Returns
-    -------
-    list of dict
-        Per joint ``joint`` (from 1), ``variables``, ``units``, ``x`` and ``y`` (edges of the
-        tiles) and ``table`` of shape (n_y, n_x), N m or N, NaN where the log has no samples.
+    ``x`` and ``y`` are edges of the tiles, ``table`` of shape (n_y, n_x) is in N m or N and NaN
+    where the log has no samples. Only an unknown effect of two logged signals has maps, one per
+    joint.
     """
     comparison = diagnosis.comparison
     read = [_variable(comparison.signals, name) for name in finding.variables]

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from skidyn._signals import Array, Signals
-from skidyn.report._decimate import rows_with_peaks
-from skidyn.report._traces import BUCKETS, elapsed
+from skidyn._signals import Array
+from skidyn.report._traces import elapsed, thinned
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,18 +22,8 @@ BINS, FEWEST = 36, 20
 def overlays(both: Sequence[Diagnosis]) -> list[dict[str, Any]]:
     """Residual of both given models against velocity and position of the own joint.
 
-    Parameters
-    ----------
-    both : sequence of two Diagnosis
-        Robots with the same joints.
-
-    Returns
-    -------
-    list of dict
-        ``joint`` (from 1), ``variable``, ``unit``, ``x``, ``apart`` (difference of the two,
-        relative to the noise) and for each of the two ``sides`` ``median``, ``low`` and ``high``
-        (quartiles) of the residual while the joint slides, N m or N; NaN where a log has no
-        samples.
+    ``apart`` is the difference of the two relative to the noise; each of the two ``sides`` contains
+    median and quartiles of the residual while the joint slides, N m or N, NaN without samples.
     """
     signals = both[0].comparison.signals
     pictures = []
@@ -89,18 +78,8 @@ def _quartiles(x: Array, residual: Array, edges: Array) -> dict[str, Array]:
 def time_tables(both: Sequence[Diagnosis], same: bool) -> dict[str, Any]:
     """Measured and modelled torque over time, thinned without losing a peak.
 
-    Parameters
-    ----------
-    both : sequence of two Diagnosis
-        Robots with the same joints.
-    same : bool
-        Whether both were diagnosed on one log.
-
-    Returns
-    -------
-    dict
-        ``joints``: for each joint one table with both models, or one table per log; ``starts`` of
-        the trajectories where the tables share them; ``end``, s.
+    ``joints``: for each joint one table with both models, or one table per log; ``starts`` of the
+    trajectories where the tables share them; ``end`` in s.
     """
     one, other = (d.comparison for d in both)
     clocks = [elapsed(one.signals)] if same else [elapsed(c.signals) for c in (one, other)]
@@ -108,10 +87,10 @@ def time_tables(both: Sequence[Diagnosis], same: bool) -> dict[str, Any]:
     for j in range(one.signals.n_joints):
         if same:
             columns = {"measured": one.measured, "first": one.predicted, "second": other.predicted}
-            tables = [_table(one.signals, clocks[0][0], columns, j)]
+            tables = [thinned(one.signals, clocks[0][0], columns, j)]
         else:
             tables = [
-                _table(c.signals, clock, {"measured": c.measured, "model": c.predicted}, j)
+                thinned(c.signals, clock, {"measured": c.measured, "model": c.predicted}, j)
                 for c, (clock, _) in zip((one, other), clocks, strict=True)
             ]
         joints.append(tables)
@@ -120,17 +99,4 @@ def time_tables(both: Sequence[Diagnosis], same: bool) -> dict[str, Any]:
         "joints": joints,
         "starts": clocks[0][1] if agree else [],
         "end": max(float(clock[-1]) for clock, _ in clocks),
-    }
-
-
-def _table(signals: Signals, clock: Array, columns: dict[str, Array], joint: int) -> dict[str, Any]:
-    own = {name: values[:, joint] for name, values in columns.items()}
-    measured = own["measured"]
-    residuals = [measured - values for name, values in own.items() if name != "measured"]
-    pieces = rows_with_peaks([measured, *residuals], signals.segments, BUCKETS)
-    rows = np.concatenate(pieces)
-    return {
-        "time": np.round(clock[rows], 5),
-        "breaks": np.cumsum([len(piece) for piece in pieces])[:-1],
-        "columns": {name: values[rows] for name, values in own.items()},
     }

@@ -17,22 +17,7 @@ SCRIPTS = ("static/common.js", "static/figures.js", "static/panels.js")
 
 
 def render_page(page: str, summary: Summary, sub: str) -> str:
-    """A page from the data of its pictures; every text in it is escaped.
-
-    Parameters
-    ----------
-    page : {"comparison", "diagnosis", "fleet"}
-        Folder of ``skidyn/report/_pages``.
-    summary : dict
-        Values of JSON: ``title``, and the data of the pictures by their names.
-    sub : str
-        A line below the title.
-
-    Returns
-    -------
-    html : str
-        A self-contained page with styles, scripts and numbers.
-    """
+    """A page from the data of its pictures, with ``sub`` below its title; every text is escaped."""
     environment = _environment()
     canvas, parts, contents, scripts = Canvas(), [], [], list(SCRIPTS)
     for name, picture in pictures(page).items():

@@ -7,18 +7,7 @@ from typing import Any
 
 
 def parameter_rows(finding: dict[str, Any]) -> list[dict[str, Any]]:
-    """One row per parameter and joint.
-
-    Parameters
-    ----------
-    finding : dict
-        One of ``summary["findings"]``.
-
-    Returns
-    -------
-    list of dict
-        ``name, joint, value, low, high, unit``; the joint is a dash for a common parameter.
-    """
+    """One row per parameter and joint of a finding; the joint is a dash for a common parameter."""
     rows = []
     for name, p in finding["parameters"].items():
         values = p["value"] if isinstance(p["value"], list) else [p["value"]]

@@ -17,19 +17,7 @@ Summary = dict[str, Any]
 
 
 class Canvas:
-    """Data for the scripts of a page, collected from its pictures.
-
-    Attributes
-    ----------
-    numbers : dict
-        ``figures``, and further data for the script of a picture.
-
-    Examples
-    --------
-    >>> canvas = Canvas()
-    >>> canvas.figure({"type": "bars", "values": [2.0, 1.0]})
-    0
-    """
+    """Data for the scripts of a page: ``figures``, and further ``numbers`` for a script."""
 
     def __init__(self) -> None:
         self.numbers: dict[str, Any] = {"figures": []}
@@ -37,10 +25,7 @@ class Canvas:
     def figure(self, figure: dict[str, Any]) -> int:
         """Number by which a template refers to a figure; a figure shown twice is stored once.
 
-        Parameters
-        ----------
-        figure : dict
-            ``type`` is a kind of figure in ``static/figures.js``; the rest is its data.
+        ``type`` is a kind of figure in ``static/figures.js``; the rest is its data.
         """
         figures: list[dict[str, Any]] = self.numbers["figures"]
         if figure not in figures:
@@ -74,47 +59,17 @@ class Picture:
     title: ClassVar[str] = ""
 
     def read(self, subject: Any) -> Any:
-        """Data that the page needs of a diagnosis, a comparison or a fleet.
-
-        Parameters
-        ----------
-        subject : object
-            Diagnosis, comparison or fleet.
-
-        Returns
-        -------
-        object
-            Stored in the summary under the name of the picture's module, as values of JSON.
-        """
+        """Data of a diagnosis, comparison or fleet, for the summary under the module's name."""
         return None
 
     def show(self, summary: Summary, canvas: Canvas) -> dict[str, Any] | None:
-        """Variables of the template.
-
-        Parameters
-        ----------
-        summary : dict
-            Data of the pictures by their names, and common data.
-        canvas : Canvas
-            Receives the figures.
-
-        Returns
-        -------
-        dict or None
-            None leaves the picture out.
-        """
+        """Variables of the template; None leaves the picture out."""
         return {}
 
 
 @cache
 def pictures(page: str) -> dict[str, Picture]:
-    """Pictures of a page by their names, in the order of the page.
-
-    Parameters
-    ----------
-    page : {"comparison", "diagnosis", "fleet"}
-        Folder of ``skidyn/report/_pages``.
-    """
+    """Pictures of a page by their names, in the order of the page."""
     found = {}
     for folder in (page, "every"):
         package = import_module(f"skidyn.report._pages.{folder}")

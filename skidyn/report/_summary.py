@@ -48,15 +48,14 @@ def summarize(
     'Missing: Stribeck friction on joint 2'
     """
     signals = diagnosis.comparison.signals
-    report = {**diagnosis.to_dict()}
-    report["provenance"] = {"versions": versions(), **(provenance or {})}
-    report["provenance"]["versions"].pop("executable", None)  # a path of this machine
+    told = {"versions": versions(), **(provenance or {})}
+    report = {**diagnosis.to_dict(), "provenance": told}
     document: dict[str, Any] = plain(
         {
             "report": report,
             "title": title or getattr(signals.robot, "name", "") or "Robot inverse dynamics",
             "story": diagnosis.story(),
-            "units": ["N" if slides else "N m" for slides in signals.prismatic],
+            "units": diagnosis.comparison.units,
             "noise": diagnosis.noise,
             "n_samples": signals.n_samples,
             "n_trajectories": len(np.unique(signals.trajectory)),

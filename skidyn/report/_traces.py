@@ -30,17 +30,8 @@ SHOWN, ROOM, REACH = 0.998, 1.15, 1.6
 def traces(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """Measured and modelled torque over time for each joint, trajectories laid end to end.
 
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        From :func:`skidyn.diagnosis.diagnose`.
-
-    Returns
-    -------
-    list of dict
-        ``time``, ``measured``, ``before``, ``after``, ``breaks`` (rows that begin a new piece),
-        ``starts`` of the trajectories, ``apart`` (stretches of time that are not judged, with the
-        reason) and ``frame`` (range of the residual's axis, and what lies outside it).
+    ``apart`` are stretches of time that are not judged, with the reason; ``frame`` is the range of
+    the residual's axis and what lies outside it.
     """
     from skidyn.diagnosis import regimes  # not needed to write a page
 
@@ -48,21 +39,19 @@ def traces(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     signals = comparison.signals
     clock, starts = elapsed(signals)
     rest = regimes(comparison)["rest"]
+    torques = {
+        "measured": comparison.measured,
+        "before": comparison.predicted,
+        "after": after.predicted,
+    }
     table = []
     for j in range(signals.n_joints):
-        measured, before = comparison.measured[:, j], comparison.predicted[:, j]
-        residuals = measured - before, measured - after.predicted[:, j]
-        pieces = rows_with_peaks([measured, *residuals], signals.segments, BUCKETS)
-        rows = np.concatenate(pieces)
+        measured = comparison.measured[:, j]
+        residuals = measured - comparison.predicted[:, j], measured - after.predicted[:, j]
         judged = comparison.judged_samples[:, j]
         table.append(
             {
-                "time": np.round(clock[rows], 5),
-                "measured": measured[rows],
-                "before": before[rows],
-                "after": after.predicted[rows, j],
-                # where no line must be drawn from the previous row
-                "breaks": np.cumsum([len(piece) for piece in pieces])[:-1],
+                **thinned(signals, clock, torques, j),
                 "starts": starts,
                 "apart": [
                     *_stretches(clock, signals.segments, rest[:, j] & ~judged, "rest"),
@@ -72,6 +61,25 @@ def traces(diagnosis: Diagnosis) -> list[dict[str, Any]]:
             }
         )
     return table
+
+
+def thinned(
+    signals: Signals, clock: Array, torques: Mapping[str, Array], joint: int
+) -> dict[str, Any]:
+    """Torques of a joint over time without losing a peak of the measured one or a residual.
+
+    ``breaks`` are the rows to which no line must be drawn from the previous one.
+    """
+    own = {name: values[:, joint] for name, values in torques.items()}
+    measured = own["measured"]
+    residuals = [measured - values for name, values in own.items() if name != "measured"]
+    pieces = rows_with_peaks([measured, *residuals], signals.segments, BUCKETS)
+    rows = np.concatenate(pieces)
+    return {
+        "time": np.round(clock[rows], 5),
+        "breaks": np.cumsum([len(piece) for piece in pieces])[:-1],
+        "columns": {name: values[rows] for name, values in own.items()},
+    }
 
 
 def _stretches(
@@ -105,20 +113,7 @@ def _frame(residuals: tuple[Array, ...], judged: NDArray[np.bool_]) -> dict[str,
 
 
 def elapsed(signals: Signals) -> tuple[Array, list[dict[str, Any]]]:
-    """Time that continues across the borders of trajectories, with a visible gap.
-
-    Parameters
-    ----------
-    signals : Signals
-        Motion.
-
-    Returns
-    -------
-    clock : ndarray of shape (n_samples,), s
-        Time on the axis.
-    starts : list of dict
-        ``trajectory`` and ``time``, s, of each beginning.
-    """
+    """Time in s that continues over the borders of trajectories with a gap, and their starts."""
     pieces = [signals.clock[segment] for segment in signals.segments]
     total = sum(float(piece[-1] - piece[0]) for piece in pieces)
     gap = min(GAP * total, 0.1 * total / len(pieces))
@@ -137,20 +132,7 @@ def elapsed(signals: Signals) -> tuple[Array, list[dict[str, Any]]]:
 def packed_table(
     table: Mapping[str, Any], columns: Mapping[str, Iterable[float | None]]
 ) -> dict[str, Any]:
-    """Columns over time in the format of the script.
-
-    Parameters
-    ----------
-    table : mapping
-        ``time`` and ``breaks``.
-    columns : mapping of str to iterable of float or None
-        Values by their names in the plots.
-
-    Returns
-    -------
-    dict
-        ``time`` and ``columns`` packed, ``breaks`` unchanged.
-    """
+    """Columns over time in the format of the script."""
     return {
         "time": packed(table["time"]),
         "breaks": table["breaks"],

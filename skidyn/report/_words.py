@@ -11,18 +11,7 @@ from skidyn.effects import get_effect, list_effects
 
 
 def coefficient_told(column: str) -> str:
-    """A coefficient in words, such as ``"Fv of viscous friction on joint 1"``.
-
-    Parameters
-    ----------
-    column : str
-        Name of a coefficient, such as ``"viscous.Fv[1]"``.
-
-    Examples
-    --------
-    >>> coefficient_told("viscous.Fv[1]")
-    'Fv of viscous friction on joint 1'
-    """
+    """A coefficient in words: ``viscous.Fv[1]`` is ``Fv of viscous friction on joint 1``."""
     match = re.fullmatch(r"(\w+)\.(\w+)\[([\d, ]+)\]", column)
     if match is None or match[1] not in list_effects():
         return column

@@ -11,7 +11,7 @@ import numpy as np
 
 from skidyn._exceptions import RobotDescriptionError, RobotDescriptionWarning
 from skidyn._text import suggest
-from skidyn.dynamics import KinematicTree, inertial_parts, skew, transform_inertial
+from skidyn.dynamics import KinematicTree, central_parts, transform_inertial
 from skidyn.robots._description import Description, Joint, Mimic, is_positive
 
 
@@ -54,18 +54,9 @@ class Assembly:
 
 
 def assemble(description: Description, selected: Sequence[str] | None) -> Assembly:
-    """Tree of moving bodies, depth first in the order of the file.
+    """Tree of moving bodies, depth first in the order of the file; other joints stay at zero.
 
-    Parameters
-    ----------
-    description : Description
-    selected : sequence of str or None
-        Joints that move; None means all. The others stay at zero.
-
-    Raises
-    ------
-    RobotDescriptionError
-        The links and joints do not form a tree, or a name is unknown.
+    A RobotDescriptionError is raised if links and joints form no tree or a name is unknown.
     """
     root = _root_of(description)
     following = _resolve_mimics(description)
@@ -108,10 +99,7 @@ def assemble(description: Description, selected: Sequence[str] | None) -> Assemb
 def _check_body(assembly: Assembly, body: int, fault: str) -> None:
     """Refuse a faulty link if the moving body that it is part of has no positive inertia."""
     if body >= 0:
-        mass, moment, inertia = inertial_parts(assembly.parameters[body])
-        center = moment / mass if mass > 0 else np.zeros(3)
-        arm = skew(center)
-        if not is_positive(inertia + mass * arm @ arm):
+        if not is_positive(central_parts(assembly.parameters[body])[2]):
             raise RobotDescriptionError(fault)
     where = "a body that does not move" if body < 0 else "a body whose inertia is positive"
     warnings.warn(

@@ -133,17 +133,7 @@ def with_whole_turns(robot: Robot) -> Robot:
     Descriptions write 3.1416 for half a turn. A first joint that is vertical but for a thousandth
     of a degree then feels the weight of the links by some millionths, and a regression would
     identify masses of tons from these. Regressors of a fit are those of this robot; torque is
-    computed with the frames as described.
-
-    Parameters
-    ----------
-    robot : Robot
-        As described.
-
-    Returns
-    -------
-    Robot
-        The same object if no angle was rounded.
+    computed with the frames as described. It is the same object if no angle was rounded.
     """
     tree = robot.tree
     rotations, axes = _whole(tree.rotations), _whole(tree.axes)

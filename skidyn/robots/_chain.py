@@ -11,7 +11,7 @@ import numpy as np
 
 from skidyn._exceptions import RobotDescriptionError
 from skidyn._text import suggest
-from skidyn.dynamics import inertial_parts, skew
+from skidyn.dynamics import central_parts
 from skidyn.robots._description import (
     Description,
     Joint,
@@ -28,20 +28,11 @@ if TYPE_CHECKING:
 
 
 def build_chain(robot: Robot) -> Chain:
-    """Chain of all bodies and of the links fixed to them, in float64 on the CPU.
+    """Chain of all bodies in their order and of the links fixed to them, in float64 on the CPU.
 
     Built from the parsed description and not by the parsers of pytorch-kinematics: these convert
     offsets through float32, independent of torch's default (frames of the bundled robots have
     errors of 1e-8 to 3e-7 m), use z for a missing axis, and do not support locked joints.
-
-    Parameters
-    ----------
-    robot : Robot
-
-    Returns
-    -------
-    Chain
-        One joint per body, in the order of the bodies.
     """
     import torch
     from pytorch_kinematics.chain import Chain
@@ -88,19 +79,9 @@ def describe_chain(
 ) -> Description:
     """Description of the frames and joints of a chain, with the inertia of its links.
 
-    Parameters
-    ----------
-    chain : Chain
-    links : mapping of str to Link
-        Inertia of links, in the frames of the chain; links without an entry have no mass.
-    joints : mapping of str to Joint
-        Joints of a file: limits, mimic joints, and continuous joints. The others have the limits of
-        the chain.
-
-    Raises
-    ------
-    RobotDescriptionError
-        A name occurs twice in the chain, or a link with mass is not in the chain.
+    Links are in the frames of the chain; those without an entry have no mass. Joints of a file add
+    limits, mimic and continuous joints; the others have the limits of the chain. A
+    RobotDescriptionError is raised if a name occurs twice or a link with mass is not in the chain.
     """
     names = chain.get_frame_names(exclude_fixed=False)
     found = dict.fromkeys(names, Link("", np.zeros(10)))
@@ -192,13 +173,7 @@ def _stands_still(joint: Joint) -> bool:
 
 
 def links_of(inertials: Mapping[str, Any]) -> dict[str, Link]:
-    """Links of inertial parameters about the origins of their frames, ten each.
-
-    Raises
-    ------
-    RobotDescriptionError
-        They are not ten finite numbers, or the inertia is impossible.
-    """
+    """Links of ten inertial parameters each about their frames' origins, which must be possible."""
     links = {}
     for name, values in inertials.items():
         parameters = np.asarray(values, dtype=np.float64).ravel()
@@ -207,8 +182,6 @@ def links_of(inertials: Mapping[str, Any]) -> dict[str, Link]:
                 f"The inertia of link {name!r} has to be ten finite numbers: m, mcx, mcy, mcz, "
                 "Ixx, Ixy, Ixz, Iyy, Iyz, Izz."
             )
-        mass, moment, inertia = inertial_parts(parameters)
-        center = moment / mass if mass > 0 else np.zeros(3)
-        arm = skew(center)
-        links[name] = link_of(name, float(mass), inertia + mass * arm @ arm, np.eye(3), center)
+        mass, center, inertia = central_parts(parameters)
+        links[name] = link_of(name, mass, inertia, np.eye(3), center)
     return links

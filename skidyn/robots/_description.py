@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from skidyn._exceptions import RobotDescriptionError, RobotDescriptionWarning
-from skidyn.dynamics import inertial_vector, transform_inertial
+from skidyn.dynamics import inertial_vector, skew, transform_inertial
 
 MOVING_TYPES = ("revolute", "continuous", "prismatic")
 
@@ -98,8 +98,7 @@ def _without_dust(matrix: np.ndarray) -> np.ndarray:
 
 
 def rotation_about(axis: np.ndarray, angle: float) -> np.ndarray:
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    cross = skew(axis)
     matrix = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
     return _without_dust(matrix)
 
@@ -140,10 +139,7 @@ def link_of(
 ) -> Link:
     """Link of a mass and of an inertia about the center of mass, in the frame of the rotation.
 
-    Raises
-    ------
-    RobotDescriptionError
-        The mass is negative, or mass or inertia is not a number.
+    A RobotDescriptionError is raised if the mass is negative, or mass or inertia is not a number.
     """
     what = f"link {name!r}"
     if mass < 0:
@@ -170,13 +166,7 @@ def symmetric(xx: float, xy: float, xz: float, yy: float, yz: float, zz: float) 
 
 
 def unit_axis(axis: np.ndarray, what: str) -> np.ndarray:
-    """The axis with length one.
-
-    Raises
-    ------
-    RobotDescriptionError
-        The axis is zero.
-    """
+    """The axis with length one; a RobotDescriptionError if it is zero."""
     largest = float(np.abs(axis).max())
     # scaled to entries up to one: the squares of 1e200 and of 1e-200 overflow or vanish
     axis = axis / largest if largest > 0 else axis
@@ -187,13 +177,7 @@ def unit_axis(axis: np.ndarray, what: str) -> np.ndarray:
 
 
 def check_limits(lower: float, upper: float, what: str) -> tuple[float, float]:
-    """Lower and upper position limit.
-
-    Raises
-    ------
-    RobotDescriptionError
-        The lower limit is above the upper one.
-    """
+    """Lower and upper position limit; a RobotDescriptionError if they are in the wrong order."""
     if lower > upper:
         raise RobotDescriptionError(
             f"The {what} has its lower limit {lower:g} above its upper limit {upper:g}."

@@ -28,12 +28,8 @@ from skidyn.robots._xml import parse_xml, read_description
 def parse_mjcf(source: str | bytes | os.PathLike[str]) -> tuple[Description, np.ndarray]:
     """Description of an MJCF model, and its gravity in the frame of the world, m/s^2.
 
-    Raises
-    ------
-    RobotDescriptionError
-        MuJoCo cannot compile the model, or a joint is neither a hinge nor a slide.
-    ImportError
-        MuJoCo is not installed.
+    A RobotDescriptionError is raised if MuJoCo cannot compile the model, or a joint is neither a
+    hinge nor a slide.
     """
     mujoco = import_optional("mujoco", extra="mujoco")
     data = read_description(source)

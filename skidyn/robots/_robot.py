@@ -150,11 +150,8 @@ class Robot(RigidBodyDynamics):
         >>> robot.gravity_torque([[0.5]])
         array([[19.62]])
         """
-        given: dict[str, Any] = {} if gravity is None else {"gravity": gravity}
-        kind = first_element(read_description(source))
-        read: Any = {"sdf": cls.from_sdf, "mujoco": cls.from_mjcf}.get(kind, cls.from_urdf)
-        robot: Robot = read(source, joints=joints, **given)
-        return robot
+        description, own = _read(source)
+        return cls._from_description(description, joints, own if gravity is None else gravity)
 
     @classmethod
     def from_urdf(
@@ -206,9 +203,8 @@ class Robot(RigidBodyDynamics):
         >>> robot.gravity_torque([[1.5707963267948966]]).round(2)
         array([[9.81]])
         """
-        data = read_description(source)
-        description = parse_urdf(parse_robot_element(data, name_of(source)))
-        return cls._from_description(description, joints, gravity)
+        element = parse_robot_element(read_description(source), name_of(source))
+        return cls._from_description(parse_urdf(element), joints, gravity)
 
     @classmethod
     def from_sdf(
@@ -522,7 +518,7 @@ def _read(source: str | bytes | os.PathLike[str]) -> tuple[Description, Any]:
     usual = (0.0, 0.0, -9.81)
     if kind == "sdf":
         return parse_sdf(data, None), usual
-    return parse_urdf(parse_robot_element(data)), usual
+    return parse_urdf(parse_robot_element(data, name_of(source))), usual
 
 
 def _refuse_displaced(robot: Robot, described: Robot) -> None:

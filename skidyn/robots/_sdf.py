@@ -39,13 +39,7 @@ _WORLD = "world"
 
 
 def parse_sdf(data: bytes, model: str | None) -> Description:
-    """Description of a model in an SDF.
-
-    Raises
-    ------
-    RobotDescriptionError
-        A link or joint is not described correctly, or there is not exactly one model.
-    """
+    """Description of the only model in an SDF; a RobotDescriptionError states what is wrong."""
     root = parse_xml(data)
     if root.tag != "sdf":
         raise RobotDescriptionError(f"The root element is <{root.tag}>; expected <sdf>.")

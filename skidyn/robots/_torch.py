@@ -31,13 +31,7 @@ class _Body(NamedTuple):
 
 
 class TorchDynamics:
-    """Inverse dynamics and regressor of a robot in torch.
-
-    Parameters
-    ----------
-    robot : Robot
-        Robot.
-    """
+    """Inverse dynamics and regressor of a robot in torch."""
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot

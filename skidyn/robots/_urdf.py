@@ -29,13 +29,7 @@ from skidyn.robots._xml import numbers, only, required, word
 
 
 def parse_urdf(root: ElementTree.Element) -> Description:
-    """Description of the robot in a cleaned ``<robot>`` element.
-
-    Raises
-    ------
-    RobotDescriptionError
-        A link or joint is not described correctly; the message names it.
-    """
+    """Description of the robot in a ``<robot>`` element; RobotDescriptionError for a wrong one."""
     refuse_repeated_names(root.iter("link"))
     refuse_repeated_names(root.iter("joint"))
     links = [_link(element) for element in root.findall("link")]
@@ -155,13 +149,7 @@ def _mimic(element: ElementTree.Element, what: str) -> Mimic | None:
 
 
 def refuse_repeated_names(elements: Iterable[ElementTree.Element]) -> None:
-    """Raise an error for an element without a name or a name that occurs twice.
-
-    Raises
-    ------
-    RobotDescriptionError
-        The error states the name.
-    """
+    """Raise a RobotDescriptionError for an element without a name or a name that occurs twice."""
     seen: set[str] = set()
     for element in elements:
         name, tag = element.get("name"), element.tag

@@ -24,15 +24,7 @@ _KEPT_IN_JOINT = frozenset({"origin", "parent", "child", "axis", "limit", "dynam
 
 
 def read_description(source: str | bytes | os.PathLike[str]) -> bytes:
-    """Text of a description given as a path or as the text itself.
-
-    Raises
-    ------
-    FileNotFoundError
-        The source is a path and there is no such file.
-    RobotDescriptionError
-        The source is empty or too large.
-    """
+    """Text of a description given as a path or as the text itself, neither empty nor too large."""
     if isinstance(source, bytes):
         data = source
     elif isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<"):
@@ -69,12 +61,8 @@ def first_element(data: bytes) -> str:
 def parse_robot_element(data: bytes, path: str = "robot.urdf.xacro") -> ElementTree.Element:
     """Root element with only links and joints, without anything that a parser could expand.
 
-    The path is used in error messages.
-
-    Raises
-    ------
-    RobotDescriptionError
-        Not well-formed XML, a document type or entity declaration, or not a URDF.
+    A RobotDescriptionError with the path is raised for text that is not well-formed XML, has a
+    document type or entity declaration, or is not a URDF.
     """
     root = parse_xml(data)
     if _local(root.tag) != "robot":
@@ -101,13 +89,7 @@ def parse_robot_element(data: bytes, path: str = "robot.urdf.xacro") -> ElementT
 
 
 def only(element: ElementTree.Element, tag: str, what: str) -> ElementTree.Element | None:
-    """The only child with a tag, or None.
-
-    Raises
-    ------
-    RobotDescriptionError
-        There are several.
-    """
+    """The only child with a tag, or None; a RobotDescriptionError if there are several."""
     found = element.findall(tag)
     if len(found) > 1:
         raise RobotDescriptionError(f"The {what} has {len(found)} <{tag}> elements; keep one.")
@@ -115,13 +97,7 @@ def only(element: ElementTree.Element, tag: str, what: str) -> ElementTree.Eleme
 
 
 def required(element: ElementTree.Element, tag: str, what: str) -> ElementTree.Element:
-    """The child with a tag.
-
-    Raises
-    ------
-    RobotDescriptionError
-        There is none, or several.
-    """
+    """The child with a tag; a RobotDescriptionError if there is none, or several."""
     child = only(element, tag, what)
     if child is None:
         raise RobotDescriptionError(f"The {what} has no <{tag}>; add one.")
@@ -129,13 +105,7 @@ def required(element: ElementTree.Element, tag: str, what: str) -> ElementTree.E
 
 
 def word(element: ElementTree.Element, key: str, what: str) -> str:
-    """A text attribute.
-
-    Raises
-    ------
-    RobotDescriptionError
-        It is absent or empty.
-    """
+    """A text attribute; a RobotDescriptionError if it is absent or empty."""
     value = element.get(key)
     if not value:
         raise RobotDescriptionError(f"The <{element.tag}> of {what} has no {key}; add {key}=...")
@@ -149,28 +119,9 @@ def numbers(
     what: str,
     default: tuple[float, ...] | None = None,
 ) -> np.ndarray:
-    """Finite numbers of an attribute.
+    """As many finite numbers of an attribute; without a default it must be there.
 
-    Parameters
-    ----------
-    element : Element
-    key : str
-        Name of the attribute.
-    count : int
-        Number of values.
-    what : str
-        Element to which they belong, for the message.
-    default : tuple of float or None
-        Values of an absent attribute; None if it is required.
-
-    Returns
-    -------
-    ndarray of shape (count,)
-
-    Raises
-    ------
-    RobotDescriptionError
-        Absent, not that many, or not finite numbers.
+    ``what`` is the element to which they belong, for the message of the RobotDescriptionError.
     """
     text = element.get(key)
     if text is None:
@@ -181,13 +132,7 @@ def numbers(
 
 
 def numbers_of(text: str, count: int, what: str) -> np.ndarray:
-    """As many finite numbers, separated by white space.
-
-    Raises
-    ------
-    RobotDescriptionError
-        Not that many, or not finite numbers.
-    """
+    """As many finite numbers, separated by white space; else a RobotDescriptionError."""
     expected = "a finite number" if count == 1 else f"{count} finite numbers"
     try:
         values = np.array([float(part) for part in text.split()])
@@ -203,10 +148,8 @@ def numbers_of(text: str, count: int, what: str) -> np.ndarray:
 def parse_xml(data: bytes) -> ElementTree.Element:
     """Root element, without anything that a parser could expand.
 
-    Raises
-    ------
-    RobotDescriptionError
-        Not well-formed XML, or a document type or entity declaration.
+    A RobotDescriptionError is raised for text that is not well-formed XML, and for a document type
+    or entity declaration.
     """
     _refuse_declarations(data)
     try:

@@ -36,6 +36,14 @@ def test_two_models_of_one_log(here, run, tmp_path):
     assert {f["joint"] for f in report["findings"] if f["in"] == ["poor"]} == {1}
 
 
+def test_a_page_and_its_numbers_are_written_together(here, capsys, tmp_path):
+    (tmp_path / "page.json").mkdir()
+    words = ["compare", *LOG, "--against", "log.csv", "--html", str(tmp_path / "page.html")]
+    assert cli.main(words) == cli.BAD_INPUT
+    assert "page.json is not a regular file" in capsys.readouterr().err
+    assert [f.name for f in tmp_path.iterdir()] == ["page.json"]
+
+
 def test_two_reports(here, capsys, tmp_path):
     for name, joint in (("a", 1), ("b", 2)):
         frame = pandas.read_csv("log.csv")

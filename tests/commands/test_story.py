@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a terminal shows of a diagnosis."""
 
-from types import SimpleNamespace
-
 import pytest
 
 from skidyn._commands._story import bar, story_lines
@@ -70,8 +68,8 @@ def test_a_screen_holds_several_findings_on_many_joints(story):
         "sure": "confidence 88%; this data cannot separate it from LuGre friction",
         "change": "joint 3: 2.5 → 2.1 N m (noise 1.2)",
     }  # fmt: skip
-    place = SimpleNamespace(share_of_excess=0.55, where="at high speed", share_of_time=0.3)
-    failures = [SimpleNamespace(joint=j, places=[place] if j < 3 else []) for j in range(1, 7)]
+    place = {"share_of_excess": 0.55, "where": "at high speed", "share_of_time": 0.3}
+    failures = [{"joint": j, "places": [place] if j < 3 else []} for j in range(1, 7)]
     story |= {"findings": [line] * 4, "joints": [joint(j, 0.6, 0.2, 0.1) for j in range(1, 7)]}
     lines = [part for text in story_lines(story, failures) for part in fit(text, 100).split("\n")]
     assert len(lines) < 34

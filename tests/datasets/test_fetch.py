@@ -12,14 +12,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from skidyn.datasets import (
-    fetch_double_pendulum,
-    fetch_emps,
-    fetch_panda_exciting,
-    fetch_panda_gaz,
-    fetch_screw_drive,
-    fetch_xl330,
-)
+from skidyn.datasets import fetch_recording
 from skidyn.exceptions import LogError
 
 pytest.importorskip("pooch")
@@ -53,29 +46,29 @@ def emps_like(path):
 def test_emps_is_read_and_kept(site, tmp_path):
     folder, address = site
     emps_like(folder / "DATA_EMPS.mat")
-    options = {"data_home": tmp_path / "home", "url": f"{address}/DATA_EMPS.mat"}
+    options = {"data_home": tmp_path / "home", "url": address}
     with pytest.warns(UserWarning, match="derived by central differences"):
-        emps = fetch_emps(**options)
+        emps = fetch_recording("emps", **options)
     assert emps.licence == "Apache-2.0"
     assert emps.frame["tau1"].iloc[0] == pytest.approx(35.15065, abs=1e-4)
     (folder / "DATA_EMPS.mat").unlink()  # the second call must not need the source
     with pytest.warns(UserWarning):
-        assert fetch_emps(**options).frame.equals(emps.frame)
+        assert fetch_recording("emps", **options).frame.equals(emps.frame)
 
 
 def test_checksum_is_held(site, tmp_path):
     folder, address = site
     emps_like(folder / "DATA_EMPS.mat")
-    options = {"data_home": tmp_path / "home", "url": f"{address}/DATA_EMPS.mat"}
+    options = {"data_home": tmp_path / "home", "url": address}
     with pytest.raises(LogError, match="SHA-256 checksum .* not abc"):
-        fetch_emps(**options, sha256="abc")
+        fetch_recording("emps", **options, sha256=["abc"])
     right = hashlib.sha256((folder / "DATA_EMPS.mat").read_bytes()).hexdigest()
     with pytest.warns(UserWarning):
-        emps = fetch_emps(**options, sha256=right)
-    with open(emps.path, "ab") as file:
+        emps = fetch_recording("emps", **options, sha256=[right])
+    with open(emps.paths[0], "ab") as file:
         file.write(b"spoiled")
     with pytest.raises(LogError, match="SHA-256 checksum"):
-        fetch_emps(**options)
+        fetch_recording("emps", **options)
 
 
 def test_panda_bag_is_read(site, tmp_path):
@@ -87,7 +80,7 @@ def test_panda_bag_is_read(site, tmp_path):
     state = store.types["sensor_msgs/msg/JointState"]
     header, time = store.types["std_msgs/msg/Header"], store.types["builtin_interfaces/msg/Time"]
     names = [f"fer_joint{k}" for k in range(1, 8)]
-    with sqlite3.connect(folder / "panda.db3") as bag:
+    with sqlite3.connect(folder / "panda_exciting_trajectory.db3") as bag:
         bag.execute("CREATE TABLE topics (id INTEGER, name TEXT, type TEXT)")
         bag.execute("CREATE TABLE messages (topic_id INTEGER, timestamp INTEGER, data BLOB)")
         bag.execute("INSERT INTO topics VALUES (1, '/joint_states', 'sensor_msgs/msg/JointState')")
@@ -97,7 +90,7 @@ def test_panda_bag_is_read(site, tmp_path):
             raw = bytes(store.serialize_cdr(message, "sensor_msgs/msg/JointState"))
             bag.execute("INSERT INTO messages VALUES (1, ?, ?)", (k, raw))
     bag.close()
-    panda = fetch_panda_exciting(data_home=tmp_path / "home", url=f"{address}/panda.db3")
+    panda = fetch_recording("panda_exciting", data_home=tmp_path / "home", url=address)
     assert panda.licence == "BSD-3-Clause"
     assert panda.frame.shape == (30, 23) and panda.frame.attrs["joint_names"] == names
 
@@ -113,7 +106,9 @@ def test_runs_of_the_double_pendulum_become_trajectories(site, tmp_path):
         header = ",".join(["time", *names])
         np.savetxt(folder / run, table, delimiter=",", header=header, comments="")
 
-    pendulum = fetch_double_pendulum(data_home=tmp_path / "home", url=address, runs=runs)
+    pendulum = fetch_recording(
+        "double_pendulum", data_home=tmp_path / "home", url=address, files=runs
+    )
 
     frame = pendulum.frame
     assert pendulum.licence == "BSD-3-Clause"
@@ -129,13 +124,13 @@ def test_currents_of_the_servo_get_their_sign_back(site, tmp_path):
     entries = [entry | {"timestamp": k / 200, "load": load} for k, load in enumerate((5, 65531))]
     (folder / "run.json").write_text(json.dumps({"mass": 0.49, "entries": entries}))
 
-    servo = fetch_xl330(data_home=tmp_path / "home", url=address, runs=("run.json",))
+    servo = fetch_recording("xl330", data_home=tmp_path / "home", url=address, files=("run.json",))
 
     assert servo.frame["i1"].tolist() == [0.005, -0.005]
     assert servo.load == pytest.approx(0.481, abs=1e-3)
     (folder / "other.json").write_text("{}")
     with pytest.raises(LogError, match="other.json is not a recording"):
-        fetch_xl330(data_home=tmp_path / "home", url=address, runs=("other.json",))
+        fetch_recording("xl330", data_home=tmp_path / "home", url=address, files=("other.json",))
 
 
 def test_runs_of_the_worm_drive_come_in_si_units(site, tmp_path):
@@ -145,7 +140,9 @@ def test_runs_of_the_worm_drive_come_in_si_units(site, tmp_path):
     (folder / "start_stop").mkdir()
     (folder / "start_stop" / "10.csv").write_text(text)
 
-    drive = fetch_screw_drive(data_home=tmp_path / "home", url=address, runs=("start_stop/10.csv",))
+    drive = fetch_recording(
+        "screw_drive", data_home=tmp_path / "home", url=address, files=("start_stop/10.csv",)
+    )
 
     frame = drive.frame
     assert drive.licence == "MIT"
@@ -154,7 +151,9 @@ def test_runs_of_the_worm_drive_come_in_si_units(site, tmp_path):
     np.testing.assert_allclose(frame["tau1"], [0, -0.984e-3, -0.984e-3])
     (folder / "start_stop" / "bad.csv").write_text("a;b;c")
     with pytest.raises(LogError, match="not a recording"):
-        fetch_screw_drive(data_home=tmp_path, url=address, runs=("start_stop/bad.csv",))
+        fetch_recording(
+            "screw_drive", data_home=tmp_path, url=address, files=("start_stop/bad.csv",)
+        )
 
 
 def test_the_panda_of_gaz_is_put_together_from_its_files(site, tmp_path):
@@ -165,10 +164,15 @@ def test_the_panda_of_gaz_is_put_together_from_its_files(site, tmp_path):
         np.savetxt(folder / f"exciting_traj_{name}.txt", values)
     np.savetxt(folder / "exciting_traj_time.txt", np.arange(20) / 1000)
 
-    panda = fetch_panda_gaz(data_home=tmp_path / "home", url=address)
+    panda = fetch_recording("panda_gaz", data_home=tmp_path / "home", url=address)
 
     np.testing.assert_allclose(panda.frame["tau7"], blocks["torques"][:, 6])
     assert panda.frame.shape == (20, 23)
     np.savetxt(folder / "exciting_traj_velocity.txt", blocks["velocity"][:5])
     with pytest.raises(LogError, match=r"dq has shape \(5, 7\); \(20, 7\) is expected"):
-        fetch_panda_gaz(data_home=tmp_path / "other", url=address)
+        fetch_recording("panda_gaz", data_home=tmp_path / "other", url=address)
+
+
+def test_an_unknown_recording_is_refused():
+    with pytest.raises(LogError, match="no recording 'empss'; there are emps, "):
+        fetch_recording("empss")

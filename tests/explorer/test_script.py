@@ -78,9 +78,7 @@ def test_the_script_gives_the_numbers_of_the_page(write, arm, log, tmp_path, mon
     shaped = next(e for e in explorer.session.ranked(2) if get_effect(e.kind).shapes).kind
     explorer.answer("add", {"kind": shaped, "joint": 2, "trajectory": 1})
     shown = explorer.answer("refine", {"joint": 2, "trajectory": 1})["history"]
-    text = explorer.session.script(
-        explorer.logs, explorer.urdf, joints=explorer.joints, reading=explorer.reading
-    )
+    text = explorer.session.script(**explorer.script)
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
 

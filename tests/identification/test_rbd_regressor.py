@@ -247,3 +247,32 @@ def test_a_function_of_several_signals_holds_beside_the_places_that_the_log_fill
         )
         errors.append(np.std(model.fit(X, y).predict(Z) - target))
     assert errors[1] < 0.7 * errors[0]
+
+
+@pytest.fixture(scope="module")
+def rubbing():
+    return make_hidden_effect_log(load_planar_arm(), "stribeck", n_trajectories=2, duration=3.0)
+
+
+@pytest.fixture(scope="module")
+def rubs(rubbing):
+    return RBDRegressor(rubbing.robot, ("viscous", "coulomb", "stribeck")).fit(rubbing.X, rubbing.y)
+
+
+def same(loaded, model, X):
+    assert np.array_equal(loaded.predict(X), model.predict(X))
+    assert list(loaded.effect_coefficients_) == list(model.effect_coefficients_)
+    for key, factor in model.evidence_.factors.items():
+        assert np.array_equal(loaded.evidence_.factors[key], factor)
+
+
+def test_skops_stores_a_fitted_model(rubs, rubbing):
+    skops = pytest.importorskip("skops.io")
+    data = skops.dumps(rubs)
+    same(skops.loads(data, trusted=skops.get_untrusted_types(data=data)), rubs, rubbing.X)
+
+
+def test_pickle_of_fitted_and_unfitted(rubs, rubbing):
+    same(pickle.loads(pickle.dumps(rubs)), rubs, rubbing.X)
+    unfitted = pickle.loads(pickle.dumps(RBDRegressor(rubbing.robot)))
+    assert not hasattr(unfitted, "coef_")

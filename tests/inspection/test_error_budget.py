@@ -25,7 +25,7 @@ def test_draws_the_history_of_a_diagnosis():
         joint_names=("a", "slider"),
         history=[{"added": None, "rmse": [1.0, 4.0]}, {"added": "dahl", "rmse": [1.0, 2.0]}],
         noise_floor=np.array([0.5, 1.0]),
-        comparison=SimpleNamespace(signals=SimpleNamespace(prismatic=np.array([False, True]))),
+        comparison=SimpleNamespace(units=("N m", "N")),
     )
     display = ErrorBudgetDisplay.from_diagnosis(diagnosis, joint=2)
     assert heights(display) == pytest.approx([1.0, -0.75, 0.25])

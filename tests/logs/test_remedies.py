@@ -131,7 +131,7 @@ def test_sign_from_the_command(read):
         ({"order": {"temp": [2, 1]}}, "order: the log has no temp1"),
         ({"gain": {"tau1": 0.0}}, "gain: tau1 cannot be multiplied by 0.0"),
         ({"gain": {"volts": 2.0}}, "gain: the log has no volts"),
-        ({"zero": {"tau1": 2.0}}, "zero: tau1 is not a position"),
+        ({"zero": {"tau1": 2.0}}, "zero: tau1 is neither a position nor a velocity"),
         ({"zero": {"q1": float("nan")}}, "zero: q1 has the value nan"),
         ({"late": {"volts": 0.1}}, "late: the log has no volts"),
         ({"late": {"tau": 100.0}}, "late: no recording is longer than"),

@@ -39,21 +39,21 @@ def diagnosis_page(fakes):
 @pytest.fixture(scope="session")
 def comparison_page(fakes):
     """Words of the page of two logs, in the second of which the spring is gone."""
-    from skidyn.report import render_comparison, summarize_comparison
+    from skidyn.report import render_html, summarize_comparison
 
     second = fakes.make_diagnosis(n_samples=1500)
     second.findings = second.findings[:1]
     both = fakes.make_diagnosis(), second
-    return texts(render_comparison(summarize_comparison(*both, names=("new", "worn"))))
+    return texts(render_html(summarize_comparison(*both, names=("new", "worn"))))
 
 
 @pytest.fixture(scope="session")
 def fleet_page(fakes):
     """Words of the page of a fleet, one robot of which deviates and one has changed."""
-    from skidyn.report import render_fleet, summarize_fleet
+    from skidyn.report import render_html, summarize_fleet
 
     return texts(
-        render_fleet(summarize_fleet(fakes.make_fleet(), drift={"robot 3": fakes.make_drift()}))
+        render_html(summarize_fleet(fakes.make_fleet(), drift={"robot 3": fakes.make_drift()}))
     )
 
 

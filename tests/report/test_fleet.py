@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import json
 
-from skidyn.report import render_fleet, summarize_fleet, write_fleet
+from skidyn.report import render_html, summarize_fleet, write_html
 
 
 def test_headline_names_who_deviates_and_who_has_changed(fakes):
@@ -9,7 +9,7 @@ def test_headline_names_who_deviates_and_who_has_changed(fakes):
     assert summary["headline"] == (
         "1 of 20 robots deviates: robot 8; robot 3 has changed over time"
     )
-    page = render_fleet(summary)
+    page = render_html(summary)
     assert "Fv of viscous friction on joint 1" in page
     assert "left its band on 4 May: 9.0, expected 4.0 to 6.0" in page
 
@@ -19,7 +19,7 @@ def test_a_fleet_without_deviation_says_so(fakes):
     fleet.q_value[:] = 1.0
     summary = summarize_fleet(fleet)
     assert summary["headline"] == "None of the 20 robots deviates from the others"
-    assert "Start of the change" not in render_fleet(summary)
+    assert "Start of the change" not in render_html(summary)
 
 
 def test_summary_is_pure_json_and_names_are_escaped(fakes, tmp_path):
@@ -27,12 +27,12 @@ def test_summary_is_pure_json_and_names_are_escaped(fakes, tmp_path):
         fakes.make_fleet(fakes.HOSTILE), drift={fakes.HOSTILE: fakes.make_drift()}
     )
     assert json.loads(json.dumps(summary, allow_nan=False)) == summary
-    page = write_fleet(tmp_path / "fleet.html", summary).read_text()
+    page = write_html(tmp_path / "fleet.html", summary).read_text()
     assert "<img" not in page
 
 
 def test_page_of_a_fleet_draws(browser, fakes, tmp_path):
-    path = write_fleet(
+    path = write_html(
         tmp_path / "fleet.html",
         summarize_fleet(fakes.make_fleet(), drift={"robot 3": fakes.make_drift()}),
     )

@@ -21,7 +21,7 @@ def test_long_logs_are_thinned_without_losing_the_largest_residual(fakes):
     diagnosis = fakes.make_diagnosis(n_samples=300_000)
     trace = summarize(diagnosis)["time"]["traces"][0]
     assert len(trace["time"]) < 25_000
-    residual = np.subtract(trace["measured"], trace["before"])
+    residual = np.subtract(trace["columns"]["measured"], trace["columns"]["before"])
     whole = diagnosis.comparison.residual[:, 0]
     assert residual.max() == pytest.approx(whole.max())
     assert residual.min() == pytest.approx(whole.min())

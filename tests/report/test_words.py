@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from skidyn.fleet import DriftReport, FleetComparison
-from skidyn.report import render_fleet, summarize_fleet
+from skidyn.report import render_html, summarize_fleet
 
 COLUMNS = ("viscous.Fv[1]", "coulomb.Fc[2]")
 
@@ -25,4 +25,4 @@ def test_a_number_is_that_of_a_trajectory(date, told):
     report = DriftReport(
         ("coulomb.Fc[2]",), (date,), np.array([[9.0]]), np.array([[4.0]]), np.array([[6.0]])
     )
-    assert f"left its band {told}" in render_fleet(summarize_fleet(compared(), drift={"a": report}))
+    assert f"left its band {told}" in render_html(summarize_fleet(compared(), drift={"a": report}))

@@ -4,7 +4,6 @@ import re
 import pytest
 
 from skidyn.report import (
-    render_comparison,
     render_html,
     summarize,
     summarize_comparison,
@@ -41,7 +40,7 @@ def test_numbers_of_the_page_are_those_of_the_report(fakes):
 
 def test_markup_in_names_is_escaped(fakes):
     first, second = fakes.make_diagnosis(), fakes.make_diagnosis(n_samples=1500)
-    page = render_comparison(summarize_comparison(first, second, names=(fakes.HOSTILE, "b")))
+    page = render_html(summarize_comparison(first, second, names=(fakes.HOSTILE, "b")))
     assert "<img" not in page and page.count("</script>") == 3
 
 

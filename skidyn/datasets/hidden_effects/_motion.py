@@ -22,12 +22,9 @@ N_HARMONICS = 5
 
 @dataclass(frozen=True)
 class Motion:
-    """Positions, velocities and accelerations of all trajectories on one time grid.
+    """Positions (rad or m), velocities and accelerations on one time grid, exact.
 
-    Attributes
-    ----------
-    q, dq, ddq : ndarray of shape (n_trajectories, n_steps, n_joints)
-        In rad or m and their derivatives, exact.
+    Their shape is (n_trajectories, n_steps, n_joints).
     """
 
     q: Array
@@ -43,12 +40,8 @@ class Motion:
 class Ranges:
     """Range of positions and speeds of each joint.
 
-    Attributes
-    ----------
-    centre, reach : ndarray of shape (n_joints,), rad or m
-        Middle of the motion and the largest distance from it.
-    speed : ndarray of shape (n_joints,), rad/s or m/s
-        Largest velocity.
+    ``centre`` is the middle of the motion and ``reach`` the largest distance from it, rad or m;
+    ``speed`` is the largest velocity.
     """
 
     centre: Array
@@ -59,11 +52,7 @@ class Ranges:
 def motion_ranges(robot: Robot) -> Ranges:
     """Moderate ranges inside the limits of a robot.
 
-    Parameters
-    ----------
-    robot : Robot
-        Robot, whose limits are kept; joints without limits turn by up to 1.3 rad or slide by up to
-        0.1 m.
+    Joints without limits turn by up to 1.3 rad or slide by up to 0.1 m.
     """
     sliding = np.array([kind == "prismatic" for kind in robot.joint_types])
     low, high = np.asarray(robot.position_limits, dtype=float).T
@@ -79,21 +68,7 @@ def motion_ranges(robot: Robot) -> Ranges:
 def plan_motion(
     robot: Robot, n_trajectories: int, step: float, n_steps: int, rng: np.random.Generator
 ) -> Motion:
-    """Plan the trajectories of a log.
-
-    Parameters
-    ----------
-    robot : Robot
-        Robot, whose limits are kept.
-    n_trajectories : int
-        Number of trajectories; kinds alternate.
-    step : float, s
-        Time between two rows.
-    n_steps : int
-        Rows per trajectory.
-    rng : Generator
-        Source of chance.
-    """
+    """Plan trajectories of alternating kinds, with ``n_steps`` rows that are ``step`` s apart."""
     ranges = motion_ranges(robot)
     time = step * np.arange(n_steps, dtype=np.float64)
     parts = []

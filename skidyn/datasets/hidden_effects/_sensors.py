@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 #: Share of the variance of torque noise that is coloured, and its time constant in s.
 COLOURED_SHARE, TIME_CONSTANT = 0.4, 0.03
+#: Cut-off of the low-pass before a user's derivative, Hz.
+CUTOFF = 10.0
 
 
 def sensor_noise(
@@ -16,20 +18,8 @@ def sensor_noise(
 ) -> Array:
     """White noise plus first-order coloured noise, per trajectory.
 
-    Parameters
-    ----------
-    shape : tuple of int
-        ``(n_trajectories, n_samples, n_joints)``.
-    std : ndarray of shape (n_joints,)
-        Standard deviation of the sum.
-    step : float, s
-        Time between samples.
-    rng : Generator
-        Source of chance.
-
-    Returns
-    -------
-    ndarray of shape ``shape``
+    The shape is (n_trajectories, n_samples, n_joints), samples are ``step`` s apart, and ``std`` is
+    the standard deviation of the sum by joint.
     """
     from scipy.signal import lfilter  # a second of imports: only where a log is made
 
@@ -48,26 +38,15 @@ def quantise(values: Array, resolution: Array | float) -> Array:
     return np.round(values / resolution) * resolution
 
 
-def filtered_derivative(velocity: Array, step: float, cutoff: float = 10.0) -> Array:
+def filtered_derivative(velocity: Array, step: float) -> Array:
     """Acceleration from measured velocity, as derived by a user.
 
-    Parameters
-    ----------
-    velocity : ndarray of shape (n_trajectories, n_samples, n_joints)
-        Measured velocity.
-    step : float, s
-        Time between samples.
-    cutoff : float, default=10.0, Hz
-        Cut-off of the zero-phase Butterworth low-pass.
-
-    Returns
-    -------
-    ndarray of the same shape
+    Samples are ``step`` s apart and pass a zero-phase Butterworth low-pass.
     """
     from scipy.signal import butter, sosfiltfilt
 
     nyquist = 0.5 / step
-    if cutoff < 0.9 * nyquist and velocity.shape[1] > 30:
-        low_pass = butter(2, cutoff / nyquist, output="sos")
+    if CUTOFF < 0.9 * nyquist and velocity.shape[1] > 30:
+        low_pass = butter(2, CUTOFF / nyquist, output="sos")
         velocity = sosfiltfilt(low_pass, velocity, axis=1)
     return np.gradient(velocity, step, axis=1)

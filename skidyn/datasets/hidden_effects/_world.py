@@ -166,14 +166,7 @@ Simulate = Callable[[World, Sequence[int], float], Outcome]
 def slip(travel: Array) -> Array:
     """Elastic-perfectly-plastic element: states in [-1, 1] that follow steps of travel.
 
-    Parameters
-    ----------
-    travel : ndarray of shape (n_trajectories, n_steps, ...)
-        Steps in units of the travel from rest to slip.
-
-    Returns
-    -------
-    ndarray of shape (n_trajectories, n_steps + 1, ...)
+    Steps along the second axis are in units of the travel from rest to slip.
     """
     moved = np.moveaxis(travel, 1, 0)
     states = np.empty((len(moved) + 1, *moved.shape[1:]))
@@ -211,17 +204,6 @@ def true_parameters(robot: Robot, rng: np.random.Generator) -> Array:
 
     The pseudo-inertia matrix of each body is changed by a congruence, which keeps it positive
     definite [1]_.
-
-    Parameters
-    ----------
-    robot : Robot
-        Nominal robot.
-    rng : Generator
-        Source of chance.
-
-    Returns
-    -------
-    ndarray of shape (n_bodies, 10)
 
     References
     ----------

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from skidyn._plain import plain
+
 Array = NDArray[np.float64]
 
 
@@ -178,12 +180,3 @@ def _counted_from_one(name: str, value: Any) -> Any:
 
 #: Draws an effect's parameters.
 Maker = Callable[[Setting], Hidden]
-
-
-def plain(value: Any) -> Any:
-    """The value in a JSON type."""
-    if isinstance(value, dict):
-        return {str(k): plain(v) for k, v in value.items()}
-    if isinstance(value, list | tuple | np.ndarray):
-        return [plain(v) for v in value]
-    return value.item() if isinstance(value, np.generic) else value

@@ -53,11 +53,11 @@ def _panel(summary: Summary, j: int, trace: dict[str, Any], added: bool) -> dict
         torque.append({**label, "of": [0, "after"]})
         residual.append({**label, "of": [0, "measured", "after"]})
     reach = trace["frame"]["reach"]
-    keys = ("measured", "before", "after") if added else ("measured", "before")
+    drawn = {k: v for k, v in trace["columns"].items() if added or k != "after"}
     return {
         "name": f"{summary['report']['joints'][j]} ({j + 1})",
         "unit": unit,
-        "tables": [packed_table(trace, {key: trace[key] for key in keys})],
+        "tables": [packed_table(trace, drawn)],
         "plots": [
             {"label": f"residual in {unit}", "height": 210, "series": residual,
              "range": [-reach, reach], "note": _cut(trace["frame"], unit)},

@@ -3,7 +3,7 @@
 
 import re
 
-from skidyn.report import render_comparison, summarize_comparison
+from skidyn.report import render_html, summarize_comparison
 
 
 def side(value):
@@ -16,7 +16,7 @@ def test_effects_come_first_and_what_differs_is_marked(fakes):
         {"name": "m_link1", "sides": [side(2.0), None], "differs": None},
         {"name": "viscous.Fv[1]", "sides": [side(0.5), side(0.75)], "differs": True},
     ]
-    page = render_comparison(summary)
+    page = render_html(summary)
     shown = re.search(r'<section id="coefficients">.*?</section>', page, re.S).group()
     assert shown.index("viscous.Fv[1]") < shown.index("m_link1")
     assert "1 base parameter of the rigid body" in shown

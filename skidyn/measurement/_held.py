@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Checks of values that are not new: held positions and torques, and zeros for missing values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from skidyn.measurement._check import Check
+from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._measures import is_held, position_step
+from skidyn.measurement._suspicion import Suspicion
+from skidyn.measurement._torque import cut_columns
+
+#: Least share of rows with the torque of the previous row, for a torque that is not coarse.
+HELD = 0.3
+#: Least length of a stuck part in rows, and as a multiple of the longest other part of one value;
+#: most stuck parts of a joint; least motion in it, as a share of the range of the joint.
+LONG, LONGER, MOST_STUCK, STUCK_WAY = 40, 5, 8, 0.1
+#: Share of rows with missing torques that is certain to be harmful.
+MANY_MISSING = 0.01
+
+
+class HeldTorque(Check):
+    """A torque that holds its last value while joints move on."""
+
+    name = "held_torque"
+    of_sensor = True
+    suspects = "torque that holds its last value: reported less often than the positions"
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        s = measurement.signals
+        together = s.trajectory[1:] == s.trajectory[:-1]
+        moved = np.any(s.q[1:] != s.q[:-1], axis=1) & together
+        if moved.sum() < 50:
+            return
+        held_all = is_held(measurement.torque, moved)
+        if held_all.any():
+            measurement.stale = True
+            share = float(held_all.sum() / moved.sum())
+            yield self.suspicion(
+                "torques hold their last value",
+                f"in {share:.0%} of the rows in which positions change, all of them at once: they "
+                "are reported less often",
+                "certain",
+                remedy=("--drop-repeated", "drop_repeated=True"),
+            )
+            return
+        shares, lost = np.zeros(measurement.n_joints), cut_columns(measurement)
+        for k in range(measurement.n_joints):
+            torque = measurement.torque[:, k]
+            share = np.mean(torque[1:][moved] == torque[:-1][moved])
+            # equal steps are due to a coarse sensor, not a slow one
+            if k not in lost and share > HELD and len(np.unique(torque)) > 0.1 * len(torque):
+                shares[k] = share if np.isnan(position_step(torque)) else 0.0
+        held = np.flatnonzero(shares)
+        if len(held):
+            yield self.suspicion(
+                f"the torque of {', '.join(measurement.joint(int(k)) for k in held)} holds its "
+                "last value",
+                f"in {100 * shares[held].max():.0f} % of the rows in which positions change: it is "
+                "reported less often",
+                "suspected",
+                [int(k) for k in held],
+            )
+
+
+class StuckTorque(Check):
+    """A torque that holds one value for a part of a recording in which its joint moves."""
+
+    name = "stuck_torque"
+    of_sensor = True
+    suspects = "torque that holds one value for a part of a recording"
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        s = measurement.signals
+        for k in range(measurement.n_joints):
+            for a, b in stuck_parts(measurement, k):
+                yield self.suspicion(
+                    f"the torque of {measurement.joint(k)} is stuck in a part of trajectory "
+                    f"{int(s.trajectory[a])}",
+                    f"from {s.clock[a]:.4g} s to {s.clock[b - 1]:.4g} s it is "
+                    f"{measurement.torque[a, k]:.4g} although the joint moves; leave this part out",
+                    "suspected",
+                    [k],
+                )
+
+
+def stuck_parts(measurement: Measurement, k: int) -> list[tuple[int, int]]:
+    """First rows of parts in which the torque of a joint, from 0, is stuck, and those after them.
+
+    Constant parts of a coarse torque, of a torque at its limit, or of zeros are not among them.
+    """
+    s, torque = measurement.signals, measurement.torque[:, k]
+    if np.ptp(torque) == 0 or measurement.idle.any():
+        return []
+    new = np.r_[True, (torque[1:] != torque[:-1]) | (s.trajectory[1:] != s.trajectory[:-1])]
+    begins = np.flatnonzero(new)
+    lengths = np.diff(np.append(begins, len(torque)))
+    others = np.sort(lengths)[: max(len(lengths) - MOST_STUCK, 1)]
+    long = np.flatnonzero(lengths >= max(LONG, LONGER * others[-1]))
+    far = STUCK_WAY * float(np.ptp(s.q[:, k]))
+    parts = [(int(begins[i]), int(begins[i] + lengths[i])) for i in long]
+    limits = (torque.min(), torque.max(), 0.0)
+    return [(a, b) for a, b in parts if torque[a] not in limits and np.ptp(s.q[a:b, k]) > far]
+
+
+class HeldPosition(Check):
+    """Positions of single joints that hold their last value while the joints move on."""
+
+    name = "held_position"
+    suspects = "positions of single joints that hold their last value: reported less often"
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        for k, share in measurement.held.items():
+            measurement.stale = True
+            rate = float(f"{measurement.rate * (1 - share):.3g}")
+            yield self.suspicion(
+                f"the position of {measurement.joint(k)} holds its last value",
+                f"in {share:.0%} of the rows in which the joint moves, after which it catches up: "
+                f"it is reported at about {rate:g} Hz",
+                "certain",
+                [k],
+                (f"--resample {rate:g}", f"resample_rate={rate:g}"),
+            )
+
+
+class MissingTorque(Check):
+    """Zeros in the place of missing torques."""
+
+    name = "missing_torque"
+    of_sensor = True
+    suspects = "zeros in the place of missing torques"
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        missing = measurement.missing
+        joints = np.flatnonzero(missing.any(axis=0)).tolist()
+        if joints:
+            rows = missing.any(axis=1)
+            names = ", ".join(measurement.joint(k) for k in joints)
+            yield self.suspicion(
+                f"missing torques of {names} were replaced by zero",
+                f"in {int(rows.sum())} rows, {rows.mean():.1%} (the first in row "
+                f"{int(np.argmax(rows))}), they are zero, but not close to zero in the rows beside "
+                "them; write missing values as empty cells, and read the log with missing='drop', "
+                "or leave these rows out",
+                "certain" if rows.mean() > MANY_MISSING else "suspected",
+                joints,
+            )
