@@ -9,8 +9,8 @@ with viscous and dry friction, rotor inertia and offset.
 
     python benchmarks/identification/so101_simulation.py FOLDER
 
-``--gains`` prints only the gain and the delay fitted to each motion alone, and what the checks of
-the servos report with these.
+``--gains`` prints only the gain and the delay fitted to each motion alone, and the settings of the
+servos that a diagnosis finds to differ from these.
 """
 
 import argparse
@@ -28,6 +28,7 @@ from skidyn.robots import Robot
 from skidyn.simulation import fit_servo, servo_torque, simulation_errors
 
 EFFECTS = ("viscous", "coulomb", "rotor_inertia", "offset")
+SETTINGS = ("servo_gain", "servo_current", "servo_voltage")
 
 
 def read(folder, number):
@@ -64,9 +65,12 @@ def main():
                 continue
             model = RBDRegressor(robot, EFFECTS)
             found = diagnose(
-                model, log[log["trajectory"] == k], controller=servo, effects=(), force=True
+                model, log[log["trajectory"] == k], controller=servo, effects=SETTINGS, force=True
             )
-            told = [c.check for c in found.checks if c.check.startswith("servo_")] or ["-"]
+            told = [
+                f"{f.kind} of joint {f.joints[0]}" for f in found.findings if f.kind in SETTINGS
+            ]
+            told = told or ["-"]
             gain, delay = float(servo.stiffness[0]), 1e3 * servo.delay
             print(f"{name:20s} {gain:8.1f} N m/rad {delay:6.0f} ms  {', '.join(told)}", flush=True)
         return

@@ -4,11 +4,15 @@
 from __future__ import annotations
 
 import argparse
+import json
+import shlex
 from typing import Any
 
 from skidyn._commands._arguments import JsonFile, command, with_joints, with_report
-from skidyn._commands._input import joint_numbers, read_model_and_log, read_robot, recorded_options
+from skidyn._commands._controllers import controller_told, driven_with, settings_of
+from skidyn._commands._input import joint_numbers, read_driven, read_robot, recorded_options
 from skidyn._commands._output import parameters, print_json, run_diagnosis
+from skidyn._exceptions import SkidynError
 from skidyn._text import digits
 from skidyn._writing import write_json
 
@@ -18,6 +22,9 @@ after. The report records the files of the log and the model.
 
   skidyn diagnose run*.csv --urdf robot.urdf --out report.json
   skidyn add --from report.json --effect dahl --joints 1,4 --out better.json
+
+A setting of a servo (servo_gain, servo_current, servo_voltage, servo_deadband) that the report
+contains is added to the controller, which is printed.
 """
 
 
@@ -38,27 +45,46 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    from skidyn.effects import make_terms
+    from skidyn.effects import get_effect, make_terms
 
+    kind, joints = options.effect, joint_numbers(options.on)
     options = recorded_options(options)
-    model, frame, tau = read_model_and_log(options, check=False)  # a diagnosis checks it
+    model, frame, tau, controller = read_driven(options, check=False)  # a diagnosis checks it
     robot = read_robot(options)
-    joints = joint_numbers(options.on)
-    spec = options.effect if joints is None else (options.effect, joints)
-    terms = make_terms([spec], robot.n_joints)
+    setting = get_effect(kind).of_servo
+    known = [] if controller is None or "tau1" in frame else settings_of(options.report)
+    added = [s for s in known if setting and s.is_of(kind, joints)]
+    if setting and not added:
+        raise SkidynError(
+            f"{options.report} has no {kind} on these joints; it is a setting of the servo, which "
+            "skidyn diagnose finds in a log without torque, or --controller states"
+        )
+    if controller is not None:  # other effects are judged by the torque with all settings
+        others = [s for s in known if s not in added]
+        controller, tau = driven_with(controller, tau, others, frame, robot.n_joints)
     given = run_diagnosis(model, frame, tau, options, kinds=())
-    before = given.rmse_before
-    fitted = model.with_effects(terms).fit(frame, tau)
-    better = model.with_effects(fitted.effect_terms_[-len(terms) :])
+    stated = None
+    if controller is not None and added:
+        controller, tau = driven_with(controller, tau, added, frame, robot.n_joints)
+        fitted = better = model.fit(frame, tau)
+        stated = controller_told(controller, robot.n_joints)
+    else:
+        terms = make_terms([kind if joints is None else (kind, joints)], robot.n_joints)
+        fitted = model.with_effects(terms).fit(frame, tau)
+        better = model.with_effects(fitted.effect_terms_[-len(terms) :])
     after = run_diagnosis(better, frame, tau, options, kinds=(), checks=given.checks).rmse_before
+    before = given.rmse_before
     if options.out:
         write_json(options.out, parameters(fitted))
     if options.json:
-        print_json({"before": before.tolist(), "after": after.tolist()})
+        content: dict[str, Any] = {"before": before.tolist(), "after": after.tolist()}
+        print_json(content if stated is None else {**content, "controller": json.loads(stated)})
         return
-    print(f"held-out error on judged samples with {options.effect} added")
+    print(f"held-out error on judged samples with {kind} added")
     for j, name in enumerate(robot.joint_names):
         change = round(after[j] / before[j] - 1, 2) if before[j] > 0 else 0.0
         unit = "N" if robot.joint_types[j] == "prismatic" else "N m"
         told = f"{digits(before[j]):>9s} -> {digits(after[j]):>9s} {unit}"
         print(f"  {j + 1} {name:24s} {told}  ({change + 0.0:+.0%})")
+    if stated is not None:
+        print(f"next: the same with --controller {shlex.quote(stated)}")

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
     from skidyn.diagnosis import Diagnosis
     from skidyn.measurement import Suspicion
-    from skidyn.simulation import Controller
 
 DESCRIPTION = """\
 Compare a model with a log and identify the physical effects that it lacks.
@@ -113,18 +112,19 @@ def _answer(options: argparse.Namespace) -> dict[str, Any]:
     """The results, as values that can be stored."""
     with noting() as noted:
         try:
-            diagnosis, frame, controller = _diagnosed(options)
+            diagnosis, frame = _diagnosed(options)
         except MisreadLogError as error:
             if options.clock != "auto" or {s.check for s in error.suspicions} != {"clock_jitter"}:
                 raise
             options = argparse.Namespace(**vars(options) | {"clock": "regular"})
-            diagnosis, frame, controller = _diagnosed(options)
+            diagnosis, frame = _diagnosed(options)
             mended = [_mended(jitter) for jitter in error.suspicions]
             diagnosis.checks[:0] = mended
             diagnosis.warnings[:0] = map(str, mended)
-        explain_motion(diagnosis, controller, frame, options)
+        explain_motion(diagnosis, frame, options)
         if options.simulate:
-            driven: dict[str, Any] = {} if controller is None else {"controller": controller}
+            used = diagnosis.controller
+            driven: dict[str, Any] = {} if used is None else {"controller": used}
             with working("Simulating", options):
                 diagnosis.judge_by_simulation(**driven)
         page = None
@@ -144,13 +144,11 @@ def _answer(options: argparse.Namespace) -> dict[str, Any]:
     }
 
 
-def _diagnosed(
-    options: argparse.Namespace,
-) -> tuple[Diagnosis, pd.DataFrame, Controller | None]:
-    """The diagnosis of the log read with the options, the log and its controller."""
+def _diagnosed(options: argparse.Namespace) -> tuple[Diagnosis, pd.DataFrame]:
+    """The diagnosis of the log read with the options, and the log."""
     model, frame, tau, controller = read_driven(options, check=False)
     diagnosis = run_diagnosis(model, frame, tau, options, controller=controller)
-    return diagnosis, frame, controller
+    return diagnosis, frame
 
 
 def _mended(jitter: Suspicion) -> Suspicion:
@@ -173,19 +171,10 @@ def _next(answer: dict[str, Any], options: argparse.Namespace) -> list[str]:
     seen = (story["servo_motion"] or {"findings": []})["findings"]
     named = [line for line in [*story["findings"], *seen] if line["kind"] != "unknown"]
     lines = []
-    if named and named[0] in seen and _is_of_servo(named[0]["kind"]):
-        lines.append(f"next: the same with {named[0]['size']} in --controller")
-    elif named:
+    if named:
         joints = ",".join(map(str, named[0]["joints"]))
         kind = named[0]["kind"]
         lines.append(f"next: skidyn add --from {report} --effect {kind} --joints {joints}")
     if answer["rivals"]:
         lines.append(f"next: skidyn separate --from {report} --out motion.csv")
     return lines
-
-
-def _is_of_servo(kind: str) -> bool:
-    """Whether an effect is one of the controller and not of the model."""
-    from skidyn.simulation import SERVO_EFFECTS  # a stored answer needs no simulation
-
-    return kind in SERVO_EFFECTS

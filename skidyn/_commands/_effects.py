@@ -10,7 +10,8 @@ from skidyn._commands._arguments import command
 from skidyn._commands._output import print_json
 
 DESCRIPTION = """\
-List the kinds of effects that the diagnosis tests and that --model and --effect accept. --json adds
+List the kinds of effects that the diagnosis tests and that --model and --effect accept. --model
+accepts no settings of servos (servo_gain and so on), which are stated in --controller. --json adds
 formula, coefficients with units, shape parameters with ranges, rivals and references.
 
   skidyn effects

@@ -7,11 +7,11 @@ import argparse
 import json
 import re
 import warnings
-from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from skidyn._commands._arguments import Input, check_files
+from skidyn._commands._controllers import read_controller
 from skidyn._commands._output import RECORDED, hashes, working
 from skidyn._exceptions import LogWarning, SkidynError
 from skidyn._limits import MOST_COLUMNS
@@ -71,9 +71,10 @@ def _log(
     frame = read_frame(options, robot, check=check, needs_torque=text is None)
     if text is None:
         return frame, torque_of(frame, robot), None
-    controller = read_controller(text, robot, frame)
-    if "tau1" in frame:
-        return frame, torque_of(frame, robot), controller
+    logged = torque_of(frame, robot) if "tau1" in frame else None
+    controller = read_controller(text, robot, frame, logged)
+    if logged is not None:
+        return frame, logged, controller
     from skidyn.simulation import servo_torque
 
     return frame, servo_torque(controller, frame), controller
@@ -82,25 +83,6 @@ def _log(
 def torque_of(frame: pd.DataFrame, robot: Robot) -> Any:
     """The logged torques, shape (n_samples, n_joints)."""
     return frame[[f"tau{j + 1}" for j in range(robot.n_joints)]].to_numpy()
-
-
-def read_controller(text: str, robot: Robot, frame: pd.DataFrame) -> Controller:
-    """The given controller, or one fitted to the log by its torque or the robot's weight."""
-    from skidyn.simulation import Controller, fit_controller, fit_servo
-
-    word = text.strip()
-    if word == "fit" and "tau1" in frame:
-        return fit_controller(frame, torque_of(frame, robot))
-    if word in ("fit", "fit-shared"):
-        return fit_servo(robot, frame, shared=word != "fit")
-    gains = json_option("controller", text)
-    names = {field.name for field in fields(Controller)}
-    if not isinstance(gains, dict) or "stiffness" not in gains or not set(gains) <= names:
-        raise SkidynError(
-            f"--controller is {text}; expected fit, or stiffness (N m/rad) and optionally "
-            f"{', '.join(sorted(names))} as JSON; fit-shared estimates one gain for all joints"
-        )
-    return Controller(**gains).checked(robot.n_joints)
 
 
 def read_frame(

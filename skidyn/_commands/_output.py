@@ -59,17 +59,16 @@ def run_diagnosis(
         )
 
 
-def explain_motion(
-    diagnosis: Diagnosis, controller: Controller | None, frame: Any, options: argparse.Namespace
-) -> None:
+def explain_motion(diagnosis: Diagnosis, frame: Any, options: argparse.Namespace) -> None:
     """Identify effects from the motion under a controller; nothing without a controller."""
+    controller = diagnosis.controller
     if controller is None:
         return
     if "tau1" not in frame:
         diagnosis.warnings.insert(0, _torque_told(controller, len(diagnosis.joint_names)))
     with working("Simulating the servos", options):
         try:
-            diagnosis.explain_servo_motion(controller)
+            diagnosis.explain_servo_motion()
         except LogError as error:
             diagnosis.warnings.append(f"The motion of the servos was not analysed: {error}.")
 

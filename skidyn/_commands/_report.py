@@ -36,8 +36,8 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> None:
     options = recorded_options(options)
     model, frame, tau, controller = read_driven(options, check=False)  # a diagnosis checks it
-    diagnosis = run_diagnosis(model, frame, tau, options)
-    explain_motion(diagnosis, controller, frame, options)
+    diagnosis = run_diagnosis(model, frame, tau, options, controller=controller)
+    explain_motion(diagnosis, frame, options)
     write_page(diagnosis, options.html, provenance(options))
     page = str(Path(options.html).resolve())
     if options.json:

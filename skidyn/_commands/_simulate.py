@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from skidyn._commands._arguments import Input, Output, command, with_controller, with_joints
+from skidyn._commands._controllers import read_controller
 from skidyn._commands._input import (
     embedded_robot,
     joint_numbers,
-    read_controller,
     read_frame,
     torque_of,
 )
@@ -115,7 +115,8 @@ def _along(options: argparse.Namespace) -> None:
     if options.controller is None:
         tau = torque_of(frame, robot)
     else:
-        said["controller"] = read_controller(options.controller, robot, frame)
+        logged = torque_of(frame, robot) if "tau1" in frame else None
+        said["controller"] = read_controller(options.controller, robot, frame, logged)
     with working("Simulating", options):
         found = simulation_errors(model, frame, tau, **said)
         if options.out is not None:

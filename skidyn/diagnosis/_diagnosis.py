@@ -32,8 +32,14 @@ from skidyn.diagnosis._rule import (
     variance_inflation,
 )
 from skidyn.diagnosis._search import search
+from skidyn.diagnosis._servo_settings import (
+    Servos,
+    settings_found,
+    split_kinds,
+    with_settings,
+)
 from skidyn.diagnosis._swift import look_at_swift
-from skidyn.effects import Term, list_effects, make_terms
+from skidyn.effects import Term, get_effect, list_effects, make_terms
 from skidyn.evidence import Fit, Problem, make_problem
 from skidyn.measurement import (
     Measurement,
@@ -44,7 +50,7 @@ from skidyn.measurement import (
     refuse_certain,
 )
 from skidyn.robots import Robot
-from skidyn.simulation import Controller, servo_torque
+from skidyn.simulation import Controller
 
 #: Suspicions about the clock with which a wave in time may be due to the logger.
 UNSTEADY = {"repeated_rows", "interpolated_rows", "clock_jitter"}
@@ -85,7 +91,9 @@ def diagnose(
     controller : Controller, optional
         Position servos from whose commands in X (``q_ref1..`` or ``cmd1..``) the torque is computed
         where ``tau`` is None (:func:`skidyn.simulation.servo_torque`). In this case checks of the
-        torque sensor are omitted, and a known limit of all servos is not an effect.
+        torque sensor are omitted, and a known limit of all servos is not an effect. Settings of the
+        servos that differ from the stated ones are the first findings, and the others are judged
+        by the torque of the servos with these settings.
     robot : Robot, optional
         Robot; needed for regressors without one.
     effects : iterable of str, optional
@@ -140,14 +148,15 @@ def diagnose(
     [('stribeck', (2,))]
     """
     # many small matrices: more threads would only wait for each other
-    of_servos = tau is None
-    if of_servos:
+    servos = None
+    if tau is None:
         if controller is None:
             raise ValueError(
                 "tau is None; pass the measured torque, or controller=Controller(...) for a log of "
                 "position servos without"
             )
-        tau = servo_torque(controller, X)
+        servos = Servos(controller, X)
+        tau = servos.torque
     with threadpool_limits(1), cores(n_jobs):
         opened = open_model(model, X, tau)
         diagnosis = _diagnose(
@@ -163,10 +172,12 @@ def diagnose(
             settings or Settings(),
             force,
             sample_weight,
-            controller if of_servos else None,
+            servos,
             checks,
         )
-        diagnosis.controller = controller
+        if controller is not None:
+            found = diagnosis.findings
+            diagnosis.controller = with_settings(controller, found, len(diagnosis.joint_names))
         if opened.outer:
             diagnosis.opened = opened
             diagnosis.__dict__.pop("model", None)
@@ -186,7 +197,7 @@ def _diagnose(
     settings: Settings,
     force: bool,
     sample_weight: Any,
-    servos: Controller | None,
+    servos: Servos | None,
     known: Sequence[Suspicion] | None,
 ) -> Diagnosis:
     if isinstance(effects, str):
@@ -195,6 +206,7 @@ def _diagnose(
         raise ValueError(f"settings={settings!r}; expected Settings(...) or None")
     if not isinstance(smooth, bool | np.bool_):
         raise ValueError(f"smooth={smooth!r}; expected True or False")
+    stated = tau
     robot = robot if robot is not None else getattr(model, "robot", None)
     if robot is None:
         raise ColumnError("this regressor has no robot; pass robot=Robot.from_urdf(...)")
@@ -215,18 +227,30 @@ def _diagnose(
         weight = _check_sample_weight(
             sample_weight, torque, dtype=np.float64, ensure_non_negative=True
         )
-    kinds = list_effects() if effects is None else list(effects)
+    wanted = list_effects() if effects is None else list(effects)
+    kinds, settings_tried = split_kinds(wanted, servos is not None)
     identified = getattr(model, "parameters", "identified") == "identified"
-    if servos is not None and np.isfinite(servos.checked(robot.n_joints).limit).all():
+    if servos is not None and np.isfinite(servos.controller.checked(robot.n_joints).limit).all():
         kinds = [kind for kind in kinds if kind != "saturation"]
-    measurement = Measurement(
-        signals,
-        torque,
-        robot,
-        robot.joint_names,
-        identified=identified,
-        of_servos=servos is not None,
-    )
+
+    def measured() -> Measurement:
+        return Measurement(
+            signals,
+            torque,
+            robot,
+            robot.joint_names,
+            identified=identified,
+            of_servos=servos is not None,
+        )
+
+    # first, since all other effects and checks are judged by the torque that they determine
+    of_servos = settings_found(measured(), servos, settings_tried)
+    if servos is not None and of_servos:
+        tau = torque = servos.with_findings(of_servos, robot.n_joints).torque
+        # what is left of a setting that is known within an error would have their name
+        alike = {rival for f in of_servos for rival in get_effect(f.kind).rivals}
+        kinds = [kind for kind in kinds if kind not in alike]
+    measurement = measured()
     once = ~copied_rows(signals, torque)
     judged, kept_weight = torque, weight
     if not once.all():
@@ -265,6 +289,11 @@ def _diagnose(
         checks = told()
     notes = [str(check) for check in checks]
     doubts = [] if force else names_in_doubt(checks)
+    if doubts and of_servos:  # what is doubtful may have looked like another servo
+        return _diagnose(
+            model, X, stated, robot, kinds, trajectory, time, rate, smooth, settings, force,
+            sample_weight, servos, known,
+        )  # fmt: skip
     if doubts:
         kinds, found = [], None
         notes.append(
@@ -290,6 +319,9 @@ def _diagnose(
     sought = [c for h in completed.findings for c in h.candidates]
     withdrawn = [c for c in sought if c.site not in kept]
     diagnosis.limits = without_withdrawn(diagnosis.limits, withdrawn)
+    diagnosis.findings[:0] = of_servos
+    if of_servos and diagnosis.verdict == "complete":
+        diagnosis.verdict = "missing"
     return diagnosis
 
 

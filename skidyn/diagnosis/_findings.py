@@ -42,8 +42,9 @@ class Finding:
         Signals that an unknown effect depends on.
     error_drop : float
         Share of the held-out squared error on these joints that adding it removes.
-    q_value : float
+    q_value : float or None
         False-discovery rate at which it was accepted: its p-value times the number of candidates.
+        None for limits of servos, which are judged by the error that they remove.
     rivals : tuple of str
         Kinds from which this data cannot separate it.
     separating_motion : str
@@ -53,7 +54,7 @@ class Finding:
     code : str
         Line of Python that adds it.
     terms : tuple of Term
-        Terms to add to a model.
+        Terms to add to a model; none for settings of servos, which change the torque.
     margin : float
         Margin over the best other explanation of the same joints, as a share of its gain; negative
         if a simpler effect was preferred.
@@ -84,7 +85,7 @@ class Finding:
     parameters: dict[str, dict[str, Any]]
     variables: tuple[str, ...]
     error_drop: float
-    q_value: float
+    q_value: float | None
     rivals: tuple[str, ...]
     separating_motion: str
     sentence: str
@@ -185,7 +186,8 @@ def make_finding(
         code = "model = diagnosis.model"
     else:
         code = f'model = diagnosis.add("{hypothesis.kind}", joints={list(joints)})'
-    sentence = _sentence(title, joints, term.trajectories, parameters, error_drop)
+    sentence = f"{told_briefly(title, joints, term.trajectories, parameters)}. "
+    sentence += _fall_told(error_drop)
     if rivals:
         sentence += (
             f" This data cannot separate it from {listed([rival_title(k) for k in rivals], 'or')}"
@@ -260,13 +262,13 @@ def _parameters(
     return table
 
 
-def _sentence(
+def told_briefly(
     title: str,
     joints: tuple[int, ...],
     trajectories: tuple[int, ...] | None,
     parameters: dict[str, dict[str, Any]],
-    drop: float,
 ) -> str:
+    """Effect, joints, and its first parameter, without a full stop."""
     where = f"joint {joints[0]}" if len(joints) == 1 else f"joints {', '.join(map(str, joints))}"
     if trajectories is not None:
         many = "y" if len(trajectories) == 1 else "ies"
@@ -274,11 +276,14 @@ def _sentence(
     # of the components of a vector, one that is not zero
     rows = sorted(parameters.items(), key=lambda item: _may_be_zero(item[1]))
     what = next((_value(name, row) for name, row in rows), "")
+    return f"{title} on {where}{what}"
+
+
+def _fall_told(drop: float) -> str:
     share = f"{drop:.0%}" if drop >= 0.005 else f"{drop:.1%}"
-    fall = f"Adding it removes {share} of the held-out squared error."
     if drop <= 0:
-        fall = "Refitting the model with it does not reduce the error on held-out data."
-    return f"{title} on {where}{what}. {fall}"
+        return "Refitting the model with it does not reduce the error on held-out data."
+    return f"Adding it removes {share} of the held-out squared error."
 
 
 def _may_be_zero(row: dict[str, Any]) -> bool:

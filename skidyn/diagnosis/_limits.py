@@ -260,7 +260,7 @@ def _not_shown(problem: Problem) -> list[Limit]:
     limits = []
     for kind in list_effects():
         effect = get_effect(kind)
-        if effect.scope != "joint":
+        if effect.scope != "joint" or effect.of_servo:
             continue
         for joint in range(problem.n_joints):
             reason = effect.not_shown(problem.signals, joint)

@@ -26,7 +26,7 @@ from skidyn.diagnosis._unknown import UnknownTorque
 from skidyn.effects import Term, get_effect, make_terms
 from skidyn.evidence import Problem
 from skidyn.identification import RBDRegressor
-from skidyn.measurement import SERVO_CHECKS, Suspicion
+from skidyn.measurement import Suspicion
 from skidyn.simulation import (
     HORIZON,
     LAWS,
@@ -36,6 +36,7 @@ from skidyn.simulation import (
     SimulationVerdict,
     explain_servo_motion,
     judge_in_turn,
+    servo_torque,
 )
 
 #: Beginning of the sentence on a finding that the model for simulation does not contain.
@@ -103,7 +104,7 @@ class Diagnosis:
     servo_motion : list of ServoFinding or None
         Effects found by :meth:`explain_servo_motion`; None before it is called.
     controller : Controller or None
-        Controller given to :func:`diagnose`.
+        Controller given to :func:`diagnose`, with the settings of servos that were found.
 
     Examples
     --------
@@ -314,11 +315,10 @@ class Diagnosis:
         A torque computed from the position error of a servo hides effects that last hundredths of a
         second. Joints are simulated in their loops (:func:`skidyn.simulation.explain_servo_motion`)
         with the findings that the simulation supports, and without unknown functions, hysteresis,
-        offsets and saturation by the controller; joints with other findings, and those whose servo
-        is not as stated, are left out. The effects found replace unknown functions and hysteresis
-        on their joints; :attr:`findings` are not changed. They are stored in :attr:`servo_motion`
-        and shown in the report and on the page, and a diagnosis without any other finding is no
-        longer ``"complete"``.
+        offsets and saturation by the controller; joints with other findings are left out. The
+        effects found replace unknown functions and hysteresis on their joints; :attr:`findings` are
+        not changed. They are stored in :attr:`servo_motion` and shown in the report and on the
+        page, and a diagnosis without any other finding is no longer ``"complete"``.
 
         Parameters
         ----------
@@ -348,14 +348,15 @@ class Diagnosis:
             raise SkidynError(
                 "controller is missing: give the gains of the servos as Controller(...)"
             )
-        # A loop with other settings than those of the servo says nothing.
-        named = {j for s in self.checks if s.check in SERVO_CHECKS for j in s.joints}
+        named: set[int] = set()
         known: list[tuple[str, int]] = []
         # A known limit of the controller is simulated and is not an effect.
         limited = np.isfinite(controller.checked(len(self.joint_names)).limit)
         for finding in self.findings:
             effect = None if finding.kind == "unknown" else get_effect(finding.kind)
             if effect is None or finding.kind in _PLAIN or effect.family == "hysteresis":
+                continue
+            if effect.of_servo:  # part of the controller
                 continue
             if finding.kind == "saturation" and all(limited[j - 1] for j in finding.joints):
                 continue
@@ -392,7 +393,8 @@ class Diagnosis:
         ----------
         kind : str
             Kind of the catalogue; ``"unknown"`` for the unknown function that was found, or
-            ``"formula"`` for the formula proposed for it.
+            ``"formula"`` for the formula proposed for it. A setting of the servo that was found is
+            added to the controller: the model is fitted to the torque of the servo with it.
         joints : sequence of int, optional
             Joints, counted from 1; by default those of the finding of this kind, or all joints.
 
@@ -404,10 +406,13 @@ class Diagnosis:
         Raises
         ------
         EffectError
-            Unknown kind, a joint that the robot lacks, or no formula was proposed.
+            Unknown kind, a joint that the robot lacks, no formula was proposed, or no such setting
+            of a servo was found.
         """
         if kind == "formula":
             return self._refitted(self._formulas(joints))
+        if kind != "unknown" and get_effect(kind).of_servo:
+            return self._with_setting(kind, joints)
         wanted = None if joints is None else set(map(int, joints))
         for finding in self.findings:
             if finding.kind != kind:
@@ -422,6 +427,25 @@ class Diagnosis:
                 return self._refitted(terms)
         spec: Any = kind if joints is None else (kind, list(joints))
         return self._refitted(make_terms([spec], len(self.joint_names)))
+
+    def _with_setting(self, kind: str, joints: Sequence[int] | None) -> Any:
+        """The model fitted to the torque of servos with a setting that was found."""
+        wanted = None if joints is None else set(joints)
+        known = {j for f in self.findings if f.kind == kind for j in f.joints}
+        moved = [f for f in self.servo_motion or () if f.kind == kind]
+        found = known | {f.joint for f in moved}
+        if not found or not (wanted is None or wanted <= found):
+            raise EffectError(
+                f"{kind} was not found on these joints; it is a setting of the servo, to be stated "
+                "in Controller(...)"
+            )
+        controller, X = self.controller, self.data[0]
+        used = [f for f in moved if wanted is None or f.joint in wanted]
+        if not used or controller is None:
+            return self._refitted(())  # the torque of the diagnosis has it
+        for f in used:
+            controller = controller.with_joint(len(self.joint_names), f.joint, **f.parameters)
+        return self.base_model.with_effects(()).fit(X, servo_torque(controller, X))
 
     def _formulas(self, joints: Sequence[int] | None) -> list[Term]:
         """Terms of the proposed formulas."""
@@ -470,8 +494,11 @@ class Diagnosis:
             "remainder_inflation": [float(x) for x in self.remainder_inflation],
             "noise_is_coloured": self.noise_is_coloured,
             "effects": [
-                {**finding.to_dict(), **of_finding(self.in_turn, k)}
-                for k, finding in enumerate(self.findings)
+                *(
+                    {**finding.to_dict(), **of_finding(self.in_turn, k)}
+                    for k, finding in enumerate(self.findings)
+                ),
+                *(found.to_effect() for found in self.servo_motion or ()),
             ],
             "unexplained": self.unexplained,
             "limits": [limit.to_dict() for limit in self.limits],

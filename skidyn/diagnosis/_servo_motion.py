@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 from skidyn._text import inside, joints_told, listed
 from skidyn.effects import get_effect
-from skidyn.simulation import title_of
 
 if TYPE_CHECKING:
     from skidyn.diagnosis._findings import Finding
@@ -51,7 +50,7 @@ def servo_motion_told(
                 for model, error in (
                     ("friction alone", found.before),
                     (inside(found.title), found.after),
-                    (inside(title_of(found.rival)), found.beside),
+                    (inside(get_effect(found.rival).title), found.beside),
                 )
             ],
         }

@@ -13,6 +13,7 @@ from skidyn.diagnosis._failures import FAILS
 from skidyn.diagnosis._findings import pairs_of, rival_title
 from skidyn.diagnosis._rule import GUESS
 from skidyn.diagnosis._servo_motion import servo_motion_told
+from skidyn.effects import get_effect
 
 if TYPE_CHECKING:
     from skidyn.diagnosis._findings import Finding
@@ -216,6 +217,11 @@ def _line(diagnosis: Diagnosis, k: int, rows: Sequence[dict[str, Any]]) -> dict[
         before, after = (step[best["joint"] - 1] for step in steps)
         change = fall(before, after, best["noise"], best["unit"])
         change = change if len(served) == 1 else f"joint {best['joint']}: {change}"
+    if is_setting(finding):  # the errors of all steps are those of the torque with it
+        best, change = (
+            None,
+            f"it removes {finding.error_drop:.0%} of the squared error of the torque",
+        )
     shown, weights = _parameters(finding)
     share = confidence(finding)
     share = 1.0 if share is None else share
@@ -286,6 +292,11 @@ def _step(history: Sequence[dict[str, Any]], finding: Finding) -> int | None:
     return None
 
 
+def is_setting(finding: Finding) -> bool:
+    """Whether a finding is a setting of the servo and not a torque of the model."""
+    return finding.kind != "unknown" and get_effect(finding.kind).of_servo
+
+
 def confidence(finding: Finding) -> float | None:
     """Confidence of a finding, if the diagnosis has it."""
     value = getattr(finding, "confidence", None)
@@ -307,6 +318,8 @@ def sure(finding: Finding) -> str:
         text += f"{'; ' if text else ''}this data cannot separate it from {rivals}"
     elif finding.kind == "unknown":
         text = "no effect of the catalogue explains it"
+    elif is_setting(finding):
+        text = "the torque that the motion requires shows it"
     elif not text:
         text = "no other effect explains it as well"
     return text

@@ -120,10 +120,11 @@ class Effect:
         initial value of the search; others are fixed.
     scope : {"joint", "pair", "robot"}
         Where it acts.
-    search : {"grid", "spectrum", "trajectories", "clock", "screened", "given"}
+    search : {"grid", "spectrum", "trajectories", "clock", "screened", "given", "servo"}
         Method to find its shape: on a grid, as a line in the spectrum over joint angle or over
         time, as a split of the trajectories into those with and without the effect, from the
-        signals on which the residual depends, or none because it is always given.
+        signals on which the residual depends, none because it is always given, or none because it
+        is a setting of a servo, which has no columns.
     nameless : bool
         Whether it represents an effect that is not in the catalogue (``unknown``).
     drawn_against : {"q", "dq", "ddq", "load", "temperature", "time"}
@@ -132,7 +133,7 @@ class Effect:
         Family of effects that are often separated only by special motion (``"hysteresis"``).
     needs : tuple of str
         Optional signals it needs: ``"temperature"``, ``"time"``, ``"load"``, ``"model_torque"``,
-        ``"robot"``.
+        ``"robot"``, ``"command"``.
     leading : int
         With ``search="trajectories"``: number of first coefficients that every single trajectory
         determines; all of them if 0.
@@ -191,9 +192,9 @@ class Effect:
     shapes: ClassVar[tuple[Shape, ...]] = ()
     forms: ClassVar[tuple[Mapping[str, float], ...]] = ()
     scope: ClassVar[Scope] = "joint"
-    search: ClassVar[Literal["grid", "spectrum", "trajectories", "clock", "screened", "given"]] = (
-        "grid"
-    )
+    search: ClassVar[
+        Literal["grid", "spectrum", "trajectories", "clock", "screened", "given", "servo"]
+    ] = "grid"
     nameless: ClassVar[bool] = False
     drawn_against: ClassVar[str] = "q"
     family: ClassVar[str] = ""
@@ -236,6 +237,11 @@ class Effect:
     def follows_fit(self) -> bool:
         """Whether the columns depend on the fit: on its torque, or its rigid body."""
         return self.needs_fit or "robot" in self.needs
+
+    @property
+    def of_servo(self) -> bool:
+        """Whether it is a setting of the controller, and not a torque of the model."""
+        return self.search == "servo"
 
     @property
     def sees_model(self) -> bool:

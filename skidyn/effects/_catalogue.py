@@ -28,6 +28,7 @@ from skidyn.effects._nameless_history import HISTORY
 from skidyn.effects._position import PositionDependentFriction, TorqueRipple
 from skidyn.effects._registry import get_effect, register_effect
 from skidyn.effects._sensor import Saturation, TimeDelay, TorqueGain
+from skidyn.effects._servo import SERVO
 from skidyn.effects._springs import EndStop, GravityCompensator, NonlinearSpring, Offset, Spring
 from skidyn.effects._term import Term
 from skidyn.effects._thermal import FrictionDrift, TemperatureFriction, TemperatureOffset
@@ -67,6 +68,7 @@ _CLASSES: tuple[type[Effect], ...] = (
     TemperatureOffset,
     ExternalWrench,
     EnvironmentContact,
+    *SERVO,
 )
 for _cls in (*_CLASSES, *NAMELESS, *HISTORY, *COUPLED, AccelerationNoise, Formula):
     register_effect(_cls)
@@ -95,7 +97,7 @@ def make_terms(specs: Iterable[TermSpec], n_joints: int) -> list[Term]:
     Raises
     ------
     EffectError
-        Unknown kind, joint out of range, or a pair effect without its pair.
+        Unknown kind, joint out of range, a pair effect without its pair, or a setting of a servo.
 
     Examples
     --------
@@ -109,7 +111,7 @@ def make_terms(specs: Iterable[TermSpec], n_joints: int) -> list[Term]:
     terms: list[Term] = []
     for spec in specs:
         if isinstance(spec, Term):
-            get_effect(spec.kind)  # refuses an unknown kind
+            _refuse_settings(get_effect(spec.kind))  # also refuses an unknown kind
             _check_joints(spec.kind, spec.places, n_joints)
             terms.append(_completed(spec))
             continue
@@ -142,6 +144,7 @@ def _kind_and_joints(spec: Any) -> tuple[str, list[int]]:
 
 
 def _expand(kind: str, joints: Sequence[int] | None, n_joints: int) -> list[Term]:
+    _refuse_settings(get_effect(kind))
     scope = get_effect(kind).scope
     chosen = tuple(range(n_joints)) if joints is None else tuple(j - 1 for j in joints)
     _check_joints(kind, chosen, n_joints)
@@ -150,6 +153,16 @@ def _expand(kind: str, joints: Sequence[int] | None, n_joints: int) -> list[Term
     if scope == "pair" and len(chosen) != 2:
         raise EffectError(f"{kind} couples two joints; write ({kind!r}, [5, 6])")
     return [Term.at(kind, chosen)]
+
+
+def _refuse_settings(effect: Effect) -> None:
+    if not effect.of_servo:
+        return
+    names = [c.name for c in effect.coefficients]
+    raise EffectError(
+        f"{effect.kind} is a setting of the servo and no torque of the model; state it in "
+        f"--controller (in Python: Controller(..., {', '.join(f'{name}=...' for name in names)}))"
+    )
 
 
 def _check_joints(kind: str, joints: Sequence[int], n_joints: int) -> None:

@@ -12,6 +12,9 @@ from skidyn._columns import command_columns
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Array
 
+#: Settings of which every joint may have its own.
+PER_JOINT = ("stiffness", "damping", "limit", "deadband", "offset", "no_load_speed")
+
 
 @dataclass(frozen=True)
 class Controller:
@@ -77,7 +80,7 @@ class Controller:
             is to fall with the speed.
         """
         values: dict[str, Any] = {}
-        for name in ("stiffness", "damping", "limit", "deadband", "offset", "no_load_speed"):
+        for name in PER_JOINT:
             value = np.asarray(getattr(self, name), dtype=float)
             signed = name == "offset"
             if value.shape not in ((), (n_joints,)) or not (signed or np.all(value >= 0)):
@@ -93,6 +96,49 @@ class Controller:
                 f"{self.limit!r}; expected a speed above 0, and as limit the torque at rest"
             )
         return Controller(**values, delay=float(self.delay), follows_velocity=self.follows_velocity)
+
+    def with_joint(self, n_joints: int, joint: int, **settings: float) -> Controller:
+        """Controller with other settings of one joint.
+
+        Parameters
+        ----------
+        n_joints : int
+            Number of joints.
+        joint : int
+            Joint, counted from 1.
+        **settings : float
+            ``stiffness``, ``damping``, ``limit``, ``deadband``, ``offset`` or ``no_load_speed`` of
+            this joint, in the units above.
+
+        Returns
+        -------
+        Controller
+            Controller whose gains are arrays of shape (n_joints,).
+
+        Raises
+        ------
+        SkidynError
+            The robot has no such joint, a controller no such setting for single joints, or a
+            setting is negative.
+
+        Examples
+        --------
+        >>> from skidyn.simulation import Controller
+        >>> Controller(40.0).with_joint(2, 2, limit=1.5).limit
+        array([inf, 1.5])
+        """
+        if not 1 <= joint <= n_joints:
+            raise SkidynError(f"no joint {joint}; the robot has joints 1 to {n_joints}")
+        strange = sorted(set(settings) - set(PER_JOINT))
+        if strange:
+            raise SkidynError(
+                f"a controller has no {strange[0]} for single joints; expected one of "
+                f"{', '.join(PER_JOINT)}"
+            )
+        changed = self.checked(n_joints)
+        for name, value in settings.items():
+            getattr(changed, name)[joint - 1] = value
+        return changed.checked(n_joints)
 
     def torque(self, q: Array, dq: Array, q_ref: Array, dq_ref: Array) -> Array:
         """Torque of the drive.

@@ -32,5 +32,8 @@ from skidyn.measurement._measures import (
     rest_share as rest_share,
     reversals as reversals,
 )
-from skidyn.measurement._servos import SERVO_CHECKS as SERVO_CHECKS
+from skidyn.measurement._servo_settings import (
+    ServoSetting as ServoSetting,
+    servo_settings as servo_settings,
+)
 from skidyn.measurement._torque import measured_delay as measured_delay

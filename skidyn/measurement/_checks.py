@@ -39,7 +39,6 @@ from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._odd import OddRecording
 from skidyn.measurement._odd_motion import OddMotion
 from skidyn.measurement._overflow import OverflowedTorque
-from skidyn.measurement._servos import ServoCurrent, ServoGain, ServoVoltage
 from skidyn.measurement._smoothing import SmoothedTorque
 from skidyn.measurement._suspicion import CERTAINTIES, Suspicion
 from skidyn.measurement._torque import Columns, TorqueDelay, UnsignedTorque
@@ -67,9 +66,6 @@ CHECKS: tuple[Check, ...] = (
     UNSIGNED,
     OverflowedTorque(),
     Axes(),
-    ServoGain(),
-    ServoCurrent(),
-    ServoVoltage(),
     OddRecording(),
     Columns(),
     TorqueScale(),
@@ -109,7 +105,7 @@ def list_checks() -> tuple[Check, ...]:
     --------
     >>> from skidyn.measurement import list_checks
     >>> [check.name for check in list_checks() if check.stage == 1]
-    ['axes', 'servo_gain', 'servo_current', 'servo_voltage', 'odd_recording', 'reading']
+    ['axes', 'odd_recording', 'reading']
     """
     return CHECKS
 

@@ -134,7 +134,9 @@ def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int]:
     beyond, middle = 0, len(lags_tried) // 2
     own_errors, own_gains, halves = np.full(n, np.nan), np.zeros(n), np.full((n, 2), np.nan)
     drifts = np.full(n, np.nan)
-    unknown = Delay(np.nan, np.nan, np.full(n, np.nan), own_errors, 0.0, own_gains, halves)
+    unknown = Delay(
+        np.nan, np.nan, np.full(n, np.nan), own_errors, 0.0, own_gains, halves, drifts=drifts
+    )
     s = fits.motion(Reading())
     every = np.arange(10 * fits.robot.n_bodies)
     regressor = fits.mean_regressor(fits.robot, s, every)

@@ -20,7 +20,9 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,30 +63,42 @@ class Servo:
 
     Attributes
     ----------
-    limit : float
-        Largest torque, N m or N; that at rest where it falls with the speed.
-    speed : float
-        Speed at which nothing is left of it, rad/s or m/s; infinite if it does not fall.
+    limit : ndarray of shape (1,) or (2,)
+        Largest torque, N m or N; if it falls with the speed, that at rest, and the speed at which
+        nothing is left of it, rad/s or m/s.
+    half : ndarray of the same shape
+        Half the widths of their 95 % intervals; NaN if the limit is not needed.
     rows : int
         Rows at the limit.
     left : float
         Share of their squared error that the limit leaves.
+    drop : float
+        Share of the squared error of all rows that the limit removes.
     is_limited : bool
         Whether the limit is needed.
     gain, error : float
         What the torque is of that of the stated bodies below the limit, and its standard error.
     unexplained : float
         Share of the variance of the torque that the stated bodies leave at this gain.
+    gain_drop : float
+        Share of the squared error of the stated bodies that this gain removes.
     """
 
-    limit: float
-    speed: float
+    limit: Array
+    half: Array
     rows: int
     left: float
+    drop: float
     is_limited: bool
     gain: float
     error: float
     unexplained: float
+    gain_drop: float
+
+    @property
+    def falls(self) -> bool:
+        """Whether the limit falls with the speed."""
+        return len(self.limit) > 1
 
 
 def servos_seen(measurement: Measurement) -> dict[int, Servo]:
@@ -101,11 +115,12 @@ def _seen(fits: Fits, j: int) -> Servo:
     mean, use = fits.mean_torque(j)
     most = np.abs(torque).max(axis=1)
     design, _ = fits.felt(j)
+    needed_of = partial(_needed, design, mean)
     below = float(np.quantile(most[use], BELOW))
     for _ in range(2):
-        needed = _needed(design, mean, use & (most < below))
+        needed = needed_of(use & (most < below))
         below = JUST_BELOW * _first_limit(needed, torque, use, most)
-    needed = _needed(design, mean, use & (most < below))
+    needed = needed_of(use & (most < below))
     error_of = _Error(needed, torque, speed, use)
     own = _limit(error_of, _first_limit(needed, torque, use, most))
     supplied = clipped(torque, speed, own).mean(axis=1)
@@ -124,11 +139,36 @@ def _seen(fits: Fits, j: int) -> Servo:
         and total < LEFT
         and (own[0] < WITHIN * np.abs(torque).max() or len(own) > 1)
     )
+    half = np.full(len(own), np.nan)
+    if is_limited:
+        low = use & (most < below)
+        half = _half(
+            own,
+            hit,
+            lambda kept: _Error(needed_of(low & kept), torque, speed, use & kept).least(own),
+        )
     used = free if is_limited else use
     stated = np.column_stack([fits.columns(Reading())[:, :, j], np.ones(len(mean))])
-    gain, error, rest = _gain(stated[used], mean[used])
-    top = float(own[1]) if len(own) > 1 else np.inf
-    return Servo(float(own[0]), top, int(at.sum()), left, is_limited, gain, error, rest)
+    gain = _gain(stated[used], mean[used])
+    return Servo(own, half, int(at.sum()), left, 1 - total, is_limited, *gain)
+
+
+def _half(
+    limit: Array, hit: NDArray[np.bool_], again: Callable[[NDArray[np.bool_]], Array]
+) -> Array:
+    """Half the widths of 95 % intervals of a limit, from blocks of rows that are left out in turn.
+
+    Each block has its part of the rows at the limit, which are few, and of the others.
+    """
+    from scipy.special import stdtrit  # scipy.stats takes longer to import
+
+    n_blocks = min(BLOCKS, int(hit.sum()))
+    block = np.empty(len(hit), dtype=np.int64)
+    for rows in (hit, ~hit):
+        block[rows] = np.arange(rows.sum()) * n_blocks // max(rows.sum(), 1)
+    found: Array = np.array([again(block != k) for k in range(n_blocks)])
+    spread = np.sum((found - found.mean(axis=0)) ** 2, axis=0)
+    return np.asarray(stdtrit(n_blocks - 1, 0.975) * np.sqrt((n_blocks - 1) / n_blocks * spread))
 
 
 def _needed(design: Array, mean: Array, low: NDArray[np.bool_]) -> Array:
@@ -206,10 +246,11 @@ def _limit(error: _Error, first: float) -> Array:
     return falling if error(falling) < FALLS * error(constant) else constant
 
 
-def _gain(columns: Array, torque: Array) -> tuple[float, float, float]:
-    """Multiple of the stated bodies' torque, its standard error, and what they leave.
+def _gain(columns: Array, torque: Array) -> tuple[float, float, float, float]:
+    """Multiple of the stated bodies' torque, its standard error, what they leave, and the gain.
 
-    The error is that by blocks that are left out in turn, what is left a share of the variance.
+    The error is that by blocks that are left out in turn, what is left a share of the variance, and
+    the gain the share of the squared error at the stated multiple that it removes.
     """
     block = np.arange(len(torque)) * BLOCKS // max(len(torque), 1)
     found: Array = np.array(
@@ -217,7 +258,12 @@ def _gain(columns: Array, torque: Array) -> tuple[float, float, float]:
     )
     gains = found[1:, 0]
     spread = np.sum((gains - gains.mean()) ** 2)
-    return float(found[0, 0]), float(np.sqrt((BLOCKS - 1) / BLOCKS * spread)), float(found[0, 1])
+    error = float(np.sqrt((BLOCKS - 1) / BLOCKS * spread))
+    _, as_stated = _multiple(columns[:, 1:], torque - columns[:, 0])
+    variances = float(np.var(torque - columns[:, 0])), max(float(np.var(torque)), 1e-300)
+    before = as_stated * variances[0] / variances[1]
+    drop = 1 - float(found[0, 1]) / max(before, 1e-300)
+    return float(found[0, 0]), error, float(found[0, 1]), float(drop)
 
 
 def _multiple(columns: Array, torque: Array) -> tuple[float, float]:

@@ -38,8 +38,4 @@ __all__ = [
 # For other packages of skidyn; no part of the public interface.
 from skidyn.simulation._additions import InTurn as InTurn, judge_in_turn as judge_in_turn
 from skidyn.simulation._score import HORIZON as HORIZON
-from skidyn.simulation._servo_laws import (
-    LAWS as LAWS,
-    SERVO_EFFECTS as SERVO_EFFECTS,
-    title_of as title_of,
-)
+from skidyn.simulation._servo_laws import LAWS as LAWS

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -87,6 +88,38 @@ def fit_all(
         mean = np.mean([search.x for search in own], axis=0)
         fits.append(Fit(dict(zip(own[0].names, map(float, mean), strict=True)), left))
     return fits
+
+
+def covariance(
+    loop: JointLoop, ranges: Mapping[str, Range], values: Mapping[str, float]
+) -> tuple[list[str], Array]:
+    """Names and covariance of the parameters of a fitted model, robust to correlated errors.
+
+    Errors of the simulated position last for tenths of a second: they are summed over blocks of a
+    second, which are taken as independent.
+
+    Parameters
+    ----------
+    loop : JointLoop
+        The joint.
+    ranges : dict of str to Range
+        Parameters.
+    values : dict of str to float
+        Their fitted values.
+    """
+    search = _Search(loop, ranges, values, 0)
+    (errors,) = _errors(loop, search.names, [search], [search.beside()])
+    slope = (errors[1:] - errors[0]) / search.step[:, None, None]
+    seconds: Any = np.floor(loop.time - loop.time[0]).astype(int)
+    block: Any = seconds + (seconds.max() + 1) * np.arange(errors.shape[2])
+    size = search.size  # parameters have very different units
+    flat = (slope * size[:, None, None]).reshape(len(size), -1)
+    sums = [np.bincount(block.ravel(), x * errors[0].ravel()) for x in flat]
+    score: Array = np.array(sums, dtype=np.float64)[:, np.unique(block)]
+    n, p = score.shape[1], len(size)
+    inverse = np.linalg.pinv(flat @ flat.T, rcond=1e-10, hermitian=True)
+    spread = inverse @ (score @ score.T) @ inverse * n / max(n - p, 1)
+    return search.names, spread * np.outer(size, size)
 
 
 class _Search:

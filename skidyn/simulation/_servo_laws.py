@@ -7,9 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from skidyn.effects import get_effect
+from skidyn._signals import Array
 from skidyn.forward import JointLoop
 
+#: Half the width of a 95 % interval in standard errors.
+WIDE = 1.96
 #: Initial values of second fits: half of a play, as share of the travel, and compliance.
 FARTHER, SOFTER = 0.02, 5e-3
 
@@ -24,38 +26,6 @@ class Range:
     size: float
     unit: str = "one"
 
-
-@dataclass(frozen=True)
-class ServoEffect:
-    """An effect of the servo itself, which is not a torque of the robot and not in the catalogue.
-
-    Parameters
-    ----------
-    kind : str
-        Name.
-    title : str
-        Title.
-    parameter : str
-        Name of its size, equal to that of the argument of :class:`~skidyn.forward.Controller`.
-    unit, unit_of_slider : str
-        Its unit.
-    """
-
-    kind: str
-    title: str
-    parameter: str
-    unit: str
-    unit_of_slider: str
-
-    def units(self, slides: bool) -> dict[str, str]:
-        """Unit of the size."""
-        return {self.parameter: self.unit_of_slider if slides else self.unit}
-
-
-#: Effects that are missing in the controller and not in the model.
-SERVO_EFFECTS = {
-    "servo_deadband": ServoEffect("servo_deadband", "Deadband of the servo", "deadband", "rad", "m")
-}
 
 FRICTION = {
     "viscous": Range(0.5, -5.0, 20.0, 1.0, "drag"),
@@ -89,18 +59,6 @@ LAWS: dict[str, dict[str, Range]] = {
 }
 #: Effects of one group act in series in a gear; a second one would be equivalent.
 GEARS = ("joint_elasticity", "backlash")
-
-
-def title_of(kind: str) -> str:
-    """Title of the effect."""
-    return SERVO_EFFECTS[kind].title if kind in SERVO_EFFECTS else get_effect(kind).title
-
-
-def units_told(kind: str, slides: bool) -> dict[str, str]:
-    """Units of the reported sizes of a kind."""
-    if kind in SERVO_EFFECTS:
-        return SERVO_EFFECTS[kind].units(slides)
-    return get_effect(kind).units(slides)
 
 
 def rivals_of(loop: JointLoop, known: tuple[str, ...]) -> list[tuple[str, dict[str, Range]]]:
@@ -146,6 +104,35 @@ def units_of(loop: JointLoop) -> dict[str, float]:
         "speed": speed,
         "way": float(np.std(loop.q[seen])) + 1e-9,
         "error": float(np.median(np.abs((loop.command - loop.q)[seen]))) + 1e-9,
+    }
+
+
+def halves_told(
+    kind: str, values: dict[str, float], names: list[str], covariance: Array
+) -> dict[str, float]:
+    """Half the widths of the 95 % intervals of :func:`sizes_told`, to first order.
+
+    Parameters
+    ----------
+    kind : str
+        Kind.
+    values : dict of str to float
+        Fitted values.
+    names : list of str
+        Names of the rows of the covariance.
+    covariance : ndarray of shape (n_names, n_names)
+        Of the fitted values.
+    """
+    here = sizes_told(kind, values)
+    slopes: dict[str, list[float]] = {name: [] for name in here}
+    for name in names:
+        step = 1e-6 * max(abs(values[name]), 1e-9)
+        there = sizes_told(kind, {**values, name: values[name] + step})
+        for told, value in there.items():
+            slopes[told].append((value - here[told]) / step)
+    return {
+        told: WIDE * float(np.sqrt(max(np.array(s) @ covariance @ np.array(s), 0.0)))
+        for told, s in slopes.items()
     }
 
 

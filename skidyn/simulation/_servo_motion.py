@@ -25,18 +25,18 @@ from skidyn._exceptions import LogError, SkidynError
 from skidyn._progress import track
 from skidyn._signals import Array
 from skidyn._text import inside, measure
+from skidyn.effects import get_effect
 from skidyn.forward import Controller, JointLoop, Task, read_task
-from skidyn.simulation._servo_fit import Fit, fit_all
+from skidyn.simulation._servo_fit import Fit, covariance, fit_all
 from skidyn.simulation._servo_laws import (
     FRICTION,
     GEARS,
     LAWS,
     Range,
+    halves_told,
     rivals_of,
     sizes_told,
     starts_of,
-    title_of,
-    units_told,
 )
 
 #: Length of a piece, s, and fewest pieces.
@@ -65,8 +65,8 @@ class ServoFinding:
     Parameters
     ----------
     kind : str
-        Kind of the catalogue, or ``"servo_deadband"``, which is missing in the controller and not
-        in the model.
+        Kind of the catalogue; ``"servo_deadband"`` is missing in the controller and not in the
+        model.
     joint : int
         Joint, counted from 1.
     parameters : dict of str to float
@@ -80,6 +80,8 @@ class ServoFinding:
         Error that the next best explanation leaves, rad or m.
     unit : {"rad", "m"}, default="rad"
         That of the joint's position.
+    halves : dict of str to float
+        Half the widths of the 95 % intervals of the parameters.
 
     Examples
     --------
@@ -96,17 +98,26 @@ class ServoFinding:
     rival: str
     beside: float
     unit: Literal["rad", "m"] = "rad"
+    halves: dict[str, float] = field(default_factory=dict)
 
     @property
     def title(self) -> str:
         """Title of the effect."""
-        return title_of(self.kind)
+        return get_effect(self.kind).title
 
     @property
     def size(self) -> str:
         """Its parameters with their units."""
-        units = units_told(self.kind, self.unit == "m")
-        return ", ".join(measure(k, v, units.get(k, "")) for k, v in self.parameters.items())
+        told = []
+        for name, value in self.parameters.items():
+            half = self.halves.get(name)
+            row = value if half is None else (value, value - half, value + half)
+            told.append(measure(name, row, self._units.get(name, "")))
+        return ", ".join(told)
+
+    @property
+    def _units(self) -> dict[str, str]:
+        return get_effect(self.kind).units(self.unit == "m")
 
     @property
     def sentence(self) -> str:
@@ -122,7 +133,7 @@ class ServoFinding:
         said = f"the error of the simulated motion is {after} instead of {before} m{self.unit}"
         if self.beside >= self.before:
             return f"{said}; no other effect reduces it"
-        return f"{said}; with {inside(title_of(self.rival))} it would be {beside}"
+        return f"{said}; with {inside(get_effect(self.rival).title)} it would be {beside}"
 
     def to_dict(self) -> dict[str, Any]:
         """As in the report of a diagnosis.
@@ -132,7 +143,38 @@ class ServoFinding:
         dict
             The parameters above, and ``sentence``.
         """
-        return {**asdict(self), "sentence": self.sentence}
+        told = asdict(self)
+        del told["halves"]
+        return {**told, "sentence": self.sentence}
+
+    def to_effect(self) -> dict[str, Any]:
+        """As one of the effects in the report of a diagnosis.
+
+        Returns
+        -------
+        dict
+            ``kind``, ``joints``, ``parameters`` with 95 % intervals, ``error_drop`` (share of the
+            squared error of the simulated position that it removes), ``q_value`` (None: effects are
+            judged by their error on held-out pieces), ``rivals``, ``separating_motion``,
+            ``sentence`` and ``judged_by``, which is ``"motion"``.
+        """
+        parameters = {}
+        for name, value in self.parameters.items():
+            half = self.halves.get(name)
+            low, high = (None, None) if half is None else (value - half, value + half)
+            unit = self._units.get(name, "1")
+            parameters[name] = {"value": value, "low": low, "high": high, "unit": unit}
+        return {
+            "kind": self.kind,
+            "joints": [self.joint],
+            "parameters": parameters,
+            "error_drop": 1.0 - (self.after / self.before) ** 2,
+            "q_value": None,
+            "rivals": [],
+            "separating_motion": get_effect(self.kind).separating_motion,
+            "sentence": self.sentence,
+            "judged_by": "motion",
+        }
 
     def __str__(self) -> str:
         return self.sentence
@@ -400,8 +442,18 @@ def _name(joint: _Joint) -> _Answer | None:
     before, after, beside = (float(np.sqrt(fit.mean)) for fit in (plain, whole[best], whole[other]))
     if not after < NEARER * _command_error(loop):
         return None
-    said = sizes_told(best, whole[best].values)
-    finding = ServoFinding(best, joint.index + 1, said, before, after, other, beside)
+    values, ranges = whole[best].values, {**joint.ranges, **first[best][1]}
+    halves = halves_told(best, values, *covariance(loop, ranges, values))
+    finding = ServoFinding(
+        best,
+        joint.index + 1,
+        sizes_told(best, values),
+        before,
+        after,
+        other,
+        beside,
+        halves=halves,
+    )
     return _Answer(finding, whole[best], first[best][1])
 
 

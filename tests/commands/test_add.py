@@ -3,7 +3,24 @@
 
 import json
 
+import pytest
+
 from skidyn import cli
+
+SERVO = '{"stiffness": [200, 12], "damping": [12, 0.6], "follows_velocity": false}'
+MODEL = ("--model", "rigid_body,viscous,coulomb,rotor_inertia")
+
+
+@pytest.fixture(scope="module")
+def weak_servo(servo_log, work, tmp_path_factory):
+    """A report of servos whose second one supplies 0.5 N m at most, which nobody was told."""
+    pytest.importorskip("jinja2", reason="needs skidyn[report]")
+    folder = tmp_path_factory.mktemp("weak")
+    servo_log({}, limit=(100.0, 0.5)).log.to_csv(folder / "run.csv", index=False)
+    words = ["diagnose", folder / "run.csv", "--urdf", work / "arm.urdf", "--controller", SERVO]
+    written = ["--out", folder / "report.json", "--html", folder / "page.html"]
+    assert cli.main([*map(str, (*words, *MODEL, *written))]) == cli.DONE
+    return folder
 
 
 def test_add_lowers_the_error_of_the_joint(diagnosed, run):
@@ -16,3 +33,30 @@ def test_add_lowers_the_error_of_the_joint(diagnosed, run):
     assert errors["after"][1] < 0.5 * errors["before"][1]
     effects = json.loads(out.read_text("utf-8"))["effects"]
     assert ("stribeck", [2]) in [(e["kind"], e["joints"]) for e in effects]
+
+
+def test_a_setting_of_a_servo_is_added_to_its_controller(weak_servo, work, run):
+    (effect,) = json.loads((weak_servo / "report.json").read_text("utf-8"))["effects"]
+    assert (effect["kind"], effect["joints"]) == ("servo_current", [2])
+    assert "Current limit of the servo" in (weak_servo / "page.html").read_text("utf-8")
+    words = ("add", "--from", weak_servo / "report.json", "--effect", "servo_current")
+    code, added = run(*words, "--joints", 2)
+    assert code == cli.DONE and added["after"][1] < 0.1 * added["before"][1]
+    assert added["controller"]["limit"] == [None, effect["parameters"]["limit"]["value"]]
+    code, clean = run(
+        "diagnose", weak_servo / "run.csv", "--urdf", work / "arm.urdf", *MODEL, "--controller",
+        json.dumps(added["controller"]), "--effects", "stribeck,servo_current",
+    )  # fmt: skip
+    assert code == cli.DONE and clean["effects"] == []
+
+
+def test_other_effects_are_added_beside_the_settings_of_the_report(weak_servo, run):
+    words = ("--effect", "stribeck", "--joints", 2)
+    code, errors = run("add", "--from", weak_servo / "report.json", *words)
+    assert code == cli.DONE and errors["before"][1] < 0.05
+
+
+def test_a_setting_that_was_not_found_is_refused(weak_servo, capsys):
+    words = ["add", "--from", str(weak_servo / "report.json"), "--effect", "servo_gain"]
+    assert cli.main(words) == cli.BAD_INPUT
+    assert "no servo_gain on these joints; it is a setting of the servo" in capsys.readouterr().err

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Every kind of the vocabulary is found in a log that another code path has made.
 
-The kinds of tests/diagnosis/test_diagnosis.py are left out here, and what MuJoCo has natively,
-which is tested in test_mujoco.py. The simulator integrates states and play at about 1 kHz and
-shares no code with the catalogue.
+The kinds of tests/diagnosis/test_diagnosis.py and test_servo_settings.py are left out here, and
+what MuJoCo has natively, which is tested in test_mujoco.py. The simulator integrates states and
+play at about 1 kHz and shares no code with the catalogue.
 """
 
 from __future__ import annotations
@@ -40,6 +40,7 @@ ELSEWHERE = {
     *("time_delay", "temperature_friction"),
     *("coupled_friction", "coupled_inertia", "coupling_spring", "base_tilt", "end_stop"),
     "external_wrench",
+    *("servo_gain", "servo_current", "servo_voltage", "servo_deadband"),
 }
 
 

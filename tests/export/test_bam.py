@@ -69,6 +69,34 @@ def test_bam_itself_reads_the_file_and_has_the_same_friction(name, tmp_path):
     assert other.kt.value == MOTOR["kt"] and other.armature.value == MOTOR["armature"]
 
 
+#: Keys of the files of better-actuator-models 1.0.2 (bam/params/xl330), for installations without
+#: that package, which requires Python 3.12.
+ALWAYS = {"model", "actuator", "friction_base", "friction_viscous", *MOTOR}
+STRIBECK = {"friction_stribeck", "dtheta_stribeck", "alpha"}
+EITHER = {"load_friction_motor", "load_friction_external"}
+PUBLISHED = {
+    "m1": set(),
+    "m2": STRIBECK,
+    "m3": {"load_friction_base"},
+    "m4": {"load_friction_base", "load_friction_stribeck", *STRIBECK},
+    "m5": {*EITHER, *(f"{key}_stribeck" for key in EITHER), *STRIBECK},
+    "m6": {*EITHER, *(f"{key}_{law}" for key in EITHER for law in ("stribeck", "quad")), *STRIBECK},
+}
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_files_have_the_keys_of_the_published_ones(name, tmp_path):
+    keys = ALWAYS | PUBLISHED[name]
+    numbers = {k: v for k, v in {**FRICTION, **MOTOR}.items() if k in keys}
+    published = {**numbers, "model": name, "actuator": "xl330"}
+    assert set(published) == keys
+    (tmp_path / "published.json").write_text(json.dumps(published))
+    servo = read_bam(tmp_path / "published.json")
+    assert (servo.name, servo.actuator, servo.parameters) == (name, "xl330", numbers)
+    write_bam(servo, tmp_path / "own.json")
+    assert json.loads((tmp_path / "own.json").read_text()) == published
+
+
 def test_friction_of_every_model_by_hand():
     p, motor, outside, speed = FRICTION, 0.6, -0.4, -0.5
     fade = np.exp(-((0.5 / 0.8) ** 1.4))

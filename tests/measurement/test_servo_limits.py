@@ -28,11 +28,11 @@ def test_a_servo_within_its_limits_has_its_gain(servo_log):
 
 def test_size_and_fall_of_a_limit_are_found(servo_log):
     weak = seen(servo_log({}, limit=(100.0, 0.5)))[1]
-    assert weak.is_limited and weak.limit == pytest.approx(0.5, rel=0.03)
-    assert weak.speed == np.inf and weak.left < 0.01
+    assert weak.is_limited and not weak.falls and weak.limit == pytest.approx([0.5], rel=0.03)
+    assert abs(weak.limit[0] - 0.5) < weak.half[0] and weak.left < 0.01
     slow = seen(servo_log({}, limit=(100.0, 0.8), no_load_speed=(np.inf, 2.0)))[1]
-    assert slow.is_limited and slow.limit == pytest.approx(0.8, rel=0.1)
-    assert slow.speed == pytest.approx(2.0, rel=0.1)
+    assert slow.is_limited and slow.falls and slow.limit == pytest.approx([0.8, 2.0], rel=0.1)
+    assert np.all(abs(slow.limit - [0.8, 2.0]) < slow.half)
     assert slow.gain == pytest.approx(1.0, abs=0.02)
 
 

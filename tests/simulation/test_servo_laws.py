@@ -3,10 +3,12 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
-from skidyn.simulation import LAWS, SERVO_EFFECTS, title_of
-from skidyn.simulation._servo_laws import FRICTION, rivals_of, sizes_told, units_told
+from skidyn.effects import get_effect
+from skidyn.simulation import LAWS
+from skidyn.simulation._servo_laws import FRICTION, halves_told, rivals_of, sizes_told
 
 
 def kinds(known=(), **words):
@@ -30,5 +32,13 @@ def test_a_known_gear_is_the_only_one():
 def test_every_size_that_is_told_has_a_unit(kind):
     values = {name: r.start for name, r in (FRICTION | LAWS[kind]).items()}
     told = sizes_told(kind, values)
-    assert title_of(kind) and set(told) <= {*units_told(kind, False), "power"}
-    assert kind not in SERVO_EFFECTS or set(told) == set(units_told(kind, True))
+    assert set(told) <= {*get_effect(kind).units(), "power"}
+
+
+def test_an_interval_follows_from_the_fitted_parameters():
+    values = {"coulomb": 2.0, "presliding": 100.0, "compliance": 0.01}
+    names, apart = ["coulomb", "presliding", "compliance"], np.diag([0.01, 4.0, 1e-8])
+    half = halves_told("joint_elasticity", values, names, apart)["K"]
+    assert half == pytest.approx(1.96 * 1e-4 / 0.01**2, rel=1e-3)
+    half = halves_told("dahl", values, names, apart)["presliding"]
+    assert half == pytest.approx(1.96 * 0.02 * np.hypot(0.1 / 2, 2 / 100), rel=1e-3)

@@ -70,7 +70,7 @@ def test_a_deadband_that_nobody_was_told_is_named(servo_log):
     (found,) = explain_servo_motion(fitted(loose), loose.log, loose.controller)
     assert (found.kind, found.joint) == ("servo_deadband", 2)
     assert found.parameters == {"deadband": pytest.approx(0.01, rel=0.05)}
-    assert found.sentence.startswith("Deadband of the servo of joint 2 (deadband = 0.010 rad)")
+    assert found.sentence.startswith("Deadband of the servo of joint 2 (deadband = 0.010")
 
 
 def test_effects_of_two_joints_are_named_one_after_the_other(servo_log):
