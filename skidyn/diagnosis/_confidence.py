@@ -18,7 +18,7 @@ from skidyn._signals import Array
 
 #: Weights of the constant, of the margin, of the logarithm of the inflation of the variance by
 #: autocorrelation, of the decimal logarithm of the share of the error that is removed.
-CONSTANT, MARGIN, CORRELATED, REMOVED = 2.4, 1.8, -1.1, 1.8
+CONSTANT, MARGIN, CORRELATED, REMOVED = 2.9, 1.8, -1.1, 1.8
 #: Weights of an unknown effect on the same joints, of folds that are blocks of time and not
 #: recordings, of an equally good kind on other joints, and of an equally good but less simple one
 #: on the same joints.
@@ -27,7 +27,7 @@ NAMELESS, BLOCKS, ALIKE, EQUALLED = -1.3, -0.5, -2.4, -0.5
 FEW = -0.6
 #: Weight of an error that mostly remains on the joint where it was largest: more than this share of
 #: the part above the noise, and this multiple of the noise. A third of such effects are right.
-STAYS, MOSTLY, ABOVE_NOISE = -1.7, 0.6, 1.2
+STAYS, MOSTLY, ABOVE_NOISE = -2.2, 0.6, 1.2
 #: Margins between which another explanation of the same joints is equally good or better; one that
 #: explains far more acts on other joints, too.
 EQUAL, ABOVE = 0.005, 0.1
@@ -37,7 +37,7 @@ COLOURED, LEAST, ENOUGH = 1.7, 0.003, 0.3
 MOST = 0.98
 #: Highest confidence of an unknown effect, which may be a known one with another formula, and of an
 #: effect that leaves most of the error.
-MOST_NAMELESS = 0.88
+MOST_NAMELESS = 0.93
 
 
 def confidence(
@@ -81,7 +81,7 @@ def confidence(
     Returns
     -------
     float
-        Between 0 and 0.98, or 0.88 for an unknown effect or if most of the error remains.
+        Between 0 and 0.98, or 0.93 for an unknown effect or if most of the error remains.
     """
     logit = CONSTANT + MARGIN * min(max(margin, 0.0), 1.0)
     logit += CORRELATED * float(np.log(max(inflation / COLOURED, 1.0)))

@@ -319,7 +319,7 @@ class RepeatedRows(Check):
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         count = measurement.repeated
-        if count > REPEATED * measurement.n_samples and not _coarse(measurement):
+        if count > REPEATED * measurement.n_samples:
             share = count / measurement.n_samples
             measurement.stale = True
             yield self.suspicion(
@@ -327,7 +327,7 @@ class RepeatedRows(Check):
                 f"in {count} of {measurement.n_samples} rows no position changes although joints "
                 "move: the recorder polled faster than the robot reports, so derivatives are too "
                 "noisy",
-                "certain" if share > MANY else "suspected",
+                "noted" if _coarse(measurement) else "certain" if share > MANY else "suspected",
                 remedy=("--drop-repeated", "drop_repeated=True"),
             )
 

@@ -219,7 +219,7 @@ def missing_values(torque: np.ndarray, idle: np.ndarray) -> np.ndarray:
         begins, ends = edges[::2], edges[1::2]
         inside = (begins > 0) & (ends < len(values))
         begins, ends = begins[inside], ends[inside]
-        if not len(begins):
+        if not len(begins) or zero.mean() > MOSTLY_ZERO:
             continue
         beside = np.minimum(values[begins - 1], values[ends])
         jump = beside > JUMPS * float(np.median(values[~zero]))
