@@ -17,8 +17,12 @@ HEAVY = ("matplotlib", "pandas", "pytorch_kinematics", "sklearn", "skorch", "tor
 
 
 def modules_after(statement: str) -> set[str]:
-    """Names of the top-level packages that a fresh interpreter has loaded after a statement."""
-    code = f"{statement}; import sys; print(*sorted({{m.partition('.')[0] for m in sys.modules}}))"
+    """Names of the packages that a fresh interpreter has loaded after a statement.
+
+    Of the packages inside another one, only those of SciPy.
+    """
+    names = "{'.'.join(m.split('.')[:1 + m.startswith('scipy.')]) for m in sys.modules}"
+    code = f"{statement}; import sys; print(*sorted({names}))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     return set(done.stdout.split())
 
@@ -35,10 +39,11 @@ def test_physics_needs_neither_torch_nor_pictures_nor_tables():
     assert not loaded.intersection({"matplotlib", "pandas", "skorch", "torch"})
 
 
-def test_a_log_is_checked_without_scikit_learn():
-    """A third of the time until the first answer."""
+def test_a_log_is_checked_without_scikit_learn_and_slow_parts_of_scipy():
+    """A third of the time until the first answer, each."""
     loaded = modules_after("import skidyn.logs, skidyn.evidence, skidyn.measurement")
-    assert not loaded.intersection(HEAVY)
+    slow = {f"scipy.{name}" for name in ("optimize", "signal", "stats")}
+    assert not loaded.intersection({*HEAVY, *slow})
 
 
 def test_a_robot_and_its_torques_need_numpy_only():

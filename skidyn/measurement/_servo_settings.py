@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import erfc
 
 import numpy as np
-from scipy.stats import norm
 
 from skidyn._signals import Array
 from skidyn.measurement._measurement import Measurement
@@ -98,7 +98,7 @@ def _gains(other: dict[int, Servo], stiffness: Array) -> Iterator[ServoSetting]:
             j,
             {"stiffness": (value, low, high)},
             servo.gain_drop,
-            float(2 * norm.sf(abs(np.log(servo.gain)) * servo.gain / servo.error)),
+            erfc(abs(np.log(servo.gain)) * servo.gain / servo.error / np.sqrt(2)),
             f"the torque computed from the stated gain is {servo.gain:.3g} ± {wide:.2g} times that "
             f"of the bodies of the description (95 %), which is 1 within {100 * ALIKE:.0f} % on "
             "most other joints",
