@@ -66,7 +66,7 @@ def dropouts(quantity: str, share: float) -> Spoil:
         changed = log.copy()
         rows = rng.random(len(log)) < share
         changed.loc[rows, columns(quantity, robot.n_joints)] = 0.0
-        return Spoiled(changed, robot, ("broken_samples",))
+        return Spoiled(changed, robot, ("broken_samples", "missing_torque"))
 
     return spoil
 

@@ -22,6 +22,7 @@ class Acceleration(Check):
     """Accelerations that are not the derivative of the velocities."""
 
     name = "acceleration"
+    stage = 2  # it is not that of a motion with wrong units or columns
     suspects = (
         "logged accelerations with the opposite sign, in degrees, or of a signal other than the "
         "velocities"
@@ -31,6 +32,8 @@ class Acceleration(Check):
         s = measurement.signals
         if measurement.lost or measurement.stale or measurement.clock != 1 or not s.ddq.any():
             return  # not logged, or to be compared once the clock is right
+        if measurement.odd_motion:
+            return
         groups: dict[str, list[int]] = {}
         slopes = {}
         for k, (of_velocity, likeness) in enumerate(measurement.velocities):

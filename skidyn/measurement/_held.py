@@ -103,6 +103,9 @@ def stuck_parts(measurement: Measurement, k: int) -> list[tuple[int, int]]:
     far = STUCK_WAY * float(np.ptp(s.q[:, k]))
     parts = [(int(begins[i]), int(begins[i] + lengths[i])) for i in long]
     limits = (torque.min(), torque.max(), 0.0)
+    whole = [torque[s.trajectory == run] for run in np.unique(s.trajectory[[a for a, _ in parts]])]
+    if any(np.ptp(own) == 0 for own in whole):
+        return []  # reported as constant in these trajectories
     return [(a, b) for a, b in parts if torque[a] not in limits and np.ptp(s.q[a:b, k]) > far]
 
 
@@ -136,7 +139,7 @@ class MissingTorque(Check):
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         missing = measurement.missing
         joints = np.flatnonzero(missing.any(axis=0)).tolist()
-        if joints:
+        if joints and not measurement.lost:
             rows = missing.any(axis=1)
             names = ", ".join(measurement.joint(k) for k in joints)
             yield self.suspicion(

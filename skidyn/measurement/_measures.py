@@ -26,7 +26,7 @@ FARTHER, BEYOND, RANGE, PLACES = 4.0, 8.0, 1e-3, 2e-3
 MOSTLY_ZERO, IDLE_WAY = 0.3, 0.01
 #: Least rows, and time in s, at an end of a recording without changes of torque, to be reported.
 IDLE_ROWS, IDLE_TIME = 8, 0.05
-#: Fewest rows of zeros in the place of missing torques; least ratio of the torque beside them to
+#: Fewest places with zeros instead of missing torques; least ratio of the torque beside them to
 #: the median torque: near a true zero it is small.
 FEWEST_MISSING, JUMPS = 5, 0.4
 #: Most steps that a position may be held before it catches up, and the share of the distance that
@@ -225,7 +225,7 @@ def missing_values(torque: np.ndarray, idle: np.ndarray) -> np.ndarray:
         jump = beside > JUMPS * float(np.median(values[~zero]))
         for a, b in zip(begins[jump], ends[jump], strict=True):
             missing[a:b, k] = True
-        if missing[:, k].sum() < max(FEWEST_MISSING, 0.5 * zero.sum()):
+        if jump.sum() < FEWEST_MISSING or missing[:, k].sum() < 0.5 * zero.sum():
             missing[:, k] = False  # zeros are usual
     return missing
 

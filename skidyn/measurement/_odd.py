@@ -116,10 +116,11 @@ class OddRecording(Check):
             if zero is not None:
                 shifted[worst.run] = zero
                 unlike = [one for one in unlike if one.run != worst.run]
-        if shifted:
+        if shifted or scaled:
             # a wrong reading of all recordings may affect one most
             asked = sum(c.gain for c in asked_changes(measurement, seen.fits) if not c.other)
             shifted = {run: zero for run, zero in shifted.items() if zero[2] > asked}
+            scaled = [one for one in scaled if one.gain > asked]
         measurement.odd = bool(scaled or unlike or shifted)
         for run, (joint, angle, gain) in shifted.items():
             yield self.suspicion(
