@@ -222,7 +222,9 @@ def missing_values(torque: np.ndarray, idle: np.ndarray) -> np.ndarray:
         if not len(begins) or zero.mean() > MOSTLY_ZERO:
             continue
         beside = np.minimum(values[begins - 1], values[ends])
-        jump = beside > JUMPS * float(np.median(values[~zero]))
+        # a coarse torque is one step away from zero
+        least = max(JUMPS * float(np.median(values[~zero])), 1.5 * float(values[~zero].min()))
+        jump = beside > least
         for a, b in zip(begins[jump], ends[jump], strict=True):
             missing[a:b, k] = True
         if jump.sum() < FEWEST_MISSING or missing[:, k].sum() < 0.5 * zero.sum():
