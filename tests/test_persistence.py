@@ -185,7 +185,7 @@ def arguments(*values):
     ("name", "values"),
     [
         ("skidyn._writing.write_text", ["{harm}", "harm"]),
-        ("skidyn.report._write.write_json", ["{harm}", {}]),
+        ("skidyn._writing.write_json", ["{harm}", {}]),
         ("skidyn.dynamics._compiled.compile_library", ["void f(void) {{}}"]),
         ("skidyn.robots._robot.Robot", ["{harm}"]),
         ("pathlib.Path", ["{harm}"]),
