@@ -18,7 +18,7 @@ from skidyn._signals import Array
 
 #: Weights of the constant, of the margin, of the logarithm of the inflation of the variance by
 #: autocorrelation, of the decimal logarithm of the share of the error that is removed.
-CONSTANT, MARGIN, CORRELATED, REMOVED = 2.9, 1.8, -1.1, 1.8
+CONSTANT, MARGIN, CORRELATED, REMOVED = 2.9, 1.8, -1.35, 1.8
 #: Weights of an unknown effect on the same joints, of folds that are blocks of time and not
 #: recordings, of an equally good kind on other joints, and of an equally good but less simple one
 #: on the same joints.

@@ -21,7 +21,8 @@ def _carried(signals: Signals, joint: int, shape: Mapping[str, Any]) -> Array:
     assert signals.load is not None
     dry = shape.get("friction", 0.0) * signals.sign[:, joint]
     viscous = shape.get("damping", 0.0) * signals.dq[:, joint]
-    return np.asarray(signals.load[:, joint] + dry + viscous)
+    carried: Array = signals.load[:, joint] + dry + viscous
+    return carried
 
 
 class LoadDependentFriction(Effect):
