@@ -13,7 +13,7 @@ from skidyn._signals import Array
 from skidyn.measurement._check import Check
 from skidyn.measurement._fits import SAMPLES, Fits, Reading
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._measures import position_step
+from skidyn.measurement._measures import position_step, runs_of
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import cut_columns, readable_fits
 
@@ -66,10 +66,10 @@ def _zeros(measurement: Measurement, k: int) -> float:
     if torque.min() >= 0 or torque.max() <= 0:
         return 0.0
     zero = (torque == 0) & ~measurement.idle
-    edges = np.flatnonzero(np.diff(np.r_[0, zero.astype(int), 0]))
-    lengths = edges[1::2] - edges[::2]
+    begins, ends = runs_of(zero)
+    lengths = ends - begins
     moves = np.r_[0, np.cumsum(speed > FAST * speed.max())]
-    moving = moves[edges[1::2]] - moves[edges[::2]] > lengths / 2
+    moving = moves[ends] - moves[begins] > lengths / 2
     passes = lengths[(lengths >= RUN) & moving]
     if len(passes) < PASSES or len(np.unique(torque)) < FINE:
         return 0.0

@@ -121,11 +121,15 @@ def find_delay(fits: Fits) -> Delay:
     far, _ = _delay_within(fits, FAR_LAGS)
     if beyond > MOST_BEYOND * fits.n_joints:
         return replace(far, runs={})  # these lags are too far apart for single recordings
-    own = ("joints", "errors", "gains", "halves", "drifts")
-    for k in np.flatnonzero(~np.isfinite(near.joints) & np.isfinite(far.joints)).tolist():
-        for name in own:
-            getattr(near, name)[k] = getattr(far, name)[k]
-    return near
+    only_far = ~np.isfinite(near.joints) & np.isfinite(far.joints)
+    return replace(
+        near,
+        joints=np.where(only_far, far.joints, near.joints),
+        errors=np.where(only_far, far.errors, near.errors),
+        gains=np.where(only_far, far.gains, near.gains),
+        halves=np.where(only_far[:, None], far.halves, near.halves),
+        drifts=np.where(only_far, far.drifts, near.drifts),
+    )
 
 
 def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int]:

@@ -202,6 +202,12 @@ def idle_rows(
     return idle
 
 
+def runs_of(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """First rows of the runs of true rows in a mask, and the rows after their last ones."""
+    edges = np.flatnonzero(np.diff(np.r_[0, mask.astype(int), 0]))
+    return edges[::2], edges[1::2]
+
+
 def missing_values(torque: np.ndarray, idle: np.ndarray) -> np.ndarray:
     """Zeros beside which the torque is not small, as a mask of shape (n_samples, n_joints).
 
@@ -215,8 +221,7 @@ def missing_values(torque: np.ndarray, idle: np.ndarray) -> np.ndarray:
     missing = np.zeros(torque.shape, dtype=bool)
     for k, values in enumerate(np.abs(torque.T)):
         zero = (values == 0) & ~idle
-        edges = np.flatnonzero(np.diff(np.r_[0, zero.astype(int), 0]))
-        begins, ends = edges[::2], edges[1::2]
+        begins, ends = runs_of(zero)
         inside = (begins > 0) & (ends < len(values))
         begins, ends = begins[inside], ends[inside]
         if not len(begins) or zero.mean() > MOSTLY_ZERO:
@@ -257,8 +262,8 @@ def longest_plateau_share(torque: np.ndarray, segments: Sequence[slice]) -> floa
     at_limit &= torque != 0  # the smallest magnitude is not a limit
     rows = 0
     for part in segments:
-        edges = np.flatnonzero(np.diff(np.r_[0, at_limit[part].astype(int), 0]))
-        lengths = edges[1::2] - edges[::2]
+        begins, ends = runs_of(at_limit[part])
+        lengths = ends - begins
         rows += int(lengths[lengths >= 5].sum())
     return rows / len(torque)
 
