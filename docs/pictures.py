@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Pictures of the pages that skidyn makes, for this documentation.
 
-    python docs/pictures.py [--chromium chromium]
+    python docs/pictures.py [--chromium /usr/bin/chromium]
 
 Simulates what is shown (two minutes), opens it in Chromium and writes ``docs/_static/pictures``.
 Look at them before they are committed.
@@ -120,7 +120,7 @@ def bring(page: Page, selector: str) -> None:
     page.evaluate("document.querySelector('nav').remove()")
     page.evaluate("s => document.querySelector(s).scrollIntoView({behavior: 'instant'})", selector)
     page.evaluate("scrollBy(0, 20)")
-    page.wait_for_timeout(300)
+    page.wait_for_timeout(1500)  # plots are drawn when they are near
 
 
 def of_the_comparison(browser: Browser, path: Path) -> None:

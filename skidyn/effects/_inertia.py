@@ -20,7 +20,7 @@ class RotorInertia(Effect):
     is_exact = True
     simplicity = 3
     rivals = ("joint_elasticity", "time_delay")
-    separating_motion = "accelerations in several poses; on the first joint no motion separates it"
+    separating_motion = "accelerations in several poses (of any joint but the first)"
     reference = "Gautier, Khalil (1990), IEEE TRA 6(3), 368-373."
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:

@@ -20,6 +20,7 @@ from skidyn._bundled import bundled
 from skidyn._exceptions import SkidynError
 from skidyn._optional import import_optional
 from skidyn._progress import listening
+from skidyn.effects import get_effect
 from skidyn.explorer._session import Session
 from skidyn.identification import RBDRegressor
 from skidyn.simulation import Controller
@@ -70,6 +71,7 @@ class Explorer:
             "units": units,
             "trajectories": s.trajectories,
             "history": s.history,
+            "titles": [get_effect(h["added"]).title if h["added"] else "" for h in s.history],
             "refinable": s.refinable,
             "noise": [float(x) for x in s.noise],
             "worst": s.worst,
@@ -317,6 +319,7 @@ def serve(
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     listener.bind((HOST, port))
+    listener.listen()  # a page that is opened at once waits instead of being refused
     port = listener.getsockname()[1]
     app = make_app(explorer, port)
     # a report that is being made is abandoned: files are written completely or not at all

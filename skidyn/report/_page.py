@@ -8,7 +8,8 @@ from typing import Any
 
 from skidyn._bundled import bundled
 from skidyn._optional import import_optional
-from skidyn._text import digits, raised
+from skidyn._text import digits, inside, raised
+from skidyn.effects import get_effect, list_effects
 from skidyn.report._glossary import meaning
 from skidyn.report._picture import Canvas, Summary, pictures
 
@@ -94,8 +95,10 @@ def change(ratio: float) -> str:
 
 
 def words(kind: str) -> str:
-    """Kind of the vocabulary as words."""
-    return "unknown effect" if kind == "unknown" else kind.replace("_", " ")
+    """Title of a kind for a sentence; other words are written without underscores."""
+    if kind == "unknown":
+        return "unknown effect"
+    return inside(get_effect(kind).title) if kind in list_effects() else kind.replace("_", " ")
 
 
 def chance(q_value: float | None) -> str:

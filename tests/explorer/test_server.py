@@ -236,7 +236,7 @@ def test_the_loop_click_by_click(explorer, tmp_path):
         tab.wait_for_selector("body[data-ranked='2 span 2']")
         given, now = errors_shown(tab, 2)
         assert now < 0.2 * given
-        assert tab.text_content("#added li span") == "spring on joint 2"
+        assert tab.text_content("#added li span") == "Spring on joint 2"
         tab.wait_for_selector("#added small:not(:empty)")
         assert "±" in tab.text_content("#added small.size")
         assert "confidence" in tab.text_content("#added small.sure")

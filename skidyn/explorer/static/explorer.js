@@ -3,8 +3,7 @@
   const token = new URLSearchParams(location.search).get("token");
   const el = (id) => document.getElementById(id);
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-  const percent = (x) => (100 * x).toFixed(Math.abs(x) < 0.0995 ? 1 : 0) + " %";
-  const words = (kind) => kind.replaceAll("_", " ");
+  const percent = (x) => (100 * x).toFixed(Math.abs(x) < 0.0995 ? 1 : 0) + "%";
   const joint = () => Number(el("joint").value);
   const trajectory = () => Number(el("trajectory").value);
   const short = (x) => (x == null ? "–" : Number(x.toPrecision(2)).toString());
@@ -128,9 +127,9 @@
     }));
     el("added").replaceChildren(...state.history.slice(1).map((h, k) => {
       const item = node("li"), off = node("button", "Remove");
-      off.setAttribute("aria-label", `Remove ${words(h.added)}`);
+      off.setAttribute("aria-label", `Remove ${state.titles[k + 1]}`);
       off.addEventListener("click", () => remove(k + 1));
-      item.append(node("span", `${words(h.added)} on ${on(h.joints)}`), off, node("small", "", "size"), node("small", "", "sure"));
+      item.append(node("span", `${state.titles[k + 1]} on ${on(h.joints)}`), off, node("small", "", "size"), node("small", "", "sure"));
       return item;
     }));
     if (state.history.length < 2) el("added").append(node("li", "nothing yet"));
@@ -167,7 +166,7 @@
     el("where").textContent = `(joint ${joint()}, ${place})`;
     el("whole").hidden = el("chosen").hidden = !span;
     el("effects").replaceChildren(...answer.effects.map(effect));
-    if (!answer.effects.length) el("effects").append(node("li", `No further effect of the catalogue reduces the held-out error of joint ${joint()} by 1 % or more.`));
+    if (!answer.effects.length) el("effects").append(node("li", `No further effect of the catalogue reduces the held-out error of joint ${joint()} by 1% or more.`));
     el("effects").removeAttribute("aria-busy");
     redraw();
     document.body.dataset.ranked = `${joint()} ${span ? "span" : "all"} ${state.history.length}`;
@@ -190,7 +189,7 @@
     } finally { el("effects").removeAttribute("aria-busy"); }
     const spent = (performance.now() - start).toFixed(0);
     document.body.dataset.spent = spent;
-    say(`${words(kind)} added and refitted in ${spent} ms`);
+    say(`${state.titles.at(-1)} added and refitted in ${spent} ms`);
     await rank();
     if (state.refinable && (await change("refine"))) {
       await rank();
