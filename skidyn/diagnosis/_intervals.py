@@ -28,7 +28,7 @@ from skidyn.evidence import (
 
 CONFIDENCE = 0.95
 #: Relative step of the derivative with respect to a shape parameter; largest change of a torque by
-#: it, relative to the torque; division of steps with a larger one, as of the waves of a fine ripple.
+#: it, relative to the torque; divisor of a step with a larger change, as of a fine ripple.
 STEP, LARGEST_CHANGE, SMALLER = 0.02, 0.3, 8.0
 
 Interval = tuple[float, float, float]
