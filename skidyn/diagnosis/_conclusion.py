@@ -455,8 +455,10 @@ def _sure(
     beside = any(set(f.joints) & set(finding.joints) for f in others)
     same = sorted({j - 1 for f in findings if f.kind == finding.kind for j in f.joints})
     before, after = (error[same] for error in errors)
-    # Noise that is correlated in time is larger than its fast part, and similar on all joints.
-    alike = max(1.0, float(np.min(errors[1] / np.maximum(parts.noise, np.finfo(float).tiny))))
+    # Noise that is correlated in time is larger than its fast part, and similar on all joints; a
+    # single joint does not show this.
+    ratio = errors[1] / np.maximum(parts.noise, np.finfo(float).tiny)
+    alike = max(1.0, float(ratio.min())) if len(ratio) > 1 else 1.0
     probability = confidence(
         finding.margin,
         float(parts.inflation[joints].max()),

@@ -83,7 +83,8 @@ def confidence(
     float
         Between 0 and 0.98, or 0.88 for an unknown effect or if most of the error remains.
     """
-    logit = CONSTANT + MARGIN * min(max(margin, 0.0), 1.0)
+    # Where all known effects leave most of the error, the best of them need not be right.
+    logit = CONSTANT + (0.0 if stays else MARGIN * min(max(margin, 0.0), 1.0))
     logit += CORRELATED * float(np.log(max(inflation / COLOURED, 1.0)))
     logit += REMOVED * float(np.log10(min(max(removed, LEAST), ENOUGH) / ENOUGH))
     logit += NAMELESS * nameless + BLOCKS * (not whole_recordings)
