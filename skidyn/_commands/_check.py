@@ -5,12 +5,14 @@ from __future__ import annotations
 
 import argparse
 import shlex
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
 from skidyn._commands._arguments import command, with_log_only
 from skidyn._commands._input import read_frame, read_robot
 from skidyn._commands._output import print_json, working
+from skidyn._exceptions import LogWarning
 
 DESCRIPTION = """\
 Check whether the signals of a log agree with their names and units. Problems are listed by their
@@ -37,7 +39,10 @@ def run(options: argparse.Namespace) -> None:
     from skidyn.logs import check_log
 
     robot = read_robot(options) if options.urdf else None
-    frame = read_frame(options, robot, check=False)
+    with warnings.catch_warnings():
+        if not options.json:  # the notes are printed above the checks
+            warnings.simplefilter("ignore", LogWarning)
+        frame = read_frame(options, robot, check=False)
     with working("Checking", options):
         quality = check_log(frame, robot)
     if options.json:

@@ -28,6 +28,8 @@ FEW = -0.6
 #: Weight of an error that mostly remains on the joint where it was largest: more than this share of
 #: the part above the noise, and this multiple of the noise. A third of such effects are right.
 STAYS, MOSTLY, ABOVE_NOISE = -2.2, 0.6, 1.2
+#: Weight of a suspicion about the signals of its joints, which would be another explanation.
+DOUBTED = -1.5
 #: Margins between which another explanation of the same joints is equally good or better; one that
 #: explains far more acts on other joints, too.
 EQUAL, ABOVE = 0.005, 0.1
@@ -96,6 +98,23 @@ def confidence(
     )
     most = MOST if has_name and not stays else MOST_NAMELESS
     return min(most, float(1 / (1 + np.exp(-logit))))
+
+
+def in_doubt(probability: float) -> float:
+    """Confidence of an effect if a check suspects the signals of its joints.
+
+    Parameters
+    ----------
+    probability : float
+        Confidence without the suspicion (:func:`confidence`).
+
+    Returns
+    -------
+    float
+        At most 0.88.
+    """
+    odds = probability / max(1 - probability, 1e-9) * float(np.exp(DOUBTED))
+    return min(MOST_NAMELESS, odds / (1 + odds))
 
 
 def mostly_stays(before: Array, after: Array, noise: Array) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,9 @@ from skidyn._exceptions import ColumnError, EffectError, LogError, LogWarning
 from skidyn._order import refuse_shuffled
 from skidyn._signals import Array, Signals, read_signals
 from skidyn.diagnosis._conclusion import conclude
+from skidyn.diagnosis._confidence import in_doubt
 from skidyn.diagnosis._correction import is_physics, open_model
+from skidyn.diagnosis._findings import Finding
 from skidyn.diagnosis._hypothesis import SearchResult
 from skidyn.diagnosis._limits import Gates, Limit, find_limits, without_withdrawn
 from skidyn.diagnosis._result import Diagnosis
@@ -315,6 +318,7 @@ def _diagnose(
     data = (X, tau) if weight is None else (X, tau, weight)
     diagnosis = conclude(wider, completed, limits, sliding, judged, notes, least, model, data)
     diagnosis.checks = checks
+    diagnosis.findings = [_beside_doubts(f, checks) for f in diagnosis.findings]
     kept = {c.site for h in diagnosis.result.findings for c in h.candidates}
     sought = [c for h in completed.findings for c in h.candidates]
     withdrawn = [c for c in sought if c.site not in kept]
@@ -323,6 +327,16 @@ def _diagnose(
     if of_servos and diagnosis.verdict == "complete":
         diagnosis.verdict = "missing"
     return diagnosis
+
+
+def _beside_doubts(finding: Finding, checks: Sequence[Suspicion]) -> Finding:
+    """The finding, less sure if a check suspects the signals of its joints or the whole log."""
+    doubts = [s for s in checks if s.certainty != "noted"]
+    if finding.confidence is None or not any(
+        not s.joints or set(s.joints) & set(finding.joints) for s in doubts
+    ):
+        return finding
+    return replace(finding, confidence=in_doubt(finding.confidence))
 
 
 def _search(

@@ -76,12 +76,14 @@ class ClockUnit(Check):
         if measurement.rate < 2 and not (shared > 1 and unnamed_scale(measurement, shared)):
             # the unit in which a robot would have been sampled at a usual rate
             usual = [
-                u
-                for factor, u in CLOCKS.items()
+                (factor, unit)
+                for factor, unit in CLOCKS.items()
                 if factor > 1 and 20 <= measurement.rate * factor <= 2e4
             ]
-            unit = usual[0] if usual else "ms"
+            factor, unit = usual[0] if usual else (1e3, "ms")
             agrees = np.isfinite(typical) and abs(typical - 1) < NEAR
+            if not agrees:
+                measurement.clock = factor  # velocities are told when time is in seconds
             yield self.suspicion(
                 f"time may be in {unit}",
                 f"the median time step is {1 / measurement.rate:.4g} s",
