@@ -103,3 +103,17 @@ def test_shifted_evidence_keeps_recordings_apart():
     merged = one.shifted(1, groups=2)
     assert dict(merged.counts) == {(1, 0): 60, (0, 0): 30}
     np.testing.assert_allclose(merged.solve(), one.solve(), rtol=1e-10)
+
+
+def test_columns_without_information_get_no_coefficient():
+    rng = np.random.default_rng(0)
+    a = rng.normal(size=(50, 3))
+    a[:, 1] = 0.0
+    rows = np.column_stack([a, a @ [1.0, 5.0, 2.0]])
+    np.testing.assert_allclose(
+        Evidence.from_rows(("a", "b", "c"), {(0, 0): rows}).solve(), [1.0, 0.0, 2.0], atol=1e-12
+    )
+    twice = np.column_stack([a[:, 0], a[:, 0], a[:, 0] * 2])
+    np.testing.assert_allclose(  # the shortest of all solutions
+        Evidence.from_rows(("a", "b"), {(0, 0): twice}).solve(), [1.0, 1.0], atol=1e-12
+    )

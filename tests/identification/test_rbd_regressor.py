@@ -276,3 +276,38 @@ def test_pickle_of_fitted_and_unfitted(rubs, rubbing):
     same(pickle.loads(pickle.dumps(rubs)), rubs, rubbing.X)
     unfitted = pickle.loads(pickle.dumps(RBDRegressor(rubbing.robot)))
     assert not hasattr(unfitted, "coef_")
+
+
+def test_a_single_sample_is_refused_or_exact():
+    robot = load_planar_arm()
+    x = np.array([[0.1, 0.2, 0.3, 0.4, 0.5, 0.6]])
+    model = RBDRegressor(robot, effects=(), smooth=False)
+    y = robot.inverse_dynamics(x[:, :2], x[:, 2:4], x[:, 4:])
+    try:
+        assert np.isfinite(model.fit(x, y).predict(x)).all()
+    except ValueError as error:
+        assert "sample" in str(error) or "row" in str(error)
+
+
+def test_missing_values_are_refused_by_the_model():
+    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=2, duration=2.0)
+    X = log.X.copy()
+    X.iloc[100, 3] = np.nan
+    with pytest.raises(ValueError, match="NaN"):
+        RBDRegressor(log.robot).fit(X, log.y)
+
+
+def test_a_trajectory_of_a_million_rows_is_fitted_exactly():
+    robot = load_planar_arm()
+    t = np.arange(1_000_000) / 1000.0
+    q = np.column_stack([np.sin(0.7 * t) + 0.3 * np.sin(2.1 * t), np.sin(1.3 * t + 1)])
+    dq = np.column_stack(
+        [0.7 * np.cos(0.7 * t) + 0.63 * np.cos(2.1 * t), 1.3 * np.cos(1.3 * t + 1)]
+    )
+    ddq = np.column_stack(
+        [-0.49 * np.sin(0.7 * t) - 1.323 * np.sin(2.1 * t), -1.69 * np.sin(1.3 * t + 1)]
+    )
+    y = robot.inverse_dynamics(q, dq, ddq) + 2.0 * dq
+    X = np.column_stack([t, q, dq, ddq])
+    model = RBDRegressor(robot, ("viscous",), smooth=False, time=0).fit(X, y)
+    np.testing.assert_allclose(model.coef_[-2:], 2.0, rtol=1e-8)

@@ -118,3 +118,12 @@ def test_mass_scales_torque_and_nothing_else(factor):
 
 def _text(name):
     return (files("skidyn.datasets") / "robots" / f"{name}.urdf").read_text()
+
+
+def test_a_thousand_joints_move_exactly(chain):
+    """All about one axis: every joint carries the inertia of what follows it."""
+    n = 1000
+    ddq = np.full((1, n), 0.1)
+    torque = Robot.from_urdf(chain([f"j{k}" for k in range(n)])).inverse_dynamics(ddq, ddq, ddq)
+    speed_up = 0.1 * np.arange(1, n + 1)  # of each link, its inertia is 1
+    np.testing.assert_allclose(torque[0], speed_up[::-1].cumsum()[::-1], rtol=1e-10)
