@@ -127,3 +127,25 @@ def test_a_thousand_joints_move_exactly(chain):
     torque = Robot.from_urdf(chain([f"j{k}" for k in range(n)])).inverse_dynamics(ddq, ddq, ddq)
     speed_up = 0.1 * np.arange(1, n + 1)  # of each link, its inertia is 1
     np.testing.assert_allclose(torque[0], speed_up[::-1].cumsum()[::-1], rtol=1e-10)
+
+
+@settings(max_examples=15, deadline=None)
+@given(seed=st.integers(0, 2**31))
+def test_rigid_bodies_know_no_direction_of_time(seed):
+    """Forces of inertia are even in the velocity; those of gravity have a potential."""
+    robot = load_scara()
+    q, dq, ddq = np.random.default_rng(seed).uniform(-2, 2, (3, 6, robot.n_joints))
+    np.testing.assert_allclose(
+        robot.inverse_dynamics(q, -dq, ddq), robot.inverse_dynamics(q, dq, ddq), atol=1e-10
+    )
+    # A torque field with a potential has a symmetric derivative.
+    step, zero = 1e-6, np.zeros_like(q)
+    slopes = np.stack(
+        [
+            robot.inverse_dynamics(q + step * e, zero, zero)
+            - robot.inverse_dynamics(q - step * e, zero, zero)
+            for e in np.eye(robot.n_joints)
+        ],
+        axis=-1,
+    ) / (2 * step)
+    np.testing.assert_allclose(slopes, slopes.transpose(0, 2, 1), atol=1e-5)
