@@ -2,6 +2,7 @@
 """Settings and fixtures of the whole test suite."""
 
 import os
+import shutil
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -36,6 +37,14 @@ def data_dir() -> Path:
 
 
 @pytest.fixture(scope="session")
+def c_compiler() -> str:
+    """Command of a C compiler; the test is skipped where there is none."""
+    names = (os.environ.get("CC", "cc"), "gcc", "clang")
+    found = [command for name in names if (command := shutil.which(name))]
+    return found[0] if found else pytest.skip("no C compiler")
+
+
+@pytest.fixture(scope="session")
 def fresh_processes():
     """No processes of joblib are left from other tests.
 
@@ -55,6 +64,21 @@ def saved(tmp_path):
         return tmp_path / name
 
     return save
+
+
+@pytest.fixture(scope="session")
+def signals_of():
+    """Makes signals of the columns of a log; accelerations that it lacks are zero."""
+    from skidyn.effects import Signals
+
+    def make(frame, robot):
+        numbers = range(1, robot.n_joints + 1)
+        q, dq = (frame[[f"{name}{k}" for k in numbers]].to_numpy() for name in ("q", "dq"))
+        ddq = frame.reindex(columns=[f"ddq{k}" for k in numbers], fill_value=0.0).to_numpy()
+        time = frame["time"].to_numpy()
+        return Signals(q, dq, ddq, frame["trajectory"].to_numpy(), time=time, robot=robot)
+
+    return make
 
 
 @pytest.fixture(scope="session")
