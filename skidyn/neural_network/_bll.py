@@ -31,7 +31,7 @@ from skorch import NeuralNet
 from skidyn._columns import ColumnSpec
 from skidyn._compat import HasMethods, Interval, StrOptions, fit_context
 from skidyn._keys import Keys, fitted_keys
-from skidyn._order import taken, time_order
+from skidyn._order import folds_taken, taken, time_order
 from skidyn.model_selection import held_out_folds, order_of_log
 from skidyn.neural_network._base import SequenceRegressor, deferred_training, train_together
 from skidyn.neural_network._lstm import LSTMRegressor, directions
@@ -244,8 +244,7 @@ class BLLRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEst
         folds = self._given_folds(table, y, groups)
         order = order_of_log(self, X, keys)
         if order is not None:
-            place = np.argsort(order)
-            folds = folds and [(np.sort(place[a]), np.sort(place[b])) for a, b in folds]
+            folds = folds_taken(folds, order)
             X, y, sample_weight = (taken(t, order) for t in (X, y, sample_weight))
         rng = check_random_state(self.random_state)
         bagging = self._bagging(keys, sample_weight is not None, int(rng.randint(2**31 - 1)))
