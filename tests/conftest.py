@@ -69,6 +69,8 @@ def saved(tmp_path):
 @pytest.fixture(scope="session")
 def signals_of():
     """Makes signals of the columns of a log; accelerations that it lacks are zero."""
+    import numpy as np
+
     from skidyn.effects import Signals
 
     def make(frame, robot):
@@ -76,7 +78,9 @@ def signals_of():
         q, dq = (frame[[f"{name}{k}" for k in numbers]].to_numpy() for name in ("q", "dq"))
         ddq = frame.reindex(columns=[f"ddq{k}" for k in numbers], fill_value=0.0).to_numpy()
         time = frame["time"].to_numpy()
-        return Signals(q, dq, ddq, frame["trajectory"].to_numpy(), time=time, robot=robot)
+        slides = np.array([kind == "prismatic" for kind in robot.joint_types])
+        trajectory = frame["trajectory"].to_numpy()
+        return Signals(q, dq, ddq, trajectory, time=time, prismatic=slides, robot=robot)
 
     return make
 
