@@ -75,3 +75,26 @@ def test_a_joint_that_slides_for_a_moment_counts_as_one_at_rest(signals_of):
     made = make_problem(signals, torque, robot=robot, rigid_body=True, terms=terms, smooth=False)
     assert made.rows.counts[1] == 0 and made.rows.counts[0] > 100
     assert not made.rows.sliding[:, 1].any()
+
+
+def test_samples_take_the_fold_of_the_nearest_row_of_their_trajectory():
+    made = problem(4)
+    rows, fold = made.rows, made.fold[0]
+    found = made.sample_folds(0)
+    for name in np.unique(made.signals.trajectory):
+        own, mine = made.signals.trajectory == name, rows.trajectory[0] == name
+        distance = np.abs(made.signals.clock[own, None] - rows.time[0][mine])
+        nearest = distance <= distance.min(axis=1, keepdims=True) + 1e-9
+        folds = np.where(nearest, fold[mine], -1)
+        assert (folds == found[own, None]).any(axis=1).all()
+
+
+def test_without_a_clock_every_sample_is_a_row():
+    made = problem(2)
+    signals = made.signals.with_(time=None)
+    torque = signals.robot.inverse_dynamics(signals.q, signals.dq, signals.ddq)
+    bare = make_problem(
+        signals, torque, robot=signals.robot, rigid_body=True, terms=made.terms, smooth=False
+    )
+    assert bare.rows.counts.tolist() == [signals.n_samples] * 2
+    np.testing.assert_array_equal(bare.rows.average(signals.q, 0), signals.q)
