@@ -344,6 +344,7 @@ def test_robots_from_a_milligram_to_thousands_of_tonnes(reference, factor):
     assert model.coef_names_ == reference.coef_names_
     np.testing.assert_allclose(model.coef_ / factor, reference.coef_, rtol=1e-6, atol=1e-9)
     np.testing.assert_allclose(model.coef_std_ / factor, reference.coef_std_, rtol=1e-4, atol=1e-9)
+    assert model.condition_number_ == pytest.approx(reference.condition_number_, rel=1e-3)
 
 
 @pytest.mark.parametrize("length", [1e-3, 1e3])
