@@ -103,8 +103,10 @@ def package_of(parts):
     return parts[0] if parts and parts[0] in PACKAGES else GROUND
 
 
+@pytest.fixture(scope="module")
 def imports_within():
     """Each import of skidyn by skidyn: where it stands, its own package, and what it imports."""
+    found = []
     for path in sorted(SOURCE.rglob("*.py")):
         parts = path.relative_to(SOURCE).with_suffix("").parts
         tree = ast.parse(path.read_text(encoding="utf-8"))
@@ -118,7 +120,8 @@ def imports_within():
                 continue
             for name in names:
                 where = f"{path.relative_to(SOURCE.parent)}:{node.lineno}"
-                yield where, package_of(parts), name.split(".")[1:], node in guarded
+                found.append((where, package_of(parts), name.split(".")[1:], node in guarded))
+    return found
 
 
 def for_type_checks(tree):
@@ -128,18 +131,18 @@ def for_type_checks(tree):
             yield from ast.walk(node)
 
 
-def test_no_package_reaches_into_another():
+def test_no_package_reaches_into_another(imports_within):
     private = [
         f"{where}: skidyn.{'.'.join(name)}"
-        for where, own, name, _ in imports_within()
+        for where, own, name, _ in imports_within
         if package_of(name) not in (own, GROUND) and any(p.startswith("_") for p in name[1:])
     ]
     assert not private, "import from the package instead (its __init__ names what others may use)"
 
 
-def test_packages_stand_on_each_other_without_circles():
+def test_packages_stand_on_each_other_without_circles(imports_within):
     below = defaultdict(set)
-    for _, own, name, typing_only in imports_within():
+    for _, own, name, typing_only in imports_within:
         if not typing_only and package_of(name) != own:
             below[own].add(package_of(name))
     below[GROUND] -= {COMMANDS}  # python -m skidyn
