@@ -2,6 +2,8 @@
 """How far the tests are the same tree as the sources, and use public names: prints what is not.
 
 Usage: python .ci/tests_mirror.py [--list]
+
+The modules of tests/whole are left out: they test the package as a whole.
 """
 
 from __future__ import annotations
@@ -57,7 +59,7 @@ def main() -> None:
         for path in (ROOT / "skidyn").rglob("*.py")
         if not path.stem.startswith("__")
     }
-    tests = sorted((ROOT / "tests").rglob("test_*.py"))
+    tests = sorted(p for p in (ROOT / "tests").rglob("test_*.py") if p.parent.name != "whole")
     tested = {place(path, "tests") for path in tests}
     private = {path: names for path in tests if (names := private_imports(path))}
     avoidable = {path: both for path, names in private.items() if (both := names & offered())}

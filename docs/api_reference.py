@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The one table of skidyn's public API: which page tells of what, and in which order.
 
-The API pages are generated from it, and ``tests/test_public_api.py`` checks that every public
+The API pages are generated from it, and ``tests/whole/test_public_api.py`` checks that every public
 symbol is in it exactly once.
 """
 

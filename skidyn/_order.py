@@ -58,6 +58,12 @@ def time_order(X: NDArray[Any], keys: Keys) -> NDArray[np.intp] | None:
     return order_in_time(keys.trajectories(X), None if keys.time is None else X[:, keys.time])
 
 
+def folds_taken(folds: Any, order: NDArray[np.intp]) -> Any:
+    """Pairs of training and test rows in a table whose rows were taken in an order."""
+    place = np.argsort(order)
+    return folds and [(np.sort(place[a]), np.sort(place[b])) for a, b in folds]
+
+
 def taken(table: Any, order: NDArray[np.intp] | None) -> Any:
     """Rows of a table in an order; the table itself where either is None."""
     from sklearn.utils import _safe_indexing

@@ -25,7 +25,11 @@ def fall(before: float, after: float, noise: float, unit: str, added: bool = Tru
 
 
 def digits(value: float) -> str:
-    """Two significant digits, without an exponent for a number of usual size."""
+    """Two significant digits, without an exponent for a number of usual size.
+
+    >>> [digits(x) for x in (0.6346, 12.34, 0.0, 3e-7, math.nan)]
+    ['0.63', '12', '0', '3e-07', '–']
+    """
     if not math.isfinite(value):
         return "–"
     if value == 0 or not 1e-4 <= abs(value) < 1e4:
@@ -39,6 +43,8 @@ def give_or_take(value: float, half: float) -> str:
 
     >>> give_or_take(10.534, 0.013), give_or_take(3.5, 0.4), give_or_take(971.2, 316.0)
     ('10.534 ± 0.013', '3.50 ± 0.40', '971 ± 316')
+    >>> give_or_take(1.0, math.nan)
+    '1.0'
     """
     if not (math.isfinite(value) and math.isfinite(half) and half > 0):
         return digits(value)
@@ -67,26 +73,38 @@ def raised(unit: str) -> str:
 
 
 def inside(title: str) -> str:
-    """A title for a sentence; names of people and models keep their capital letter."""
+    """A title for a sentence; names of people and models keep their capital letter.
+
+    >>> inside("Spring"), inside("Coulomb friction")
+    ('spring', 'Coulomb friction')
+    """
     return title if title.startswith(NAMES) else title[:1].lower() + title[1:]
 
 
 def joints_told(joints: Iterable[int]) -> str:
-    """Text of joints, such as ``"joints 1 and 2"``."""
+    """Text of joints.
+
+    >>> joints_told([1]), joints_told([1, 2, 4])
+    ('joint 1', 'joints 1, 2 and 4')
+    """
     numbers = [str(j) for j in joints]
     return f"joint{'s' if len(numbers) > 1 else ''} {listed(numbers)}"
 
 
 def listed(parts: Sequence[str], word: str = "and") -> str:
-    """Parts of a sentence, joined by commas and a word before the last one."""
+    """Parts of a sentence, joined by commas and a word before the last one.
+
+    >>> listed(["a", "b"], "or"), listed([])
+    ('a or b', '')
+    """
     return f" {word} ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else list(parts))
 
 
 def measure(name: str, value: object, unit: str = "") -> str:
     """A parameter with half its interval, if that is known; the unit ``"1"`` means none.
 
-    >>> measure("k", (3.5, 3.1, 3.9), "N m/rad")
-    'k = 3.50 ± 0.40 N m/rad'
+    >>> measure("k", (3.5, 3.1, 3.9), "N m/rad^2"), measure("n", 3)
+    ('k = 3.50 ± 0.40 N m/rad²', 'n = 3')
     """
     if isinstance(value, tuple) and len(value) == 3:
         middle, low, high = value
@@ -101,6 +119,8 @@ def suggest(word: object, names: Iterable[str], cutoff: float = 0.6) -> str:
 
     >>> suggest("dq_elbw", ["q_elbow", "dq_elbow"])
     " (did you mean 'dq_elbow'?)"
+    >>> suggest("weight", ["q1", "q2"])
+    ''
     """
     tried = [name for name in islice(names, TRIED) if len(name) <= LONGEST_TRIED]
     close = difflib.get_close_matches(str(word)[:LONGEST_TRIED], tried, n=1, cutoff=cutoff)

@@ -2,6 +2,8 @@
 """Settings and fixtures of the whole test suite."""
 
 import os
+import shutil
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -35,6 +37,14 @@ def data_dir() -> Path:
 
 
 @pytest.fixture(scope="session")
+def c_compiler() -> str:
+    """Command of a C compiler; the test is skipped where there is none."""
+    names = (os.environ.get("CC", "cc"), "gcc", "clang")
+    found = [command for name in names if (command := shutil.which(name))]
+    return found[0] if found else pytest.skip("no C compiler")
+
+
+@pytest.fixture(scope="session")
 def fresh_processes():
     """No processes of joblib are left from other tests.
 
@@ -54,6 +64,25 @@ def saved(tmp_path):
         return tmp_path / name
 
     return save
+
+
+@pytest.fixture(scope="session")
+def signals_of():
+    """Makes signals of the columns of a log; accelerations that it lacks are zero."""
+    import numpy as np
+
+    from skidyn.effects import Signals
+
+    def make(frame, robot):
+        numbers = range(1, robot.n_joints + 1)
+        q, dq = (frame[[f"{name}{k}" for k in numbers]].to_numpy() for name in ("q", "dq"))
+        ddq = frame.reindex(columns=[f"ddq{k}" for k in numbers], fill_value=0.0).to_numpy()
+        time = frame["time"].to_numpy()
+        slides = np.array([kind == "prismatic" for kind in robot.joint_types])
+        trajectory = frame["trajectory"].to_numpy()
+        return Signals(q, dq, ddq, trajectory, time=time, prismatic=slides, robot=robot)
+
+    return make
 
 
 @pytest.fixture(scope="session")
@@ -96,3 +125,58 @@ def _servo_log(terms, **untold):
             moved.loc[run.index, f"dq{j}"] = np.gradient(run[f"q{j}"], run["time"])
     columns = ["time", "trajectory", "q1", "q2", "dq1", "dq2", "q_ref1", "q_ref2"]
     return SimpleNamespace(robot=log.robot, log=moved[columns], controller=servo)
+
+
+@pytest.fixture(scope="session")
+def chain():
+    """Writes the URDF of links one after the other, which turn about y, from names of joints."""
+    body = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+    link = f'<link name="l{{}}"><inertial><mass value="1"/>{body}</inertial></link>'
+    joint = (
+        '<joint name="{}" type="continuous"><parent link="l{}"/><child link="l{}"/>'
+        '<axis xyz="0 1 0"/></joint>'
+    )
+
+    def write(names):
+        parts = [link.format(k) for k in range(len(names) + 1)]
+        parts += [joint.format(name, k, k + 1) for k, name in enumerate(names)]
+        return f"<robot name='r'>{''.join(parts)}</robot>"
+
+    return write
+
+
+@pytest.fixture
+def secret(tmp_path, monkeypatch):
+    """A file beside the working folder, and the names by which an attacker may call it."""
+    (tmp_path / "secret").mkdir()
+    file = tmp_path / "secret" / "secret.stl"
+    file.write_text("the secret")
+    (tmp_path / "work" / "x").mkdir(parents=True)
+    monkeypatch.chdir(tmp_path / "work")
+    names = [str(file), "../secret/secret.stl", file.as_uri(), "x/../../secret/secret.stl"]
+    return file, [*names, "package://../../secret/secret.stl"]
+
+
+_OPENED: list[str] | None = None
+
+
+def _audit(event, arguments):
+    if event == "open" and _OPENED is not None and isinstance(arguments[0], (str, bytes)):
+        _OPENED.append(os.path.realpath(os.fsdecode(arguments[0])))
+
+
+@pytest.fixture(scope="session")
+def opened():
+    """Gives the real paths of all files that a call opens, whatever library opens them."""
+    sys.addaudithook(_audit)  # cannot be removed, so it does nothing outside of a call
+
+    def watch(call):
+        global _OPENED
+        _OPENED = seen = []
+        try:
+            call()
+        finally:
+            _OPENED = None
+        return set(seen)
+
+    return watch

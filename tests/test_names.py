@@ -2,51 +2,69 @@
 """Names of columns: what is recognised, and what is left alone."""
 
 import sys
+import warnings
 
 import pytest
 
-from skidyn._names import match_names
-from skidyn.exceptions import LogError
+from skidyn.exceptions import LogError, LogWarning
 from skidyn.logs import read_log
 from skidyn.robots import Robot
 
 JOINTS = ("shoulder_pan_joint", "elbow_joint")
 
 
-def matched(names, **options):
-    return match_names(names, **options).columns
+@pytest.fixture
+def match(tmp_path, chain):
+    """Reads a log with these columns: the column of each signal, and the notes of the reader."""
+
+    def read_columns(names, joints=(), **options):
+        # each column has numbers of its own, and moves at one unit per second
+        rows = [names, *([str(100 * k + row) for k in range(len(names))] for row in range(3))]
+        (tmp_path / "log.csv").write_text("\n".join(map(";".join, rows)))
+        robot = Robot.from_urdf(chain(joints)) if joints else None
+        options = {"check": False, "needs_torque": False, "robot": robot, **options}
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", LogWarning)
+            frame = read_log(tmp_path / "log.csv", **options)
+        found = {
+            c: int(frame[c].iloc[1]) // 100 for c in frame if frame[c].iloc[1] != 1 or c == "time"
+        }
+        return {c: names[k] for c, k in found.items()}, frame.attrs["notes"]
+
+    return read_columns
 
 
-def test_contract_names():
+def test_contract_names(match):
     names = ["time", "trajectory", "q1", "dq1", "ddq1", "tau1", "temp1"]
-    assert matched(names) == {name: name for name in names}
+    assert match(names)[0] == {name: name for name in names}
 
 
-def test_targets_and_commands_are_no_joints():
-    names = ["t", "q1", "q2", "q_target1", "tau1", "tau2", "tau_cmd1", "i_des1"]
-    assert set(matched(names)) == {"time", "q1", "q2", "tau1", "tau2"}
-    assert set(matched(names, robot_joints=JOINTS)) == {"time", "q1", "q2", "tau1", "tau2"}
-
-
-def test_columns_follow_the_order_of_the_robot():
-    names = ["q_elbow_joint", "q_shoulder_pan_joint"]
-    match = match_names(names, robot_joints=JOINTS)
-    assert match.columns == {"q1": "q_shoulder_pan_joint", "q2": "q_elbow_joint"}
-    assert not match.notes
-
-
-def test_names_without_the_word_joint_are_taken_and_told():
-    match = match_names(["q_Elbow", "q_shoulder-pan", "q_gripper"], robot_joints=JOINTS)
-    assert match.columns == {"q1": "q_shoulder-pan", "q2": "q_Elbow"}
-    assert any(
-        "q_Elbow taken for joint(s) shoulder_pan_joint, elbow_joint" in note for note in match.notes
+@pytest.mark.parametrize("joints", [(), JOINTS])
+def test_targets_and_commands_are_no_joints(match, joints):
+    names = ["t", "q1", "q2", "tau1", "tau2", "q_target1", "tau_cmd1", "i_des1"]
+    columns, _ = match(names, joints)
+    assert {c: columns[c] for c in ("time", "q1", "q2", "tau1", "tau2")} == dict(
+        zip(("time", "q1", "q2", "tau1", "tau2"), names, strict=False)
     )
-    assert any("q_gripper belong to no joint" in note for note in match.notes)
 
 
-def test_actual_and_indexed_names():
-    assert matched(["actual_q_0", "actual_q_1"]) == {"q1": "actual_q_0", "q2": "actual_q_1"}
-    assert matched(["Actual Torque 1"]) == {"tau1": "Actual Torque 1"}
+def test_columns_follow_the_order_of_the_robot(match):
+    columns, notes = match(["time", "q_elbow_joint", "q_shoulder_pan_joint"], JOINTS)
+    assert (columns["q1"], columns["q2"]) == ("q_shoulder_pan_joint", "q_elbow_joint")
+    assert all("velocities" in note for note in notes)
+
+
+def test_names_without_the_word_joint_are_taken_and_told(match):
+    columns, notes = match(["time", "q_Elbow", "q_shoulder-pan", "q_gripper"], JOINTS)
+    assert (columns["q1"], columns["q2"]) == ("q_shoulder-pan", "q_Elbow")
+    assert any("q_Elbow taken for joint(s) shoulder_pan_joint, elbow_joint" in n for n in notes)
+    assert any("q_gripper belong to no joint" in note for note in notes)
+
+
+def test_actual_and_indexed_names(match):
+    names = ["time", "actual_q_0", "actual_q_1", "Actual Torque 1", "Actual Torque 2"]
+    columns, _ = match(names)
+    assert [columns[c] for c in ("time", "q1", "q2", "tau1", "tau2")] == names
 
 
 @pytest.mark.parametrize(
@@ -57,39 +75,38 @@ def test_actual_and_indexed_names():
         ["time_from_start", "theta1", "omega1", "tau_meas_1"],
     ],
 )
-def test_headers_with_units_and_other_words(names):
-    assert matched(names) == dict(zip(["time", "q1", "dq1", "tau1"], names, strict=True))
+def test_headers_with_units_and_other_words(match, names):
+    columns, _ = match(names)
+    assert [columns[c] for c in ("time", "q1", "dq1", "tau1")] == names
 
 
-def test_a_clock_in_two_columns_is_not_taken_for_one():
-    assert "time" not in matched(["sec", "nanosec", "q1"])
+def test_a_clock_in_two_columns_is_not_taken_for_one(match):
+    with pytest.raises(LogError, match="no time column"):
+        match(["sec", "nanosec", "q1", "tau1"])
 
 
-def test_said_goes_before_guessed():
-    columns = {"q1": "alpha", "time": "clock"}
-    assert matched(["time", "clock", "alpha", "q1"], columns=columns) == {
-        "q1": "alpha",
-        "time": "clock",
-    }
+def test_said_goes_before_guessed(match):
+    columns, _ = match(["time", "clock", "alpha", "q1"], columns={"q1": "alpha", "time": "clock"})
+    assert (columns["q1"], columns["time"]) == ("alpha", "clock")
 
 
 @pytest.mark.parametrize(
     "columns, message",
     [
         ({"position": "alpha"}, "'position' is not a signal of a log"),
-        ({"q": 9}, "column 9, but the log has 2"),
+        ({"q": 9}, "column 9, but .* has 2"),
         ({"q": "pos_{joint}"}, "no column matches .pos_{joint}."),
         ({"time": ["a", "b"]}, "takes one column"),
     ],
 )
-def test_mappings_that_cannot_be_met(columns, message):
+def test_mappings_that_cannot_be_met(match, columns, message):
     with pytest.raises(LogError, match=message):
-        match_names(["alpha", "beta"], columns=columns)
+        match(["alpha", "beta"], columns=columns)
 
 
-def test_a_damaged_number_makes_no_billions_of_joints():
+def test_a_damaged_number_makes_no_billions_of_joints(match):
     with pytest.raises(LogError, match="a column of joint 99999999991, but only 2 columns"):
-        match_names(["time", "q99999999991"])
+        match(["time", "q99999999991"])
 
 
 def read(path, text):
@@ -123,18 +140,6 @@ def counted(path, number, names, **options):
     return calls(lambda: read_log(path, check=False, **options))
 
 
-def robot_with(joints):
-    link = '<link name="{}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" '
-    link += 'ixz="0" iyz="0"/></inertial></link>'
-    text = "<robot name='r'>" + link.format("l0")
-    for k, name in enumerate(joints):
-        text += link.format(f"l{k + 1}") + (
-            f'<joint name="{name}" type="continuous"><parent link="l{k}"/>'
-            f'<child link="l{k + 1}"/><axis xyz="0 1 0"/></joint>'
-        )
-    return Robot.from_urdf(text + "</robot>")
-
-
 @pytest.mark.parametrize("piece", ["_", " ", "[", "1", "a_", "(a)", "/", "q", "]"])
 def test_twice_the_columns_are_twice_the_work(tmp_path, piece):
     path = tmp_path / "log.csv"
@@ -143,11 +148,11 @@ def test_twice_the_columns_are_twice_the_work(tmp_path, piece):
 
 
 @pytest.mark.parametrize("alike", [True, False])
-def test_twice_the_joints_are_twice_the_work(tmp_path, alike):
+def test_twice_the_joints_are_twice_the_work(tmp_path, chain, alike):
     """Joints that are named almost as in the log, and joints that are not in it."""
     path, numbers = tmp_path / "log.csv", []
     for n in (200, 400):
-        robot = robot_with([f"A{k}b" for k in range(n)])
+        robot = Robot.from_urdf(chain([f"A{k}b" for k in range(n)]))
         own = [f"{'a' if alike else 'c'}{k}B" for k in range(n)]
         names = [f"{joint}_{word}" for word in ("position", "effort") for joint in own]
         numbers.append(counted(path, n, names, robot=robot))
@@ -165,7 +170,11 @@ def test_what_was_meant_is_looked_for_among_some_short_names(tmp_path):
     assert many < few + 20_000  # one such comparison takes about 40,000 calls
 
 
-def test_one_column_is_never_two_joints(tmp_path):
+def test_one_column_is_never_two_joints(tmp_path, chain):
     (tmp_path / "log.csv").write_text("time,elbow_pos,elbow_effort\n0,1,2\n1,1,2\n2,1,2\n")
     with pytest.raises(LogError, match="no q of the joint"):
-        read_log(tmp_path / "log.csv", robot=robot_with(["Elbow", "elbow_joint"]), check=False)
+        read_log(
+            tmp_path / "log.csv",
+            robot=Robot.from_urdf(chain(["Elbow", "elbow_joint"])),
+            check=False,
+        )

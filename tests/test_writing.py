@@ -1,18 +1,25 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What is written replaces files only, and never what it was made from."""
 
+import json
 import os
+import signal
 import stat
+import subprocess
+import sys
+import tempfile
 import threading
+from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 
 from skidyn import save_model
-from skidyn._writing import keep, keeping_inputs, replacing, write_text
 from skidyn.datasets import load_planar_arm
 from skidyn.exceptions import SkidynError
 from skidyn.export import write_urdf
 from skidyn.report import write_json
+from skidyn.robots import Robot
 
 WRITERS = {
     "report.json": lambda path: write_json(path, {"a": 1}),
@@ -27,6 +34,17 @@ def writer(request):
     if request.param == "model.skops":
         pytest.importorskip("skops.io")
     return request.param, WRITERS[request.param]
+
+
+@pytest.fixture
+def large(writer, chain):
+    """Writes the same kind of file with more in it than small disks hold."""
+    robot = Robot.from_urdf(chain([f"j{k}" for k in range(300)]))
+    return {
+        "report.json": lambda path: write_json(path, {"a": list(range(60_000))}),
+        "robot.urdf": lambda path: write_urdf(robot, path),
+        "model.skops": lambda path: save_model(path, {"a": list(range(60_000))}),
+    }[writer[0]]
 
 
 @posix
@@ -83,21 +101,7 @@ def test_a_circle_of_links_is_named(tmp_path):
     (tmp_path / "a").symlink_to(tmp_path / "b")
     (tmp_path / "b").symlink_to(tmp_path / "a")
     with pytest.raises(OSError, match="/a'"):
-        write_text(tmp_path / "a", "text")
-
-
-def test_an_input_is_protected_under_every_name(tmp_path):
-    log = write_text(tmp_path / "log.csv", "the recording")
-    os.link(log, tmp_path / "hard.csv")
-    names = [log, tmp_path / "hard.csv", tmp_path / "x" / ".." / "log.csv"]
-    (tmp_path / "x").mkdir()
-    with keeping_inputs():
-        keep([log])
-        for name in names:
-            with pytest.raises(SkidynError, match="read by this command"):
-                write_text(name, "a report")
-    assert log.read_text() == "the recording"
-    write_text(log, "no command is running")
+        write_json(tmp_path / "a", {})
 
 
 def test_a_description_and_what_it_lacks_are_written_together(tmp_path):
@@ -107,19 +111,74 @@ def test_a_description_and_what_it_lacks_are_written_together(tmp_path):
     assert [f.name for f in tmp_path.iterdir()] == ["robot.urdf.skidyn.json"]
 
 
-def test_a_full_disk_names_the_file(tmp_path):
-    with pytest.raises(OSError, match="No space left") as raised, replacing(tmp_path / "a.json"):
-        raise OSError(28, "No space left on device")
-    assert raised.value.filename == str(tmp_path / "a.json")
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_many_writers_of_one_file_leave_a_whole_one(tmp_path):
-    texts = [f"{k}" * 100_000 for k in range(8)]
-    threads = [threading.Thread(target=write_text, args=(tmp_path / "a", t)) for t in texts]
+    texts = [{"a": f"{k}" * 100_000} for k in range(8)]
+    threads = [threading.Thread(target=write_json, args=(tmp_path / "a", t)) for t in texts]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    assert (tmp_path / "a").read_text() in texts
+    assert json.loads((tmp_path / "a").read_text()) in texts
     assert [f.name for f in tmp_path.iterdir()] == ["a"]
+
+
+@contextmanager
+def files_of_at_most(size):
+    """What the system refuses beyond it, it refuses like a full disk: amid the writing."""
+    resource = pytest.importorskip("resource")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, handler)
+
+
+@contextmanager
+def nobody():
+    """Root may write anywhere, so the tests of root are done by another user."""
+    if os.geteuid() != 0:
+        yield
+        return
+    os.seteuid(65534)
+    try:
+        yield
+    finally:
+        os.seteuid(0)
+
+
+def test_a_full_disk_leaves_the_old_file(tmp_path, writer, large):
+    name, write = writer
+    write(tmp_path / name)
+    before = {f.name: f.read_bytes() for f in tmp_path.iterdir()}
+    with files_of_at_most(50_000), pytest.raises(OSError, match="File too large") as raised:
+        large(tmp_path / name)
+    assert raised.value.filename == str(tmp_path / name)
+    assert {f.name: f.read_bytes() for f in tmp_path.iterdir()} == before
+
+
+def test_a_read_only_folder_is_named(writer):
+    name, write = writer
+    with tempfile.TemporaryDirectory() as parent:  # others may enter it, unlike tmp_path
+        os.chmod(parent, 0o755)
+        folder = Path(parent, "read_only")
+        folder.mkdir(mode=0o555)
+        with nobody(), pytest.raises(PermissionError, match="read_only"):
+            write(folder / name)
+        assert not list(folder.iterdir())
+
+
+def test_a_process_killed_while_writing_leaves_the_old_report(tmp_path):
+    file = write_json(tmp_path / "report.json", {"a": 1})
+    before = file.read_text()
+    code = (
+        "import os, signal, sys\n"
+        "from skidyn.report import write_json\n"
+        "os.replace = lambda *_: os.kill(os.getpid(), signal.SIGKILL)\n"
+        "write_json(sys.argv[1], {'a': list(range(100000))})"
+    )
+    done = subprocess.run([sys.executable, "-c", code, str(file)], capture_output=True)
+    assert done.returncode == -9
+    assert file.read_text() == before

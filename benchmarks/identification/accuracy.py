@@ -3,9 +3,9 @@
 
     python benchmarks/identification/accuracy.py
 
-Exact torque of a Panda whose motion shrinks toward one pose, so that the columns become dependent.
-It prints the largest error of a base parameter, relative to the largest parameter; the condition
-number is that of columns of unit size.
+Exact torque of a Panda whose motion is reduced around one pose, so that the columns become
+dependent. It prints the range of the motion, the condition number of the columns of unit size and
+the largest error of a base parameter relative to the largest parameter.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def main() -> None:
     index = find_base_parameters(robot).index
     truth = robot.inertial_parameters * np.random.default_rng(1).uniform(0.7, 1.3, (7, 1))
     expected = find_base_parameters(robot).values(truth - robot.inertial_parameters)
-    print(f"{'condition':>12s}{'Gram':>10s}{'QR':>10s}{'auto':>10s}  taken")
+    print(f"{'range':>8s}{'condition':>12s}{'Gram':>10s}{'QR':>10s}{'auto':>10s}  taken")
     for reach in RANGES:
         motion = reach * random_motion(robot, 20_000)
         motion[0] += [0.3, -0.5, 0.2, -1.8, 0.4, 1.5, 0.7]
@@ -41,14 +41,14 @@ def main() -> None:
             errors[method] = np.abs(found - expected).max() / np.abs(expected).max()
         taken = "gram" if errors["auto"] == errors["gram"] else "qr"
         print(
-            f"{condition:12.1e}"
+            f"{reach:8g}{condition:12.1e}"
             + "".join(f"{errors[m]:10.1e}" for m in ("gram", "qr", "auto"))
             + f"  {taken}"
         )
 
 
 def _solution(evidence) -> np.ndarray:
-    """Least squares without a threshold on the rank: what the factors know."""
+    """Least squares without a threshold on the rank: from the factors alone."""
     stacked = np.vstack(list(evidence.factors.values()))
     size = np.linalg.norm(stacked[:, :-1], axis=0)
     return np.linalg.lstsq(stacked[:, :-1] / size, stacked[:, -1], rcond=1e-16)[0] / size

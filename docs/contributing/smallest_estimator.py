@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The estimator of the recipe; tests/test_recipes.py runs it."""
+"""The estimator of the recipe; tests/whole/test_recipes.py runs it."""
 
 from __future__ import annotations
 

@@ -3,12 +3,12 @@
 Your own robot and your own log
 ===============================
 
-From a URDF and CSV files with your own column names and units to a model with a known error. The
-files are generated here; replace them by yours.
+A model with a known error is made from a URDF and CSV files with their own column names and units.
+The files are generated here; replace them by yours.
 """
 
 # %%
-# Two files, as a logger could write them: positions in degrees, time in milliseconds.
+# A logger could write two such files, with positions in degrees and time in milliseconds.
 import tempfile
 import warnings
 from pathlib import Path

@@ -9,7 +9,8 @@ from its neighbours, without the sample itself, neither follows the noise nor di
 """
 
 # %%
-# A motion whose derivatives are known, measured by an encoder of 1e-3 rad and twenty times finer.
+# The derivatives of this motion are known. It is measured by an encoder with a resolution of 1e-3
+# rad, and by one that is twenty times finer.
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd

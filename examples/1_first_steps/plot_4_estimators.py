@@ -9,7 +9,7 @@ simulated with a known arm, and each is fitted with the estimator intended for i
 """
 
 # %%
-# Torque of an arm whose bodies differ from the URDF by up to 20 %, with friction.
+# The bodies of the arm differ from the URDF by up to 20 %, and its joints have friction.
 import os
 
 import matplotlib.pyplot as plt
@@ -60,7 +60,7 @@ def noisy(noise, rng):
 
 
 # %%
-# The median over random logs of each kind.
+# The errors are medians over random logs of each kind.
 cases = (
     (broken, (0.0, 0.05, 0.1, 0.15, 0.2), ("weighted", "robust"), "share of broken rows"),
     (short, (20, 40, 80, 160, 320), ("weighted", "ridge", "entropic"), "samples"),

@@ -3,15 +3,15 @@
 Which effect looks like what?
 =============================
 
-The residual of a model due to each missing effect, plotted against the signal that shows it best.
-The motion of one arm is simulated without and with each effect on joint 1; the difference of the
-two torques is the torque of the effect. A report of :func:`skidyn.diagnosis.diagnose` contains the
-same picture for its findings, so the two can be compared.
+The residual due to each missing effect is plotted against the signal that shows it best. The motion
+of one arm is simulated without and with each effect on joint 1; the difference of the two torques
+is the torque of the effect. A report of :func:`skidyn.diagnosis.diagnose` contains the same picture
+for its findings, so the two can be compared.
 """
 
 # %%
-# Four families at a glance. Dots are samples; their colour is the direction of motion (blue:
-# forward, orange: backward), which separates friction from everything else.
+# The first picture shows four families. Dots are samples; their colour is the direction of motion
+# (blue: forward, orange: backward), which separates friction from all other effects.
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -69,8 +69,8 @@ figure.supylabel("torque of the effect in N m", fontsize=9)
 plt.show()
 
 # %%
-# Every kind of the catalogue: friction, hysteresis, functions of the position, inertia and the
-# transmission, the torque sensor, and effects on the whole arm.
+# The second picture shows every kind of the catalogue: friction, hysteresis, functions of the
+# position, inertia and the transmission, the torque sensor, and effects on the whole arm.
 KINDS = {
     "viscous": "dq", "coulomb": "dq", "stribeck": "dq", "nonlinear_viscous": "dq",
     "asymmetric_friction": "dq", "load_dependent_friction": "dq",
@@ -90,7 +90,7 @@ figure.supylabel("torque of the effect in N m", fontsize=9)
 plt.show()
 
 # %%
-# What separates the families:
+# The families differ as follows:
 #
 # * **Friction** changes its sign with the direction: two branches, one per colour. Plain Coulomb
 #   friction has two level branches; Stribeck friction rises towards zero velocity, nonlinear

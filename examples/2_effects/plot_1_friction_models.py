@@ -3,8 +3,8 @@
 Which friction model?
 =====================
 
-Fit the candidates, predict held-out trajectories, and compare the errors in a table. A model that
-is too simple for the joint has a larger error; one that is more complex than needed is hardly
+The candidates are fitted, predict held-out trajectories, and are compared by their errors. A model
+that is too simple for the joint has a larger error; one that is more complex than needed is hardly
 worse. Four simulated arms differ only in the friction of joint 1.
 """
 
@@ -57,7 +57,7 @@ for arm, kinds in chosen.items():
     print(f"{arm:20s} {', '.join(kinds) or 'nothing to add'}")
 
 # %%
-# Held-out error, relative to the best candidate of each arm.
+# The table has the held-out error relative to the best candidate of each arm.
 relative = errors / errors.min(axis=1, keepdims=True)
 figure, axes = plt.subplots(figsize=(7, 3), layout="constrained")
 axes.imshow(np.log(relative), cmap="Blues", aspect="auto", vmax=0.8)

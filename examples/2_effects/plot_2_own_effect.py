@@ -10,7 +10,7 @@ any other.
 """
 
 # %%
-# The log: a planar arm, with the drag on its second joint added to the simulated torque.
+# The drag on the second joint of a planar arm is added to the simulated torque.
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -27,8 +27,8 @@ y = log.y.copy()
 y[:, 1] += TRUE_DRAG * np.maximum(0, q - TRUE_ENTRY) * dq * np.abs(dq)
 
 # %%
-# Without the effect in the catalogue: the largest finding is unknown, and depends on the second
-# joint's motion.
+# Without the effect in the catalogue, the largest finding is an unknown effect that depends on the
+# motion of the second joint.
 model = RBDRegressor(log.robot)
 nameless = diagnose(model, log.X, y)
 print("verdict:", nameless.verdict)
@@ -36,8 +36,8 @@ print(nameless.findings[0].sentence)
 
 
 # %%
-# The effect: its name, its coefficients with unit and sign, its shape parameters with unit, initial
-# grid and range, the effects with which it may be confused, and its column.
+# An effect consists of its name, its coefficients with unit and sign, its shape parameters with
+# unit, initial grid and range, the effects with which it may be confused, and its column.
 class LiquidDrag(Effect):
     """Drag of a liquid that the link dips into."""
 
@@ -59,7 +59,7 @@ class LiquidDrag(Effect):
 register_effect(LiquidDrag)
 
 # %%
-# With the effect in the catalogue.
+# With the effect in the catalogue, it is found with its size.
 diagnosis = diagnose(model, log.X, y)
 for finding in diagnosis.findings:
     print(finding.sentence)

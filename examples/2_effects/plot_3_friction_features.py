@@ -36,8 +36,9 @@ log = make_hidden_effect_log(Robot.from_urdf(URDF), None, n_trajectories=6, dura
 X, y = log.X, log.y.ravel()
 
 # %%
-# The pipeline: sine and cosine of the position for gravity, friction columns, a linear model. The
-# number of the trajectory and the time are not features; ``DropKeys`` removes them.
+# The pipeline consists of sine and cosine of the position for gravity, the columns of friction and
+# a linear model. The number of the trajectory and the time are not features; ``DropKeys`` removes
+# them.
 features = DropKeys().set_output(transform="pandas")
 friction = FrictionTransformer().set_output(transform="pandas")
 trees = HistGradientBoostingRegressor(max_iter=100, random_state=0)
@@ -57,7 +58,7 @@ for name, model in models.items():
     print(f"{name:20s} {errors[name]:.3f} N m on trajectories left out")
 
 # %%
-# The columns that the transformer appends.
+# These columns are appended by the transformer.
 print(FrictionTransformer(("viscous", "coulomb")).fit(X).get_feature_names_out()[-2:])
 
 figure, axes = plt.subplots(figsize=(6, 2.5), layout="constrained")

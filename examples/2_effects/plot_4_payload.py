@@ -5,7 +5,7 @@ A payload, and the effect of a wrong drive gain
 
 An arm repeats its motion with a load at the flange. Runs with and without it give the load's mass
 and centre of mass with intervals; wrong gains give another mass with the same small residual, and
-only a known load reveals them.
+only a known load shows that they are wrong.
 """
 
 # %%

@@ -8,7 +8,8 @@ better could any model be, and how large could an effect be without being detect
 """
 
 # %%
-# A SCARA arm, one of whose joints slides, with exactly the friction of the model.
+# The log is that of a SCARA arm, one of whose joints slides, with exactly the friction of the
+# model.
 import matplotlib.pyplot as plt
 
 from skidyn.datasets import load_scara, make_hidden_effect_log
@@ -27,14 +28,14 @@ for row in zip(log.robot.joint_names, diagnosis.rmse_before, diagnosis.noise_flo
     print("{:14s} {:7.4f}  {:7.4f}".format(*row))
 
 # %%
-# Limits of hidden effects. If ``largest_hidden`` is ``None``, this log cannot show the effect at
-# any size, for instance because no temperature was logged.
+# The next table has the limits of hidden effects. If ``largest_hidden`` is ``None``, this log
+# cannot show the effect at any size, for instance because no temperature was logged.
 for limit in [limit for limit in diagnosis.limits if limit.joint == 1][:8]:
     print(limit.sentence)
 
 # %%
-# The limits of dry-friction effects as a share of each joint's torque. The log excludes larger
-# effects.
+# The picture has the limits of dry-friction effects as a share of each joint's torque. The log
+# excludes larger effects.
 kinds = ("offset", "dahl", "stribeck", "position_dependent_friction", "maxwell_slip")
 spread = log.y.std(axis=0)
 figure, axes = plt.subplots(figsize=(7, 3), layout="constrained")

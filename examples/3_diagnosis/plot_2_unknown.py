@@ -26,8 +26,8 @@ for finding in diagnosis.findings:
     print(finding.sentence)
 
 # %%
-# One finding per joint. A person who knows the robot may recognise the shapes and define them as an
-# effect:
+# There is one finding per joint. A person who knows the robot may recognise the shapes and define
+# them as an effect:
 for finding in diagnosis.findings:
     ResidualDisplay.from_finding(finding, joint=finding.joints[0])
 

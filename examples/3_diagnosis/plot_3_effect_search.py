@@ -48,7 +48,7 @@ grid = GridSearchCV(
 print("best of the grid:", grid.best_params_["effects"])
 
 # %%
-# The test.
+# Both are tested on the held-out trajectories.
 models = {
     "start": RBDRegressor(log.robot).fit(X, y),
     "best of grid": grid.best_estimator_,

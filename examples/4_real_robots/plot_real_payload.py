@@ -3,8 +3,9 @@
 An additional payload, and a missing hand
 =========================================
 
-Two loads that the model does not contain. A UR10e repeats its motion with 2.805 kg at the flange;
-and the description of a Panda contains a hand of 0.73 kg that the recorded arm does not have.
+In two logs the load differs from that of the model. A UR10e repeats its motion with 2.805 kg at the
+flange, and the description of a Panda contains a hand of 0.73 kg that the recorded arm does not
+have.
 """
 
 # %%
@@ -29,9 +30,8 @@ if not (DATA / "ur10e").is_dir():
 
 # %%
 # **UR10e.** Currents become torques by drive gains. With the published set, payloads are about 10 %
-# too heavy; multiplied by 0.91 it is calibrated (a known load carried by the same robot on other
-# days). Without that calibration only the product of mass and gain is known, which the finding
-# states.
+# too heavy; the factor 0.91 was found with a known load of the same robot on other days. Without
+# that calibration only the product of mass and gain is known, which the finding states.
 gains = 0.91 * np.array([14.87, 13.26, 11.13, 10.62, 11.03, 11.47])
 log = load_recording(
     DATA / "ur10e" / "ur10e_excitation.npz",

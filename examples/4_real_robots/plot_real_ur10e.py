@@ -10,7 +10,7 @@ point-to-point motion.
 """
 
 # %%
-# Three recordings for the identification, two for the test.
+# Three recordings are used for the identification and two for the test.
 import os
 import sys
 from pathlib import Path
@@ -51,7 +51,7 @@ judge = {
 }
 
 # %%
-# Effects missing in the three recordings, in the order in which they were added.
+# The missing effects of the three recordings are listed in the order in which they were added.
 robot = Robot.from_urdf(DATA / "ur10e_min.urdf")
 model = RBDRegressor(robot, ("viscous", "coulomb", "offset", "rotor_inertia"))
 diagnosis = diagnose(model, choose, choose[TAU], settings=Settings(max_findings=6))
@@ -99,7 +99,7 @@ for error in REST:
     print(error.sentence)
 
 # %%
-# The error by joint and regime before and after.
+# The pictures have the error by joint and regime before and after.
 if not os.environ.get("SKIDYN_SMALL"):
     from skidyn.inspection import ErrorMapDisplay
 

@@ -10,7 +10,7 @@ the torque must predict it from the motion alone. Here both are done with the sa
 """
 
 # %%
-# A two-joint arm whose friction has a pre-sliding part that the physics does not contain.
+# The friction of a two-joint arm has a pre-sliding part that the physics does not contain.
 import os
 
 import matplotlib.pyplot as plt
@@ -51,8 +51,8 @@ residual = cross_fitted_residual(physics, X, y)
 print(f"residual of the physics: {residual.std():.3f} N m")
 
 # %%
-# **Forecasting.** Each residual from the earlier measured ones. Such numbers should always be
-# compared with persistence and an autoregression.
+# **Forecasting.** Each residual is predicted from the earlier measured ones. Such numbers should
+# always be compared with persistence and an autoregression.
 table = forecast_table(residual, X["trajectory"])
 train = table.X[:, 0] < 0.7 * X["trajectory"].max()
 epochs = 5 if small else 20
@@ -69,7 +69,7 @@ for name, model in forecasters.items():
     errors[f"forecast: {name}"] = np.sqrt(((table.y[~train] - forecast) ** 2).mean())
 
 # %%
-# **Modelling.** The torque from the motion, trajectories held out.
+# **Modelling.** The torque is predicted from the motion, on held-out trajectories.
 member = LSTMRegressor(max_epochs=epochs)
 models = {
     "model: physics": physics,

@@ -10,7 +10,7 @@ its output; then all of them predict motions faster than those they were trained
 """
 
 # %%
-# A planar arm that is 30 % heavier than its description, with friction.
+# A planar arm is 30 % heavier than its description and has friction.
 import os
 
 import matplotlib.pyplot as plt

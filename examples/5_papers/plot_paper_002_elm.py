@@ -5,8 +5,8 @@ ELM committee: amount of data and uncertainty
 
 Bargsten, de Gea Fernández and Kassahun compare identified parameters with a committee of extreme
 learning machines, on the data to which both were fitted, and leave two questions to later work: a
-test on other motions, and the amount of data that each needs. Both are shown here, and incremental
-learning.
+test on other motions, and the amount of data that each needs. This example shows both, and
+incremental learning.
 """
 
 # %%
@@ -55,7 +55,8 @@ class Classical(LinearRegression):
 
 
 # %%
-# Error on trajectories that neither has seen, against the number of training trajectories.
+# The picture has the error on trajectories to which neither was fitted, against the number of
+# training trajectories.
 models = {
     "identified parameters": Classical(),
     "ELM committee, p = 0.5": ELMCommittee(trajectory=0, random_state=0),

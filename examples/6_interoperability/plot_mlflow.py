@@ -34,7 +34,8 @@ log = make_hidden_effect_log(load_planar_arm(), "stribeck", joints=[2])
 diagnosis = diagnose(RBDRegressor(log.robot), log.X, log.y)
 
 # %%
-# One run. ``skops`` is MLflow's safe format; ``cloudpickle`` stores classes of a script too.
+# This is one run. ``skops`` is MLflow's safe format; ``cloudpickle`` stores classes of a script
+# too.
 folder = Path(tempfile.mkdtemp())
 mlflow.set_tracking_uri(f"sqlite:///{folder / 'runs.db'}")
 mlflow.create_experiment("planar arm", artifact_location=(folder / "artifacts").as_uri())
@@ -57,7 +58,7 @@ for point in history:
     print(f"step {point.step}: held-out RMSE {point.value:.4f} N m")
 
 # %%
-# The same as a picture: the error decreases with every added effect.
+# The picture shows that the error decreases with every added effect.
 steps = ["as given", *(f"+ {entry['added']}" for entry in diagnosis.history[1:])]
 fig, ax = plt.subplots(figsize=(6, 3.4), layout="constrained")
 ax.bar(steps, [point.value for point in history])

@@ -34,7 +34,7 @@ left_out = write_onnx(model, file)
 print(f"{file.name}: {file.stat().st_size / 1000:.0f} kB, not in it: {left_out or 'nothing'}")
 
 # %%
-# Without skidyn.
+# The file is run without skidyn.
 session = onnxruntime.InferenceSession(str(file))
 joints = range(1, log.robot.n_joints + 1)
 inputs = {s: log.X[[f"{s}{j}" for j in joints]].to_numpy() for s in ("q", "dq", "ddq")}

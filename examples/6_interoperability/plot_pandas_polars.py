@@ -33,7 +33,7 @@ table = pl.from_pandas(log.X)
 from_polars = RBDRegressor(log.robot).fit(table, log.y)
 
 # %%
-# An array: first ``time`` and ``trajectory``, then q, dq, ddq of all joints.
+# The array has ``time`` and ``trajectory`` first, then q, dq and ddq of all joints.
 signals = [f"{s}{j}" for s in ("q", "dq", "ddq") for j in (1, 2)]
 array = log.X[["time", "trajectory", *signals]].to_numpy()
 from_array = RBDRegressor(log.robot, time=0, trajectory=1).fit(array, log.y)
@@ -54,7 +54,7 @@ smoothed = smooth.fit_transform(positions)
 print(smoothed.head(3))
 
 # %%
-# The velocity derived from positions alone, compared with the recorded one.
+# The picture compares the velocity derived from positions alone with the recorded one.
 part = slice(100, 300)
 time = log.X["time"].to_numpy()[part]
 fig, ax = plt.subplots(figsize=(6, 3.4), layout="constrained")

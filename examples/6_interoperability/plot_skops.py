@@ -39,7 +39,7 @@ loaded = sio.load(file, trusted=types)
 print("same prediction:", np.array_equal(loaded.predict(log.X), model.predict(log.X)))
 
 # %%
-# One second of it, around a reversal of the second joint.
+# The picture has one second of the log around a reversal of the second joint.
 part = slice(100, 200)
 time = log.X["time"].to_numpy()[part]
 fig, ax = plt.subplots(figsize=(6, 3.4), layout="constrained")

@@ -53,6 +53,9 @@ def fit(line: str, width: int, end: str = "") -> str:
     >>> print(fit("0.5   one two three four five", 20))
     0.5   one two three
           four five
+    >>> print(fit("written: /a/path/to/be/copied.json", 20))
+    written:
+        /a/path/to/be/copied.json
     """
     line = _OBEYED.sub(lambda hit: f"\\x{ord(hit[0]):02x}", line)
     if len(line) <= width:

@@ -195,9 +195,7 @@ class ELMCommittee(MultiOutputMixin, RegressorMixin, BaseEstimator):
         X, y = validate_data(
             self, X, y, reset=first, multi_output=True, y_numeric=True, dtype=np.float64
         )
-        weight = np.ones(len(X))
-        if sample_weight is not None:
-            weight = _check_sample_weight(sample_weight, X, dtype=np.float64)
+        weight = _check_sample_weight(sample_weight, X, dtype=np.float64)
         if not (weight > 0).any():
             raise ValueError("all sample weights are zero; at least one must be positive.")
         inputs = X[:, list(fitted_keys(self).features)]

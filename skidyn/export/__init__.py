@@ -41,6 +41,5 @@ from skidyn.export._bam import (
 )
 from skidyn.export._model import (
     check_model as check_model,
-    name_term as name_term,
     static_model as static_model,
 )

@@ -8,7 +8,7 @@ import re
 from skidyn._exceptions import SkidynError
 from skidyn.dynamics import C, renumber, statements
 from skidyn.export._files import PathLike, write_files
-from skidyn.export._model import StaticModel, name_term, static_model
+from skidyn.export._model import StaticModel, static_model
 from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
 
@@ -101,7 +101,7 @@ def function_text(static: StaticModel, name: str) -> str:
     lines += [f"tau[{j}] = {value};" for (j,), value in outputs.items()]
     unused = [x for x in ("q", "dq", "ddq") if not re.search(rf"\b{x}\[", "\n".join(lines))]
     lines[:0] = [f"(void){x};" for x in unused]
-    left = "; ".join(name_term(robot, term) for term in static.left)
+    left = "; ".join(static.left_names)
     return _TEMPLATE.format(
         robot=printable(robot.name),
         terms=printable(static.title),

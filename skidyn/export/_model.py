@@ -40,6 +40,11 @@ class StaticModel:
         kinds = dict.fromkeys(term.kind for term in self.held)
         return ", ".join(["rigid bodies", *(kind.replace("_", " ") for kind in kinds)])
 
+    @property
+    def left_names(self) -> list[str]:
+        """Names of the effects that are left out."""
+        return [name_term(self.robot, term) for term in self.left]
+
 
 def static_model(model: RBDRegressor | Robot) -> StaticModel:
     """Record the part of a model that is a function of q, dq and ddq.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from skidyn._optional import import_optional
 from skidyn.dynamics import operands
 from skidyn.export._files import PathLike, write_files
-from skidyn.export._model import StaticModel, name_term, static_model
+from skidyn.export._model import StaticModel, static_model
 from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
 
@@ -124,7 +124,7 @@ def _proto(static: StaticModel) -> Any:
         proto,
         {
             "joints": json.dumps(robot.joint_names),
-            "not_held": json.dumps([name_term(robot, term) for term in static.left]),
+            "not_held": json.dumps(static.left_names),
         },
     )
     onnx.checker.check_model(proto, full_check=True)

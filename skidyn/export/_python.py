@@ -10,7 +10,7 @@ from skidyn._exceptions import SkidynError
 from skidyn.dynamics import python_function
 from skidyn.export._c import printable
 from skidyn.export._files import PathLike, write_files
-from skidyn.export._model import StaticModel, name_term, static_model
+from skidyn.export._model import StaticModel, static_model
 from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
 
@@ -108,7 +108,7 @@ def _text(static: StaticModel, name: str) -> str:
     robot = static.robot
     columns = python_function(static.program, "_columns")
     used = [f for f in _FUNCTIONS if re.search(rf"\b{f}\(", columns)]
-    left = "; ".join(name_term(robot, term) for term in static.left)
+    left = "; ".join(static.left_names)
     return _TEMPLATE.format(
         robot=printable(robot.name),
         terms=printable(static.title),

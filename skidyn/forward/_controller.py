@@ -41,8 +41,9 @@ class Controller:
         Whether the velocity of the reference is fed forward; if False, the velocity itself is
         damped, as in position servos.
     no_load_speed : float or array-like of shape (n_joints,), default=inf
-        Speed at which the voltage is used up, rad/s (m/s): the largest torque falls linearly from
-        ``limit`` at rest to nothing there. Infinite for a limit of the current alone.
+        Speed at which the whole voltage is needed for the motion, rad/s (m/s): the largest torque
+        decreases linearly from ``limit`` at rest to zero at this speed. Infinite for a limit of the
+        current alone.
 
     Examples
     --------
@@ -76,8 +77,8 @@ class Controller:
         Raises
         ------
         SkidynError
-            A gain is negative or does not have one number for each joint, or a torque without limit
-            is to fall with the speed.
+            A gain is negative or does not have one number for each joint, or ``no_load_speed`` is
+            given without a finite ``limit``.
         """
         values: dict[str, Any] = {}
         for name in PER_JOINT:
@@ -118,7 +119,7 @@ class Controller:
         Raises
         ------
         SkidynError
-            The robot has no such joint, a controller no such setting for single joints, or a
+            The robot has no such joint, a controller has no such setting for single joints, or a
             setting is negative.
 
         Examples

@@ -20,7 +20,7 @@ from skidyn._exceptions import SkidynError
 from skidyn._signals import Array, Signals
 from skidyn.dynamics import BoundProgram, Program, Tape
 from skidyn.effects import Law, PathMemory, Term, TermSum
-from skidyn.robots import Instant, SymbolicRobot, Symbols, filled, replay, symbols
+from skidyn.robots import Instant, SymbolicRobot, Symbols, filled, symbols
 
 #: Relative difference between rows that are evaluated together and one by one above which an effect
 #: has a memory.
@@ -344,15 +344,10 @@ class _StateRobot(SymbolicRobot):
         """Torques, shape (1, n_joints)."""
         if not (self._free and parameters is self._own):
             return super().inverse_dynamics(q, dq, ddq, parameters=parameters, gravity=gravity)
-        engine, tape = self._robot._engine, self._tape
+        engine = self._robot._engine
         program = engine.program("inverse_dynamics", engine.gravity_key(gravity), True, True, False)
-        phi = [tape.input("phi", i) for i in range(10 * self._robot.n_bodies)]
-        inputs = {"q": q[0], "dq": dq[0], "ddq": ddq[0], "parameter": phi}
-        outputs = replay(program, tape, inputs)
-        result = np.full(program.shape, tape.constant(0.0), dtype=object)
-        for key, scalar in outputs.items():
-            result[key] = scalar
-        return result[np.newaxis].view(Symbols)
+        phi = [self._tape.input("phi", i) for i in range(10 * self._robot.n_bodies)]
+        return self._run(program, q=q, dq=dq, ddq=ddq, parameter=[phi])
 
 
 def _model_torque(model: Any, moment: _Moment) -> Any:

@@ -130,9 +130,9 @@ class ErrorBudgetDisplay:
         Parameters
         ----------
         estimators : mapping of str to fitted regressor
-            Models from poor to rich.
+            Models in the order in which effects were added.
         X : DataFrame or array of shape (n_samples, n_features)
-            Motion that the fits have not seen.
+            Motion that was not used for the fits.
         y : array-like of shape (n_samples, n_joints), N m or N
             Measured torque.
         joint : int, default=1
@@ -172,7 +172,7 @@ class ErrorBudgetDisplay:
         y_true : array-like of shape (n_samples, n_joints) or (n_samples,), N m or N
             Measured torque.
         predictions : mapping of str to array-like of the shape of y_true
-            Predictions of the models from poor to rich.
+            Predictions of the models in the order in which effects were added.
         joint : int, default=1
             Joint, counted from 1.
         noise_floor : float, optional

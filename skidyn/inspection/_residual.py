@@ -133,8 +133,8 @@ class ResidualDisplay:
         joint : int, default=1
             Joint whose residual is drawn, counted from 1.
         candidate : fitted regressor, optional
-            A richer model; the difference of its prediction from that of ``estimator`` is drawn as
-            the candidate's curve.
+            A model with a further effect; the difference of its prediction from that of
+            ``estimator`` is drawn as the candidate's curve.
         robot : Robot, optional
             Needed for regressors that have none of their own.
         ax : matplotlib Axes, optional

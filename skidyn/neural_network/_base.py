@@ -171,9 +171,7 @@ class SequenceRegressor(
         X, y = validate_data(self, X, y, multi_output=True, y_numeric=True, dtype=np.float64)
         keys = self._keys()
         rng = check_random_state(self.random_state)
-        weight = np.ones(len(X))
-        if sample_weight is not None:
-            weight = _check_sample_weight(sample_weight, X, dtype=np.float64, copy=True)
+        weight = _check_sample_weight(sample_weight, X, dtype=np.float64, copy=True)
         if not (weight > 0).any():
             raise ValueError("all sample weights are zero; at least one must be positive.")
         order = order_of_log(self, X, keys)

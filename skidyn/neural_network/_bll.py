@@ -31,7 +31,7 @@ from skorch import NeuralNet
 from skidyn._columns import ColumnSpec
 from skidyn._compat import HasMethods, Interval, StrOptions, fit_context
 from skidyn._keys import Keys, fitted_keys
-from skidyn._order import taken, time_order
+from skidyn._order import folds_taken, taken, time_order
 from skidyn.model_selection import held_out_folds, order_of_log
 from skidyn.neural_network._base import SequenceRegressor, deferred_training, train_together
 from skidyn.neural_network._lstm import LSTMRegressor, directions
@@ -52,9 +52,9 @@ class BLLRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEst
     """Bagged LSTM networks, stacked by a meta-regressor (BLL).
 
     Members are trained on bootstraps of the log; their mean is the input of a meta-regressor,
-    which is trained on predictions for trajectories that the averaged members have not seen. (The
-    paper [1]_ trains it on the rows for which it reports errors; :ref:`papers_own_forms` lists all
-    differences.)
+    which is trained on predictions for trajectories that were not used to train the averaged
+    members. (The paper [1]_ trains it on the rows for which it reports errors;
+    :ref:`papers_own_forms` lists all differences.)
 
     To learn the residual of a physical model, use it in :class:`skidyn.hybrid.HybridRegressor`:
     ``HybridRegressor(physics, BLLRegressor())``.
@@ -80,13 +80,13 @@ class BLLRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEst
         still serve as history. Whole trajectories give a more realistic spread, but every member
         then misses a third of them, which reduces accuracy.
     cv : int, cross-validator or None, default=None
-        How the meta-regressor's inputs are predicted on rows that members have not seen. With None,
-        they are the mean over the members that have not seen the trajectory, which needs no further
-        training: with ``resample="trajectory"`` the members whose bootstrap left it out; with
-        ``"window"`` every member leaves out one of twenty folds of the trajectories. With a number
-        (or a cross-validator) the members are trained again without each fold; so they are with
-        None if there are fewer than three trajectories or the members are not networks of this
-        package (3 folds, by trajectory or, for a single one, by blocks of rows).
+        How the meta-regressor's inputs are predicted on rows that were not used for training. With
+        None, they are the mean over the members that were trained without the trajectory, which
+        needs no further training: with ``resample="trajectory"`` the members whose bootstrap left
+        it out; with ``"window"`` every member leaves out one of twenty folds of the trajectories.
+        With a number (or a cross-validator) the members are trained again without each fold; so
+        they are with None if there are fewer than three trajectories or the members are not
+        networks of this package (3 folds, by trajectory or, for a single one, by blocks of rows).
     n_jobs : int, default=None
         Number of processes. Each trains ten networks side by side, since most of the time of a
         small network's step is overhead that they can share; more processes therefore help only
@@ -105,7 +105,7 @@ class BLLRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEst
         The meta-regressor.
     n_stacked_ : int
         Number of rows on which the meta-regressor was trained: those with a prediction by members
-        that had not seen them.
+        that were trained without them.
     n_features_in_ : int
         Number of columns of X.
     feature_names_in_ : ndarray of str
@@ -244,8 +244,7 @@ class BLLRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEst
         folds = self._given_folds(table, y, groups)
         order = order_of_log(self, X, keys)
         if order is not None:
-            place = np.argsort(order)
-            folds = folds and [(np.sort(place[a]), np.sort(place[b])) for a, b in folds]
+            folds = folds_taken(folds, order)
             X, y, sample_weight = (taken(t, order) for t in (X, y, sample_weight))
         rng = check_random_state(self.random_state)
         bagging = self._bagging(keys, sample_weight is not None, int(rng.randint(2**31 - 1)))

@@ -30,8 +30,8 @@ class LSTMRegressor(SequenceRegressor):
     once.
 
     Weights decay (``optimizer__weight_decay=0.3``), since a log of some minutes has few
-    trajectories, which a network memorises. The network is trained by skorch, whose callbacks and
-    optimisers can be used.
+    trajectories, to which a network would overfit. The network is trained by skorch, whose
+    callbacks and optimisers can be used.
 
     It is useful only if no model of the robot exists: with a URDF, a rigid-body model with friction
     predicts far better on most logs (:doc:`/user_guide/learners`).

@@ -22,7 +22,7 @@ from torch import nn
 from skidyn._columns import Columns, column_names, resolve_columns
 from skidyn._compat import HasMethods, Interval, StrOptions
 from skidyn._keys import Keys
-from skidyn._order import taken, time_order
+from skidyn._order import folds_taken, taken, time_order
 from skidyn.hybrid import TrainingRange, distances, fade, learned_weights
 from skidyn.identification import RBDRegressor
 from skidyn.model_selection import held_out_folds
@@ -229,8 +229,7 @@ class SDLRegressor(SequenceRegressor):
             folds = list(check_cv(self.cv).split(table, target, groups))
         order = time_order(array, self._keys())
         if order is not None:
-            place = np.argsort(order)
-            folds = folds and [(np.sort(place[a]), np.sort(place[b])) for a, b in folds]
+            folds = folds_taken(folds, order)
             array, table, target, counts = (taken(t, order) for t in (array, table, target, counts))
         torque = target.reshape(len(array), -1)
         trajectories = self._keys().trajectories(array)

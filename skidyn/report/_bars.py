@@ -41,6 +41,14 @@ class Scale:
 
 
 def scale_of(ratios: Iterable[float | None]) -> Scale:
-    """A scale that includes all errors over noise, and the noise."""
+    """A scale that includes all errors over noise, and the noise.
+
+    >>> scale = scale_of([4.0, 1.0, None])
+    >>> scale.ticks, scale.place(4.0), scale.place(1.0), scale.place(None)
+    ([1, 2, 3, 4], 98.0, 24.5, 0.0)
+    >>> scale = scale_of([300.0, 1.0])
+    >>> scale.ticks, scale.place(1.0), scale.place(10.0), scale.place(100.0)
+    ([1, 10, 100], 10.8, 46.7, 82.6)
+    """
     known = [r for r in ratios if r is not None and isfinite(r)]
     return Scale(max([1.5, *known]) * 1.02)

@@ -20,7 +20,7 @@ from skidyn._columns import Columns, resolve_columns, with_columns
 from skidyn._exceptions import ColumnError, SkidynError
 from skidyn._signals import Array, find_segments
 from skidyn.dynamics import ScalarFunction
-from skidyn.export import name_term, static_model
+from skidyn.export import static_model
 from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
 
@@ -107,10 +107,9 @@ def simulate_closed_loop(
     """
     static = static_model(model)
     if static.left:
-        left = ", ".join(name_term(static.robot, term) for term in static.left)
         raise SkidynError(
-            f"{left}: depends on more than the current q, dq and ddq and cannot be simulated "
-            "here; fit a model without it first"
+            f"{', '.join(static.left_names)}: depends on more than the current q, dq and ddq and "
+            "cannot be simulated here; fit a model without it first"
         )
     n = static.robot.n_joints
     gains = [_gain(x, n, name) for x, name in ((stiffness, "stiffness"), (damping, "damping"))]

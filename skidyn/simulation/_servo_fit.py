@@ -53,21 +53,8 @@ def fit_all(
 ) -> list[Fit]:
     """Fit models to each half of the pieces and test them on the other.
 
-    Parameters
-    ----------
-    loop : JointLoop
-        The joint.
-    models : sequence of dict of str to Range
-        Parameters of each.
-    start : dict of str to float
-        Initial values of parameters.
-    parts : sequence of int, default=(0, 1)
-        Halves that are fitted.
-
-    Returns
-    -------
-    list of Fit
-        One for each model.
+    A model is given by the ranges of its parameters, ``start`` has initial values by parameter, and
+    ``parts`` are the halves that are fitted.
     """
     searches = [_Search(loop, ranges, start, k) for ranges in models for k in parts]
     # Gears and presliding are simulated with other equations.
@@ -97,15 +84,6 @@ def covariance(
 
     Errors of the simulated position last for tenths of a second: they are summed over blocks of a
     second, which are taken as independent.
-
-    Parameters
-    ----------
-    loop : JointLoop
-        The joint.
-    ranges : dict of str to Range
-        Parameters.
-    values : dict of str to float
-        Their fitted values.
     """
     search = _Search(loop, ranges, values, 0)
     (errors,) = _errors(loop, search.names, [search], [search.beside()])

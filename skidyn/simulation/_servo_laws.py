@@ -62,14 +62,9 @@ GEARS = ("joint_elasticity", "backlash")
 
 
 def rivals_of(loop: JointLoop, known: tuple[str, ...]) -> list[tuple[str, dict[str, Range]]]:
-    """Kinds that may be missing in addition to known ones, some with two starts.
+    """Kinds that may be missing in addition to those that the loop has, some with two starts.
 
-    Parameters
-    ----------
-    loop : JointLoop
-        The joint; if a deadband is known, no other is fitted.
-    known : tuple of str
-        Kinds that are part of the loop already.
+    If a deadband is known, no other is fitted.
     """
     left_out = set(known)
     if left_out & set(GEARS):
@@ -112,16 +107,7 @@ def halves_told(
 ) -> dict[str, float]:
     """Half the widths of the 95 % intervals of :func:`sizes_told`, to first order.
 
-    Parameters
-    ----------
-    kind : str
-        Kind.
-    values : dict of str to float
-        Fitted values.
-    names : list of str
-        Names of the rows of the covariance.
-    covariance : ndarray of shape (n_names, n_names)
-        Of the fitted values.
+    The covariance is that of the fitted values with the given names, in this order.
     """
     here = sizes_told(kind, values)
     slopes: dict[str, list[float]] = {name: [] for name in here}

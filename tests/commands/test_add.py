@@ -42,7 +42,8 @@ def test_a_setting_of_a_servo_is_added_to_its_controller(weak_servo, work, run):
     words = ("add", "--from", weak_servo / "report.json", "--effect", "servo_current")
     code, added = run(*words, "--joints", 2)
     assert code == cli.DONE and added["after"][1] < 0.1 * added["before"][1]
-    assert added["controller"]["limit"] == [None, effect["parameters"]["limit"]["value"]]
+    limit = effect["parameters"]["limit"]["value"]
+    assert added["controller"] == {**json.loads(SERVO), "limit": [None, limit]}
     code, clean = run(
         "diagnose", weak_servo / "run.csv", "--urdf", work / "arm.urdf", *MODEL, "--controller",
         json.dumps(added["controller"]), "--effects", "stribeck,servo_current",
@@ -60,3 +61,12 @@ def test_a_setting_that_was_not_found_is_refused(weak_servo, capsys):
     words = ["add", "--from", str(weak_servo / "report.json"), "--effect", "servo_gain"]
     assert cli.main(words) == cli.BAD_INPUT
     assert "no servo_gain on these joints; it is a setting of the servo" in capsys.readouterr().err
+
+
+def test_a_damaged_setting_is_refused(weak_servo, capsys):
+    content = json.loads((weak_servo / "report.json").read_text("utf-8"))
+    content["effects"][0]["parameters"] = {}
+    (weak_servo / "damaged.json").write_text(json.dumps(content), encoding="utf-8")
+    words = ["add", "--from", str(weak_servo / "damaged.json"), "--effect", "servo_current"]
+    assert cli.main(words) == cli.BAD_INPUT
+    assert "it must come from skidyn diagnose" in capsys.readouterr().err

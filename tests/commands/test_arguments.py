@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 
 import pytest
@@ -16,6 +17,8 @@ from skidyn import cli
         ["diagnose", "{log}", "--urdf", "{urdf}", "--out", "{log}"],
         ["diagnose", "{log}", "--urdf", "{urdf}", "--out", "{other}"],  # a glob of the shell
         ["diagnose", "{log}", "--urdf", "{urdf}", "--html", "{urdf}"],
+        ["diagnose", "{log}", "--urdf", "{urdf}", "--out", "{hard_link}"],
+        ["diagnose", "{log}", "--urdf", "{urdf}", "--out", "{roundabout}"],
         ["identify", "{log}", "--urdf", "{urdf}", "--out", "{log}"],
         ["export", "{log}", "--urdf", "{urdf}", "--format", "urdf", "--out", "{urdf}"],
         ["export", "{log}", "--urdf", "{urdf}", "--format", "urdf", "--out", "{link}"],
@@ -34,7 +37,10 @@ def test_no_command_writes_onto_what_it_reads(report, tmp_path, words, capsys):
     shutil.copy(tmp_path / "log.csv", tmp_path / "other.csv")
     shutil.copy(tmp_path / "report.json", tmp_path / "again.json")
     (tmp_path / "link.urdf").symlink_to(tmp_path / "arm.urdf")
+    os.link(tmp_path / "log.csv", tmp_path / "hard.csv")
     places = {
+        "hard_link": tmp_path / "hard.csv",
+        "roundabout": tmp_path / "x" / ".." / "log.csv",
         "log": tmp_path / "log.csv",
         "other": tmp_path / "other.csv",
         "urdf": tmp_path / "arm.urdf",

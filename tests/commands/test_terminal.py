@@ -17,7 +17,6 @@ import time
 import pytest
 
 from skidyn import cli
-from skidyn._commands._terminal import fit
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 
 pandas = pytest.importorskip("pandas")
@@ -155,12 +154,6 @@ def test_help_keeps_examples_that_can_be_copied(monkeypatch, capsys):
     assert max(map(len, text.splitlines())) <= 60
     copied = text.replace(" \\\n      ", " ")
     assert "skidyn diagnose run1.csv run2.csv --urdf robot.urdf --out report.json" in copied
-
-
-def test_words_are_not_broken():
-    assert fit("short", 80) == "short"
-    path = "/a/long/path/that/must/stay/as/it/is/to/be/copied.json"
-    assert fit(f"written: {path}", 30) == f"written:\n    {path}"
 
 
 BASH = shutil.which("bash")

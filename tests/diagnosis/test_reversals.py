@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
-from skidyn.diagnosis import Settings, diagnose
-from skidyn.diagnosis._reversals import look_at_reversals
-from skidyn.diagnosis._search import search
+from skidyn.diagnosis import diagnose
 from skidyn.effects import dahl_state
 from skidyn.identification import RBDRegressor
 
@@ -39,18 +37,6 @@ def test_its_way_is_measured_by_a_model_that_reaches_up_to_the_reversals(diagnos
 
     (term,) = [t for t in model.effect_terms_ if t.kind == "dahl"]
     assert term.shape["presliding"] == pytest.approx(0.004, rel=0.5)
-
-
-def test_what_the_sliding_samples_did_not_show_is_found_close_to_the_reversals(diagnosis):
-    problem = diagnosis.problem
-    nothing = search(problem, [], Settings(), nameless=False)
-    assert not nothing.findings
-
-    wider, result = look_at_reversals(problem, nothing, ["dahl", "coulomb"], Settings())
-
-    assert [(h.kind, h.joints) for h in result.findings] == [("dahl", (0,))]
-    assert wider.rows.sliding[:, 0].sum() > problem.rows.sliding[:, 0].sum()
-    np.testing.assert_array_equal(wider.rows.sliding[:, 1], problem.rows.sliding[:, 1])
 
 
 def test_a_joint_that_sticks_at_reversals_is_no_hysteresis(log):

@@ -5,15 +5,11 @@ import numpy as np
 import pytest
 
 from skidyn.datasets import load_panda, load_scara, load_ur5
-from skidyn.dynamics._compiled import find_compiler
-
-needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 
 
-@needs_compiler
 @pytest.mark.parametrize("load", [load_panda, load_scara, load_ur5])
 @pytest.mark.parametrize("n_samples", [0, 1, 63, 64, 65, 1000])
-def test_compiled_equals_numpy(load, n_samples):
+def test_compiled_equals_numpy(c_compiler, load, n_samples):
     robot = load()
     states = np.random.default_rng(0).normal(size=(3, n_samples, robot.n_joints))
     parameters = np.random.default_rng(1).normal(size=(robot.n_bodies, 10))
@@ -22,8 +18,7 @@ def test_compiled_equals_numpy(load, n_samples):
         np.testing.assert_allclose(compiled, robot.inverse_dynamics(*states, **options), atol=1e-11)
 
 
-@needs_compiler
-def test_signals_of_any_memory_order():
+def test_signals_of_any_memory_order(c_compiler):
     robot = load_scara()
     q, dq, ddq = np.random.default_rng(0).normal(size=(3, 4, 100)).transpose(0, 2, 1)
     compiled = robot.inverse_dynamics(q, dq, ddq, backend="compiled")
@@ -48,8 +43,7 @@ def test_unknown_backend_and_precision():
         robot.inverse_dynamics(q, q, q, backend="compiled", dtype=np.float32)
 
 
-@pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
-def test_compiled_regressor_equals_numpy_whole_in_chunks_and_into_used_memory():
+def test_compiled_regressor_equals_numpy_whole_in_chunks_and_into_used_memory(c_compiler):
     robot = load_scara()
     q, dq, ddq = np.random.default_rng(0).normal(size=(3, 700, robot.n_joints))
     expected = robot.torque_regressor(q, dq, ddq)

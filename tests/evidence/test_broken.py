@@ -9,7 +9,6 @@ import pytest
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.effects import Signals
 from skidyn.evidence import broken_notes
-from skidyn.evidence._broken import TORQUE_SHARE, leaps, reversals
 from skidyn.exceptions import LogWarning
 from skidyn.identification import RBDRegressor
 
@@ -30,22 +29,22 @@ def test_a_dropped_packet_at_either_end_or_within_is_found():
     torque = friction(signals)
     torque[[0, 500, 501, 1999]] = 9.0
 
-    found = leaps(torque, signals, TORQUE_SHARE)
+    (note,) = broken_notes(signals, torque, ("elbow",))
 
-    assert np.flatnonzero(found).tolist() == [0, 500, 501, 1999]
+    assert "4 samples" in note and "row 0" in note
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.02, 0.5])
 def test_the_jumps_of_dry_friction_are_no_leaps(noise):
     signals = swing()
 
-    assert not leaps(friction(signals, noise), signals, TORQUE_SHARE).any()
+    assert broken_notes(signals, friction(signals, noise), ("elbow",)) == []
 
 
 def test_a_signal_at_rest_has_no_leaps():
     signals = swing()
 
-    assert not leaps(np.zeros_like(signals.q), signals, TORQUE_SHARE).any()
+    assert broken_notes(signals, np.zeros_like(signals.q), ("elbow",)) == []
 
 
 def test_the_note_names_joint_row_and_value():
@@ -90,7 +89,11 @@ def test_a_moment_of_motion_the_other_way_is_no_leap():
     signals = signals.with_(dq=dq)
     torque = friction(signals)
 
-    assert not leaps(torque, signals, TORQUE_SHARE, reversals(signals)).any()
-    torque[501] = 60.0
-    found = leaps(torque, signals, TORQUE_SHARE, reversals(signals))
-    assert np.flatnonzero(found).tolist() == [501]
+    def told(torque):
+        return [n for n in broken_notes(signals, torque, ("elbow",)) if "torque" in n]
+
+    assert told(torque) == []
+    broken = torque.copy()
+    broken[501] = 60.0
+    (note,) = told(broken)
+    assert "1 sample" in note and "row 501" in note

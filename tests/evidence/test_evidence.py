@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given, settings, strategies as st
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.evidence import Evidence
@@ -103,3 +104,38 @@ def test_shifted_evidence_keeps_recordings_apart():
     merged = one.shifted(1, groups=2)
     assert dict(merged.counts) == {(1, 0): 60, (0, 0): 30}
     np.testing.assert_allclose(merged.solve(), one.solve(), rtol=1e-10)
+
+
+def test_columns_without_information_get_no_coefficient():
+    rng = np.random.default_rng(0)
+    a = rng.normal(size=(50, 3))
+    a[:, 1] = 0.0
+    rows = np.column_stack([a, a @ [1.0, 5.0, 2.0]])
+    np.testing.assert_allclose(
+        Evidence.from_rows(("a", "b", "c"), {(0, 0): rows}).solve(), [1.0, 0.0, 2.0], atol=1e-12
+    )
+    twice = np.column_stack([a[:, 0], a[:, 0], a[:, 0] * 2])
+    np.testing.assert_allclose(  # the shortest of all solutions
+        Evidence.from_rows(("a", "b"), {(0, 0): twice}).solve(), [1.0, 1.0], atol=1e-12
+    )
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 2**31), factors=st.lists(st.floats(1e-6, 1e6), min_size=3, max_size=3))
+def test_units_of_the_columns_do_not_change_the_fit(seed, factors):
+    rows = np.random.default_rng(seed).normal(size=(40, 4))
+    one = Evidence.from_rows(("a", "b", "c"), {(0, 0): rows}).solve()
+    other = Evidence.from_rows(("a", "b", "c"), {(0, 0): rows * [*factors, 1.0]}).solve()
+    np.testing.assert_allclose(other * factors, one, rtol=1e-8, atol=1e-10)
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 2**31), order=st.permutations(range(5)))
+def test_the_order_of_recordings_does_not_change_the_fit(seed, order):
+    rows = np.random.default_rng(seed).normal(size=(5, 30, 3))
+    parts = [Evidence.from_rows(("a", "b"), {(k, 0): rows[k]}) for k in range(5)]
+    forth, back = (sum(p[1:], p[0]) for p in (parts, [parts[k] for k in order]))
+    np.testing.assert_allclose(forth.solve(), back.solve(), rtol=1e-10)
+    np.testing.assert_allclose(
+        Evidence.from_rows(("a", "b"), {(0, 0): np.vstack(rows)}).solve(), forth.solve(), rtol=1e-9
+    )

@@ -16,7 +16,6 @@ from skidyn.evidence import (
     solve_left_out,
     without_each,
 )
-from skidyn.evidence._folds import nearest_folds
 
 
 @pytest.fixture
@@ -107,17 +106,3 @@ def test_jackknife_of_a_mean_is_its_standard_error():
 def test_each_part_is_left_out_once():
     parts = [np.full((2, 1), k) for k in range(3)]
     assert [sorted(set(rows.ravel())) for rows in without_each(parts)] == [[1, 2], [0, 2], [0, 1]]
-
-
-def test_samples_take_the_fold_of_the_nearest_row_of_their_trajectory():
-    signals = SimpleNamespace(
-        trajectory=np.repeat([0, 1, 2], 4), clock=np.tile([0.0, 1.0, 2.0, 3.0], 3)
-    )
-    fold = nearest_folds(
-        signals,
-        np.arange(12),
-        trajectory=np.array([0, 0, 1]),
-        time=np.array([0.4, 2.2, 1.0]),
-        fold=np.array([0, 1, 2]),
-    )
-    assert fold.tolist() == [0, 0, 1, 1, 2, 2, 2, 2, 0, 0, 0, 0]

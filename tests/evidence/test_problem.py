@@ -2,7 +2,6 @@
 import numpy as np
 import pytest
 
-from skidyn._signals import read_signals
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.effects import Signals, Term, get_effect, make_terms
 from skidyn.evidence import make_problem
@@ -51,10 +50,10 @@ def test_blocks_of_one_trajectory_share_no_sample(rate):
 
 @pytest.mark.parametrize("kind", ["friction_over_position", "function_of_position", "stribeck"])
 @pytest.mark.parametrize("rate", [100.0, 1000.0])
-def test_what_is_screened_on_few_samples_of_a_fast_log_is_near_what_all_samples_say(kind, rate):
+def test_few_samples_of_a_fast_log_say_nearly_what_all_samples_say(kind, rate, signals_of):
     log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=2, duration=4.0, rate=rate)
-    signals, torque = read_signals(log.X, log.y, log.robot)
-    made = make_problem(signals, torque, robot=log.robot, rigid_body=True, terms=[])
+    signals = signals_of(log.X, log.robot)
+    made = make_problem(signals, log.y, robot=log.robot, rigid_body=True, terms=[])
     term = Term(kind, (2,), get_effect(kind).grid(made.signals, (1,))[0])
     quick, exact = made.screening_rows(term)[1], made.term_rows(term)[1]
     named_or_slow = kind == "stribeck" or rate < 200
@@ -62,7 +61,7 @@ def test_what_is_screened_on_few_samples_of_a_fast_log_is_near_what_all_samples_
     assert np.linalg.norm(quick - exact) <= tolerance * np.linalg.norm(exact)
 
 
-def test_a_joint_that_slides_for_a_moment_counts_as_one_at_rest():
+def test_a_joint_that_slides_for_a_moment_counts_as_one_at_rest(signals_of):
     robot = load_planar_arm()
     log = make_hidden_effect_log(robot, "stribeck", joints=[1], n_trajectories=5, random_state=2)
     frame = log.frame.copy()
@@ -70,9 +69,32 @@ def test_a_joint_that_slides_for_a_moment_counts_as_one_at_rest():
     still |= frame["time"] > frame["time"].min() + 0.5
     frame.loc[still, "dq2"] = 0.0
     names = [f"{quantity}{k}" for quantity in ("q", "dq") for k in (1, 2)]
-    table = frame[["time", "trajectory", *names]]
-    signals, torque = read_signals(table, frame[["tau1", "tau2"]], robot)
+    signals = signals_of(frame[["time", "trajectory", *names]], robot)
+    torque = frame[["tau1", "tau2"]].to_numpy()
     terms = make_terms(["viscous", "coulomb"], 2)
     made = make_problem(signals, torque, robot=robot, rigid_body=True, terms=terms, smooth=False)
     assert made.rows.counts[1] == 0 and made.rows.counts[0] > 100
     assert not made.rows.sliding[:, 1].any()
+
+
+def test_samples_take_the_fold_of_the_nearest_row_of_their_trajectory():
+    made = problem(4)
+    rows, fold = made.rows, made.fold[0]
+    found = made.sample_folds(0)
+    for name in np.unique(made.signals.trajectory):
+        own, mine = made.signals.trajectory == name, rows.trajectory[0] == name
+        distance = np.abs(made.signals.clock[own, None] - rows.time[0][mine])
+        nearest = distance <= distance.min(axis=1, keepdims=True) + 1e-9
+        folds = np.where(nearest, fold[mine], -1)
+        assert (folds == found[own, None]).any(axis=1).all()
+
+
+def test_without_a_clock_every_sample_is_a_row():
+    made = problem(2)
+    signals = made.signals.with_(time=None)
+    torque = signals.robot.inverse_dynamics(signals.q, signals.dq, signals.ddq)
+    bare = make_problem(
+        signals, torque, robot=signals.robot, rigid_body=True, terms=made.terms, smooth=False
+    )
+    assert bare.rows.counts.tolist() == [signals.n_samples] * 2
+    np.testing.assert_array_equal(bare.rows.average(signals.q, 0), signals.q)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import cumulative_trapezoid
 
 from skidyn.datasets import load_planar_arm, load_scara, load_ur5, make_hidden_effect_log
 from skidyn.exceptions import SkidynError
@@ -23,7 +24,10 @@ def test_every_limit_holds_and_the_motion_starts_and_ends_at_rest(load, motion):
     excitation = design_excitation(robot, motion=motion, limits=given, **FAST)
 
     limits = given.resolved(robot)
-    _, q, dq, ddq = excitation.sample(1000.0)
+    time, q, dq, ddq = excitation.sample(1000.0)
+    for value, slope in ((q, dq), (dq, ddq)):
+        gone = cumulative_trapezoid(slope, time, axis=0, initial=0.0)
+        np.testing.assert_allclose(gone, value - value[0], atol=1e-4)
     assert np.all((q > limits.position[:, 0]) & (q < limits.position[:, 1]))
     assert np.all(np.abs(dq) <= limits.velocity)
     assert np.all(np.abs(ddq) <= 3.0)

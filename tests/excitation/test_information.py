@@ -9,7 +9,6 @@ from skidyn.datasets import load_planar_arm
 from skidyn.effects import Term
 from skidyn.exceptions import SkidynError
 from skidyn.excitation import design_excitation
-from skidyn.excitation._information import make_model, recorded_information
 from skidyn.robots import base_parameter_index
 
 ROBOT = load_planar_arm()
@@ -24,62 +23,61 @@ def recording(rate, duration=6.0):
     return pd.DataFrame(np.hstack(states), columns=names).assign(time=time)
 
 
-def test_the_matrix_is_that_of_the_regressor():
-    frame = recording(100.0)
-    model = make_model(ROBOT, ("viscous",))
+def information(frame, rate):
+    """Of a recording: each sample counts by its time, torque by its limit."""
     q, dq, ddq = (frame[[f"{s}1", f"{s}2"]].to_numpy() for s in ("q", "dq", "ddq"))
     regressor = ROBOT.torque_regressor(q, dq, ddq)[:, :, base_parameter_index(ROBOT)]
     friction = dq[:, :, None] * np.eye(2)
     columns = np.concatenate([regressor, friction], axis=2) / ROBOT.effort_limits[:, None]
     flat = columns.reshape(-1, columns.shape[2])
-    expected = flat.T @ flat / 100.0  # seconds for each sample
-    np.testing.assert_allclose(recorded_information(model, frame), expected, rtol=1e-9, atol=1e-9)
+    return flat.T @ flat / rate
 
 
-def test_recordings_count_by_their_length_and_not_by_their_rate():
-    model = make_model(ROBOT, None)
-    slow, fast, long = (
-        recorded_information(model, frame)
-        for frame in (recording(100.0), recording(400.0), recording(100.0, 12.0))
+def told(recorded):
+    """Motion that is designed to follow recordings, and its information."""
+    motion = design_excitation(
+        ROBOT, effects=("viscous",), recorded=recorded, duration=6.0, iterations=0
     )
-    scale = np.abs(slow).max()
-    np.testing.assert_allclose(slow, fast, atol=0.02 * scale)
-    assert np.trace(long) == pytest.approx(2 * np.trace(slow), rel=0.1)
-    twice = recorded_information(model, [recording(100.0)] * 2)
-    np.testing.assert_allclose(twice, 2 * slow)
-    derived = recorded_information(model, recording(400.0).drop(columns=["ddq1", "ddq2"]))
-    np.testing.assert_allclose(derived, fast, atol=0.05 * scale)
+    return motion, information(motion.to_frame(500.0), 500.0)
+
+
+@pytest.mark.parametrize("rate", [100.0, 400.0])
+@pytest.mark.parametrize("times", [1, 2])
+def test_the_next_motion_is_judged_together_with_the_recordings(rate, times):
+    """Recordings count by their length and not by their rate."""
+    first = recording(rate)
+    motion, own = told([first] * times)
+    together = times * information(first, rate) + own
+    assert motion.log_determinant == pytest.approx(np.linalg.slogdet(together)[1], abs=0.01)
+
+
+def test_accelerations_that_were_not_recorded_are_derived():
+    first = recording(400.0)
+    derived, _ = told(first.drop(columns=["ddq1", "ddq2"]))
+    assert derived.log_determinant == pytest.approx(told(first)[0].log_determinant, abs=0.05)
 
 
 def test_a_designed_motion_counts_like_its_recording():
     first = design_excitation(ROBOT, duration=6.0, iterations=0)
-    model = make_model(ROBOT, None)
-    by_motion = recorded_information(model, first)
-    by_table = recorded_information(model, first.to_frame(100.0))
-    np.testing.assert_allclose(by_motion, by_table, atol=0.01 * np.abs(by_motion).max())
+    by_motion, by_table = (told(r)[0].log_determinant for r in (first, first.to_frame(100.0)))
+    assert by_motion == pytest.approx(by_table, abs=0.02)
 
 
-def test_the_next_motion_is_judged_together_with_the_recordings():
-    first = recording(100.0, 30.0)
+def test_the_next_motion_adds_what_the_recordings_lack():
     fast = {"duration": 6.0, "iterations": 3}
-
     alone = design_excitation(ROBOT, **fast)
-    after = design_excitation(ROBOT, recorded=first, **fast)
-
-    model = make_model(ROBOT, None)
-    together = recorded_information(model, [first, after.to_frame(500.0)])
-    assert after.log_determinant == pytest.approx(np.linalg.slogdet(together)[1], abs=0.01)
+    after = design_excitation(ROBOT, recorded=recording(100.0, 30.0), **fast)
     assert after.log_determinant > alone.log_determinant
     assert not np.allclose(after.weights, alone.weights)
 
 
 def test_what_is_no_recording_is_refused():
-    model = make_model(ROBOT, None)
+    fast = {"duration": 6.0, "iterations": 0}
     with pytest.raises(SkidynError, match="no column 'time'"):
-        recorded_information(model, recording(100.0).drop(columns="time"))
+        design_excitation(ROBOT, recorded=recording(100.0).drop(columns="time"), **fast)
     with pytest.raises(SkidynError, match="recorded holds ndarray"):
-        recorded_information(model, [np.zeros((5, 6))])
+        design_excitation(ROBOT, recorded=[np.zeros((5, 6))], **fast)
     with pytest.raises(SkidynError, match="cannot be designed for dahl: .* the motion before"):
-        make_model(ROBOT, [Term("dahl", (1,), {"presliding": 0.02})])
+        design_excitation(ROBOT, effects=[Term("dahl", (1,), {"presliding": 0.02})], **fast)
     with pytest.raises(SkidynError, match="stribeck has the shape parameter 'vs': give a Term"):
-        make_model(ROBOT, ["stribeck"])
+        design_excitation(ROBOT, effects=["stribeck"], **fast)

@@ -14,8 +14,6 @@ from skidyn import cli
 from skidyn.datasets import load_planar_arm
 from skidyn.effects import Term, get_effect
 from skidyn.explorer import Session
-from skidyn.explorer._script import script
-from skidyn.explorer._server import Explorer
 from skidyn.identification import RBDRegressor
 from skidyn.simulation import servo_torque
 
@@ -66,19 +64,20 @@ def test_the_script_gives_the_numbers_of_the_page(write, arm, log, tmp_path, mon
     served = {}
 
     def serve(session, folder, *, port, ready, **words):
-        served["explorer"] = Explorer(session, folder, **words)
+        served["session"], served["words"] = session, words
 
     monkeypatch.setattr(skidyn.explorer, "serve", serve)
     monkeypatch.chdir(tmp_path)  # the script is run elsewhere
     words = ["explore", "log.csv", "--urdf", "arm.urdf", "--folder", str(tmp_path), *options]
     assert cli.main(words) == cli.DONE
-    explorer = served["explorer"]
-    plain = next(e for e in explorer.session.ranked(2) if not get_effect(e.kind).shapes).kind
-    explorer.answer("add", {"kind": plain, "joint": 2, "trajectory": 1})
-    shaped = next(e for e in explorer.session.ranked(2) if get_effect(e.kind).shapes).kind
-    explorer.answer("add", {"kind": shaped, "joint": 2, "trajectory": 1})
-    shown = explorer.answer("refine", {"joint": 2, "trajectory": 1})["history"]
-    text = explorer.session.script(**explorer.script)
+    session = served["session"]
+    plain = next(e for e in session.ranked(2) if not get_effect(e.kind).shapes).kind
+    session.add(plain, joint=2)
+    shaped = next(e for e in session.ranked(2) if get_effect(e.kind).shapes).kind
+    session.add(shaped, joint=2, refined=False)
+    session.refine()
+    shown = session.history
+    text = session.script(**served["words"])
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
 
@@ -94,11 +93,13 @@ def test_the_script_gives_the_numbers_of_the_page(write, arm, log, tmp_path, mon
     assert (elsewhere / "model.skops").is_file()
 
 
-def test_the_model_is_written_as_it_was_given():
+def test_the_model_is_written_as_it_was_given(log):
     term = Term("stribeck", (2,), {"vs": np.float64(0.1)})
     model = RBDRegressor(load_planar_arm(), ["viscous", term], consistent=True)
+    session = Session(model, log.X, log.y)
+    session.add("spring", joint=2)
 
-    text = script(model, [("spring", 2)], ["a.csv"], "r.urdf", None, {"rate": None})
+    text = session.script(["a.csv"], "r.urdf", reading={"rate": None})
 
     compile(text, "explored.py", "exec")
     assert "['viscous', Term('stribeck', (2,), {'vs': 0.1})], consistent=True)" in text
@@ -111,12 +112,12 @@ def test_the_script_of_servos_computes_their_torque(sticky_servo, arm, tmp_path,
     sticky_servo.log.to_csv(tmp_path / "servos.csv", index=False)
     model = RBDRegressor(sticky_servo.robot, ["viscous", "coulomb"])
     servo = sticky_servo.controller.checked(2)
-    text = script(model, [], [str(tmp_path / "servos.csv")], str(arm), None, {}, servo)
+    session = Session(model, sticky_servo.log, servo_torque(servo, sticky_servo.log))
+    text = session.script([str(tmp_path / "servos.csv")], str(arm), controller=servo)
     assert "limit=[np.inf, np.inf]" in text and "needs_torque=False" in text
     text = text.replace('"model.skops"', repr(str(tmp_path / "model.skops")))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         exec(compile(text, "explored.py", "exec"), {})
-    shown = Session(model, sticky_servo.log, servo_torque(servo, sticky_servo.log)).history
     printed = [float(x) for x in capsys.readouterr().out.split()[-2:]]
-    assert printed == pytest.approx(shown[0]["rmse"], rel=1e-6)
+    assert printed == pytest.approx(session.history[0]["rmse"], rel=1e-6)

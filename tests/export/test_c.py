@@ -2,32 +2,39 @@
 """The exported C function, compiled and called."""
 
 import ctypes
+import subprocess
 
 import numpy as np
 import pytest
 
 from skidyn.datasets import load_planar_arm
-from skidyn.dynamics._compiled import compile_library, find_compiler
 from skidyn.export import c_source, write_c
 from skidyn.robots import Robot
 
 STRICT = ("-O2", "-std=c99", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC")
 
 
-def called(text, motion, name="skidyn_inverse_dynamics"):
-    if find_compiler() is None:
-        pytest.skip("no C compiler")
-    function = getattr(compile_library(text, STRICT), name)
-    function.restype = None
-    torque = np.empty_like(motion[0])
-    for k in range(len(torque)):
-        arrays = [np.ascontiguousarray(signal[k]) for signal in motion]
-        function(*(ctypes.c_void_p(a.ctypes.data) for a in (*arrays, torque[k])))
-    return torque
+@pytest.fixture
+def called(c_compiler, tmp_path):
+    """Torque of a motion by a source that is compiled without a warning."""
+
+    def call(text, motion, name="skidyn_inverse_dynamics"):
+        (tmp_path / "model.c").write_text(text)
+        built = ["-o", "model.so", "model.c", "-lm"]
+        subprocess.run([c_compiler, *STRICT, *built], cwd=tmp_path, check=True)
+        function = getattr(ctypes.CDLL(str(tmp_path / "model.so")), name)
+        function.restype = None
+        torque = np.empty_like(motion[0])
+        for k in range(len(torque)):
+            arrays = [np.ascontiguousarray(signal[k]) for signal in motion]
+            function(*(ctypes.c_void_p(a.ctypes.data) for a in (*arrays, torque[k])))
+        return torque
+
+    return call
 
 
 @pytest.mark.parametrize("name", ["tree", "scara"])
-def test_every_static_effect_equals_predict(models, name, states):
+def test_every_static_effect_equals_predict(models, name, states, called):
     model = models[name]
     motion = states(model.robot_)
     expected = model.predict(np.hstack(motion))
@@ -35,14 +42,14 @@ def test_every_static_effect_equals_predict(models, name, states):
 
 
 @pytest.mark.parametrize("name", ["ur5", "panda", "planar_arm"])
-def test_consistent_models_equal_predict(consistent, name, states):
+def test_consistent_models_equal_predict(consistent, name, states, called):
     model = consistent[name]
     motion = states(model.robot_)
     torque = called(c_source(model, name="torque"), motion, "torque")
     np.testing.assert_allclose(torque, model.predict(np.hstack(motion)), rtol=1e-10, atol=1e-10)
 
 
-def test_a_robot_alone_gives_its_rigid_bodies(tmp_path, states):
+def test_a_robot_alone_gives_its_rigid_bodies(tmp_path, states, called):
     robot = load_planar_arm()
     motion = states(robot)
     assert write_c(robot, tmp_path / "arm.c") == ()
@@ -50,7 +57,7 @@ def test_a_robot_alone_gives_its_rigid_bodies(tmp_path, states):
     np.testing.assert_allclose(torque, robot.inverse_dynamics(*motion), atol=1e-12)
 
 
-def test_joint_names_cannot_break_out_of_the_text(states):
+def test_joint_names_cannot_break_out_of_the_text(states, called):
     evil = '*/ int x; /* """ + '
     robot = Robot.from_urdf(
         '<robot name="*/ r"><link name="a"/><link name="b"><inertial><mass value="1"/></inertial>'

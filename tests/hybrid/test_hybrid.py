@@ -18,15 +18,12 @@ from sklearn.pipeline import Pipeline
 from sklearn.preprocessing import FunctionTransformer
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
-from skidyn._compat import CallbackSupportMixin, FitProgress
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.hybrid import HybridRegressor, OwnJointRegressor
-from skidyn.hybrid._hybrid import _honest_residuals
 from skidyn.identification import RBDRegressor
 from skidyn.model_selection import TrajectoryKFold
 from skidyn.neural_network import LSTMRegressor
 
-QUIET = FitProgress(None, None)
 FEATURES = ["q1", "q2", "dq1", "dq2"]  # what learners without key columns see
 TREES = ExtraTreesRegressor(15, min_samples_leaf=5, random_state=0)
 
@@ -80,16 +77,26 @@ class RowsSeen(LinearRegression):
         return np.full(len(X), -self.seen_)
 
 
+class Listener(LinearRegression):
+    """Notes the trajectories and the targets of every fit."""
+
+    told = []
+
+    def fit(self, X, y):
+        self.told.append((X[:, 0].astype(int), np.ravel(y)))
+        return super().fit(X, y)
+
+
 def test_no_residual_betrays_the_fold_that_is_held_out():
     trajectory = np.repeat(np.arange(4), 3)
     folds = [(np.flatnonzero(trajectory != k), np.flatnonzero(trajectory == k)) for k in range(4)]
-    residuals = _honest_residuals(RowsSeen(), trajectory[:, None], np.zeros(12), None, folds, QUIET)
-    for k, residual in enumerate(residuals):
-        for own, seen in zip(trajectory, residual, strict=True):
-            assert seen == sum(10.0**other for other in range(4) if other not in (k, own))
-    two = [(np.arange(3, 6), np.arange(3)), (np.arange(3), np.arange(3, 6))]
-    residuals = _honest_residuals(RowsSeen(), trajectory[:6, None], np.zeros(6), None, two, QUIET)
-    np.testing.assert_array_equal(residuals, [[10.0] * 6, [1.0] * 6])
+    Listener.told.clear()
+    HybridRegressor(RowsSeen(), Listener(), cv=folds).fit(trajectory[:, None], np.zeros(12))
+    held_out = [set(range(4)) - set(own) for own, _ in Listener.told]
+    assert [{k} in held_out for k in range(4)] == [True] * 4
+    for out, (own, residual) in zip(held_out, Listener.told, strict=True):
+        for k, seen in zip(own, residual, strict=True):
+            assert seen == sum(10.0**other for other in range(4) if other not in {k, *out})
 
 
 def test_tables_searches_and_storage(make_log):
@@ -137,7 +144,7 @@ def test_joints_are_known_by_the_names_of_the_robot():
 
 
 @pytest.mark.skipif(
-    not hasattr(CallbackSupportMixin, "set_callbacks"), reason="scikit-learn has no callbacks"
+    not hasattr(HybridRegressor, "set_callbacks"), reason="scikit-learn has no callbacks"
 )
 def test_progress_counts_every_fit(make_log):
     class Count:

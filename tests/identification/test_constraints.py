@@ -12,7 +12,6 @@ from skidyn.identification import (
     make_consistent,
     pseudo_inertia,
 )
-from skidyn.identification._constraints import start_bodies
 
 ROBOT = load_planar_arm()
 KNOWN = {
@@ -40,10 +39,6 @@ def test_knowledge_is_kept_whatever_the_data(noise):
     model = RBDRegressor(ROBOT, consistent=BodyConstraints(**KNOWN)).fit(X, y)
     check(model.inertial_parameters_)
     assert all(np.all(c >= 0) for c in model.effect_coefficients_.values())
-
-
-def test_the_start_keeps_everything():
-    check(start_bodies(BodyConstraints(**KNOWN), ROBOT.body_names, ROBOT.inertial_parameters))
 
 
 def squared_error(factor, target, parameters, coefficients):

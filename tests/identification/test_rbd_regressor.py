@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import pickle
+import re
 from importlib import resources
+from importlib.resources import files
 
 import numpy as np
 import pandas as pd
@@ -25,6 +27,10 @@ ONE_JOINT = """<robot name="pendulum"><link name="base"/>
 <inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>
 <joint name="j1" type="revolute"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/>
 <limit lower="-3" upper="3" effort="50" velocity="3"/></joint></robot>"""
+HIDDEN = make_hidden_effect_log(
+    load_planar_arm(), "stribeck", joints=[2], n_trajectories=6, duration=8.0, rate=100.0
+)
+TEXT = (files("skidyn.datasets") / "robots" / "planar_arm.urdf").read_text()
 
 
 class AnyColumns(RBDRegressor):
@@ -276,3 +282,75 @@ def test_pickle_of_fitted_and_unfitted(rubs, rubbing):
     same(pickle.loads(pickle.dumps(rubs)), rubs, rubbing.X)
     unfitted = pickle.loads(pickle.dumps(RBDRegressor(rubbing.robot)))
     assert not hasattr(unfitted, "coef_")
+
+
+def test_a_single_sample_is_refused_or_exact():
+    robot = load_planar_arm()
+    x = np.array([[0.1, 0.2, 0.3, 0.4, 0.5, 0.6]])
+    model = RBDRegressor(robot, effects=(), smooth=False)
+    y = robot.inverse_dynamics(x[:, :2], x[:, 2:4], x[:, 4:])
+    try:
+        assert np.isfinite(model.fit(x, y).predict(x)).all()
+    except ValueError as error:
+        assert "sample" in str(error) or "row" in str(error)
+
+
+def test_missing_values_are_refused_by_the_model():
+    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=2, duration=2.0)
+    X = log.X.copy()
+    X.iloc[100, 3] = np.nan
+    with pytest.raises(ValueError, match="NaN"):
+        RBDRegressor(log.robot).fit(X, log.y)
+
+
+def test_a_trajectory_of_a_million_rows_is_fitted_exactly():
+    robot = load_planar_arm()
+    t = np.arange(1_000_000) / 1000.0
+    q = np.column_stack([np.sin(0.7 * t) + 0.3 * np.sin(2.1 * t), np.sin(1.3 * t + 1)])
+    dq = np.column_stack(
+        [0.7 * np.cos(0.7 * t) + 0.63 * np.cos(2.1 * t), 1.3 * np.cos(1.3 * t + 1)]
+    )
+    ddq = np.column_stack(
+        [-0.49 * np.sin(0.7 * t) - 1.323 * np.sin(2.1 * t), -1.69 * np.sin(1.3 * t + 1)]
+    )
+    y = robot.inverse_dynamics(q, dq, ddq) + 2.0 * dq
+    X = np.column_stack([t, q, dq, ddq])
+    model = RBDRegressor(robot, ("viscous",), smooth=False, time=0).fit(X, y)
+    np.testing.assert_allclose(model.coef_[-2:], 2.0, rtol=1e-8)
+
+
+def scaled(mass=1.0, length=1.0):
+    """The arm with masses in other units, and lengths in others."""
+
+    def change(match):
+        power = {"mass value": 0, "xyz": 1}.get(match[1], 2)
+        weight = 1.0 if match[1] == "xyz" else mass
+        numbers = [float(x) * weight * length**power for x in match[2].split()]
+        return f'{match[1]}="{" ".join(map(repr, numbers))}"'
+
+    inertial = re.sub(r'(mass value|i[xyz]{2})="([^"]+)"', change, TEXT)
+    text = re.sub(r'(?<=origin )(xyz)="([^"]+)"', change, inertial)
+    return Robot.from_urdf(text, gravity=(0.0, 0.0, -9.81 * length))
+
+
+@pytest.fixture(scope="module")
+def reference():
+    return RBDRegressor(load_planar_arm()).fit(HIDDEN.X, HIDDEN.y)
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1e-3, 1e3, 1e6])
+def test_robots_from_a_milligram_to_thousands_of_tonnes(reference, factor):
+    model = RBDRegressor(scaled(mass=factor)).fit(HIDDEN.X, HIDDEN.y * factor)
+    assert model.coef_names_ == reference.coef_names_
+    np.testing.assert_allclose(model.coef_ / factor, reference.coef_, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(model.coef_std_ / factor, reference.coef_std_, rtol=1e-4, atol=1e-9)
+    assert model.condition_number_ == pytest.approx(reference.condition_number_, rel=1e-3)
+
+
+@pytest.mark.parametrize("length", [1e-3, 1e3])
+def test_millimetres_and_kilometres(reference, length):
+    """Lengths in other units, gravity too: torque grows with their square."""
+    model = RBDRegressor(scaled(length=length)).fit(HIDDEN.X, HIDDEN.y * length**2)
+    np.testing.assert_allclose(
+        model.predict(HIDDEN.X) / length**2, reference.predict(HIDDEN.X), rtol=1e-6, atol=1e-6
+    )

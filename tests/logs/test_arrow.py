@@ -3,8 +3,10 @@
 
 import numpy as np
 import pandas
+import pandas as pd
 import pytest
 
+from skidyn.exceptions import LogError
 from skidyn.logs import read_log
 
 
@@ -39,3 +41,12 @@ def test_the_index_of_pandas_is_a_column_like_others(tmp_path):
     frame.to_parquet(tmp_path / "log.parquet")
     read = read_log(tmp_path / "log.parquet", check=False)
     np.testing.assert_array_equal(read["time"], [0.0, 0.5, 1.0])
+
+
+def test_lists_of_differing_length(tmp_path):
+    rows = [[0.0, 0.0]] * 5 + [[0.0]]
+    pd.DataFrame({"time": range(6), "position": rows, "effort": rows}).to_parquet(
+        tmp_path / "log.parquet"
+    )
+    with pytest.raises(LogError, match="position has 1 values in row 5, 2 in most"):
+        read_log(tmp_path / "log.parquet")

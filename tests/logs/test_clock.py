@@ -1,136 +1,149 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Clocks of logs."""
+"""The clock of a log: its unit, its gaps, channels with clocks of their own, and rests."""
+
+import warnings
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from skidyn.exceptions import LogError
-from skidyn.logs._clock import (
-    align_channels,
-    derive_velocity,
-    seconds,
-    split_at_restarts,
-    split_trajectories,
-)
+from skidyn.exceptions import LogError, LogWarning
+from skidyn.logs import read_log
 
 
-def test_nanoseconds_since_1970_keep_their_differences():
+@pytest.fixture
+def read(tmp_path):
+    """Reads a table, or channels with clocks of their own: the log, and the notes of the reader."""
+
+    def read_channels(*tables, **options):
+        path = tmp_path / ("log.csv" if len(tables) == 1 else "log.h5")
+        if len(tables) == 1:
+            tables[0].to_csv(path, index=False)
+        else:
+            h5py = pytest.importorskip("h5py")
+            with h5py.File(path, "w") as file:
+                for channel, table in zip("abc", tables, strict=False):
+                    for name in table:
+                        file[f"{channel}/{name}"] = table[name].to_numpy()
+        options = {"check": False, "needs_torque": False, **options}
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", LogWarning)
+            log = read_log(path, **options)
+        return log, [note for note in log.attrs["notes"] if "velocities" not in note]
+
+    return read_channels
+
+
+def test_nanoseconds_since_1970_keep_their_differences(read):
     stamps = 1_700_000_000_000_000_000 + np.arange(5) * 1_000_001
-    clock = seconds(pd.DataFrame({"time": stamps}), None, "log")
-    np.testing.assert_array_equal(np.diff(clock), 1_000_001)
+    log, _ = read(pd.DataFrame({"time": stamps, "q1": 0.0}), units={"time": "ns"})
+    np.testing.assert_allclose(np.diff(log["time"]), 1.000001e-3, rtol=1e-9)
 
 
-def test_unreadable_clock():
+def test_unreadable_clock(read):
     with pytest.raises(LogError, match="neither numbers nor dates"):
-        seconds(pd.DataFrame({"time": ["noon", "later"]}), None, "log")
+        read(pd.DataFrame({"time": ["noon", "later"], "q1": 0.0}))
 
 
-def test_channels_at_a_rate_of_their_own_are_not_filled_across_gaps():
+def test_channels_at_a_rate_of_their_own_are_not_filled_across_gaps(read):
     fast = pd.DataFrame({"time": np.arange(0, 2, 0.01), "q1": 0.0})
     t = np.r_[np.arange(0, 0.5, 0.02), np.arange(1.5, 2, 0.02)]
-    slow = pd.DataFrame({"time": t, "tau1": 3 * t})
-    notes = []
-    table = align_channels([fast, slow], ["a", "b"], None, notes)
-    assert not ((table["time"] > 0.485) & (table["time"] < 1.495)).any()
-    np.testing.assert_allclose(table["tau1"], 3 * table["time"])
-    assert "row(s) outside their common time and 101 in gaps left out" in notes[0]
+    log, notes = read(fast, pd.DataFrame({"time": t, "tau1": 3 * t}))
+    assert not ((log["time"] > 0.485) & (log["time"] < 1.495)).any()
+    np.testing.assert_allclose(log["tau1"], 3 * log["time"])
+    assert any("row(s) outside their common time and 101 in gaps left out" in n for n in notes)
 
 
-def test_common_rate():
+def test_common_rate(read):
     t = np.arange(0, 1, 0.013)
-    table = align_channels([pd.DataFrame({"time": t, "q1": 2 * t})], ["a"], 50.0, [])
-    np.testing.assert_allclose(np.diff(table["time"]), 0.02)
-    np.testing.assert_allclose(table["q1"], 2 * table["time"])
+    log, _ = read(pd.DataFrame({"time": t, "q1": 2 * t}), resample_rate=50.0)
+    np.testing.assert_allclose(np.diff(log["time"]), 0.02)
+    np.testing.assert_allclose(log["q1"], 2 * log["time"])
 
 
-def test_runs_with_a_clock_of_their_own_are_resampled_apart():
+def test_runs_with_a_clock_of_their_own_are_resampled_apart(read):
     t = np.r_[np.arange(0, 1, 0.013), np.arange(0, 1, 0.017)]
-    run = np.r_[np.zeros(77), np.ones(59)]
-    notes = []
-    table = align_channels(
-        [pd.DataFrame({"time": t, "trajectory": run, "q1": 2 * t + 10 * run})], ["a"], 50.0, notes
-    )
-    assert table["trajectory"].value_counts().to_dict() == {0: 50, 1: 50}
-    np.testing.assert_allclose(table["q1"], 2 * table["time"] + 10 * table["trajectory"])
-    assert notes == ["interpolated to 50 Hz within 2 run(s) without a gap"]
+    run = np.r_[np.zeros(77, dtype=int), np.ones(59, dtype=int)]
+    table = pd.DataFrame({"time": t, "trajectory": run, "q1": 2 * t + 10 * run})
+    log, notes = read(table, resample_rate=50.0)
+    assert log["trajectory"].value_counts().to_list() == [50, 50]
+    first = log["trajectory"] == log["trajectory"].iloc[0]
+    np.testing.assert_allclose(log["q1"], 2 * log["time"] + 10 * ~first)
+    assert "interpolated to 50 Hz within 2 run(s) without a gap" in notes
 
 
-def test_resampling_does_not_fill_a_gap():
+def test_resampling_does_not_fill_a_gap(read):
     t = np.r_[np.arange(0, 1, 0.01), np.arange(3, 4, 0.01), 9.0]
-    notes = []
-    table = align_channels([pd.DataFrame({"time": t, "q1": t})], ["a"], 20.0, notes)
-    np.testing.assert_allclose(table["q1"], table["time"])
-    assert not ((table["time"] > 0.991) & (table["time"] < 2.99)).any()
-    assert notes[0].endswith("1 isolated row(s) left out")
+    log, notes = read(pd.DataFrame({"time": t, "q1": t}), resample_rate=20.0)
+    np.testing.assert_allclose(log["q1"], log["time"])
+    assert not ((log["time"] > 0.991) & (log["time"] < 2.99)).any()
+    assert any(note.endswith("1 isolated row(s) left out") for note in notes)
 
 
-def test_a_slower_clock_averages_vibration_away():
+def test_a_slower_clock_averages_vibration_away(read):
     t = np.arange(0, 2, 0.001)
     vibration = np.sin(2 * np.pi * 260 * t)  # single samples at 50 Hz would show 10 Hz
     table = pd.DataFrame({"time": t, "q1": t**2 + vibration})
-    notes = []
-    slow = align_channels([table], ["a"], 50.0, notes)
-    inside = slow.iloc[1:-1]
+    log, notes = read(table, resample_rate=50.0)
+    inside = log.iloc[1:-1]
     np.testing.assert_allclose(inside["q1"], inside["time"] ** 2, atol=0.07)
-    assert notes == ["averaged to 50 Hz within 1 run(s) without a gap"]
+    assert "averaged to 50 Hz within 1 run(s) without a gap" in notes
     other = pd.DataFrame({"time": t, "tau1": 3 * t + vibration})
     positions = pd.DataFrame({"time": np.arange(0.004, 2, 0.02), "q1": 1.0})
-    notes = []
-    both = align_channels([positions, other], ["a", "b"], None, notes).iloc[1:-1]
+    both, notes = read(positions, other)
+    both = both.iloc[1:-1]
     np.testing.assert_allclose(both["tau1"], 3 * both["time"], atol=0.07)
-    assert notes[0].startswith("channels a, b interpolated to the clock of a (b averaged over its")
+    assert any("interpolated to the clock of a (b averaged over its" in note for note in notes)
 
 
-def test_a_mean_reaches_into_no_gap_and_over_no_missing_value():
+def test_a_mean_reaches_into_no_gap_and_over_no_missing_value(read):
     t = np.r_[np.arange(0, 1, 0.01), np.arange(3, 4, 0.01)]
     tau = np.where(t < 2, 1.0, 5.0)
     tau[40] = np.nan
-    channel = pd.DataFrame({"time": t, "tau1": tau})
     positions = pd.DataFrame({"time": np.arange(0, 4, 0.05), "q1": 1.0})
-    both = align_channels([positions, channel], ["a", "b"], None, [])
+    both, _ = read(positions, pd.DataFrame({"time": t, "tau1": tau}), missing="drop")
     early = both["time"] < 2
-    missing = np.isnan(both["tau1"])
-    np.testing.assert_allclose(both["time"][missing], 0.4)
-    np.testing.assert_allclose(both["tau1"][early & ~missing], 1)
-    np.testing.assert_allclose(both["tau1"][~early], 5)
+    assert np.abs(both["time"] - 0.4).min() > 0.04  # the row of the missing value
+    np.testing.assert_allclose(both["tau1"], np.where(early, 1.0, 5.0))
 
 
-def test_channels_whose_clock_starts_anew_cannot_be_brought_together():
+def test_channels_whose_clock_starts_anew_cannot_be_brought_together(read):
     fast = pd.DataFrame({"time": np.tile(np.arange(5) / 10, 2), "q1": 0.0})
     slow = pd.DataFrame({"time": np.arange(3) / 5, "tau1": 0.0})
-    with pytest.raises(LogError, match="the clock of a goes back in row 5.*separate file"):
-        align_channels([fast, slow], ["a", "b"], None, [])
+    with pytest.raises(LogError, match="the clock of .*a goes back in row 5.*separate file"):
+        read(fast, slow)
     unread = fast.assign(time=np.r_[np.nan, np.arange(9)])
-    with pytest.raises(LogError, match="the clock of a is not a number in row 0"):
-        align_channels([unread], ["a"], 10.0, [])
+    with pytest.raises(LogError, match="the clock of .* is not a number in row 0"):
+        read(unread, resample_rate=10.0)
 
 
 @pytest.mark.parametrize(
     ("rate", "speed", "noise"),
     [(1000, 0.05, 0), (1000, 0.05, 2e-5), (500, 0.02, 1e-4), (100, 0.3, 5e-4)],
 )
-def test_rests_are_told_from_slow_motion_whatever_the_rate_and_the_noise(rate, speed, noise):
+def test_rests_are_told_from_slow_motion_whatever_the_rate_and_the_noise(read, rate, speed, noise):
     third = 3 * rate
     move = speed * np.arange(third) / rate
     rest = np.ones(third)
     q = np.r_[move, move[-1] * rest, move[-1] + move, 2 * move[-1] * rest, 2 * move[-1] - move]
     q = q + noise * np.random.default_rng(0).normal(size=len(q))
-    time = np.arange(len(q)) / rate
-    number = split_trajectories(time, np.zeros(len(q), int), np.c_[q, q], None, 2.0)
-    cuts = time[np.flatnonzero(np.diff(number))]
+    table = pd.DataFrame({"time": np.arange(len(q)) / rate, "q1": q, "q2": q})
+    log, _ = read(table, split_dwells=2.0)
+    cuts = log["time"][np.flatnonzero(np.diff(log["trajectory"]))]
     np.testing.assert_allclose(cuts, [4.5, 10.5], atol=0.05)
 
 
-def test_small_step_back_is_no_restart():
-    assert split_at_restarts(np.array([0.0, 1.0, 2.0, 1.9, 2.1]))[1] == 0
-    assert split_at_restarts(np.array([0.0, 1.0, 2.0, 0.0, 1.0]))[1] == 1
+def test_a_clock_that_restarts_begins_a_trajectory(read):
+    again = pd.DataFrame({"time": [0.0, 1.0, 2.0, 0.0, 1.0], "q1": 0.0})
+    assert read(again)[0]["trajectory"].tolist() == [1, 1, 1, 2, 2]
+    with pytest.raises(LogError, match="time goes backwards in 1 place"):
+        read(again.assign(time=[0.0, 1.0, 2.0, 1.9, 2.1]))
 
 
-def test_velocity_does_not_cross_trajectories():
+def test_velocity_does_not_cross_trajectories(read):
     t = np.tile(np.arange(4) / 10, 2)
-    q = np.r_[5 * t[:4], 100 - t[4:]][:, None]
-    dq = derive_velocity(q, t, np.repeat([0, 1], 4))
-    np.testing.assert_allclose(dq[:, 0], [5] * 4 + [-1] * 4)
+    table = pd.DataFrame({"time": t, "trajectory": np.repeat([1, 2], 4)})
+    log, _ = read(table.assign(q1=np.r_[5 * t[:4], 100 - t[4:]]))
+    np.testing.assert_allclose(log["dq1"], [5] * 4 + [-1] * 4)
     with pytest.raises(LogError, match="row 4 is isolated"):
-        derive_velocity(q[:5], t[:5], np.array([0, 0, 0, 0, 1]))
+        read(table[:5].assign(q1=0.0))

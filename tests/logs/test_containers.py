@@ -139,3 +139,44 @@ def test_matlab_without_numbers(tmp_path):
     savemat(tmp_path / "log.mat", {"robot": "arm"})
     with pytest.raises(LogError, match="no numeric columns.*use table2struct"):
         read_log(tmp_path / "log.mat")
+
+
+def test_channels_without_common_time(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        for name, start in (("q", 0.0), ("tau", 100.0)):
+            file[f"{name}_group/time"] = start + np.arange(50) / 100
+            file[f"{name}_group/{name}"] = np.ones((50, 2))
+    with pytest.raises(LogError, match="do not overlap in time"):
+        read_log(tmp_path / "log.h5")
+
+
+def test_broken_containers(tmp_path):
+    pytest.importorskip("h5py")
+    for name in ("log.h5", "log.mat", "log.parquet"):
+        (tmp_path / name).write_bytes(b"nothing of the kind" * 10)
+        with pytest.raises(LogError, match=name):
+            read_log(tmp_path / name)
+
+
+def test_numbers_of_an_hdf5_log_do_not_lie_in_other_files(secret):
+    secret, _ = secret
+    time = np.arange(10.0)
+    with h5py.File("external.h5", "w") as file:
+        file["time"] = time
+        file.create_dataset("q1", (10,), "u1", external=[(str(secret), 0, 10)])
+    with h5py.File("virtual.h5", "w") as file:
+        file["time"] = time
+        layout = h5py.VirtualLayout((10,), "f8")
+        layout[:] = h5py.VirtualSource("../secret/other.h5", "q1", shape=(10,))
+        file.create_virtual_dataset("q1", layout)
+    for name in ("external.h5", "virtual.h5"):
+        told = f"{name}: the numbers of /q1 are stored in another file"
+        with pytest.raises(LogError, match=told):
+            read_log(name)
+    with h5py.File("link.h5", "w") as file:
+        file["time"], file["q1"], file["tau1"] = time, time, time
+        file["dq1"] = h5py.ExternalLink("../secret/other.h5", "/q1")
+    with h5py.File("../secret/other.h5", "w") as file:
+        file["q1"] = np.full(10, 7.0)
+    np.testing.assert_allclose(read_log("link.h5", check=False)["dq1"], 1.0)  # derived from q1

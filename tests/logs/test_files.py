@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What readers used to lose without a word: each is read as it is meant, or refused."""
 
+import io
+import os
+import zipfile
+from contextlib import suppress
+
 import numpy as np
 import pytest
 
-pandas = pytest.importorskip("pandas", reason="needs skidyn[io]")
-
-from skidyn.exceptions import LogError, LogWarning  # noqa: E402
-from skidyn.logs import read_log  # noqa: E402
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.exceptions import LogError, LogWarning, SkidynError
+from skidyn.logs import read_log
 
 ROWS = "1,0.1,0.2\n2,0.2,0.3\n3,0.3,0.4\n"
 HEADER = "time,q1,tau1\n"
@@ -96,3 +100,58 @@ def write(path, arrays):
         with h5py.File(path, "w") as file:
             for name, array in arrays.items():
                 file[name] = array
+
+
+def test_pickles_in_npz_are_refused(tmp_path):
+    objects = np.array([{"a": 1}, None], dtype=object)
+    np.savez(tmp_path / "log.npz", t=np.arange(2), q=objects)
+    with pytest.raises(LogError, match="pickles"):
+        read_log(tmp_path / "log.npz")
+
+
+def test_archives_that_unpack_to_too_much_are_refused(tmp_path):
+    np.savez_compressed(tmp_path / "bomb.npz", t=np.zeros(2_000_000))
+    with pytest.raises(LogError, match="more than max_bytes"):
+        read_log(tmp_path / "bomb.npz", max_bytes=2**20)
+    header = io.BytesIO()
+    shape = {"descr": "<f8", "fortran_order": False, "shape": (10**12,)}
+    np.lib.format.write_array_header_1_0(header, shape)
+    with zipfile.ZipFile(tmp_path / "lie.npz", "w") as archive:
+        archive.writestr("t.npy", header.getvalue() + b"\0" * 80)
+    with pytest.raises(LogError, match="declares an array of shape"):
+        read_log(tmp_path / "lie.npz")
+    (tmp_path / "no.npz").write_bytes(b"no archive")
+    with pytest.raises(LogError, match="not a NumPy archive"):
+        read_log(tmp_path / "no.npz")
+
+
+@pytest.mark.parametrize("suffix", ["mat", "feather"])
+def test_modules_that_come_with_a_log_are_not_imported(secret, suffix):
+    """These formats are decoded in another process first."""
+    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=1, duration=1.0).frame
+    if suffix == "mat":
+        from scipy.io import savemat
+
+        savemat("log.mat", {name: log[name].to_numpy() for name in log})
+    else:
+        pytest.importorskip("pyarrow")
+        log.to_feather("log.feather")
+    for name in ("numpy", "scipy", "pyarrow", "resource"):
+        with open(f"{name}.py", "w") as file:
+            file.write("open('harm', 'w').close()\n")
+    assert len(read_log(f"log.{suffix}", check=False)) == len(log)
+    assert not os.path.exists("harm")
+
+
+def test_names_inside_an_archive_lead_nowhere(secret):
+    secret, names = secret
+    arrays = {"time": np.arange(10.0), "q1": np.arange(10.0)}
+    np.savez("log.npz", **arrays)
+    with zipfile.ZipFile("log.npz", "a") as archive:
+        for name in names:
+            archive.writestr(f"{name}.npy", b"evil")
+    with suppress(SkidynError):
+        read_log("log.npz", check=False)
+    assert secret.read_text() == "the secret"
+    assert [f.name for f in secret.parent.iterdir()] == ["secret.stl"]
+    assert [f.name for f in secret.parents[1].joinpath("work").glob("*.*")] == ["log.npz"]

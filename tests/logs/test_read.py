@@ -7,12 +7,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from skidyn.datasets import load_planar_arm
+from skidyn.datasets import load_panda, load_planar_arm, make_hidden_effect_log
 from skidyn.exceptions import LogError, LogWarning
 from skidyn.logs import check_log, read_log
 
 ROBOT = load_planar_arm()
 N = 200
+LOG = make_hidden_effect_log(ROBOT, None, n_trajectories=3, duration=4.0).frame
 
 
 def table(n=N, names="q{k} dq{k} tau{k}", rate=100.0):
@@ -340,3 +341,69 @@ def test_rows_without_order_in_time_are_refused(data_dir):
         pytest.skip(f"{file} is not here")
     with pytest.raises(LogError, match="4449 of 4449 rows"):
         read_log(file)
+
+
+def test_absent_unknown_and_empty_files(tmp_path):
+    with pytest.raises(LogError, match="no such file"):
+        read_log(tmp_path / "log.csv")
+    (tmp_path / "log.xyz").write_text("1")
+    with pytest.raises(LogError, match="unknown kind of log '.xyz'"):
+        read_log(tmp_path / "log.xyz")
+    (tmp_path / "log.csv").write_text("")
+    with pytest.raises(LogError, match="empty"):
+        read_log(tmp_path / "log.csv")
+    with pytest.raises(LogError, match="list of paths is empty"):
+        read_log([])
+
+
+def test_rows_in_reverse_order(saved):
+    one = LOG[LOG["trajectory"] == 1].drop(columns="trajectory")
+    with pytest.raises(LogError, match=r"reverse order. Sort them by time"):
+        read_log(saved(one[::-1]))
+
+
+def test_repeated_times_are_counted(saved):
+    repeated = pd.concat([LOG, LOG.iloc[[10, 20]]]).sort_values("time", kind="stable")
+    with pytest.warns(LogWarning, match="2 of 1202 rows repeat the time.*first in row 11"):
+        frame = read_log(saved(repeated), check=False)
+    assert len(frame) == len(LOG)
+
+
+def test_joint_counts_that_differ(saved):
+    with pytest.raises(LogError, match=r"has 2 joints.*robot has 7.*joints=\[...\]"):
+        read_log(saved(LOG), robot=load_panda())
+    with pytest.raises(LogError, match="the log has 2 joints, the robot has 7"):
+        check_log(LOG, load_panda())
+    with pytest.raises(LogError, match=r"tau3, but positions of 2 joint"):
+        read_log(saved(LOG.assign(tau3=0.0)))
+
+
+def test_joint_names_that_differ_are_suggested(saved):
+    renamed = LOG.rename(columns=lambda name: name.replace("q1", "q_jiont1").replace("q2", "q_x"))
+    with pytest.raises(LogError, match=r"joint1, joint2 \(did you mean 'jiont1'\?\)"):
+        read_log(saved(renamed), robot=ROBOT)
+    with pytest.raises(LogError, match="'speed', .*did you mean 'speed1'"):
+        read_log(saved(LOG.rename(columns={"q1": "speed1"})), columns={"q": ["speed", "q2"]})
+
+
+def test_suspicions_are_issued_as_warnings(saved):
+    first = LOG[LOG["trajectory"] == 1].reset_index(drop=True)
+    with pytest.warns(LogWarning, match="1 gap") as caught:
+        read_log(saved(first.drop(index=range(100, 200))), robot=ROBOT)
+    assert caught[0].filename == __file__  # at the caller's line, not inside skidyn
+
+
+def test_a_time_to_split_at_is_no_yes_or_no(saved):
+    with pytest.raises(LogError, match="split_gaps is True; expected the time in s"):
+        read_log(saved(LOG), split_gaps=True)
+
+
+def test_one_broken_log_among_fifty_is_named(tmp_path):
+    files = []
+    for k in range(50):
+        rows = "".join(f"{t / 10},{t * 0.1},{t * 0.2}\n" for t in range(5))
+        broken = "0.5,0.1\n" if k == 37 else ""
+        files.append(tmp_path / f"robot_{k}.csv")
+        files[-1].write_text("time,q1,tau1\n" + rows + broken)
+    with pytest.raises(LogError, match=r"robot_37\.csv: line 7 has 2 fields"):
+        read_log(files, check=False)

@@ -3,12 +3,14 @@
 
 import json
 import warnings
+from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from skidyn.datasets import load_planar_arm
-from skidyn.exceptions import LogError, LogWarning
+from skidyn.exceptions import LogError, LogWarning, SkidynError
 from skidyn.logs import read_log
 
 writer = pytest.importorskip("mcap.writer")
@@ -211,3 +213,31 @@ def test_truncated_bags_are_refused_by_name(tmp_path, kind, share):
     file.write_bytes(file.read_bytes()[: int(share * file.stat().st_size)])
     with pytest.raises(LogError, match="log"):
         quiet_read(path, robot=load_planar_arm())
+
+
+def test_broken_bags(tmp_path):
+    pytest.importorskip("mcap_ros2")
+    pytest.importorskip("rosbags")
+    for name in ("log.mcap", "log.bag", "log.db3"):
+        (tmp_path / name).write_bytes(b"nothing of the kind" * 10)
+        with pytest.raises(LogError, match=name):
+            read_log(tmp_path / name)
+
+
+def test_a_bag_reads_no_database_outside_its_folder(secret, opened):
+    rosbags = pytest.importorskip("rosbags.rosbag2")
+    secret, _ = secret
+    with rosbags.Writer("bag", version=9):
+        pass
+    database = next(Path("bag").glob("*.db3"))
+    database.rename(secret.parent / database.name)
+    metadata = Path("bag/metadata.yaml")
+    text = metadata.read_text()
+    metadata.write_text(text.replace(database.name, f"../../secret/{database.name}"))
+
+    def read():
+        with suppress(SkidynError):
+            read_log("bag")
+
+    heard = opened(read)
+    assert not {f for f in heard if f.startswith(str(secret.parent))}

@@ -4,21 +4,22 @@
 import numpy as np
 import pytest
 
-from skidyn._signals import read_signals
 from skidyn.measurement import Measurement, servo_settings
 from skidyn.simulation import servo_torque
 
 
-def settings(servo):
-    signals, torque = read_signals(
-        servo.log, servo_torque(servo.controller, servo.log), servo.robot
-    )
-    names = servo.robot.joint_names
-    measurement = Measurement(signals, torque, servo.robot, names, of_servos=True)
-    return servo_settings(measurement, np.array([200.0, 12.0]))
+@pytest.fixture
+def settings(signals_of):
+    def found(servo):
+        robot, torque = servo.robot, servo_torque(servo.controller, servo.log)
+        signals = signals_of(servo.log, robot)
+        measurement = Measurement(signals, torque, robot, robot.joint_names, of_servos=True)
+        return servo_settings(measurement, np.array([200.0, 12.0]))
+
+    return found
 
 
-def test_a_gain_has_its_size_and_a_chance(servo_log):
+def test_a_gain_has_its_size_and_a_chance(servo_log, settings):
     assert settings(servo_log({})) == []
     (found,) = settings(servo_log({}, stiffness=(200.0, 8.0)))
     value, low, high = found.parameters["stiffness"]
@@ -27,7 +28,7 @@ def test_a_gain_has_its_size_and_a_chance(servo_log):
     assert found.chance < 1e-6 and found.error_drop > 0.9
 
 
-def test_a_limit_has_no_chance_but_the_error_that_it_removes(servo_log):
+def test_a_limit_has_no_chance_but_the_error_that_it_removes(servo_log, settings):
     (found,) = settings(servo_log({}, limit=(100.0, 0.5)))
     value, low, high = found.parameters["limit"]
     assert (found.kind, found.joint, found.chance) == ("servo_current", 1, None)

@@ -60,3 +60,11 @@ def test_divergence_is_an_error(log):
     X, y = log
     with pytest.raises(ValueError, match="lower learning_rate"):
         LSTMRegressor(**SMALL | {"learning_rate": 1e30}).fit(X, y)
+
+
+def test_a_diverging_network_is_told():
+    rng = np.random.default_rng(0)
+    X, y = rng.normal(size=(200, 6)), rng.normal(size=(200, 2))
+    model = LSTMRegressor(window=3, hidden_size=4, max_epochs=3, learning_rate=1e30)
+    with pytest.raises(ValueError, match="training diverged in epoch 1"):
+        model.fit(X, y)

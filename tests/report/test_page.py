@@ -25,6 +25,8 @@ def test_page_loads_nothing(fakes):
     assert not re.search(r"""(?:src|href)=["']?(?:https?:)?//""", page)
     assert "url(" not in page and "@import" not in page
     assert "default-src 'none'" in page
+    for bundled in ("uPlot", ".u-wrap", "Permission is hereby granted"):  # with its licence
+        assert bundled in page
 
 
 def test_non_finite_numbers_do_not_break_the_page(fakes):

@@ -1,25 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
+"""A picture of a page is one module and one template, in the folder of the page."""
+
+import re
 from importlib import resources
 
 import pytest
 
-from skidyn.report._picture import Canvas, pictures
-
 
 @pytest.mark.parametrize("page", ["comparison", "diagnosis", "fleet"])
-def test_every_picture_is_a_module_and_a_template(page):
+def test_every_picture_has_a_module_a_template_and_a_place(page):
     folders = [resources.files("skidyn.report").joinpath("_pages", f) for f in (page, "every")]
-    names = {entry.name for folder in folders for entry in folder.iterdir()}
-    names -= {"__init__.py", "__pycache__"}
-    found = pictures(page)
-    assert names == {f"{name}.{end}" for name in found for end in ("py", "html.jinja")}
-    places = [picture.place for picture in found.values()]
-    assert places == sorted(set(places)), "two pictures at one place"
-
-
-def test_a_figure_shown_twice_is_stored_once():
-    canvas = Canvas()
-    first = canvas.figure({"type": "bars", "values": [1.0]})
-    assert canvas.figure({"type": "bars", "values": [2.0]}) != first
-    assert canvas.figure({"type": "bars", "values": [1.0]}) == first
-    assert len(canvas.numbers["figures"]) == 2
+    files = {file.name: file for folder in folders for file in folder.iterdir()}
+    sources = {n.removesuffix(".py"): f for n, f in files.items() if n.endswith(".py")}
+    del sources["__init__"]
+    templates = {n.removesuffix(".html.jinja") for n in files if n.endswith(".html.jinja")}
+    assert templates == set(sources)
+    places = [
+        re.findall(r"^    place(?:, title)? = (\d+)", f.read_text(), re.M) for f in sources.values()
+    ]
+    assert all(len(found) == 1 for found in places)
+    assert len({found[0] for found in places}) == len(places), "two pictures at one place"

@@ -1,8 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Descriptions are read as text, bytes or files, whatever else they hold."""
 
-import pytest
+import json
+import os
 
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from skidyn.exceptions import SkidynError
 from skidyn.robots import Robot
 
 GOOD_INERTIA = '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>'
@@ -58,3 +63,51 @@ def test_attributes_that_nobody_knows_are_passed_over_in_silence(capfd):
     text = robot(TWO, joint("j", "a", "b")).replace("<robot ", f"<robot {more} ", 1)
     assert Robot.from_urdf(text).chain.n_joints == 1
     assert capfd.readouterr() == ("", "")
+
+
+def test_entities_are_never_expanded(chain):
+    lol = '<!DOCTYPE robot [<!ENTITY a "lol"><!ENTITY b "&a;&a;&a;&a;">]>'
+    other = '<!DOCTYPE robot [<!ENTITY f SYSTEM "file:///etc/passwd">]>'
+    for declaration in (lol, other):
+        with pytest.raises(SkidynError, match="document type or entities"):
+            Robot.from_urdf(declaration + chain(["j"]))
+
+
+def test_files_that_a_description_names_are_not_opened(secret, opened, chain):
+    secret, names = secret
+    assert str(secret) in opened(lambda: open(names[1]).close())
+    for name in names:
+        mesh = f'<geometry><mesh filename="{name}"/></geometry>'
+        picture = (
+            f'<visual>{mesh}<material name="m"><texture filename="{name}"/></material></visual>'
+        )
+        inside = f"</inertial>{picture}<collision>{mesh}</collision>"
+        text = chain(["j"]).replace("</inertial>", inside)
+        space = 'xmlns:xi="http://www.w3.org/2001/XInclude"'
+        more = f'<include filename="{name}"/><xi:include {space} href="{name}"/></robot>'
+        text = text.replace("</robot>", more)
+        text = f'<?xml-stylesheet href="{name}"?>{text}'
+        with open("robot.urdf", "w") as file:
+            file.write(text)
+        with open("robot.urdf.skidyn.json", "w") as file:
+            file.write(json.dumps({"include": name}))
+        heard = opened(lambda: Robot.from_urdf("robot.urdf"))
+        assert os.path.realpath("robot.urdf") in heard
+        assert str(secret) not in heard and os.path.realpath("robot.urdf.skidyn.json") not in heard
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.text(max_size=40))
+def test_any_joint_name_is_kept_or_refused(chain, name):
+    from xml.sax.saxutils import quoteattr
+
+    text = chain(["NAME"]).replace('"NAME"', quoteattr(name))
+    try:
+        assert Robot.from_urdf(text).n_joints == 1
+    except SkidynError:
+        pass
+
+
+def test_ten_thousand_joints_are_read(chain):
+    robot = Robot.from_urdf(chain([f"j{k}" for k in range(10_000)]))
+    assert robot.n_joints == 10_000

@@ -14,7 +14,7 @@ from skidyn.effects import unregister_effect
 from skidyn.identification import ESTIMATORS, RBDRegressor
 from skidyn.logs import read_log, register_reader
 
-RECIPES = Path(__file__).parents[1] / "docs" / "contributing"
+RECIPES = Path(__file__).parents[2] / "docs" / "contributing"
 
 
 def smallest_estimator():

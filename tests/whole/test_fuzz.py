@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-SOURCE = Path(__file__).resolve().parents[1] / "benchmarks" / "scale" / "fuzz.py"
+SOURCE = Path(__file__).resolve().parents[2] / "benchmarks" / "scale" / "fuzz.py"
 _specification = importlib.util.spec_from_file_location("fuzz", SOURCE)
 fuzz = importlib.util.module_from_spec(_specification)
 _specification.loader.exec_module(fuzz)
