@@ -8,6 +8,8 @@ relative standard deviation is below 10 %, the usual limit in the field. Numbers
 iterations keep an answer within half a minute, after which the error hardly falls.
 """
 
+import io
+
 import mujoco
 import numpy as np
 from mujoco import sysid
@@ -137,7 +139,8 @@ def fit(spec, known: list, start, scale: np.ndarray, iterations: int):
             out = np.moveaxis(cube, 2, 0).reshape(-1, x.shape[1])
         return [out], *more
 
-    best, result = sysid.optimize(start, residual, max_iters=iterations, x_scale="jac")
+    words = {"max_iters": iterations, "x_scale": "jac", "output": io.StringIO()}
+    best, result = sysid.optimize(start, residual, **words)
     left = residual(result.x.ravel(), best)[0][0]
     sizes = np.maximum(np.linalg.norm(result.jac, axis=0), 1e-12)
     inverse = np.linalg.pinv(result.jac / sizes, rcond=OPEN)
