@@ -106,9 +106,11 @@ def conclude(
     slight = _slight(problem, result.findings, intervals)
     remarks += slight.values()
     findings = []
+    preceding: dict[str, Array] = {}  # errors before the first finding of each kind was added
     for i, hypothesis in enumerate(result.findings):
         if i in slight:
             continue
+        preceding.setdefault(hypothesis.kind, np.array(history[i]["rmse"]))
         others = rivals.get(hypothesis.kind, ())
         for candidate, chance in zip(hypothesis.candidates, hypothesis.chances, strict=True):
             drop = _drop(shown[i], shown[i + 1], tuple(candidate.rows))
@@ -132,9 +134,10 @@ def conclude(
     episodes, inside = find_episodes(problem, smooth, least, share_held)
     if episodes:
         findings.append(_episodic(episodes, inside, result.fit.residual))
-    errors = np.array(history[0]["rmse"]), rmse
     whole = problem.whole_trajectories
-    findings = [_sure(f, findings, parts, errors, whole) for f in findings]
+    findings = [
+        _sure(f, findings, parts, (preceding.get(f.kind, rmse), rmse), whole) for f in findings
+    ]
     diagnosis = Diagnosis(
         _verdict(findings, parts),
         robot.joint_names,
@@ -452,8 +455,10 @@ def _sure(
     beside = any(set(f.joints) & set(finding.joints) for f in others)
     same = sorted({j - 1 for f in findings if f.kind == finding.kind for j in f.joints})
     before, after = (error[same] for error in errors)
-    # Noise that is correlated in time is larger than its fast part, and similar on all joints.
-    alike = max(1.0, float(np.min(errors[1] / np.maximum(parts.noise, np.finfo(float).tiny))))
+    # Noise that is correlated in time is larger than its fast part, and similar on all joints; a
+    # single joint does not show this.
+    ratio = errors[1] / np.maximum(parts.noise, np.finfo(float).tiny)
+    alike = max(1.0, float(ratio.min())) if len(ratio) > 1 else 1.0
     probability = confidence(
         finding.margin,
         float(parts.inflation[joints].max()),

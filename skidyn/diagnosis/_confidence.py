@@ -83,7 +83,8 @@ def confidence(
     float
         Between 0 and 0.98, or 0.88 for an unknown effect or if most of the error remains.
     """
-    logit = CONSTANT + MARGIN * min(max(margin, 0.0), 1.0)
+    # Where all known effects leave most of the error, the best of them need not be right.
+    logit = CONSTANT + (0.0 if stays else MARGIN * min(max(margin, 0.0), 1.0))
     logit += CORRELATED * float(np.log(max(inflation / COLOURED, 1.0)))
     logit += REMOVED * float(np.log10(min(max(removed, LEAST), ENOUGH) / ENOUGH))
     logit += NAMELESS * nameless + BLOCKS * (not whole_recordings)
@@ -103,7 +104,8 @@ def mostly_stays(before: Array, after: Array, noise: Array) -> bool:
     Parameters
     ----------
     before, after : ndarray of shape (n_joints,), N m or N
-        Error of the joints of an effect without and with all findings.
+        Error of the joints of an effect before it was added, and with all findings: what others
+        removed earlier is no evidence for it.
     noise : ndarray of shape (n_joints,), N m or N
         Noise of these joints, including noise correlated in time, which is similar on all joints.
 

@@ -236,14 +236,11 @@ def _joints(problem: Problem, hypothesis: Hypothesis, candidate: Candidate) -> t
 
 def notes(kind: str, parameters: Mapping[str, dict[str, Any]]) -> list[str]:
     """Notes on a finding other than its effect, size and rivals."""
-    caveat = "" if kind == UNKNOWN else get_effect(kind).caveat
-    sentences = [f"Note that {caveat}."] if caveat else []
-    mass = parameters.get("mass", {}).get("value", 0.0)
-    if isinstance(mass, float) and mass < 0:
-        sentences.append(
-            "The mass is negative: the description includes a load that the robot does not have."
-        )
-    return sentences
+    if kind == UNKNOWN:
+        return []
+    effect = get_effect(kind)
+    caveat = f"Note that {effect.caveat}." if effect.caveat else ""
+    return [sentence for sentence in (caveat, effect.meaning(parameters)) if sentence]
 
 
 def rival_title(kind: str) -> str:

@@ -27,9 +27,9 @@ from skidyn.evidence import (
 )
 
 CONFIDENCE = 0.95
-#: Relative step (absolute for linear parameters) of the derivative with respect to a shape
-#: parameter.
-STEP = 0.02
+#: Relative step of the derivative with respect to a shape parameter; largest change of a torque by
+#: it, relative to the torque; divisor of a step with a larger change, as of a fine ripple.
+STEP, LARGEST_CHANGE, SMALLER = 0.02, 0.3, 8.0
 
 Interval = tuple[float, float, float]
 
@@ -104,18 +104,25 @@ def _slopes(
             if np.isclose(here, shape.low, rtol=1e-6):
                 continue  # at the end of its range; beyond, it is another effect
             log = shape.spacing == "log"
-            step = STEP * here if log else STEP * max(abs(here), 1e-3)
-            sides = [
-                problem.term_rows(term.with_shape(**{shape.name: v}))
-                for v in (here + step, here - step)
-            ]
-            width = 2 * step / here if log else 2 * step
-            slopes.append(
-                {j: ((sides[0][j] - sides[1][j]) @ whole[own])[:, None] / width for j in sides[0]}
-            )
+            step = STEP * (here if log else max(abs(here), 1e-3))
+            change, size = np.inf, 0.0
+            while change > LARGEST_CHANGE * size and step > 1e-9 * abs(here):
+                sides = [
+                    problem.term_rows(term.with_shape(**{shape.name: v}))
+                    for v in (here + step, here - step)
+                ]
+                apart = {j: (sides[0][j] - sides[1][j]) @ whole[own] for j in sides[0]}
+                both = {j: (sides[0][j] + sides[1][j]) @ whole[own] for j in sides[0]}
+                change, size = (_norm(torque) for torque in (apart, both))
+                width, step = 2 * step / (here if log else 1.0), step / SMALLER
+            slopes.append({j: torque[:, None] / width for j, torque in apart.items()})
             owners.append((i, shape.name, log))
             spread.append(_spacing(shape))
     return slopes, owners, spread
+
+
+def _norm(torque: dict[int, Array]) -> float:
+    return float(np.sqrt(sum(np.sum(own**2) for own in torque.values())))
 
 
 def _spacing(shape: Shape) -> float:

@@ -36,6 +36,8 @@ LINE_BLOCKS = 60
 #: Number of waves within the range of a joint from which they differ from torques of bodies, and
 #: number of positions at which fewer waves are fitted.
 MANY, PLACES = 8.0, 400
+#: Step between the waves per rad that are tried around a line, and number of corrections after it.
+GRID, CORRECTIONS = 0.05, 2
 
 
 @dataclass(frozen=True)
@@ -166,16 +168,30 @@ def _peaks(q: Array, r: Array) -> list[tuple[float, float]]:
     return peaks
 
 
-def _strongest_wave(q: Array, r: Array, lowest: float, highest: float, count: int = 21) -> float:
+def _strongest_wave(q: Array, r: Array, lowest: float, highest: float) -> float:
     """Of evenly spaced waves, the one with the largest amplitude in a signal over q."""
     # Each wave is the previous one rotated by the same angle at every sample: one product of
     # complex numbers instead of a sine and a cosine.
+    count = 1 + round((highest - lowest) / GRID)
     turned, turn = r * np.exp(-1j * lowest * q), np.exp(-1j * (highest - lowest) / (count - 1) * q)
     strength = []
     for _ in range(count):
         strength.append(float(np.abs(turned.sum())))
         turned *= turn
     return float(np.linspace(lowest, highest, count)[int(np.argmax(strength))])
+
+
+def _correction(q: Array, r: Array, waves: float) -> float:
+    """Change to the waves of a line, found on a grid, by one step of least squares."""
+    wave = np.exp(1j * waves * q)
+    columns = [wave.real, wave.imag]
+    block = np.column_stack(columns)
+    cosine, sine = np.linalg.solve(block.T @ block, block.T @ r)
+    # about the mean position, so that the phase there and the number of waves are independent
+    slope = (q - q.mean()) * (sine * wave.real - cosine * wave.imag)
+    block = np.column_stack([*columns, slope])
+    change = np.linalg.lstsq(block.T @ block, block.T @ r, rcond=None)[0][2]
+    return float(np.clip(change, -2 * GRID, 2 * GRID))
 
 
 def _refined_wave(q: Array, r: Array, waves: float) -> float:
@@ -186,6 +202,8 @@ def _refined_wave(q: Array, r: Array, waves: float) -> float:
     """
     span = float(np.ptp(q))
     if waves * span > MANY * 2 * np.pi:
+        for _ in range(CORRECTIONS):
+            waves += _correction(q, r, waves)
         return waves
     bins = np.minimum(((q - q.min()) / span * PLACES).astype(int), PLACES - 1)
     count = np.bincount(bins, minlength=PLACES)

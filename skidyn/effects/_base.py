@@ -323,6 +323,20 @@ class Effect:
         """
         return None
 
+    def meaning(self, parameters: Mapping[str, Mapping[str, Any]]) -> str:
+        """What the identified parameters mean for the robot, as a sentence; empty by default.
+
+        Parameters
+        ----------
+        parameters : mapping of str to mapping
+            ``value`` and ``unit`` of each physical parameter.
+
+        Returns
+        -------
+        str
+        """
+        return ""
+
     def not_shown(self, signals: Signals, joint: int) -> str | None:
         """Reason why this data cannot show the effect on a joint; None if it can.
 

@@ -113,6 +113,16 @@ class TorqueRipple(Effect):
         a, b = coefficients
         return {"A": float(np.hypot(a, b)), "phase": float(np.arctan2(-b, a)), **shape}
 
+    def meaning(self, parameters: Mapping[str, Mapping[str, Any]]) -> str:
+        waves, unit = (parameters["N"][name] for name in ("value", "unit"))
+        if unit == "1/m":
+            return f"It repeats every {2e3 * np.pi / waves:.4g} mm, as a screw does with its lead."
+        return (
+            f"It repeats {waves:.4g} times per turn of the joint: once per turn of the motor if "
+            f"the gear ratio is {waves:.4g}, or twice, as in a strain wave gear, if it is "
+            f"{waves / 2:.4g}."
+        )
+
     def units(self, prismatic: bool = False) -> dict[str, str]:
         torque, length = ("N", "m") if prismatic else ("N m", "rad")
         return {"A": torque, "phase": "rad", "N": f"1/{length}"}

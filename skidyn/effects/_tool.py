@@ -104,6 +104,11 @@ class Payload(_ToolEffect):
         place = {f"com_{a}": v / mass if mass else 0.0 for a, v in zip("xyz", moment, strict=True)}
         return {"mass": mass, **place}
 
+    def meaning(self, parameters: Mapping[str, Mapping[str, Any]]) -> str:
+        if parameters.get("mass", {}).get("value", 0.0) >= 0:
+            return ""
+        return "The mass is negative: the description includes a load that the robot does not have."
+
     def units(self, prismatic: bool = False) -> dict[str, str]:
         moment = {f"first_moment_{a}": "kg m" for a in "xyz"}
         return {"mass": "kg", **{f"com_{a}": "m" for a in "xyz"}, **moment}

@@ -36,3 +36,11 @@ def test_the_curve_is_that_of_a_spring(missing):
 
 def test_a_mass_below_zero_is_explained():
     assert "description includes a load" in notes("payload", {"mass": {"value": -1.0}})[-1]
+
+
+def test_a_ripple_is_told_as_gear_ratio_or_lead():
+    def rows(waves, unit):
+        return {"N": {"value": waves, "unit": unit}, "A": {"value": 0.16, "unit": "N m"}}
+
+    assert "if it is 101." in notes("torque_ripple", rows(202.0, "1/rad"))[-1]
+    assert "every 5 mm" in notes("torque_ripple", rows(2e3 * np.pi / 5, "1/m"))[-1]

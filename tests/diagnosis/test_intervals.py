@@ -3,7 +3,9 @@
 
 import numpy as np
 
-from skidyn.diagnosis import parameter_intervals
+from skidyn.datasets import load_ur5, make_hidden_effect_log
+from skidyn.diagnosis import diagnose, parameter_intervals
+from skidyn.identification import RBDRegressor
 
 
 def test_intervals_lie_around_the_fit_and_hold_the_truth(missing, spring_log):
@@ -24,3 +26,15 @@ def test_shapes_that_are_held_make_intervals_no_wider(missing):
             if isinstance(interval, tuple):
                 wide = free[term][name]
                 assert interval[2] - interval[1] <= 1.01 * (wide[2] - wide[1])
+
+
+def test_a_fine_ripple_has_narrow_intervals_of_its_waves_and_size():
+    # a wave of 60 periods per rad is another one at waves that differ by two per cent
+    log = make_hidden_effect_log(
+        load_ur5(), "torque_ripple", joints=[2], n_trajectories=8, duration=8.0, random_state=2
+    )
+    model = RBDRegressor(log.robot)
+    (ripple,) = diagnose(model, log.X, log.y, effects=["torque_ripple"]).findings
+    waves, size = (ripple.parameters[name] for name in ("N", "A"))
+    assert waves["low"] < 60 < waves["high"] and waves["high"] - waves["low"] < 0.1
+    assert size["high"] - size["low"] < 0.1 * size["value"]
