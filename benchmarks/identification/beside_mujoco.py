@@ -36,9 +36,13 @@ from skidyn.identification import RBDRegressor
 from skidyn.logs import load_recording
 from skidyn.robots import Robot
 
+sys.path.append(str(Path(__file__).resolve().parents[1] / "peers"))
+from mujoco_sysid import PIECE, fit, parameters, pieces, read
+
 DATA = Path(os.environ.get("SKIDYN_DATA", "no folder given"))
-PIECE, STEP = 0.25, 0.0025
-PIECES = 40
+STEP, PIECES = 0.0025, 40
+#: Start and bound of what mujoco.sysid fits for every drive, SI units.
+DRIVES = {"frictionloss": (2.0, 60.0), "damping": (2.0, 80.0), "armature": (0.5, 10.0)}
 EFFECTS = ("viscous", "coulomb", "rotor_inertia")
 
 
@@ -60,109 +64,24 @@ def panda():
     return DATA / "panda" / "panda_min.urdf", 7, frame.iloc[:third], frame.iloc[third:]
 
 
-def read(path: Path, n: int, model: str | None = None):
-    """Model with a motor and two sensors for each joint, without contacts and limits."""
-    spec = mujoco.MjSpec.from_string(model or path.read_text())
-    spec.option.timestep = STEP
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
-    spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
-    joints = [joint.name for joint in spec.joints][:n]
-    for name in joints:
-        motor = spec.add_actuator(name=f"{name} motor", target=name)
-        motor.trntype = mujoco.mjtTrn.mjTRN_JOINT
-    for kind in (mujoco.mjtSensor.mjSENS_JOINTPOS, mujoco.mjtSensor.mjSENS_JOINTVEL):
-        for name in joints:
-            sensor = spec.add_sensor(name=f"{name} {kind.name}", type=kind, objname=name)
-            sensor.objtype = mujoco.mjtObj.mjOBJ_JOINT
-    return spec, joints
-
-
-def pieces(spec, n: int, table) -> list:
-    """Pieces of the recording as mujoco.sysid takes them."""
-    model = spec.compile()
+def cut(model, n: int, table) -> list:
+    """Pieces of a recording, spread evenly."""
+    motion = {k: table[[f"{k}{j + 1}" for j in range(n)]].to_numpy() for k in ("q", "dq", "tau")}
     clock = table["time"].to_numpy()
-    values = {k: table[[f"{k}{j + 1}" for j in range(n)]].to_numpy() for k in ("q", "dq", "tau")}
     starts = np.linspace(clock[0], clock[-1] - PIECE - STEP, PIECES)
-    out = []
-    for start in starts:
-        times = start + STEP * np.arange(round(PIECE / STEP) + 1)
-        at = {
-            k: np.column_stack([np.interp(times, clock, x) for x in v.T]) for k, v in values.items()
-        }
-        control = sysid.TimeSeries.from_control_names(times - start, at["tau"], model)
-        seen = np.hstack([at["q"], at["dq"]])
-        sensed = sysid.TimeSeries.from_names(times - start, seen, model)
-        begin = sysid.create_initial_state(model, at["q"][0], at["dq"][0])
-        out.append(sysid.SystemTrajectory(model, control, sensed, begin, None))
-    return out
-
-
-def set_joint(name: str, what: str):
-    """What writes a parameter into the description."""
-
-    def modify(spec, parameter) -> None:
-        value = float(parameter.value[0])
-        setattr(spec.joint(name), what, [value, 0, 0] if what == "damping" else value)
-
-    return modify
-
-
-def set_body(name: str):
-    """What writes a pseudo-inertia into the description.
-
-    mujoco.sysid's own takes the inertia from the geometry first, which a bare URDF lacks.
-    """
-
-    def modify(spec, parameter) -> None:
-        numbers = sysid.model_modifier.pi_from_theta(parameter.value)
-        mass, moment, about_frame = numbers[0], numbers[1:4], numbers[4:].reshape(3, 3)
-        middle = moment / mass
-        inertia = about_frame - mass * (middle @ middle * np.eye(3) - np.outer(middle, middle))
-        sizes, axes = np.linalg.eigh(inertia)
-        axes[:, 0] *= np.sign(np.linalg.det(axes))
-        body, turn = spec.body(name), np.empty(4)
-        mujoco.mju_mat2Quat(turn, axes.ravel())
-        body.mass, body.ipos, body.inertia, body.iquat = mass, middle, sizes, turn
-        body.fullinertia = np.full(6, np.nan)
-
-    return modify
+    return pieces(model, motion | {"time": clock}, starts)
 
 
 def with_mujoco(path: Path, n: int, train, iterations: int):
     """Description with the parameters that mujoco.sysid finds."""
-    spec, joints = read(path, n)
-    model = spec.compile()
-    known = pieces(spec, n, train)
-    parameters = sysid.ParameterDict()
-    for name in joints:
-        for what, start, most in (
-            ("frictionloss", 2.0, 60.0),
-            ("damping", 2.0, 80.0),
-            ("armature", 0.5, 10.0),
-        ):
-            own = sysid.Parameter(
-                f"{name} {what}", start, 0.0, most, modifier=set_joint(name, what)
-            )
-            parameters.add(own)
-        body = spec.joint(name).parent.name
-        words = {"inertia_type": sysid.InertiaType.Pseudo, "modifier": set_body(body)}
-        parameters.add(sysid.body_inertia_param(spec, model, body, **words))
-
-    def build(found):
-        return sysid.apply_param_modifiers(found, spec)
-
-    def residual(x, found):
-        out, *more = sysid.model_residual(x, found, build, known, resample_true=False, n_threads=1)
-        if x.ndim > 1:  # columns are steps of the finite differences times pieces
-            cube = out.reshape(len(out), x.shape[1], len(known))
-            out = np.moveaxis(cube, 2, 0).reshape(-1, x.shape[1])
-        return [out], *more
-
-    best, _ = sysid.optimize(
-        parameters, residual, max_iters=iterations, verbose=False, x_scale="jac"
-    )
-    return sysid.apply_param_modifiers(best, spec)
+    spec, joints = read(path.read_text(), n, STEP)
+    known = cut(spec.compile(), n, train)
+    start = {what: np.full(n, value) for what, (value, _) in DRIVES.items()}
+    most = {what: np.full(n, value) for what, (_, value) in DRIVES.items()}
+    speed = np.sqrt(np.mean(train[[f"dq{j + 1}" for j in range(n)]].to_numpy() ** 2, axis=0))
+    scale = np.hstack([PIECE * speed, speed])
+    found, _ = fit(spec, known, parameters(spec, joints, start, most), scale, iterations)
+    return sysid.apply_param_modifiers(found, spec)
 
 
 def with_skidyn(path: Path, n: int, train, _, estimator: str = "weighted"):
@@ -173,19 +92,19 @@ def with_skidyn(path: Path, n: int, train, _, estimator: str = "weighted"):
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "model.xml")
         write_mjcf(model, file)
-        return read(path, n, file.read_text())[0].compile()
+        return read(file.read_text(), n, STEP)[0].compile()
 
 
 def as_described(path: Path, n: int, *_):
     """The URDF as it is."""
-    return read(path, n)[0].compile()
+    return read(path.read_text(), n, STEP)[0].compile()
 
 
 def error(model, path: Path, n: int, test) -> np.ndarray:
     """Error of the position at the pieces' ends, mrad, root mean square over pieces."""
-    spec, _ = read(path, n)
+    spec, _ = read(path.read_text(), n, STEP)
     data, left = mujoco.MjData(model), []
-    for piece in pieces(spec, n, test):
+    for piece in cut(spec.compile(), n, test):
         mujoco.mj_setState(
             model, data, piece.initial_state, mujoco.mjtState.mjSTATE_FULLPHYSICS.value
         )

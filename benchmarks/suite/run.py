@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Generate the suite, run every peer on the same logs, and print the scores.
 
-    python benchmarks/suite/run.py FOLDER [--seed 2026] [--logs 60] [--jobs 2] [--peers NAMES]
+    python benchmarks/suite/run.py FOLDER [--seed 2026] [--logs 60] [--errors 16] [--peers NAMES]
     python benchmarks/suite/run.py --table benchmarks/suite/results.json
 
 A peer is a file of ``benchmarks/peers`` with ``PACKAGE`` and ``answer(log, robot) -> dict``; add
@@ -9,9 +9,10 @@ your own. It runs in processes of its own, of one thread each and ``--jobs`` at 
 ``--seconds`` of the processor a log at most, by ``--python`` of an environment that has its package
 (peers need no skidyn, but for its own). FOLDER receives ``cases`` (what a tool may see), ``truth``,
 ``prepared``, ``answers/PEER``, ``models/PEER`` and ``simulated``; what is there is not made again,
-so that an interrupted run goes on. Answers of a tool that is no Python: one JSON per case
-into ``FOLDER/answers/NAME``, then ``--peers NAME``. ``--keep`` writes the scores, and ``--table``
-prints what was kept.
+so that an interrupted run goes on. Errors on held-out trajectories and of the motion, which take a
+second fit of every peer, are computed for the first ``--errors`` logs. Answers of a tool that is no
+Python: one JSON per case into ``FOLDER/answers/NAME``, then ``--peers NAME``. ``--keep`` writes the
+scores, and ``--table`` prints what was kept.
 """
 
 from __future__ import annotations
@@ -75,15 +76,27 @@ def make(folder: Path, suite: list[SuiteCase], jobs: int) -> list[dict]:
 
 
 def ask(
-    folder: Path, peers: dict[str, str], cases: list[str], seconds: float, jobs: int
+    folder: Path,
+    peers: dict[str, str],
+    cases: list[str],
+    judged: list[str],
+    seconds: float,
+    jobs: int,
 ) -> dict[str, list[dict]]:
-    """Answers of every peer, by the Python of each; what the folder lacks of them is made."""
+    """Answers of every peer, by the Python of each; what the folder lacks of them is made.
+
+    For the cases in ``judged``, with the error on held-out trajectories.
+    """
     files = {peer: [folder / "answers" / peer / f"{case}.json" for case in cases] for peer in peers}
-    for stage, lacks in (("answers", _unanswered), ("errors", _unjudged)):
+    for stage, asked, lacks in (("answers", cases, _unanswered), ("errors", judged, _unjudged)):
         tasks = []
         for peer, python in peers.items():
             source = PEERS / f"{peer}.py"
-            missing = [folder / "cases" / file.stem for file in files[peer] if lacks(file)]
+            missing = [
+                folder / "cases" / file.stem
+                for file in files[peer]
+                if file.stem in asked and lacks(file)
+            ]
             if source.exists():  # the others were answered by a tool elsewhere
                 words = [python, HERE / "_ask.py", source, stage, str(seconds)]
                 tasks += [[*words, *some] for some in chunks(missing)]
@@ -273,6 +286,7 @@ def main() -> None:
     parser.add_argument("folder", type=Path, nargs="?")
     parser.add_argument("--seed", type=int, default=2026)
     parser.add_argument("--logs", type=int, default=60)
+    parser.add_argument("--errors", type=int, default=16, help="number of logs with errors")
     parser.add_argument("--peers", default="", help="all by default, skidyn's first")
     parser.add_argument("--python", default=sys.executable, help="of the peers but skidyn's")
     parser.add_argument(
@@ -295,8 +309,9 @@ def main() -> None:
     made = _processor()
     pythons = {p: sys.executable if p.startswith("skidyn") else options.python for p in peers}
     names = [case.name for case in suite]
-    answers = ask(options.folder, pythons, names, options.seconds, options.jobs)
-    motions = simulate(options.folder, names, options.jobs)
+    judged = names[: options.errors]
+    answers = ask(options.folder, pythons, names, judged, options.seconds, options.jobs)
+    motions = simulate(options.folder, judged, options.jobs)
     scores = {peer: score(peer, truths, said, motions) for peer, said in answers.items()}
     if options.keep:
         old = json.loads(options.keep.read_text())["peers"] if options.keep.exists() else {}
