@@ -29,6 +29,7 @@ from spoils import SPOILS, NoJointMovesError, Spoiled
 from spoils_of_channels import CHANNELS
 from spoils_of_clocks import CLOCKS
 from spoils_of_joints import JOINTS
+from spoils_of_others import OTHERS
 from spoils_of_owners import OWNERS
 from spoils_of_parts import PARTS
 
@@ -44,7 +45,7 @@ from skidyn.measurement import Suspicion
 from skidyn.robots import Robot
 
 ROBOTS = (load_panda, load_ur5, load_scara, load_planar_arm)
-MISTAKES = SPOILS | PARTS | CLOCKS | JOINTS | OWNERS | CHANNELS
+MISTAKES = SPOILS | PARTS | CLOCKS | JOINTS | OWNERS | CHANNELS | OTHERS
 Answer: TypeAlias = tuple[str, frozenset[tuple[str, tuple[int, ...]]]]
 #: How often a log is read again, and the least share of its rows that a remedy may leave.
 ROUNDS, LEFT = 3, 0.15

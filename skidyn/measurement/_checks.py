@@ -32,13 +32,17 @@ from skidyn.measurement._clock import (
     SlowSampling,
 )
 from skidyn.measurement._copies import CopiedTorque, RepeatedRecordings
+from skidyn.measurement._crosstalk import Crosstalk
+from skidyn.measurement._divided import DividedRecordings
 from skidyn.measurement._elapsed import LostRows
 from skidyn.measurement._held import HeldPosition, HeldTorque, MissingTorque, StuckTorque
+from skidyn.measurement._joint_gravity import JointGravity
 from skidyn.measurement._lengths import Lengths
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._odd import OddRecording
 from skidyn.measurement._odd_motion import OddMotion
 from skidyn.measurement._overflow import OverflowedTorque
+from skidyn.measurement._slow_torque import SlowTorque
 from skidyn.measurement._smoothing import SmoothedTorque
 from skidyn.measurement._suspicion import CERTAINTIES, Suspicion
 from skidyn.measurement._torque import Columns, TorqueDelay, UnsignedTorque
@@ -67,6 +71,7 @@ CHECKS: tuple[Check, ...] = (
     OverflowedTorque(),
     Axes(),
     OddRecording(),
+    DividedRecordings(),
     Columns(),
     TorqueScale(),
     NoFriction(),
@@ -76,9 +81,12 @@ CHECKS: tuple[Check, ...] = (
     Acceleration(),
     HeldTorque(),
     StuckTorque(),
+    SlowTorque(),
     ComputedTorque(),
     SmoothedTorque(),
     TorqueDelay(),
+    JointGravity(),
+    Crosstalk(),
     Lengths(),
     ConstantTorque(),
     CopiedTorque(),
