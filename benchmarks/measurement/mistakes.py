@@ -7,10 +7,11 @@ Usage: python benchmarks/measurement/mistakes.py [--cases FOLDER] [--seed 1] [--
 One mistake is made in each log, half of which have a hidden effect (see ``spoils.py`` and
 ``spoils_of_*.py``). For every mistake it prints the number of logs in which it was reported on the
 right joints with the right remedy, the number of these in which it was certain, and the number of
-logs with another suspicion that the log without the mistake does not have. ``--fix`` reads the log
-again with the remedy and prints in how many cases this restored the recorded columns;
-``--diagnose`` compares the diagnosis of the fixed log with that of the clean one where it did not.
-``--cases`` takes a folder of logs of another simulator (``*/log.parquet`` and ``robot.urdf``).
+logs with another suspicion that the log without the mistake does not have, and that remains with
+the remedy of the right one. ``--fix`` reads the log again with the remedy and prints in how many
+cases this restored the recorded columns; ``--diagnose`` compares the diagnosis of the fixed log
+with that of the clean one where it did not. ``--cases`` takes a folder of logs of another simulator
+(``*/log.parquet`` and ``robot.urdf``).
 """
 
 from __future__ import annotations
@@ -203,6 +204,11 @@ def main() -> None:
                 if i not in own:
                     own[i] = {(c.check, c.joints) for c in check_log(case.frame, case.robot).checks}
                 other = [c for c in other if (c.check, c.joints) not in own[i]]
+            mended = [c for c in right if c.remedy]
+            if other and mended:  # what is gone with the remedy followed from the mistake
+                again = check_log(*read_again(spoiled.frame, spoiled.robot, mended)).checks
+                left = {(c.check, c.joints) for c in again if c.certainty != "noted"}
+                other = [c for c in other if (c.check, c.joints) in left]
             certain = any(c.certainty == "certain" for c in right)
             counts[:3] += [bool(right), certain, bool(other)]
             good = None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Mistakes that others made in logs: shares of other channels, commands, parts of the recordings."""
+"""Mistakes that others made: shares of other channels, commands, parts of the recordings."""
 
 from __future__ import annotations
 

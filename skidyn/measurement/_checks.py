@@ -31,6 +31,7 @@ from skidyn.measurement._clock import (
     RepeatedRows,
     SlowSampling,
 )
+from skidyn.measurement._commanded import CommandedMotion
 from skidyn.measurement._copies import CopiedTorque, RepeatedRecordings
 from skidyn.measurement._crosstalk import Crosstalk
 from skidyn.measurement._divided import DividedRecordings
@@ -70,8 +71,8 @@ CHECKS: tuple[Check, ...] = (
     UNSIGNED,
     OverflowedTorque(),
     Axes(),
-    OddRecording(),
     DividedRecordings(),
+    OddRecording(),
     Columns(),
     TorqueScale(),
     NoFriction(),
@@ -85,6 +86,7 @@ CHECKS: tuple[Check, ...] = (
     ComputedTorque(),
     SmoothedTorque(),
     TorqueDelay(),
+    CommandedMotion(),
     JointGravity(),
     Crosstalk(),
     Lengths(),

@@ -128,7 +128,13 @@ def without(fits: Fits, joint: int, source: int, share: float) -> Fits:
     torque = fits.torque.copy()
     torque[:, joint] -= share * torque[:, source]
     return Fits(
-        fits.robot, fits.signals, torque, fits.moving, fits.recorded, fits.left_out, fits.backend,
+        fits.robot,
+        fits.signals,
+        torque,
+        fits.moving,
+        fits.recorded,
+        fits.left_out,
+        fits.backend,
         _felt=fits._felt,
     )
 

@@ -25,6 +25,8 @@ from skidyn.measurement._torque import asked_changes
 
 #: Fewest recordings, and rows of each, to be compared.
 RECORDINGS, FEWEST = 4, 12
+#: Least share of the recordings that differ; fewer are found one by one.
+SHARE = 0.3
 #: Error of identified bodies, as a share of the spread, from which recordings are divided.
 WORTH = 0.08
 #: How nearly the multiples of either group must be the same, as a share, and what they may differ
@@ -37,6 +39,8 @@ ROUNDS = 12
 SURE, DROP, BETTER = 40.0, 0.4, 0.8
 #: Zeros that are tried, and the least that is reported, rad.
 ZEROS, LEAST_ZERO = np.deg2rad([-60, -40, -20, 20, 40, 60]), np.deg2rad(4)
+#: Zeros that are examined in detail.
+FINALISTS = 4
 
 
 @dataclass(frozen=True)
@@ -133,10 +137,8 @@ def _divided_torques(fits: Fits, joints: list[int]) -> Iterator[Division]:
         margin = mended.margin(here)
         changed = float(np.isin(number[use], out).sum())
         margin[k] -= changed * np.log(abs(value)) / max(float(mended.inflation[k]), 1.0)
-        drop = 1 - float(_spread(mended.residual[k]) / _spread(here.residual[k]))
-        if abs(value) > 1:  # a residual of a larger torque is larger
-            part = ~np.isin(number[use], out)
-            drop = 1 - float(_spread(mended.residual[k][part]) / _spread(here.residual[k][part]))
+        after = _spread(mended.residual[k]) / _spread(fits.average(torque[:, k])[use])
+        drop = 1 - after / (_spread(here.residual[k]) / _spread(y[use]))
         gain = float(margin.sum())
         if gain > SURE and drop > DROP:
             kind = "sign" if USUAL[0] < -value < USUAL[1] else "scale"
@@ -163,9 +165,9 @@ def _multiples(designs: list[Array], targets: list[Array]) -> Array:
             for y, p, m in zip(targets, predicted, multiples, strict=True)
         )
         if left < best:
-            # bodies and friction of the description are positive
-            sign = np.sign(c[0] * scale[0] + c[1] * scale[1] + c[2] * scale[2]) or 1.0
-            best, found = left, multiples * sign
+            # as multiples of the stated bodies, or of friction, which is positive
+            unit = c[0] if c[0] != 0 and abs(c[0]) * scale[0] > abs(c[2]) * scale[2] else c[2]
+            best, found = left, multiples * (unit if unit is c[0] else np.sign(unit) or 1.0)
     return found
 
 
@@ -181,10 +183,13 @@ def _two_groups(multiples: Array) -> tuple[NDArray[np.bool_], float] | None:
         cut = int(np.argmax(np.diff(logs)))
         low = multiples <= order[cut]
     size = int(low.sum())
-    if not 0 < size < n:
+    if not SHARE * n <= size <= (1 - SHARE) * n:
         return None
-    # where there are as many of both, the others are right that have the sign of the bodies
     others = low if 2 * size <= n else ~low
+    if 2 * size == n:  # those are right that are nearer to the stated bodies
+        middles = [float(np.median(multiples[part])) for part in (low, ~low)]
+        far = [np.inf if m <= 0 else abs(np.log(m)) for m in middles]
+        others = low if far[0] > far[1] else ~low
     usual, other = float(np.median(multiples[~others])), float(np.median(multiples[others]))
     if usual == 0:
         return None
@@ -206,52 +211,56 @@ def _divided_zeros(fits: Fits) -> Iterator[Division]:
         return
     here = fits.identified(Reading())
     plain = _by_run(fits, fits.signals.q, number, runs)
-    best: tuple[float, int, float] = (0.0, 0, 0.0)
+    tried = []
     for k in np.flatnonzero(~fits.signals.prismatic).tolist():
         for angle in ZEROS.tolist():
             q = fits.signals.q.copy()
             q[:, k] -= angle
-            change = _by_run(fits, q, number, runs) - plain
-            better = change > 0
-            if 0 < better.sum() < len(runs):
-                best = max(best, (float(change[better].sum()), k, angle))
-    gain, k, angle = best
-    if gain < SURE:
-        return
+            better, apart = _set_apart(_by_run(fits, q, number, runs) - plain)
+            tried.append((apart, k, angle, runs[better]))
+    tried.sort(key=lambda one: -one[0])
 
-    def moved(angle: float) -> Array:
+    def mended(k: int, angle: float, out: NDArray[np.int64]) -> Fits:
         q = fits.signals.q.copy()
-        q[:, k] -= angle
-        return q
+        q[np.isin(fits.signals.trajectory, out), k] -= angle
+        return _with(fits, q=q)
 
-    out = runs[_by_run(fits, moved(angle), number, runs) > plain]
-    inside = np.isin(fits.signals.trajectory, out)
+    def margin(k: int, angle: float, out: NDArray[np.int64]) -> float:
+        return float(mended(k, angle, out).identified(Reading()).margin(here).sum())
 
-    def mended(angle: float) -> Fits:
-        return _with(fits, q=np.where(inside[:, None], moved(angle), fits.signals.q))
-
-    def likelihood(angle: float) -> float:
-        return float(mended(angle).identified(Reading()).margin(here).sum())
-
-    value, step = likelihood(angle), np.deg2rad(10)
+    value, k, angle, out = max(
+        ((margin(*one[1:]), *one[1:]) for one in tried[:FINALISTS]), key=lambda one: one[0]
+    )
+    if value < SURE:
+        return
+    step = np.deg2rad(10)
     while step > np.deg2rad(1):
-        near, other = max((likelihood(a), a) for a in (angle - step, angle + step))
+        near, other = max((margin(k, a, out), a) for a in (angle - step, angle + step))
         if near > value:
             value, angle = near, other
         else:
             step /= 2
-    if abs(angle) < LEAST_ZERO or value < SURE:
+    if abs(angle) < LEAST_ZERO:
         return
     if 2 * len(out) > len(runs):
         out, angle = np.setdiff1d(runs, out), -angle
-        inside = ~inside
-    there = mended(angle).identified(Reading())
+    there = mended(k, angle, out).identified(Reading())
     worst = int(np.argmax(there.margin(here)))
     drop = 1 - float(_spread(there.residual[worst]) / _spread(here.residual[worst]))
     rows = np.isin(number, out)
     without, left = left_by_effects(fits, worst, rows)
     if drop > DROP and 1 - drop < BETTER * left / without:
         yield Division("zero", k, tuple(map(int, out)), angle, value, drop)
+
+
+def _set_apart(change: Array) -> tuple[NDArray[np.bool_], float]:
+    """Recordings that gain more than the others, by the largest gap, and how far they are apart."""
+    order, n = np.sort(change), len(change)
+    least = int(np.ceil(SHARE * n))
+    gaps = np.diff(order)[least - 1 : n - least]
+    cut = least - 1 + int(np.argmax(gaps))
+    middle = (order[cut] + order[cut + 1]) / 2
+    return change > middle, float(np.abs(change - middle).sum())
 
 
 def _by_run(fits: Fits, q: Array, number: Array, runs: Array) -> Array:
@@ -276,8 +285,15 @@ def _with(fits: Fits, torque: Array | None = None, q: Array | None = None) -> Fi
     signals = fits.signals if q is None else fits.signals.with_(q=q)
     torque = fits.torque if torque is None else torque
     return replace(
-        fits, signals=signals, torque=torque, backend="numpy",
-        _known={}, _moved={}, _parts={}, _fitted={}, _felt={},
+        fits,
+        signals=signals,
+        torque=torque,
+        backend="numpy",
+        _known={},
+        _moved={},
+        _parts={},
+        _fitted={},
+        _felt={},
     )
 
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Check for a single joint from whose torque gravity was removed.
 
-A controller may compensate gravity on the joints that need it, and log what is left of their torque.
-The gravity of the stated bodies is added to one torque at a time; it is removed there only if all of
-it is missing, and no effect, as a gravity compensator or a spring, takes its place.
+A controller may compensate gravity on the joints that need it, and log what is left of the torque.
+The gravity of the stated bodies is added to one torque at a time. It was removed only if all of it
+is missing, and no effect, as a gravity compensator or a spring, takes its place.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from skidyn.measurement._torque import asked_changes, readable_fits
 
 #: Log-likelihood that the gravity of a joint must gain, also beside any effect, and the least share
 #: of it there.
-SURE, LEAST, BESIDE = 40.0, 15.0, 0.3
+SURE, LEAST, BESIDE = 20.0, 15.0, 0.3
 #: How far the share of gravity that is missing may be from all of it, and its largest standard
 #: error: a gain, another body or a compensator takes off another share.
 ALL, KNOWN = 0.25, 0.1
@@ -96,9 +96,7 @@ def find_without_gravity(fits: Fits) -> list[tuple[int, float, float, float]]:
             continue
         torque = fits.torque.copy()
         torque[:, k] += fits.robot.gravity_torque(fits.motion(Reading()).q)[:, k]
-        whole = Fits(
-            fits.robot, fits.signals, torque, fits.moving, fits.recorded, fits.left_out
-        )
+        whole = Fits(fits.robot, fits.signals, torque, fits.moving, fits.recorded, fits.left_out)
         there = NearBodies(whole, Reading(), gains, inflation)
         duel = duel_of(here, there, range(fits.n_joints))
         if duel.gain > SURE and duel.beside > max(LEAST, BESIDE * duel.gain):

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Check for positions without noise: commanded in place of measured ones, or computed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from skidyn._signals import Array
+from skidyn.measurement._check import Check
+from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._suspicion import Suspicion
+from skidyn.measurement._torque import SMALLEST, measured_delay
+
+#: Order of the differences of positions, and the sum of the squares of its weights, by which white
+#: noise grows.
+ORDER, WEIGHTS = 6, 924.0
+#: Scatter of a position, rad (m for a slider), below what encoders and vibrations leave; and of a
+#: torque that is measured, as a share of its spread.
+NOISELESS, NOISY = 1e-7, 1e-3
+#: Fewest rows.
+ENOUGH = 200
+
+
+class CommandedMotion(Check):
+    """Positions that were commanded or computed, not measured."""
+
+    name = "commanded_motion"
+    of_sensor = True
+    suspects = "commanded or computed positions instead of measured ones"
+    stage = 2
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        s = measurement.signals
+        moving = [k for k, moves in enumerate(measurement.excited) if moves]
+        within = s.trajectory[ORDER:] == s.trajectory[:-ORDER]
+        if measurement.stale or measurement.computed or not moving or within.sum() < ENOUGH:
+            return
+        positions = _scatter(s.q[:, moving], within)
+        torque = measurement.torque[:, moving]
+        noise = _scatter(torque, within) / (np.std(torque, axis=0) + 1e-300)
+        if positions.max() > NOISELESS or noise.min() < NOISY:
+            return
+        delay = measured_delay(measurement)
+        lead = delay.common if delay is not None and np.isfinite(delay.common) else 0.0
+        yield self.suspicion(
+            "the positions have no measurement noise, but the torques do: they were commanded, "
+            "filtered or computed",
+            f"they scatter by at most {positions.max():.1g} rad from sample to sample"
+            + (
+                f", and are ahead of the torque by {1e3 * lead:.0f} ms, as commands are"
+                if lead > SMALLEST
+                else ""
+            )
+            + "; commands differ from the motion by the error of the controller, which friction "
+            "and elastic joints determine: record the measured positions",
+            "noted",
+            moving,
+        )
+
+
+def _scatter(values: Array, within: Array) -> Array:
+    """Scatter of every channel, from differences that smooth functions do not have."""
+    rest = np.abs(np.diff(values, n=ORDER, axis=0))[within]
+    return np.asarray(1.4826 * np.median(rest, axis=0) / np.sqrt(WEIGHTS))
