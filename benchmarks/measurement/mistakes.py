@@ -82,6 +82,9 @@ def stored(folder: Path) -> list[Case]:
     for path in sorted(folder.glob("*/log.parquet")):
         robot = Robot.from_urdf(path.parent / "robot.urdf")
         frame = read_log(path, robot=robot, check=False)
+        moved = [c for c in frame if c.startswith("q") and np.ptp(frame[c]) > 0]
+        if not moved:  # a simulation that diverged
+            continue
         cases.append(Case(f"{path.parent.name} {robot.name}", frame, robot))
     return cases
 

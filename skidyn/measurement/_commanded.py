@@ -10,17 +10,17 @@ import numpy as np
 from skidyn._signals import Array
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._measures import divided_differences
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import SMALLEST, measured_delay
 
-#: Order of the differences of positions, and the sum of the squares of its weights, by which white
-#: noise grows.
-ORDER, WEIGHTS = 6, 924.0
+#: Order of the differences, which motion hardly reaches.
+ORDER = 6
 #: Scatter of a position, rad (m for a slider), below what encoders and vibrations leave; and of a
 #: torque that is measured, as a share of its spread.
 NOISELESS, NOISY = 1e-7, 1e-3
-#: Fewest rows.
-ENOUGH = 200
+#: Fewest rows of a recording.
+ENOUGH = 100
 
 
 class CommandedMotion(Check):
@@ -34,12 +34,12 @@ class CommandedMotion(Check):
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         s = measurement.signals
         moving = [k for k, moves in enumerate(measurement.excited) if moves]
-        within = s.trajectory[ORDER:] == s.trajectory[:-ORDER]
-        if measurement.stale or measurement.computed or not moving or within.sum() < ENOUGH:
+        parts = [rows for rows in s.segments if rows.stop - rows.start > ENOUGH]
+        if measurement.stale or measurement.computed or not moving or not parts:
             return
-        positions = _scatter(s.q[:, moving], within)
+        positions = _scatter(s.q[:, moving], s.clock, parts)
         torque = measurement.torque[:, moving]
-        noise = _scatter(torque, within) / (np.std(torque, axis=0) + 1e-300)
+        noise = _scatter(torque, s.clock, parts) / (np.std(torque, axis=0) + 1e-300)
         if positions.max() > NOISELESS or noise.min() < NOISY:
             return
         delay = measured_delay(measurement)
@@ -60,7 +60,7 @@ class CommandedMotion(Check):
         )
 
 
-def _scatter(values: Array, within: Array) -> Array:
+def _scatter(values: Array, time: Array, parts: list[slice]) -> Array:
     """Scatter of every channel, from differences that smooth functions do not have."""
-    rest = np.abs(np.diff(values, n=ORDER, axis=0))[within]
-    return np.asarray(1.4826 * np.median(rest, axis=0) / np.sqrt(WEIGHTS))
+    rest = [divided_differences(values[rows], time[rows], ORDER) for rows in parts]
+    return np.asarray(1.4826 * np.median(np.abs(np.concatenate(rest)), axis=0))

@@ -15,6 +15,7 @@ import numpy as np
 from skidyn._signals import Array
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._measures import divided_differences
 from skidyn.measurement._suspicion import Suspicion
 
 #: Rows between two values of the slower bus that are tried, and orders of the differences: of held
@@ -68,7 +69,13 @@ class SlowTorque(Check):
 def _period(measurement: Measurement, joint: int, order: int) -> tuple[int, float, float]:
     """Period of a torque's differences, its log-likelihood gain, and their largest ratio."""
     s, torque = measurement.signals, measurement.torque[:, joint]
-    parts = [np.abs(np.diff(torque[rows], n=order)) for rows in s.segments]
+    parts = [
+        np.abs(divided_differences(torque[rows], s.clock[rows], order))
+        for rows in s.segments
+        if rows.stop - rows.start > 4 * FEWEST
+    ]
+    if not parts:
+        return 0, 0.0, 1.0
     longest = max(parts, key=len)
     spread = float(np.std(torque))
     if spread == 0 or len(longest) < 4 * FEWEST:
