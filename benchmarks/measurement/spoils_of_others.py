@@ -94,7 +94,7 @@ def bursts(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled
         kept.append(rows[~lost])
         stamps.append(log["time"].to_numpy()[rows[: int((~lost).sum())]])
     changed = log.iloc[np.concatenate(kept)].reset_index(drop=True)
-    told = ("lost_rows", "joined_recordings")
+    told = ("lost_rows", "joined")
     return Spoiled(changed.assign(time=np.concatenate(stamps)), robot, told, "", None, told)
 
 

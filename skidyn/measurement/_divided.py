@@ -166,8 +166,8 @@ def _multiples(designs: list[Array], targets: list[Array]) -> Array:
         )
         if left < best:
             # as multiples of the stated bodies, or of friction, which is positive
-            unit = c[0] if c[0] != 0 and abs(c[0]) * scale[0] > abs(c[2]) * scale[2] else c[2]
-            best, found = left, multiples * (unit if unit is c[0] else np.sign(unit) or 1.0)
+            heavy = abs(c[0]) * scale[0] > abs(c[2]) * scale[2]
+            best, found = left, multiples * (c[0] if heavy else np.sign(c[2]) or 1.0)
     return found
 
 

@@ -78,8 +78,7 @@ def find_without_gravity(fits: Fits) -> list[tuple[int, float, float, float]]:
         before, after = (
             fit_admissible(columns[use, :, k], target[use]) for target in (y, y + pull[:, k])
         )
-        inflation = max(before.inflation, after.inflation)
-        if after.likelihood - before.likelihood > LEAST * inflation:
+        if after.likelihood - before.likelihood > LEAST:
             promising.append(k)
     if not promising:
         return []

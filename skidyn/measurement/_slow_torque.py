@@ -23,7 +23,7 @@ from skidyn.measurement._suspicion import Suspicion
 PERIODS, ORDERS = range(2, 17), (1, 2, 4)
 #: Least log-likelihood gain of a period on a joint; share of the joints that must agree; how many
 #: times as large the largest differences are as the smallest ones.
-SURE, AGREEING, TIMES = 40.0, 0.6, 3.0
+SURE, AGREEING, TIMES = 40.0, 0.6, 1.7
 #: Fewest differences of each phase, and least size of them as a share of the spread of the torque.
 FEWEST, ROUNDING = 30, 1e-9
 
