@@ -263,7 +263,7 @@ def _set_apart(change: Array) -> tuple[NDArray[np.bool_], float]:
     return change > middle, float(np.abs(change - middle).sum())
 
 
-def _by_run(fits: Fits, q: Array, number: Array, runs: Array) -> Array:
+def _by_run(fits: Fits, q: Array, number: NDArray[np.int64], runs: NDArray[np.int64]) -> Array:
     """Log-likelihood of every recording with stated bodies, with friction common to all of them."""
     moved = _with(fits, q=q)
     outcome = moved.nominal(Reading(), 2)

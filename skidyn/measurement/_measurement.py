@@ -110,9 +110,9 @@ class Measurement:
         s = self.signals
         self.leaps = find_leaps(s.q, s.clock, s.trajectory)
         if len(self.leaps):  # no other check should interpret a jump as motion
-            self.cut(self.leaps)
+            self.cut(self.leaps.astype(np.intp))
 
-    def cut(self, rows: Array) -> None:
+    def cut(self, rows: NDArray[np.intp]) -> None:
         """End trajectories before some rows, for all checks that follow.
 
         Parameters
