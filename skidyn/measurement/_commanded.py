@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Check for positions without noise: commanded in place of measured ones, or computed."""
+"""Check for commanded positions: without noise, and ahead of the torque."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import divided_differences
 from skidyn.measurement._suspicion import Suspicion
-from skidyn.measurement._torque import SMALLEST, measured_delay
+from skidyn.measurement._torque import ERRORS, SMALLEST, measured_delay
 
 #: Order of the differences, which motion hardly reaches.
 ORDER = 6
@@ -24,11 +24,11 @@ ENOUGH = 100
 
 
 class CommandedMotion(Check):
-    """Positions that were commanded or computed, not measured."""
+    """Positions that were commanded, not measured."""
 
     name = "commanded_motion"
     of_sensor = True
-    suspects = "commanded or computed positions instead of measured ones"
+    suspects = "commanded positions instead of measured ones"
     stage = 2
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
@@ -43,18 +43,13 @@ class CommandedMotion(Check):
         if positions.max() > NOISELESS or noise.min() < NOISY:
             return
         delay = measured_delay(measurement)
-        lead = delay.common if delay is not None and np.isfinite(delay.common) else 0.0
+        if delay is None or not delay.common > max(SMALLEST, ERRORS * delay.error):
+            return  # a simulation without noise is in time
         yield self.suspicion(
-            "the positions have no measurement noise, but the torques do: they were commanded, "
-            "filtered or computed",
-            f"they scatter by at most {positions.max():.1g} rad from sample to sample"
-            + (
-                f", and are ahead of the torque by {1e3 * lead:.0f} ms, as commands are"
-                if lead > SMALLEST
-                else ""
-            )
-            + "; commands differ from the motion by the error of the controller, which friction "
-            "and elastic joints determine: record the measured positions",
+            "positions were commanded, not measured",
+            f"they scatter by at most {positions.max():.1g} rad from sample to sample, less than "
+            f"any encoder, and are ahead of the torque by {1e3 * delay.common:.0f} ms; commands "
+            "differ from the motion by the error of the controller, so record measured positions",
             "noted",
             moving,
         )

@@ -58,20 +58,22 @@ class Crosstalk(Check):
     of_sensor = True
     suspects = "torque that contains a share of the torque of another joint"
     stage = 2
-    misnames = True
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         fits = readable_fits(measurement)
         if fits is None or measurement.stale or measurement.computed or measurement.odd:
             return
         for one in find_shares(measurement, fits):
+            # drives of a wrist are often coupled, and with them the currents of their motors
+            coupled = abs(one.joint - one.source) == 1
             yield self.suspicion(
                 f"the torque of {measurement.joint(one.joint)} contains {100 * one.share:.0f} % of "
-                f"that of {measurement.joint(one.source)}",
+                f"that of {measurement.joint(one.source)}"
+                + (", or their drives are coupled" if coupled else ""),
                 f"its noise contains this share (standard error {100 * one.error:.1f} %), and "
                 "without it, bodies and friction explain the torque better by "
                 f"{one.gain:.0f} (log-likelihood); calibrate the torque channels together",
-                "suspected",
+                "noted" if coupled else "suspected",
                 [one.joint, one.source],
             )
 

@@ -22,6 +22,8 @@ CLEAR = 4.0
 #: Share of moving rows backwards in time, and of rows that skip others, for a suspicion and for
 #: certainty.
 BACKWARDS, SKIPPED, SURELY = 0.1, 0.004, 0.02
+#: Squared steps by velocities, over their mean, from which rows are fast.
+FAST = 0.25
 #: Steps of the clock from which a step is a burst of lost rows, and bursts for a suspicion and for
 #: certainty.
 LONG, FEWEST_BURSTS, SURE_BURSTS = 4.0, 4, 12
@@ -56,6 +58,8 @@ class Elapsed:
         Steps of the positions over the spread of the positions, in the middle.
     index : ndarray of shape (n_steps,) of int
         Row after every step.
+    fast : ndarray of shape (n_steps,) of bool
+        Rows that are not slow compared with the mean, unlike those of a robot that mostly rests.
     """
 
     steps: Array
@@ -65,6 +69,7 @@ class Elapsed:
     disorder: float
     size: float
     index: NDArray[np.intp]
+    fast: NDArray[np.bool_]
 
 
 def elapsed_steps(measurement: Measurement) -> Elapsed | None:
@@ -103,6 +108,7 @@ def elapsed_steps(measurement: Measurement) -> Elapsed | None:
         float(np.median(ratio)),
         float(np.median(np.sqrt(size / len(used)))),
         np.flatnonzero(together) + 1,
+        square > FAST * np.mean(square),
     )
 
 
@@ -174,7 +180,7 @@ class LostRows(Check):
         self, measurement: Measurement, found: Elapsed, rows: NDArray[np.bool_]
     ) -> Iterator[Suspicion]:
         """Rows lost in bursts: a few long steps along the velocities, and no other odd ones."""
-        long = found.along & found.clear & (found.steps > LONG)
+        long = rows & found.fast & found.along & (found.steps > LONG)
         others = rows & ~long & (np.abs(found.steps - 1) > 1 + WHOLE)
         if long.sum() < FEWEST_BURSTS or long.sum() < OTHERS * others.sum():
             return

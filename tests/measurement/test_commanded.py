@@ -29,7 +29,7 @@ def test_commands_ahead_of_the_motion():
     found = told(frame)
     one = found["commanded_motion"]
     assert one.certainty == "noted" and one.joints == (1, 2)
-    assert "are ahead of the torque by" in one.evidence
+    assert "ahead of the torque by" in one.evidence
     assert found["torque_delay"].remedy.option.startswith("--late tau=0.0")
 
 

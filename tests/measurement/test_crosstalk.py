@@ -18,8 +18,11 @@ def told(frame, robot):
 def test_a_share_of_another_torque_is_told_alone(joint, source, share):
     frame = make_hidden_effect_log(UR5, "stribeck", joints=[2], **OPTIONS).frame
     mixed = frame[f"tau{joint}"] + share * frame[f"tau{source}"]
-    (one,) = told(frame.assign(**{f"tau{joint}": mixed}), UR5)
-    assert (one.check, one.joints, one.certainty) == ("crosstalk", (joint, source), "suspected")
+    checks = check_log(frame.assign(**{f"tau{joint}": mixed}), UR5).checks
+    (one,) = [s for s in checks if s.check == "crosstalk"]
+    assert one.joints == (joint, source)
+    # drives of neighbouring joints may be coupled
+    assert one.certainty == "noted" and "drives are coupled" in one.suspicion
     found = float(one.suspicion.split(" contains ")[1].split(" %")[0])
     assert found == pytest.approx(100 * share, rel=0.25)
 
