@@ -185,7 +185,9 @@ class LostRows(Check):
         if long.sum() < FEWEST_BURSTS or long.sum() < OTHERS * others.sum():
             return
         measurement.lost = True
-        measurement.cut(found.index[long])
+        measurement.cut(
+            found.index[found.along & found.clear & (found.steps > LONG)]
+        )  # slow ones too
         yield self.suspicion(
             "rows are missing in bursts without a gap in the clock",
             f"{int(long.sum())} times all joints move along their velocities, but by "
