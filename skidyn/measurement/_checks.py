@@ -115,7 +115,7 @@ def list_checks() -> tuple[Check, ...]:
     --------
     >>> from skidyn.measurement import list_checks
     >>> [check.name for check in list_checks() if check.stage == 1]
-    ['axes', 'odd_recording', 'reading']
+    ['axes', 'divided_recordings', 'odd_recording', 'reading']
     """
     return CHECKS
 
