@@ -7,10 +7,11 @@ Usage: python benchmarks/measurement/mistakes.py [--cases FOLDER] [--seed 1] [--
 One mistake is made in each log, half of which have a hidden effect (see ``spoils.py`` and
 ``spoils_of_*.py``). For every mistake it prints the number of logs in which it was reported on the
 right joints with the right remedy, the number of these in which it was certain, and the number of
-logs with another suspicion that the log without the mistake does not have. ``--fix`` reads the log
-again with the remedy and prints in how many cases this restored the recorded columns;
-``--diagnose`` compares the diagnosis of the fixed log with that of the clean one where it did not.
-``--cases`` takes a folder of logs of another simulator (``*/log.parquet`` and ``robot.urdf``).
+logs with another suspicion that the log without the mistake does not have, and that remains with
+the remedy of the right one. ``--fix`` reads the log again with the remedy and prints in how many
+cases this restored the recorded columns; ``--diagnose`` compares the diagnosis of the fixed log
+with that of the clean one where it did not. ``--cases`` takes a folder of logs of another simulator
+(``*/log.parquet`` and ``robot.urdf``).
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from spoils import SPOILS, NoJointMovesError, Spoiled
 from spoils_of_channels import CHANNELS
 from spoils_of_clocks import CLOCKS
 from spoils_of_joints import JOINTS
+from spoils_of_others import OTHERS
 from spoils_of_owners import OWNERS
 from spoils_of_parts import PARTS
 
@@ -44,7 +46,7 @@ from skidyn.measurement import Suspicion
 from skidyn.robots import Robot
 
 ROBOTS = (load_panda, load_ur5, load_scara, load_planar_arm)
-MISTAKES = SPOILS | PARTS | CLOCKS | JOINTS | OWNERS | CHANNELS
+MISTAKES = SPOILS | PARTS | CLOCKS | JOINTS | OWNERS | CHANNELS | OTHERS
 Answer: TypeAlias = tuple[str, frozenset[tuple[str, tuple[int, ...]]]]
 #: How often a log is read again, and the least share of its rows that a remedy may leave.
 ROUNDS, LEFT = 3, 0.15
@@ -80,6 +82,9 @@ def stored(folder: Path) -> list[Case]:
     for path in sorted(folder.glob("*/log.parquet")):
         robot = Robot.from_urdf(path.parent / "robot.urdf")
         frame = read_log(path, robot=robot, check=False)
+        moved = [c for c in frame if c.startswith("q") and np.ptp(frame[c]) > 0]
+        if not moved:  # a simulation that diverged
+            continue
         cases.append(Case(f"{path.parent.name} {robot.name}", frame, robot))
     return cases
 
@@ -202,6 +207,11 @@ def main() -> None:
                 if i not in own:
                     own[i] = {(c.check, c.joints) for c in check_log(case.frame, case.robot).checks}
                 other = [c for c in other if (c.check, c.joints) not in own[i]]
+            mended = [c for c in right if c.remedy]
+            if other and mended:  # what is gone with the remedy followed from the mistake
+                again = check_log(*read_again(spoiled.frame, spoiled.robot, mended)).checks
+                left = {(c.check, c.joints) for c in again if c.certainty != "noted"}
+                other = [c for c in other if (c.check, c.joints) in left]
             certain = any(c.certainty == "certain" for c in right)
             counts[:3] += [bool(right), certain, bool(other)]
             good = None

@@ -223,7 +223,8 @@ def differential(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> S
         return None
     a, b = f"tau{n - 1}", f"tau{n}"
     changed = log.assign(**{a: (log[a] + log[b]) / 2, b: (log[a] - log[b]) / 2})
-    return Spoiled(changed, robot, ("unexplained", "reading", "torque_scale"), "", None, ALSO)
+    told = ("unexplained", "reading", "torque_scale", "crosstalk")
+    return Spoiled(changed, robot, told, "", None, ALSO)
 
 
 def turned_tool(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled | None:

@@ -175,18 +175,26 @@ class CoarseTorque(Check):
     suspects = "torque in coarse steps"
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
-        for k in range(measurement.n_joints):
-            torque = measurement.torque[:, k]
-            step, spread = torque_step(torque), float(torque.std())
-            if np.isfinite(step) and step > NOTED_STEP * spread > 0:
-                unit = "N" if measurement.signals.prismatic[k] else "N m"
-                yield self.suspicion(
-                    f"the torque of {measurement.joint(k)} comes in coarse steps",
-                    f"the steps of {step:.3g} {unit} are {step / spread:.0%} of its standard "
-                    "deviation; smaller effects cannot be found on this joint",
-                    "suspected" if step > LARGE_STEP * spread else "noted",
-                    [k],
-                )
+        for k, (step, share) in coarse_torques(measurement).items():
+            unit = "N" if measurement.signals.prismatic[k] else "N m"
+            yield self.suspicion(
+                f"the torque of {measurement.joint(k)} comes in coarse steps",
+                f"the steps of {step:.3g} {unit} are {share:.0%} of its standard deviation; "
+                "smaller effects cannot be found on this joint",
+                "suspected" if share > LARGE_STEP else "noted",
+                [k],
+            )
+
+
+def coarse_torques(measurement: Measurement) -> dict[int, tuple[float, float]]:
+    """Joints, from 0, whose torque comes in coarse steps: the step, and its share of the spread."""
+    found = {}
+    for k in range(measurement.n_joints):
+        torque = measurement.torque[:, k]
+        step, spread = torque_step(torque), float(torque.std())
+        if np.isfinite(step) and step > NOTED_STEP * spread > 0:
+            found[k] = (step, step / spread)
+    return found
 
 
 class SmoothTorque(Check):
@@ -197,23 +205,29 @@ class SmoothTorque(Check):
     suspects = "torque that was filtered before it was recorded, so that its noise is unknown"
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
-        number, ratios = measurement.signals.trajectory, []
-        within = number[4:] == number[:-4]
-        if within.sum() < ENOUGH or measurement.computed:
-            return
-        for torque in measurement.torque.T:
-            spread = float(np.median(np.abs(torque - np.median(torque))))
-            bend = np.abs(np.diff(torque, n=4))[within]
-            if spread > 0 and np.median(bend) > 0:
-                ratios.append(float(np.median(bend)) / spread / np.sqrt(70))
-        if ratios and max(ratios) < NOISELESS:
+        scatter = torque_scatter(measurement)
+        if scatter < NOISELESS and not measurement.computed:
             yield self.suspicion(
                 "the torque has no noise",
-                f"from sample to sample it scatters by at most {max(ratios):.1g} of its spread: "
+                f"from sample to sample it scatters by at most {scatter:.1g} of its spread: "
                 "it was filtered before it was recorded, or computed, and the ratio of the error "
                 "to this noise is not meaningful",
                 "noted",
             )
+
+
+def torque_scatter(measurement: Measurement) -> float:
+    """Largest scatter of a torque from sample to sample, as a share of its spread; inf if none."""
+    number, ratios = measurement.signals.trajectory, []
+    within = number[4:] == number[:-4]
+    if within.sum() < ENOUGH:
+        return np.inf
+    for torque in measurement.torque.T:
+        spread = float(np.median(np.abs(torque - np.median(torque))))
+        bend = np.abs(np.diff(torque, n=4))[within]
+        if spread > 0 and np.median(bend) > 0:
+            ratios.append(float(np.median(bend)) / spread / np.sqrt(70))
+    return max(ratios, default=np.inf)
 
 
 class BrokenSamples(Check):

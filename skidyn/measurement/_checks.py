@@ -31,14 +31,19 @@ from skidyn.measurement._clock import (
     RepeatedRows,
     SlowSampling,
 )
+from skidyn.measurement._commanded import CommandedMotion
 from skidyn.measurement._copies import CopiedTorque, RepeatedRecordings
+from skidyn.measurement._crosstalk import Crosstalk
+from skidyn.measurement._divided import DividedRecordings
 from skidyn.measurement._elapsed import LostRows
 from skidyn.measurement._held import HeldPosition, HeldTorque, MissingTorque, StuckTorque
+from skidyn.measurement._joint_gravity import JointGravity
 from skidyn.measurement._lengths import Lengths
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._odd import OddRecording
 from skidyn.measurement._odd_motion import OddMotion
 from skidyn.measurement._overflow import OverflowedTorque
+from skidyn.measurement._slow_torque import SlowTorque
 from skidyn.measurement._smoothing import SmoothedTorque
 from skidyn.measurement._suspicion import CERTAINTIES, Suspicion
 from skidyn.measurement._torque import Columns, TorqueDelay, UnsignedTorque
@@ -66,6 +71,7 @@ CHECKS: tuple[Check, ...] = (
     UNSIGNED,
     OverflowedTorque(),
     Axes(),
+    DividedRecordings(),
     OddRecording(),
     Columns(),
     TorqueScale(),
@@ -76,9 +82,13 @@ CHECKS: tuple[Check, ...] = (
     Acceleration(),
     HeldTorque(),
     StuckTorque(),
+    SlowTorque(),
     ComputedTorque(),
     SmoothedTorque(),
     TorqueDelay(),
+    CommandedMotion(),
+    JointGravity(),
+    Crosstalk(),
     Lengths(),
     ConstantTorque(),
     CopiedTorque(),
@@ -105,7 +115,7 @@ def list_checks() -> tuple[Check, ...]:
     --------
     >>> from skidyn.measurement import list_checks
     >>> [check.name for check in list_checks() if check.stage == 1]
-    ['axes', 'odd_recording', 'reading']
+    ['axes', 'divided_recordings', 'odd_recording', 'reading']
     """
     return CHECKS
 

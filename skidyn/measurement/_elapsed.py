@@ -22,6 +22,11 @@ CLEAR = 4.0
 #: Share of moving rows backwards in time, and of rows that skip others, for a suspicion and for
 #: certainty.
 BACKWARDS, SKIPPED, SURELY = 0.1, 0.004, 0.02
+#: Squared steps by velocities, over their mean, from which rows are fast.
+FAST = 0.25
+#: Steps of the clock from which a step is a burst of lost rows, and bursts for a suspicion and for
+#: certainty.
+LONG, FEWEST_BURSTS, SURE_BURSTS = 4.0, 4, 12
 #: Ratio of the number of steps of two or more to that of zero, or between one and two.
 OTHERS = 3.0
 #: Share of the rows that skip others from which rows backwards in time are exchanged with them.
@@ -51,6 +56,10 @@ class Elapsed:
         Steps of the positions over those that velocities make of the clock, in the middle.
     size : float
         Steps of the positions over the spread of the positions, in the middle.
+    index : ndarray of shape (n_steps,) of int
+        Row after every step.
+    fast : ndarray of shape (n_steps,) of bool
+        Rows that are not slow compared with the mean, unlike those of a robot that mostly rests.
     """
 
     steps: Array
@@ -59,6 +68,8 @@ class Elapsed:
     clear: NDArray[np.bool_]
     disorder: float
     size: float
+    index: NDArray[np.intp]
+    fast: NDArray[np.bool_]
 
 
 def elapsed_steps(measurement: Measurement) -> Elapsed | None:
@@ -96,6 +107,8 @@ def elapsed_steps(measurement: Measurement) -> Elapsed | None:
         clear,
         float(np.median(ratio)),
         float(np.median(np.sqrt(size / len(used)))),
+        np.flatnonzero(together) + 1,
+        square > FAST * np.mean(square),
     )
 
 
@@ -130,6 +143,9 @@ class LostRows(Check):
         rows = found.clear & found.moving
         if rows.sum() < 200:
             return
+        yield from self._bursts(measurement, found, rows)
+        if measurement.lost:
+            return
         back = float(np.sum(found.along & (found.steps < -WHOLE) & rows) / rows.sum())
         steps = found.steps[rows & (found.along | (found.steps == 0))]
         whole = np.abs(steps - np.round(steps)) < WHOLE
@@ -159,3 +175,24 @@ class LostRows(Check):
                 "in one step as their velocities imply",
                 "certain" if share > SURELY else "suspected",
             )
+
+    def _bursts(
+        self, measurement: Measurement, found: Elapsed, rows: NDArray[np.bool_]
+    ) -> Iterator[Suspicion]:
+        """Rows lost in bursts: a few long steps along the velocities, and no other odd ones."""
+        long = rows & found.fast & found.along & (found.steps > LONG)
+        others = rows & ~long & (np.abs(found.steps - 1) > 1 + WHOLE)
+        if long.sum() < FEWEST_BURSTS or long.sum() < OTHERS * others.sum():
+            return
+        measurement.lost = True
+        measurement.cut(
+            found.index[found.along & found.clear & (found.steps > LONG)]
+        )  # slow ones too
+        yield self.suspicion(
+            "rows are missing in bursts without a gap in the clock",
+            f"{int(long.sum())} times all joints move along their velocities, but by "
+            f"{np.median(found.steps[long]):.0f} times as far as in one step (the median), and "
+            "hardly ever otherwise; use the time stamps of the robot. Other checks treat the parts "
+            "as separate trajectories",
+            "certain" if long.sum() > SURE_BURSTS else "suspected",
+        )

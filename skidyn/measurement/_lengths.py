@@ -15,11 +15,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from skidyn._signals import Array
+from skidyn.measurement._channels import NOISELESS, coarse_torques, torque_scatter
 from skidyn.measurement._check import Check
 from skidyn.measurement._duel import duel_of
 from skidyn.measurement._fits import Fits, Reading
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._near_bodies import ExtraColumns, Factored, NearBodies
+from skidyn.measurement._near_bodies import LOOSE, ExtraColumns, Factored, NearBodies
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import readable_fits
 from skidyn.robots import Robot
@@ -75,8 +76,11 @@ class Lengths(Check):
         fits = readable_fits(measurement)
         if fits is None or measurement.scaled or measurement.lost or measurement.smoothed:
             return
-        if measurement.stale or measurement.computed:
+        if measurement.stale or measurement.computed or measurement.odd:
             return
+        if torque_scatter(measurement) < NOISELESS:
+            return  # without noise, errors of the derivatives are significant
+        fits = fits.without(list(coarse_torques(measurement)))  # rounding is not white noise
         found = find_lengths(fits)
         if found is None or found.gain < LEAST:
             return
@@ -93,7 +97,7 @@ class Lengths(Check):
             range(fits.n_joints),
             but=("payload",) if confirmed >= LEAST else (),
         )
-        if duel.beside < LEAST:
+        if min(duel.beside, _beside_gains(found)) < LEAST:
             return
         robot = fits.robot
         off = {
@@ -111,6 +115,25 @@ class Lengths(Check):
             "suspected",
             sorted({int(robot.tree.coordinates[body]) for body in off}),
         )
+
+
+def _beside_gains(found: Stretched) -> float:
+    """Least gain of the lengths where the torque of any one joint may have another scale."""
+    return min(
+        _with_gain(found.there, k) - _with_gain(found.here, k)
+        for k in range(len(found.here.joints))
+    )
+
+
+def _with_gain(near: NearBodies, k: int) -> float:
+    """Posterior of a fit in which the torque of one of the joints has a free scale."""
+    joint, use, place = near.joints[k], near.rows[k], near.places[k]
+    bodies = place < near.n_bodies
+    column = near.fits.mean_torque(joint)[0][use] - near.targets[k]  # of the stated bodies
+    column += near.designs[k][:, bodies] @ near.plain.coefficients[place[bodies]]
+    columns = np.zeros((near.fits.n_rows, 1))
+    columns[use, 0] = column / (float(np.std(column)) + 1e-12)
+    return near.fit(ExtraColumns({joint: columns}, (), np.array([LOOSE]))).posterior
 
 
 def _before(robot: Robot, body: int) -> str:

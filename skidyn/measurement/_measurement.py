@@ -110,10 +110,24 @@ class Measurement:
         s = self.signals
         self.leaps = find_leaps(s.q, s.clock, s.trajectory)
         if len(self.leaps):  # no other check should interpret a jump as motion
-            cut = np.zeros(s.n_samples, dtype=np.int64)
-            cut[1:] = s.trajectory[1:] != s.trajectory[:-1]
-            cut[self.leaps] = 1
-            self.signals = s.with_(trajectory=np.cumsum(cut))
+            self.cut(self.leaps.astype(np.intp))
+
+    def cut(self, rows: NDArray[np.intp]) -> None:
+        """End trajectories before some rows, for all checks that follow.
+
+        Parameters
+        ----------
+        rows : ndarray of int
+            First rows of new trajectories.
+        """
+        s = self.signals
+        first = np.zeros(s.n_samples, dtype=np.int64)
+        first[1:] = s.trajectory[1:] != s.trajectory[:-1]
+        first[rows] = 1
+        self.signals = s.with_(trajectory=np.cumsum(first))
+        for name, value in vars(type(self)).items():
+            if isinstance(value, cached_property):
+                self.__dict__.pop(name, None)
 
     @property
     def n_joints(self) -> int:
@@ -191,7 +205,7 @@ class Measurement:
     @cached_property
     def odd_motion(self) -> dict[int, dict[int, float]]:
         """Recordings in which velocities are not the usual multiple of the rate of positions."""
-        if len(self.leaps):
+        if len(self.leaps) or self.lost:
             return {}  # parts between leaps have no numbers of their own
         from skidyn.measurement._odd_motion import odd_motion
 
@@ -267,7 +281,7 @@ class Measurement:
         """Recordings in which a position never changes although its velocity does, by joint."""
         from skidyn.measurement._odd_motion import stuck_positions
 
-        return {} if len(self.leaps) else stuck_positions(self.signals)
+        return {} if len(self.leaps) or self.lost else stuck_positions(self.signals)
 
     @cached_property
     def held(self) -> dict[int, float]:

@@ -386,3 +386,32 @@ def find_leaps(q: np.ndarray, time: np.ndarray, trajectory: np.ndarray) -> np.nd
         if any(stay):
             kept.append(row + 1)
     return np.array(kept if len(kept) <= max(PLACES * n, 2) else [], dtype=np.intp)
+
+
+def divided_differences(values: np.ndarray, time: np.ndarray, order: int) -> np.ndarray:
+    """Differences that are zero for polynomials below their order, also with uneven steps.
+
+    They are scaled so that white noise keeps its size.
+
+    Parameters
+    ----------
+    values : ndarray of shape (n_samples, ...)
+        Samples of one trajectory.
+    time : ndarray of shape (n_samples,), s
+        Their times.
+    order : int
+        Order of the differences.
+
+    Returns
+    -------
+    ndarray of shape (n_samples - order, ...)
+    """
+    n = len(values) - order
+    near = np.stack([time[k : n + k] for k in range(order + 1)])
+    apart = near[:, None] - near[None, :]
+    apart /= np.abs(apart).max(axis=(0, 1)) + 1e-300  # products of small steps would be tiny
+    apart[np.arange(order + 1), np.arange(order + 1)] = 1.0
+    weights = 1 / np.where(apart == 0, np.finfo(float).eps, apart).prod(axis=1)
+    weights /= np.sqrt(np.sum(weights**2, axis=0))
+    shape = (n, *(1,) * (values.ndim - 1))
+    return np.asarray(sum(w.reshape(shape) * values[k : n + k] for k, w in enumerate(weights)))

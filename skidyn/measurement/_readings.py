@@ -225,6 +225,11 @@ def _first(accepted: list[Change]) -> Change:
         for c in accepted
         if c.gain + c.confirmed >= first.gain + first.confirmed - close or _but_for_angle(c, first)
     ]
+    if first.kind == "motion_sign":
+        # friction and inertia of a last joint reverse alike with either; the motion is felt by
+        # other joints as well, which do not decide
+        sign = (c for c in tied if c.kind == "torque_sign" and c.joints == first.joints)
+        return next(sign, first)
     # an angle that is free fits at least as well as one that is not
     return next((c for c in tied if c.kind != "zero"), first) if first.kind == "zero" else first
 

@@ -502,7 +502,7 @@ class JoinedRecordings(Check):
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         s = measurement.signals
         rows = measurement.leaps
-        if len(rows):
+        if len(rows) and not measurement.lost:  # lost rows make positions jump as well
             shown = ", ".join(str(int(row)) for row in rows[:6]) + (" .." if len(rows) > 6 else "")
             joint = int(np.argmax(np.abs(s.q[rows[0]] - s.q[rows[0] - 1])))
             if _was_held(measurement, joint):

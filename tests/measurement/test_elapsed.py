@@ -60,3 +60,17 @@ def test_rows_that_are_exchanged_with_their_neighbours():
     frame = FRAME.copy()
     frame[signals] = FRAME[signals].to_numpy()[order]
     assert "exchanged with others" in told_of(frame)["lost_rows"].suspicion
+
+
+def test_rows_that_were_lost_in_bursts_under_an_even_clock():
+    kept, stamps = [], []
+    for _, own in FRAME.groupby("trajectory"):
+        lost = np.zeros(len(own), dtype=bool)
+        for start in range(80, len(own) - 100, 120):
+            lost[start : start + 20] = True
+        kept.append(own.index[~lost])
+        stamps.append(own["time"].to_numpy()[: (~lost).sum()])
+    frame = FRAME.loc[np.concatenate(kept)].reset_index(drop=True)
+    told = told_of(frame.assign(time=np.concatenate(stamps)))
+    assert {name for name, one in told.items() if one.certainty != "noted"} == {"lost_rows"}
+    assert "in bursts" in told["lost_rows"].suspicion

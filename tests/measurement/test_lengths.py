@@ -55,3 +55,9 @@ def test_links_of_an_arm():
     ).frame
     (one,) = told(frame, described(robot, [1, 1, 0.8, 1.2, 1, 1]))
     assert one.check == "lengths" and {3, 4} <= set(one.joints)
+
+
+@pytest.mark.parametrize("change", [lambda x: 1.2 * x, lambda x: np.round(2 * x / x.std()) / 2])
+def test_gains_and_coarse_torque_make_no_link_longer(change):
+    frame = LOG.assign(tau2=change(LOG["tau2"]))
+    assert "lengths" not in {s.check for s in told(frame, ARM)}

@@ -1,0 +1,301 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Comparison of recordings: a third to half of them with another sign, scale or zero of a joint.
+
+A single recording that differs is seen by bodies of the others. Where many differ, bodies of all of
+them are those of none. So the torque of a joint is one function of its motion, times one of two
+multiples, or with one of two zeros, and which one a recording has is fitted as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidyn._signals import Array
+from skidyn.measurement._bodies import explained
+from skidyn.measurement._check import Check
+from skidyn.measurement._duel import left_by_effects
+from skidyn.measurement._fits import SAMPLES, Fits, Reading
+from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._suspicion import Suspicion
+from skidyn.measurement._torque import asked_changes
+
+#: Fewest recordings, and rows of each, to be compared.
+RECORDINGS, FEWEST = 4, 12
+#: Least share of the recordings that differ; fewer are found one by one.
+SHARE = 0.3
+#: Error of identified bodies, as a share of the spread, from which recordings are divided.
+WORTH = 0.08
+#: How nearly the multiples of either group must be the same, as a share, and what they may differ
+#: by without a mistake: a payload or friction that changes.
+ALIKE, USUAL = 0.25, (0.4, 2.5)
+#: Rounds of the fit of multiples.
+ROUNDS = 12
+#: Log-likelihood that two groups must gain with identified bodies, the share of the residual that
+#: they must take off, and what they may leave of what the best effect leaves.
+SURE, DROP, BETTER = 40.0, 0.4, 0.8
+#: Zeros that are tried, and the least that is reported, rad.
+ZEROS, LEAST_ZERO = np.deg2rad([-60, -40, -20, 20, 40, 60]), np.deg2rad(4)
+#: Zeros that are examined in detail.
+FINALISTS = 4
+
+
+@dataclass(frozen=True)
+class Division:
+    """Recordings in which a joint has another multiple, or another zero.
+
+    Attributes
+    ----------
+    kind : {"sign", "scale", "zero"}
+        Difference.
+    joint : int
+        Joint, from 0.
+    runs : tuple of int
+        The recordings that differ; at most half.
+    value : float
+        Multiple of the torque, or angle of the zero, rad.
+    gain, drop : float
+        Log-likelihood gain with identified bodies, and share of the residual that it takes off.
+    """
+
+    kind: str
+    joint: int
+    runs: tuple[int, ...]
+    value: float
+    gain: float
+    drop: float
+
+
+class DividedRecordings(Check):
+    """A joint with another sign, scale or zero in a third to half of the recordings."""
+
+    name = "divided_recordings"
+    suspects = "several recordings with another sign, scale or zero of one joint than the others"
+    stage = 1
+    misnames = True
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        if measurement.stale or measurement.lost or measurement.odd:
+            return
+        seen = explained(measurement)
+        if seen is None or seen.errors[1].max() < WORTH:
+            return
+        fits = seen.fits
+        found = [*_divided_torques(fits, seen.joints), *_divided_zeros(fits)]
+        if not found:
+            return
+        best = max(found, key=lambda one: one.gain)
+        if sum(c.gain for c in asked_changes(measurement, fits) if not c.other) > best.gain:
+            return
+        measurement.odd = True
+        name = measurement.joint(best.joint)
+        what = {
+            "sign": f"the torque of {name} has the opposite sign",
+            "scale": f"the torque of {name} is {best.value:.3g} times that of the others",
+            "zero": f"the zero of {name} differs by about {np.rad2deg(best.value):.0f} deg",
+        }[best.kind]
+        runs = ", ".join(map(str, best.runs))
+        yield self.suspicion(
+            f"in trajectories {runs} {what}",
+            "with this correction, identified bodies explain the torque of all trajectories better "
+            f"by {best.gain:.0f} (log-likelihood) and leave {100 * best.drop:.0f} % less residual; "
+            "fix these files, or diagnose them separately",
+            "suspected",
+            [best.joint],
+        )
+
+
+def _runs_of(fits: Fits) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Recording of every row, and the recordings."""
+    number = fits.signals.trajectory[::SAMPLES]
+    return number, np.unique(number)
+
+
+def _divided_torques(fits: Fits, joints: list[int]) -> Iterator[Division]:
+    """Joints whose torque has one of two multiples."""
+    number, runs = _runs_of(fits)
+    columns, here = fits.columns(Reading()), fits.identified(Reading())
+    for k in joints:
+        y, use = fits.mean_torque(k)
+        rows = [use & (number == run) for run in runs]
+        told = [i for i, own in enumerate(rows) if own.sum() >= FEWEST]
+        if len(told) < RECORDINGS:
+            continue
+        design = np.column_stack([columns[:, :, k], np.ones(len(y))])
+        multiples = _multiples([design[rows[i]] for i in told], [y[rows[i]] for i in told])
+        split = _two_groups(multiples)
+        if split is None:
+            continue
+        others, value = split
+        out = runs[[told[i] for i in np.flatnonzero(others)]]
+        torque = fits.torque.copy()
+        torque[np.isin(fits.signals.trajectory, out), k] /= value
+        mended = _with(fits, torque=torque).identified(Reading())
+        margin = mended.margin(here)
+        changed = float(np.isin(number[use], out).sum())
+        margin[k] -= changed * np.log(abs(value)) / max(float(mended.inflation[k]), 1.0)
+        after = _spread(mended.residual[k]) / _spread(fits.average(torque[:, k])[use])
+        drop = 1 - after / (_spread(here.residual[k]) / _spread(y[use]))
+        gain = float(margin.sum())
+        if gain > SURE and drop > DROP:
+            kind = "sign" if USUAL[0] < -value < USUAL[1] else "scale"
+            yield Division(kind, k, tuple(map(int, out)), value, gain, drop)
+
+
+def _multiples(designs: list[Array], targets: list[Array]) -> Array:
+    """Multiple of every recording of one function of the motion, by turns with its coefficients."""
+    scale = np.linalg.norm(np.vstack(designs), axis=0) + 1e-12
+    best, found = np.inf, np.ones(len(targets))
+    for reference in np.argsort([-len(y) for y in targets])[:3]:
+        multiples = np.zeros(len(targets))
+        multiples[reference] = 1.0
+        for _ in range(ROUNDS):
+            x = np.vstack([m * d for m, d in zip(multiples, designs, strict=True)]) / scale
+            gram = x.T @ x + 1e-6 * np.eye(x.shape[1]) * np.sum(x**2) / x.shape[1]
+            c = np.linalg.solve(gram, x.T @ np.concatenate(targets)) / scale
+            predicted = [d @ c for d in designs]
+            multiples = np.array(
+                [y @ p / (p @ p + 1e-300) for y, p in zip(targets, predicted, strict=True)]
+            )
+        left = sum(
+            float(np.sum((y - m * p) ** 2)) / (float(y @ y) + 1e-300)
+            for y, p, m in zip(targets, predicted, multiples, strict=True)
+        )
+        if left < best:
+            # as multiples of the stated bodies, or of friction, which is positive
+            heavy = abs(c[0]) * scale[0] > abs(c[2]) * scale[2]
+            best, found = left, multiples * (c[0] if heavy else np.sign(c[2]) or 1.0)
+    return found
+
+
+def _two_groups(multiples: Array) -> tuple[NDArray[np.bool_], float] | None:
+    """Recordings whose multiple is another one than that of the others, and their ratio."""
+    n = len(multiples)
+    order = np.sort(multiples)
+    cut = int(np.argmax(np.diff(order)))
+    if np.any(multiples < 0):
+        low = multiples < 0
+    else:
+        logs = np.log(np.maximum(order, 1e-6))
+        cut = int(np.argmax(np.diff(logs)))
+        low = multiples <= order[cut]
+    size = int(low.sum())
+    if not SHARE * n <= size <= (1 - SHARE) * n:
+        return None
+    others = low if 2 * size <= n else ~low
+    if 2 * size == n:  # those are right that are nearer to the stated bodies
+        middles = [float(np.median(multiples[part])) for part in (low, ~low)]
+        far = [np.inf if m <= 0 else abs(np.log(m)) for m in middles]
+        others = low if far[0] > far[1] else ~low
+    usual, other = float(np.median(multiples[~others])), float(np.median(multiples[others]))
+    if usual == 0:
+        return None
+    value = other / usual
+    spread = [
+        float(np.median(np.abs(multiples[part] / middle - 1)))
+        for part, middle in ((others, other), (~others, usual))
+        if middle != 0
+    ]
+    if len(spread) < 2 or max(spread) > ALIKE or USUAL[0] < value < USUAL[1] or value == 0:
+        return None
+    return others, -1.0 if USUAL[0] < -value < USUAL[1] else value
+
+
+def _divided_zeros(fits: Fits) -> Iterator[Division]:
+    """A joint whose position has one of two zeros."""
+    number, runs = _runs_of(fits)
+    if len(runs) < RECORDINGS:
+        return
+    here = fits.identified(Reading())
+    plain = _by_run(fits, fits.signals.q, number, runs)
+    tried = []
+    for k in np.flatnonzero(~fits.signals.prismatic).tolist():
+        for angle in ZEROS.tolist():
+            q = fits.signals.q.copy()
+            q[:, k] -= angle
+            better, apart = _set_apart(_by_run(fits, q, number, runs) - plain)
+            tried.append((apart, k, angle, runs[better]))
+    tried.sort(key=lambda one: -one[0])
+
+    def mended(k: int, angle: float, out: NDArray[np.int64]) -> Fits:
+        q = fits.signals.q.copy()
+        q[np.isin(fits.signals.trajectory, out), k] -= angle
+        return _with(fits, q=q)
+
+    def margin(k: int, angle: float, out: NDArray[np.int64]) -> float:
+        return float(mended(k, angle, out).identified(Reading()).margin(here).sum())
+
+    value, k, angle, out = max(
+        ((margin(*one[1:]), *one[1:]) for one in tried[:FINALISTS]), key=lambda one: one[0]
+    )
+    if value < SURE:
+        return
+    step = np.deg2rad(10)
+    while step > np.deg2rad(1):
+        near, other = max((margin(k, a, out), a) for a in (angle - step, angle + step))
+        if near > value:
+            value, angle = near, other
+        else:
+            step /= 2
+    if abs(angle) < LEAST_ZERO:
+        return
+    if 2 * len(out) > len(runs):
+        out, angle = np.setdiff1d(runs, out), -angle
+    there = mended(k, angle, out).identified(Reading())
+    worst = int(np.argmax(there.margin(here)))
+    drop = 1 - float(_spread(there.residual[worst]) / _spread(here.residual[worst]))
+    rows = np.isin(number, out)
+    without, left = left_by_effects(fits, worst, rows)
+    if drop > DROP and 1 - drop < BETTER * left / without:
+        yield Division("zero", k, tuple(map(int, out)), angle, value, drop)
+
+
+def _set_apart(change: Array) -> tuple[NDArray[np.bool_], float]:
+    """Recordings that gain more than the others, by the largest gap, and how far they are apart."""
+    order, n = np.sort(change), len(change)
+    least = int(np.ceil(SHARE * n))
+    gaps = np.diff(order)[least - 1 : n - least]
+    cut = least - 1 + int(np.argmax(gaps))
+    middle = (order[cut] + order[cut + 1]) / 2
+    return change > middle, float(np.abs(change - middle).sum())
+
+
+def _by_run(fits: Fits, q: Array, number: NDArray[np.int64], runs: NDArray[np.int64]) -> Array:
+    """Log-likelihood of every recording with stated bodies, with friction common to all of them."""
+    moved = _with(fits, q=q)
+    outcome = moved.nominal(Reading(), 2)
+    total = np.zeros(len(runs))
+    for k in range(fits.n_joints):
+        if not fits.usable(k):
+            continue
+        own = number[fits.moving[:, k]]
+        scale = float(outcome.scale[k])
+        for i, run in enumerate(runs):
+            rest = outcome.residual[k][own == run] / scale
+            total[i] -= 2.5 * float(np.log1p(rest**2 / 4).sum()) / float(outcome.inflation[k])
+            total[i] -= len(rest) * np.log(scale) / float(outcome.inflation[k])
+    return total
+
+
+def _with(fits: Fits, torque: Array | None = None, q: Array | None = None) -> Fits:
+    """The same rows with another torque, or other positions."""
+    signals = fits.signals if q is None else fits.signals.with_(q=q)
+    torque = fits.torque if torque is None else torque
+    return replace(
+        fits,
+        signals=signals,
+        torque=torque,
+        backend="numpy",
+        _known={},
+        _moved={},
+        _parts={},
+        _fitted={},
+        _felt={},
+    )
+
+
+def _spread(values: Array) -> float:
+    return float(np.std(values)) + 1e-12

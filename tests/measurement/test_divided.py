@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Signs, scales and zeros that change for a third to half of the recordings."""
+
+import pytest
+
+from skidyn.datasets import load_ur5, make_hidden_effect_log
+from skidyn.logs import check_log
+
+ROBOT = load_ur5()
+OPTIONS = {"n_trajectories": 6, "duration": 5.0, "random_state": 1}
+FRAME = make_hidden_effect_log(ROBOT, "stribeck", joints=[2], **OPTIONS).frame
+
+
+def told(frame):
+    return [s for s in check_log(frame, ROBOT).checks if s.certainty != "noted"]
+
+
+@pytest.mark.parametrize("count", [2, 3])
+@pytest.mark.parametrize(
+    "name, change, what",
+    [
+        ("tau3", lambda x: -x, "opposite sign"),
+        ("tau6", lambda x: -x, "opposite sign"),
+        ("tau2", lambda x: 10 * x, " is 10"),
+        ("q3", lambda x: x + 0.7, "the zero of"),
+    ],
+)
+def test_recordings_of_two_kinds_are_told_alone(name, change, what, count):
+    frame = FRAME.copy()
+    runs = FRAME["trajectory"].unique()[1 : 1 + count]
+    rows = FRAME["trajectory"].isin(runs)
+    frame.loc[rows, name] = change(FRAME.loc[rows, name])
+    (one,) = told(frame)
+    assert one.check == "divided_recordings" and one.joints == (int(name[-1]),)
+    assert what in one.suspicion
+    assert ", ".join(map(str, runs)) in one.suspicion
+
+
+@pytest.mark.parametrize("effect", ["payload", "external_wrench", "environment_contact"])
+def test_effects_of_some_recordings_are_no_mistake(effect):
+    frame = make_hidden_effect_log(ROBOT, effect, **OPTIONS).frame
+    assert "divided_recordings" not in {s.check for s in told(frame)}

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Torque from a slower bus."""
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.logs import check_log
+
+ROBOT = load_planar_arm()
+FRAME = make_hidden_effect_log(
+    ROBOT, "torque_ripple", n_trajectories=4, duration=8.0, random_state=3
+).frame
+
+
+def told_of(change=None):
+    frame = FRAME.copy()
+    rng = np.random.default_rng(0)
+    for _, own in FRAME.groupby("trajectory") if change else ():
+        t = own["time"].to_numpy()
+        few = np.arange(0, len(t), 5)
+        for name in ("tau1", "tau2"):
+            x = own[name].to_numpy()
+            noise = 0.001 * np.std(x) * rng.normal(size=len(x))
+            frame.loc[own.index, name] = change(t, x, few) + noise * (change is not spline)
+    return {s.check: s for s in check_log(frame, ROBOT).checks if s.certainty != "noted"}
+
+
+def held(t, x, few):
+    return x[np.arange(len(t)) // 5 * 5]
+
+
+def line(t, x, few):
+    return np.interp(t, t[few], x[few])
+
+
+def spline(t, x, few):
+    return CubicSpline(t[few], x[few])(t)
+
+
+@pytest.mark.parametrize("change, way", [(held, "held"), (line, "inter"), (spline, "inter")])
+def test_torque_between_the_values_of_a_slower_bus_is_told_alone(change, way):
+    told = told_of(change)
+    assert list(told) == ["slow_torque"]
+    rate = len(FRAME.query("trajectory == trajectory.iloc[0]")) / 8.0 / 5
+    one = told["slow_torque"]
+    assert f"was {way}" in one.suspicion and one.remedy.option.startswith("--resample ")
+    assert float(one.remedy.option.split()[1]) == pytest.approx(rate, rel=0.05)
+
+
+def test_torque_that_was_measured_in_every_row():
+    assert told_of() == {}
