@@ -253,11 +253,9 @@ def _vague(
                 continue  # without the fold that determines it, its value is arbitrary
             effect = candidate.term.effect
             sizes = [c for c in effect.coefficients if not c.is_zero]
-            if len(sizes) > 1 and not effect.grows:
+            if len(sizes) > 1:
                 continue  # each of them may be zero given the others, but not all together
             others = {s.name for s in effect.shapes}
-            if effect.grows:  # without its first one, the mass, it is no such effect
-                others |= set(intervals[candidate.term]) - {sizes[0].name}
             found = [
                 value
                 for name, value in intervals[candidate.term].items()
