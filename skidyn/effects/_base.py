@@ -250,7 +250,7 @@ class Effect:
 
     @property
     def on_bodies(self) -> bool:
-        """Whether it acts on the bodies of the robot, so that the transmissions carry its torque."""
+        """Whether it acts on the bodies of the robot, so that the gears carry its torque."""
         return self.scope == "robot" and not self.needs_fit
 
     def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
