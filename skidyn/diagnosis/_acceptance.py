@@ -48,9 +48,7 @@ class JudgingSearch(RankingSearch):
                 continue
             errors, own = part.errors, rival.errors
             if errors.shape != own.shape:
-                if within_recordings(best) or within_recordings(rival):
-                    continue  # one is of some recordings, judged on other folds
-                # one occurs in one recording only: both are judged by parts of recordings
+                # one occurs in some recordings only: both are judged by parts of recordings
                 errors, own = (self._errors(h, within=True) for h in (part, rival))
             variance = errors.sum(0) / np.maximum(self.problem.rows.counts, 1)
             variance = np.where(variance > 0, variance, 1.0)  # a joint at rest
@@ -276,7 +274,8 @@ class JudgingSearch(RankingSearch):
 
     def shadow(self, hypothesis: Hypothesis) -> bool:
         """Whether an explanation is small enough to be an error of earlier, imperfect formulas."""
-        joints = sorted({j for c in hypothesis.candidates for j in c.rows})
+        # Its gain may be on other joints: what is wrong on one also changes the bodies of others.
+        joints = range(self.problem.n_joints)
         settings, tolerance = self.settings, self._tolerance(hypothesis)
         own, earlier = self._removed(self.left, hypothesis.gain), self.start - self.left
         if not self._mostly_small(joints, hypothesis.gain, own, tolerance * earlier):

@@ -191,4 +191,4 @@ def simplicity_of(hypothesis: Hypothesis) -> int:
 def uses_the_fit(candidate: Candidate) -> bool:
     """Whether its columns depend on the fit of the model."""
     effect = candidate.term.effect
-    return bool({"robot", "model_torque"} & set(effect.needs)) and effect.search == "grid"
+    return effect.follows_fit and effect.search == "grid"

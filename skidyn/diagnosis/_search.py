@@ -57,6 +57,7 @@ class _Search(ReconsideringSearch):
             self.left = self._left()
             self.start = np.maximum(self.start, self.left)
             if self.findings:
+                self.follow_fit()
                 self.follow_again()
             best = self.accepted(self.rank())
             if best is None:

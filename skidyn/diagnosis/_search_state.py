@@ -70,8 +70,10 @@ class SearchState:
         self.nameless = nameless and bool(settings.max_findings)
         if self.nameless:
             self._followed = problem.torque - problem.explained(base)
-            sensor = np.nan_to_num(sensor_noise(problem.signals, self._followed))
-            self._coarse = np.flatnonzero(position_noise(problem, base) > sensor).tolist()
+            # all noise of the residual: that of the sensor, and that from the positions
+            noise = np.nan_to_num(sensor_noise(problem.signals, self._followed))
+            coarse = 2 * position_noise(problem, base) ** 2 > noise**2
+            self._coarse = np.flatnonzero(coarse).tolist()
             self.pool += nameless_candidates(problem, self._followed, coarse=self._coarse)
         self.by_recording = recording_candidates(problem, self.kinds)
         self.n_tests = max(1, len(self.pool) + len(self.by_recording))
@@ -163,6 +165,31 @@ class SearchState:
         """Residual of the present model at every sample, shape (n_samples, n_joints)."""
         fit = replace(self.fit, terms=self.problem.terms + (c.term for c in self.chosen))
         return self.problem.torque - self.ripple - self.problem.explained(fit)
+
+    def follow_fit(self) -> None:
+        """Columns of candidates that depend on the load or torque of the model, computed anew.
+
+        A payload in some recordings, for example, also loads the gears there; without it, friction
+        that depends on the load could not be found beside it.
+        """
+        before = self.problem.signals
+        self.problem.set_fit(self.fit)
+        after = self.problem.signals
+        changed = set()
+        for name in ("load", "model_torque"):
+            old, new = getattr(before, name), getattr(after, name)
+            moved = np.mean((new - old) ** 2, axis=0) > SAME * np.mean(old**2, axis=0)
+            changed |= {(name, j) for j in np.flatnonzero(moved).tolist()}
+
+        def is_stale(c: Candidate) -> bool:
+            reads = {*c.joints, c.term.shape.get("other", c.joints[0])}
+            return any((name, j) in changed for name in c.term.effect.needs for j in reads)
+
+        pool = list(filter(is_stale, dict.fromkeys([*self.whole_pool, *self.by_recording])))
+        terms = [c.term for c in sorted(pool, key=lambda c: (c.term.effect.needs, c.joints))]
+        rows = dict(zip(terms, self.problem.prepare(terms, screening=True), strict=True))
+        for c in pool:
+            c.rows.update(rows[c.term])
 
     def follow_again(self) -> None:
         """Add functions of signals on which the residual now depends, which others had hidden."""

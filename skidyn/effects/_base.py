@@ -248,6 +248,11 @@ class Effect:
         """Whether it acts on the torque of the whole model, as a sensor does."""
         return "model_torque" in self.needs
 
+    @property
+    def on_bodies(self) -> bool:
+        """Whether it acts on the bodies of the robot, so that the gears carry its torque."""
+        return self.scope == "robot" and not self.needs_fit
+
     def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
         """Linear coefficients for a given shape, one per column.
 

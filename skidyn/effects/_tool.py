@@ -61,6 +61,7 @@ class Payload(_ToolEffect):
     """A rigid body fixed to the last link."""
 
     kind = "payload"
+    is_exact = True
     drawn_against = "q"
     title = "Payload"
     formula = r"Y_n(q, \dot q, \ddot q)\,\pi_\mathrm{payload}"

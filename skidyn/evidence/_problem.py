@@ -361,7 +361,9 @@ class Problem:
         # An effect of the torque sensor acts on the torque before the sensor.
         dry, smooth = np.zeros_like(self.torque), np.zeros_like(self.torque)
         for term, own in fit.terms.slices(len(self.rigid_index)):
-            if not term.effect.sees_model:
+            if term.effect.on_bodies:
+                self._add(load, term, fit.coefficients[own])
+            elif not term.effect.sees_model:
                 self._add(dry if term.is_dry else smooth, term, fit.coefficients[own])
         self.signals = self.signals.with_(
             load=load,

@@ -305,9 +305,11 @@ class ForwardModel:
             direction=direction,
         )
         torque = np.zeros_like(q)
-        for term in terms:
+        for term in sorted(terms, key=lambda term: not term.effect.on_bodies):
             for j, block in term.torque_columns(signals).items():
                 torque[:, j] += block @ model.effect_coefficients_[term]
+            if term.effect.on_bodies:
+                signals = signals.with_(load=rigid + torque)
         torque[lost] = np.nan
         return torque
 

@@ -88,10 +88,13 @@ class Prediction(Reading):
     def _effects(self, signals: Signals, torque: Array) -> Iterator[tuple[Term, dict[int, Array]]]:
         """Columns of every effect, each computed with the torque of the effects before it.
 
-        Effects on the transmission use the rigid body's torque, given as ``torque``; those of the
-        sensor come last and use the model's. The torque of each is added to ``torque``.
+        Effects on the transmission use the torque of the bodies: the rigid body's, given as
+        ``torque``, and that of loads and contacts, which come first. Effects of the sensor come
+        last and use the model's. The torque of each is added to ``torque``.
         """
-        order = sorted(self.effect_terms_, key=lambda term: term.effect.needs_fit)
+        order = sorted(
+            self.effect_terms_, key=lambda term: (not term.effect.on_bodies, term.effect.needs_fit)
+        )
         on_sensor = any(term.effect.sees_model for term in order)
         smooth = torque.copy()
         signals = signals.with_(load=torque.copy(), inertial_parameters=self.inertial_parameters_)
@@ -105,6 +108,8 @@ class Prediction(Reading):
                 torque[:, j] += own
                 if on_sensor and not term.is_dry:
                     smooth[:, j] += own
+            if term.effect.on_bodies:
+                signals = signals.with_(load=torque.copy())
             yield term, blocks
 
     def rigid_body_torque(self, q: Array, dq: Array, ddq: Array) -> Array:

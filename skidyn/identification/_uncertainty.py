@@ -241,9 +241,14 @@ def _with_load(model: Prediction, terms: Iterable[Term], signals: Signals) -> Si
     """Signals with the torques of the model, if some of the effects need them."""
     if not any(term.effect.needs_fit for term in terms):
         return signals
-    total = model._torque(signals)
+    load = model.rigid_body_torque(signals.q, signals.dq, signals.ddq)
+    total = load.copy()
+    for term, blocks in model._effects(signals, total):
+        if term.effect.on_bodies:
+            for j, block in blocks.items():
+                load[:, j] += block @ model.effect_coefficients_[term]
     return signals.with_(
-        load=model.rigid_body_torque(signals.q, signals.dq, signals.ddq),
+        load=load,
         model_torque=total,
         smooth_torque=total,
         inertial_parameters=model.inertial_parameters_,

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A second effect is found beside the first."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from skidyn.datasets import load_planar_arm
+from skidyn.diagnosis import diagnose
+from skidyn.identification import RBDRegressor
+
+ROBOT = load_planar_arm()
+RECORDINGS, HEAVY, NOISE = 10, (2, 5, 6, 9), np.array([0.05, 0.02])
+
+
+def motion():
+    """Sums of sines in separate recordings, with their exact derivatives."""
+    rng = np.random.default_rng(4)
+    time = np.arange(0.0, 6.0, 0.01)
+    tables = []
+    for k in range(1, RECORDINGS + 1):
+        omega = 2 * np.pi * rng.uniform(0.15, 0.9, (3, 2))
+        phase, size = rng.uniform(0, 2 * np.pi, (3, 2)), rng.uniform(0.2, 0.5, (3, 2))
+        waves = time[:, None, None] * omega + phase
+        q, dq = (size * np.sin(waves)).sum(1), (size * omega * np.cos(waves)).sum(1)
+        ddq = -(size * omega**2 * np.sin(waves)).sum(1)
+        columns = {f"{s}{j + 1}": x[:, j] for s, x in (("q", q), ("dq", dq)) for j in (0, 1)}
+        tables.append((pd.DataFrame({"trajectory": k, "time": time + 10 * k} | columns), ddq))
+    return pd.concat([t for t, _ in tables], ignore_index=True), np.vstack([a for _, a in tables])
+
+
+@pytest.fixture(scope="module")
+def plain():
+    """Log, rigid-body torque with a heavier last link in some recordings, and the rest of it."""
+    X, ddq = motion()
+    q, dq = X[["q1", "q2"]].to_numpy(), X[["dq1", "dq2"]].to_numpy()
+    bodies = ROBOT.inertial_parameters.copy()
+    light = ROBOT.inverse_dynamics(q, dq, ddq, parameters=bodies)
+    bodies[-1] += [3.0, 0.3, 0.0, 0.0, 0.01, 0.0, 0.0, 0.04, 0.0, 0.04]
+    heavy = ROBOT.inverse_dynamics(q, dq, ddq, parameters=bodies)
+    noise = NOISE * np.random.default_rng(5).normal(size=q.shape)
+    rest = 0.8 * dq + 0.5 * np.sign(dq) + noise
+    return X, light, heavy, rest
+
+
+def diagnosed(X, torque):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return diagnose(RBDRegressor(ROBOT, ("viscous", "coulomb")), X, torque)
+
+
+def test_friction_that_grows_with_a_load_of_some_recordings(plain):
+    X, light, heavy, rest = plain
+    load = np.where(np.isin(X["trajectory"], HEAVY)[:, None], heavy, light)
+    direction = np.sign(X[["dq1", "dq2"]].to_numpy())
+
+    torque = load + rest + 0.08 * np.abs(load) * direction
+
+    diagnosis = diagnosed(X, torque)
+
+    kinds = {(f.kind, f.trajectories) for f in diagnosis.findings}
+    assert kinds == {("payload", HEAVY), ("load_dependent_friction", None)}
+    for finding in diagnosis.findings:
+        if finding.kind == "load_dependent_friction":
+            assert finding.parameters["mu"]["value"] == pytest.approx(0.08, rel=0.1)
+    # the gears of the model carry the load too
+    error = np.abs(diagnosis.model.predict(X) - torque)
+    assert np.all(np.median(error, axis=0) < NOISE)
+
+
+def test_friction_of_the_last_recording_is_no_drift(plain):
+    X, light, _, rest = plain
+    few = X["trajectory"].to_numpy() <= 6
+    X, torque = X[few].reset_index(drop=True), (light + rest)[few]
+    last = X["trajectory"].to_numpy() == 6
+    torque[last, 1] += 0.4 * np.sign(X["dq2"].to_numpy()[last])
+
+    findings = diagnosed(X, torque).findings
+
+    said = [(f.kind, f.joints, f.trajectories) for f in findings]
+    assert said == [("coulomb", (2,), (6,))]
