@@ -289,7 +289,7 @@ class ForwardModel:
                 np.where(lost[:, None], 0.0, x) for x in (q, dq, ddq, direction)
             )
         rigid = model.rigid_body_torque(q, dq, ddq)
-        signals = _Rows(
+        signals: Signals = _Rows(
             q,
             dq,
             ddq,
