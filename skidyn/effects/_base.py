@@ -339,6 +339,7 @@ class Effect:
         Returns
         -------
         str
+            The sentence.
         """
         return ""
 

@@ -121,7 +121,7 @@ def _divided_torques(fits: Fits, joints: list[int]) -> Iterator[Division]:
     for k in joints:
         y, use = fits.mean_torque(k)
         rows = [use & (number == run) for run in runs]
-        told = [i for i, own in enumerate(rows) if own.sum() >= FEWEST]
+        told = [i for i, own in enumerate(rows) if own.sum() >= FEWEST and np.any(y[own])]
         if len(told) < RECORDINGS:
             continue
         design = np.column_stack([columns[:, :, k], np.ones(len(y))])
@@ -154,7 +154,7 @@ def _multiples(designs: list[Array], targets: list[Array]) -> Array:
         multiples[reference] = 1.0
         for _ in range(ROUNDS):
             x = np.vstack([m * d for m, d in zip(multiples, designs, strict=True)]) / scale
-            gram = x.T @ x + 1e-6 * np.eye(x.shape[1]) * np.sum(x**2) / x.shape[1]
+            gram = x.T @ x + 1e-6 * np.eye(x.shape[1]) * (np.sum(x**2) / x.shape[1] + 1e-300)
             c = np.linalg.solve(gram, x.T @ np.concatenate(targets)) / scale
             predicted = [d @ c for d in designs]
             multiples = np.array(
