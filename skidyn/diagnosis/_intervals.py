@@ -105,8 +105,8 @@ def _slopes(
                 continue  # at the end of its range; beyond, it is another effect
             log = shape.spacing == "log"
             step = STEP * (here if log else max(abs(here), 1e-3))
-            change, size = np.inf, 0.0
-            while change > LARGEST_CHANGE * size and step > 1e-9 * abs(here):
+            change, size, least = np.inf, 0.0, 1e-7 * step
+            while change > LARGEST_CHANGE * size and step > least:
                 sides = [
                     problem.term_rows(term.with_shape(**{shape.name: v}))
                     for v in (here + step, here - step)

@@ -45,10 +45,11 @@ class CommandedMotion(Check):
         delay = measured_delay(measurement)
         if delay is None or not delay.common > max(SMALLEST, ERRORS * delay.error):
             return  # a simulation without noise is in time
+        unit = "m" if s.prismatic[moving[int(np.argmax(positions))]] else "rad"
         yield self.suspicion(
             "positions were commanded, not measured",
-            f"they scatter by at most {positions.max():.1g} rad from sample to sample, less than "
-            f"any encoder, and are ahead of the torque by {1e3 * delay.common:.0f} ms; commands "
+            f"they scatter by at most {positions.max():.1g} {unit} from sample to sample, less "
+            f"than any encoder, and are ahead of the torque by {1e3 * delay.common:.0f} ms; commands "
             "differ from the motion by the error of the controller, so record measured positions",
             "noted",
             moving,

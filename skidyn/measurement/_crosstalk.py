@@ -129,16 +129,7 @@ def without(fits: Fits, joint: int, source: int, share: float) -> Fits:
     """
     torque = fits.torque.copy()
     torque[:, joint] -= share * torque[:, source]
-    return Fits(
-        fits.robot,
-        fits.signals,
-        torque,
-        fits.moving,
-        fits.recorded,
-        fits.left_out,
-        fits.backend,
-        _felt=fits._felt,
-    )
+    return fits.with_torque(torque)
 
 
 def _noise(measurement: Measurement, joints: list[int]) -> Array | None:

@@ -9,7 +9,7 @@ multiples, or with one of two zeros, and which one a recording has is fitted as 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -133,7 +133,7 @@ def _divided_torques(fits: Fits, joints: list[int]) -> Iterator[Division]:
         out = runs[[told[i] for i in np.flatnonzero(others)]]
         torque = fits.torque.copy()
         torque[np.isin(fits.signals.trajectory, out), k] /= value
-        mended = _with(fits, torque=torque).identified(Reading())
+        mended = fits.with_torque(torque).identified(Reading())
         margin = mended.margin(here)
         changed = float(np.isin(number[use], out).sum())
         margin[k] -= changed * np.log(abs(value)) / max(float(mended.inflation[k]), 1.0)
@@ -223,7 +223,7 @@ def _divided_zeros(fits: Fits) -> Iterator[Division]:
     def mended(k: int, angle: float, out: NDArray[np.int64]) -> Fits:
         q = fits.signals.q.copy()
         q[np.isin(fits.signals.trajectory, out), k] -= angle
-        return _with(fits, q=q)
+        return _with_positions(fits, q)
 
     def margin(k: int, angle: float, out: NDArray[np.int64]) -> float:
         return float(mended(k, angle, out).identified(Reading()).margin(here).sum())
@@ -265,7 +265,7 @@ def _set_apart(change: Array) -> tuple[NDArray[np.bool_], float]:
 
 def _by_run(fits: Fits, q: Array, number: NDArray[np.int64], runs: NDArray[np.int64]) -> Array:
     """Log-likelihood of every recording with stated bodies, with friction common to all of them."""
-    moved = _with(fits, q=q)
+    moved = _with_positions(fits, q)
     outcome = moved.nominal(Reading(), 2)
     total = np.zeros(len(runs))
     for k in range(fits.n_joints):
@@ -280,21 +280,10 @@ def _by_run(fits: Fits, q: Array, number: NDArray[np.int64], runs: NDArray[np.in
     return total
 
 
-def _with(fits: Fits, torque: Array | None = None, q: Array | None = None) -> Fits:
-    """The same rows with another torque, or other positions."""
-    signals = fits.signals if q is None else fits.signals.with_(q=q)
-    torque = fits.torque if torque is None else torque
-    return replace(
-        fits,
-        signals=signals,
-        torque=torque,
-        backend="numpy",
-        _known={},
-        _moved={},
-        _parts={},
-        _fitted={},
-        _felt={},
-    )
+def _with_positions(fits: Fits, q: Array) -> Fits:
+    """The same rows with other positions, (n_samples, n_joints)."""
+    moved = fits.signals.with_(q=q)
+    return Fits(fits.robot, moved, fits.torque, fits.moving, fits.recorded, fits.left_out)
 
 
 def _spread(values: Array) -> float:

@@ -187,12 +187,16 @@ class Fits:
         signals, torque = self.signals.take(samples), self.torque[samples]
         return Fits(self.robot, signals, torque, self.moving[rows], recorded, self.left_out)
 
+    def with_torque(self, torque: Array) -> Fits:
+        """The same rows with another torque, (n_samples, n_joints); what motion implies is kept."""
+        return replace(self, torque=torque, _known={}, _fitted={})
+
     def scaled(self, gains: Mapping[int, float]) -> Fits:
         """The same rows with columns of the torque divided by gains."""
         torque = self.torque.copy()
         for column, gain in gains.items():
             torque[:, column] /= gain
-        return replace(self, torque=torque, _known={}, _fitted={})
+        return self.with_torque(torque)
 
     def with_gravity(self, reading: Reading) -> Fits:
         """The same rows with the gravity torque of the stated bodies added."""
@@ -201,7 +205,7 @@ class Fits:
         for joint in range(self.n_joints):
             column, sign = self.torque_column(reading, joint)
             torque[:, column] += sign * pull[:, joint]
-        return Fits(self.robot, self.signals, torque, self.moving, self.recorded, self.left_out)
+        return self.with_torque(torque)
 
     @property
     def n_rows(self) -> int:

@@ -66,7 +66,8 @@ def find_without_gravity(fits: Fits) -> list[tuple[int, float, float, float]]:
     fits : Fits
         Rows.
     """
-    pull = fits.average(fits.robot.gravity_torque(fits.motion(Reading()).q))
+    gravity = fits.robot.gravity_torque(fits.motion(Reading()).q)
+    pull = fits.average(gravity)
     columns = fits.columns(Reading())
     promising = []
     for k in range(fits.n_joints):
@@ -94,9 +95,8 @@ def find_without_gravity(fits: Fits) -> list[tuple[int, float, float, float]]:
         if abs(share - 1) > ALL or error > KNOWN:
             continue
         torque = fits.torque.copy()
-        torque[:, k] += fits.robot.gravity_torque(fits.motion(Reading()).q)[:, k]
-        whole = Fits(fits.robot, fits.signals, torque, fits.moving, fits.recorded, fits.left_out)
-        there = NearBodies(whole, Reading(), gains, inflation)
+        torque[:, k] += gravity[:, k]
+        there = NearBodies(fits.with_torque(torque), Reading(), gains, inflation)
         duel = duel_of(here, there, range(fits.n_joints))
         if duel.gain > SURE and duel.beside > max(LEAST, BESIDE * duel.gain):
             found.append((k, share, error, duel.gain))
