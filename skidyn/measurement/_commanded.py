@@ -49,8 +49,8 @@ class CommandedMotion(Check):
         yield self.suspicion(
             "positions were commanded, not measured",
             f"they scatter by at most {positions.max():.1g} {unit} from sample to sample, less "
-            f"than any encoder, and are ahead of the torque by {1e3 * delay.common:.0f} ms; commands "
-            "differ from the motion by the error of the controller, so record measured positions",
+            f"than any encoder, and are ahead of the torque by {1e3 * delay.common:.0f} ms; "
+            "commands differ from the motion by the error of the controller, so record measured positions",
             "noted",
             moving,
         )
