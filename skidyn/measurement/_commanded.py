@@ -50,7 +50,8 @@ class CommandedMotion(Check):
             "positions were commanded, not measured",
             f"they scatter by at most {positions.max():.1g} {unit} from sample to sample, less "
             f"than any encoder, and are ahead of the torque by {1e3 * delay.common:.0f} ms; "
-            "commands differ from the motion by the error of the controller, so record measured positions",
+            "commands differ from the motion by the error of the controller, so record measured "
+            "positions",
             "noted",
             moving,
         )
