@@ -106,11 +106,9 @@ def conclude(
     slight = _slight(problem, result.findings, intervals)
     remarks += slight.values()
     findings = []
-    preceding: dict[str, Array] = {}  # errors before the first finding of each kind was added
     for i, hypothesis in enumerate(result.findings):
         if i in slight:
             continue
-        preceding.setdefault(hypothesis.kind, np.array(history[i]["rmse"]))
         others = rivals.get(hypothesis.kind, ())
         for candidate, chance in zip(hypothesis.candidates, hypothesis.chances, strict=True):
             drop = _drop(shown[i], shown[i + 1], tuple(candidate.rows))
@@ -134,10 +132,9 @@ def conclude(
     episodes, inside = find_episodes(problem, smooth, least, share_held)
     if episodes:
         findings.append(_episodic(episodes, inside, result.fit.residual))
+    errors = np.array(history[0]["rmse"]), rmse
     whole = problem.whole_trajectories
-    findings = [
-        _sure(f, findings, parts, (preceding.get(f.kind, rmse), rmse), whole) for f in findings
-    ]
+    findings = [_sure(f, findings, parts, errors, whole) for f in findings]
     diagnosis = Diagnosis(
         _verdict(findings, parts),
         robot.joint_names,

@@ -123,8 +123,7 @@ def mostly_stays(before: Array, after: Array, noise: Array) -> bool:
     Parameters
     ----------
     before, after : ndarray of shape (n_joints,), N m or N
-        Error of the joints of an effect before it was added, and with all findings: what others
-        removed earlier is no evidence for it.
+        Error of the joints of an effect without and with all findings.
     noise : ndarray of shape (n_joints,), N m or N
         Noise of these joints, including noise correlated in time, which is similar on all joints.
 
