@@ -35,7 +35,7 @@ class Hypothesis:
         Coefficients and shape parameters.
     chances : tuple of float
         P-value of every term at its acceptance, in the order of the candidates.
-    tried : int
+    tried : float
         Number of candidates among which it was chosen.
     margin : float
         Margin over the best other explanation of the same joints, as a share of its gain.
@@ -58,7 +58,7 @@ class Hypothesis:
     score: float
     n_parameters: int
     chances: tuple[float, ...] = ()
-    tried: int = 1
+    tried: float = 1
     margin: float = 1.0
     alike: bool = False
     elsewhere: tuple[tuple[int, ...], ...] = ()

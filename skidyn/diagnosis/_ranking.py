@@ -23,6 +23,7 @@ from skidyn.diagnosis._hypothesis import (
     some_recordings,
     within_recordings,
 )
+from skidyn.diagnosis._parts import PartScan, part_candidates
 from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
 from skidyn.diagnosis._recordings import choose
 from skidyn.diagnosis._rule import (
@@ -51,13 +52,15 @@ class RankingSearch(SearchState):
     def rank(self) -> list[Hypothesis]:
         """Explanations of the residual, best first."""
         screening, recordings = self._screening(), self._by_kind_of_recording()
-        looks: list[Callable[[], Any]] = [self._lines, self._splits, *screening, *recordings]
+        once = [self._lines, self._splits, self._parts]
+        looks: list[Callable[[], Any]] = [*once, *screening, *recordings]
         text = f"{self._round}: screening effects"
-        lines, splits, *found = each(lambda look: look(), looks, text)
+        lines, splits, parts, *found = each(lambda look: look(), looks, text)
         rough = sorted(self._found(found[: len(screening)]) + splits, key=lambda item: item[1])
         ranking = self._finals([candidates for candidates, _ in rough[: self.settings.finalists]])
         ranking += [self._against_functions(h, ranking) for h in lines]
         ranking += self._finals([own for of_kind in found[len(screening) :] for own in of_kind])
+        ranking += self._finals(parts)
         ranking += self._other_forms(ranking)
         # The least specific explanations are last: differences between recordings, and vibration.
         return sorted(
@@ -112,7 +115,9 @@ class RankingSearch(SearchState):
     def _holds_in_all(self, own: Hypothesis, ranking: Sequence[Hypothesis]) -> bool:
         """Whether an effect common to all recordings explains nearly as much as separate ones."""
         recordings = {k for c in own.candidates for k in c.term.trajectories or ()}
-        if len(recordings) <= self.settings.most_recordings or not within_recordings(own):
+        chosen = any(c.n_parts > 1 for c in own.candidates)
+        few = len(recordings) <= self.settings.most_recordings and not chosen
+        if few or not within_recordings(own):
             return False
         return any(
             h.score > self.settings.recordings_share * own.score
@@ -229,6 +234,13 @@ class RankingSearch(SearchState):
                 own = self._each_by_itself(split.candidate) if split.apart else own
                 found.append((own, -float(split.drop.sum()) + 2 * sum(c.width for c in own)))
         return found
+
+    def _parts(self) -> list[list[Candidate]]:
+        """Effects of a part of the recordings, those that may be possible."""
+        scan = PartScan(self.problem, self.blocks, self.sigma, self.target)
+        tester, least = self.tester(self.chosen), self.settings.least_gain
+        found = part_candidates(self.problem, self.pool, scan, tester, self.significant, least)
+        return [own for own in found if all(self.can_be(c, self.chosen) for c in own)]
 
     def _each_by_itself(self, candidate: Candidate) -> list[Candidate]:
         """Effects of some recordings, with a separate size in each of them."""

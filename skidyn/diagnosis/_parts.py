@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Effects of any kind in a part of the recordings, which is found together with the effect.
+
+An end stop that only some recordings reach, a cable that was attached in between, friction of a
+gear that was cold at first: every effect of the catalogue that may come and go is tried with equal
+size in a part of the recordings. Of all parts, the one that removes most of the squared error
+consists of the recordings with the largest separate estimates [1]_, so that few have to be tried;
+its p-value still counts all parts of its size.
+
+References
+----------
+.. [1] D. B. Neill (2012), Fast subset scan for spatial pattern detection, Journal of the Royal
+   Statistical Society B 74(2).
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaln
+
+from skidyn._signals import Array
+from skidyn.diagnosis._candidates import Candidate
+from skidyn.diagnosis._rule import Tester
+from skidyn.evidence import RIDGE, Problem, column_sizes, felt_columns, gram_of, products_with
+
+#: Fewest recordings of which a part is looked for.
+FEWEST = 3
+#: Shapes of a kind on the same joints that are tried in full.
+SHAPES = 3
+#: Largest share of what the part explains that the same effect in all recordings may explain.
+MOST_IN_ALL = 0.8
+#: A recording whose information about an effect is a smaller share of the largest has no estimate.
+BLIND = 1e-3
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of the recordings in which an effect acts.
+
+    Attributes
+    ----------
+    recordings : tuple of int
+        Numbers of these trajectories.
+    drop : float
+        Squared error that the effect removes, in units of the noise, minus the price of the choice.
+    """
+
+    recordings: tuple[int, ...]
+    drop: float
+
+
+class PartScan:
+    """Parts of the recordings for one model.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows.
+    blocks : sequence of dict
+        Columns of the model beside the rigid body.
+    sigma : ndarray of shape (n_joints,)
+        Noise of one row.
+    target : sequence of ndarray
+        Averaged torque.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        blocks: Sequence[dict[int, Array]],
+        sigma: Array,
+        target: Sequence[Array],
+    ) -> None:
+        felt, width = felt_columns(problem, blocks, sigma)
+        y = {j: t / s for j, (t, s) in enumerate(zip(target, sigma, strict=True))}
+        gram = gram_of(felt, width)
+        scale = column_sizes(gram)
+        normal = gram / scale[:, None] / scale + RIDGE * np.eye(width)
+        self._inverse = np.linalg.inv(normal) / scale[:, None] / scale
+        solution = self._inverse @ products_with(felt, y, width)
+        self._felt, self._sigma = felt, sigma
+        self._residual = [y[j] - f.rows @ solution[f.places] for j, f in enumerate(felt)]
+        self.names = np.unique(np.concatenate(problem.rows.trajectory))
+        place = [np.searchsorted(self.names, t) for t in problem.rows.trajectory]
+        self._rows = [[np.flatnonzero(p == i) for i in range(len(self.names))] for p in place]
+        self._place = place
+
+    def roughly(self, candidate: Candidate) -> float:
+        """Squared error that separate sizes would remove if the model could not follow them."""
+        n, k = len(self.names), candidate.width
+        own, score = np.zeros((n, k)), np.zeros((n, k))
+        for j, rows in candidate.rows.items():
+            block = rows / self._sigma[j]
+            np.add.at(own, self._place[j], block**2)
+            np.add.at(score, self._place[j], block * self._residual[j][:, None])
+        seen = own > BLIND * own.max(axis=0)
+        return float(np.sum(np.where(seen, score**2 / np.where(seen, own, 1.0), 0.0)))
+
+    def part(self, candidate: Candidate) -> Part | None:
+        """The best part of the recordings, None if the effect in all of them explains as much."""
+        n, k = len(self.names), candidate.width
+        score, cross = np.zeros((n, k)), np.zeros((n, len(self._inverse), k))
+        own = np.zeros((n, k, k))
+        for j, rows in candidate.rows.items():
+            block, felt = rows / self._sigma[j], self._felt[j]
+            for i, here in enumerate(self._rows[j]):
+                b = block[here]
+                own[i] += b.T @ b
+                score[i] += b.T @ self._residual[j][here]
+                cross[i, felt.places] += felt.rows[here].T @ b
+        size = np.sqrt(np.maximum(np.einsum("ikk->k", own), 1e-300))
+        own, score, cross = own / size[:, None] / size, score / size, cross / size
+        shared = np.einsum("ipk,pq,jql->ijkl", cross, self._inverse, cross, optimize=True)
+        joint = -shared
+        joint[np.arange(n), np.arange(n)] += own
+        seen = np.flatnonzero(np.einsum("ikk->i", own) > BLIND * np.einsum("ikk->i", own).max())
+        best, all_of_them = None, self._drop(score, joint, np.arange(n))
+        for order in self._orders(score, own, joint, seen):
+            for m in range(1, len(order)):
+                inside = order[:m]
+                drop = self._drop(score, joint, inside) - price_of_part(n, m)
+                if best is None or drop > best.drop:
+                    names = tuple(sorted(int(self.names[i]) for i in inside))
+                    best = Part(names, drop)
+        return best if best is not None and all_of_them < MOST_IN_ALL * best.drop else None
+
+    @staticmethod
+    def _drop(score: Array, joint: Array, inside: NDArray[np.int64]) -> float:
+        """Squared error removed with equal size in some recordings."""
+        gram, right = joint[np.ix_(inside, inside)].sum((0, 1)), score[inside].sum(0)
+        k = len(right)
+        return float(right @ np.linalg.solve(gram + 1e-9 * np.eye(k), right))
+
+    @staticmethod
+    def _orders(
+        score: Array, own: Array, joint: Array, seen: NDArray[np.int64]
+    ) -> list[NDArray[np.int64]]:
+        """Recordings in the order of their estimates, from both ends."""
+        n, k = len(seen), score.shape[1]
+        gram = joint[np.ix_(seen, seen)].transpose(0, 2, 1, 3).reshape(n * k, n * k)
+        # the model absorbs an effect of equal size in all recordings: only differences count
+        estimate = np.linalg.solve(gram + 1e-4 * np.eye(n * k), score[seen].ravel()).reshape(n, k)
+        along = estimate[:, 0]
+        if k > 1:
+            weight = np.sqrt(np.einsum("ikk->i", own[seen]))
+            along = estimate @ np.linalg.svd(estimate * weight[:, None], full_matrices=False)[2][0]
+        order = seen[np.argsort(-along, kind="stable")]
+        return [order, order[::-1]]
+
+
+def price_of_part(n: int, m: int) -> float:
+    """Twice the logarithm of the number of parts of m of n recordings, of any size equally."""
+    return 2.0 * float(np.log(n_parts(n, m)))
+
+
+def n_parts(n: int, m: int) -> float:
+    """Number of parts of m of n recordings, times the number of sizes."""
+    return n * float(np.exp(gammaln(n + 1) - gammaln(m + 1) - gammaln(n - m + 1)))
+
+
+def part_candidates(
+    problem: Problem,
+    pool: Sequence[Candidate],
+    scan: PartScan,
+    tester: Tester,
+    significant: Callable[[float, Candidate], bool],
+    least: float,
+) -> list[list[Candidate]]:
+    """Of every kind, its terms in the best part of the recordings.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows.
+    pool : sequence of Candidate
+        Effects that may be missing, in all recordings.
+    scan : PartScan
+        Parts for the present model.
+    tester : Tester
+        Tests given the present model.
+    significant : callable
+        Function that returns whether the p-value of a candidate is small enough.
+    least : float
+        Squared error that an effect must remove, in units of the noise.
+    """
+    if len(scan.names) < FEWEST:
+        return []
+    sites: dict[tuple[str, tuple[int, ...]], list[tuple[float, Candidate]]] = defaultdict(list)
+    for candidate in pool:
+        if candidate.term.effect.comes_and_goes and candidate.term.trajectories is None:
+            rough = scan.roughly(candidate)
+            if rough > least:
+                sites[candidate.site].append((rough, candidate))
+    found: dict[str, list[tuple[float, Candidate]]] = defaultdict(list)
+    for (kind, _), own in sites.items():
+        own = sorted(own, key=lambda item: -item[0])[:SHAPES]
+        parts = [(part, c) for _, c in own if (part := scan.part(c)) is not None]
+        if not parts:
+            continue
+        part, candidate = max(parts, key=lambda item: item[0].drop)
+        inside = within(problem, candidate, part.recordings)
+        if part.drop > least and significant(tester.test(inside.rows, inside.zeros).chance, inside):
+            found[kind].append((part.drop, inside))
+    return [_same_part(own) for own in found.values()]
+
+
+def _same_part(found: list[tuple[float, Candidate]]) -> list[Candidate]:
+    """The best candidate of a kind, and those of other joints that act in the same recordings."""
+    found = sorted(found, key=lambda item: -item[0])
+    best = found[0][1]
+    taken, own = set(best.joints), [best]
+    for _, candidate in found[1:]:
+        if candidate.term.trajectories == best.term.trajectories and taken.isdisjoint(
+            candidate.joints
+        ):
+            own.append(candidate)
+            taken |= set(candidate.joints)
+    return own
+
+
+def within(problem: Problem, candidate: Candidate, recordings: tuple[int, ...]) -> Candidate:
+    """A candidate that acts in some recordings only."""
+    rows = {
+        j: np.where(np.isin(problem.rows.trajectory[j], recordings)[:, None], block, 0.0)
+        for j, block in candidate.rows.items()
+    }
+    n = len(np.unique(np.concatenate(problem.rows.trajectory)))
+    term = candidate.term.with_shape(trajectories=recordings)
+    return replace(candidate, term=term, rows=rows, n_parts=n_parts(n, len(recordings)))
