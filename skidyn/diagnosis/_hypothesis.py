@@ -138,9 +138,13 @@ def is_vibration(hypothesis: Hypothesis) -> bool:
 
 def says_little(hypothesis: Hypothesis) -> bool:
     """Whether an explanation has the lowest priority: a vibration or differences between runs."""
-    return is_vibration(hypothesis) or (
-        hypothesis.kind == UNKNOWN and within_recordings(hypothesis)
-    )
+    apart = hypothesis.kind == UNKNOWN and within_recordings(hypothesis)
+    return is_vibration(hypothesis) or (apart and not in_part(hypothesis))
+
+
+def in_part(hypothesis: Hypothesis) -> bool:
+    """Whether a term of it acts in a part of the recordings that was found together with it."""
+    return any(c.n_parts > 1 for c in hypothesis.candidates)
 
 
 def within_recordings(hypothesis: Hypothesis) -> bool:

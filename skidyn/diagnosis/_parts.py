@@ -25,7 +25,8 @@ from scipy.special import gammaln
 
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
-from skidyn.diagnosis._rule import Tester
+from skidyn.diagnosis._rule import ROUNDS, Tester
+from skidyn.effects import Term
 from skidyn.evidence import RIDGE, Problem, column_sizes, felt_columns, gram_of, products_with
 
 #: Fewest recordings of which a part is looked for.
@@ -36,6 +37,8 @@ SHAPES = 3
 MOST_IN_ALL = 0.8
 #: A recording whose information about an effect is a smaller share of the largest has no estimate.
 BLIND = 1e-3
+#: A kind, and the names of the shape entries that only one of its further forms has.
+_Form = tuple[str, frozenset[str]]
 
 
 @dataclass(frozen=True)
@@ -169,9 +172,10 @@ def part_candidates(
     scan: PartScan,
     tester: Tester,
     significant: Callable[[float, Candidate], bool],
+    refined: Callable[[Candidate], Candidate],
     least: float,
 ) -> list[list[Candidate]]:
-    """Of every kind, its terms in the best part of the recordings.
+    """Of every kind and form, its terms in the best part of the recordings.
 
     Parameters
     ----------
@@ -185,19 +189,23 @@ def part_candidates(
         Tests given the present model.
     significant : callable
         Function that returns whether the p-value of a candidate is small enough.
+    refined : callable
+        Function that returns a candidate with its shape refined.
     least : float
         Squared error that an effect must remove, in units of the noise.
     """
     if len(scan.names) < FEWEST:
         return []
-    sites: dict[tuple[str, tuple[int, ...]], list[tuple[float, Candidate]]] = defaultdict(list)
+    sites: dict[tuple[_Form, tuple[int, ...]], list[tuple[float, Candidate]]] = defaultdict(list)
     for candidate in pool:
-        if candidate.term.effect.comes_and_goes and candidate.term.trajectories is None:
+        effect = candidate.term.effect
+        if effect.comes_and_goes and candidate.term.trajectories is None:
             rough = scan.roughly(candidate)
             if rough > least:
-                sites[candidate.site].append((rough, candidate))
-    found: dict[str, list[tuple[float, Candidate]]] = defaultdict(list)
-    for (kind, _), own in sites.items():
+                form = candidate.kind, effect.form_names & set(candidate.term.shape)
+                sites[form, candidate.joints].append((rough, candidate))
+    found: dict[_Form, list[tuple[float, Candidate]]] = defaultdict(list)
+    for (form, _), own in sites.items():
         own = sorted(own, key=lambda item: -item[0])[:SHAPES]
         parts = [(part, c) for _, c in own if (part := scan.part(c)) is not None]
         if not parts:
@@ -205,8 +213,39 @@ def part_candidates(
         part, candidate = max(parts, key=lambda item: item[0].drop)
         inside = within(problem, candidate, part.recordings)
         if part.drop > least and significant(tester.test(inside.rows, inside.zeros).chance, inside):
-            found[kind].append((part.drop, inside))
-    return [_same_part(own) for own in found.values()]
+            found[form].append(_settled(problem, scan, refined, part, inside))
+    own = sorted(found.values(), key=lambda own: -max(drop for drop, _ in own))
+    return [_same_part(of_form) for of_form in own]
+
+
+def _settled(
+    problem: Problem,
+    scan: PartScan,
+    refined: Callable[[Candidate], Candidate],
+    part: Part,
+    inside: Candidate,
+) -> tuple[float, Candidate]:
+    """A part and its candidate, each found again with the other until they stay the same.
+
+    On the grid, the shape may hide the effect in recordings where it is weak.
+    """
+    for _ in range(ROUNDS if inside.n_shapes else 0):
+        term = refined(inside).term
+        everywhere = replace(inside, term=in_all(term), rows=problem.term_rows(in_all(term)))
+        again = scan.part(everywhere)
+        if again is None or again.drop <= part.drop:
+            break
+        same = again.recordings == part.recordings
+        part, inside = again, within(problem, everywhere, again.recordings)
+        if same:
+            break
+    return part.drop, inside
+
+
+def in_all(term: Term) -> Term:
+    """The same term in all recordings."""
+    shape = {name: value for name, value in term.shape.items() if name != "trajectories"}
+    return Term(term.kind, term.joints, shape)
 
 
 def _same_part(found: list[tuple[float, Candidate]]) -> list[Candidate]:

@@ -19,6 +19,7 @@ from skidyn.diagnosis._hypothesis import (
     UNKNOWN,
     Hypothesis,
     grouped_by_joints,
+    in_part,
     says_little,
     some_recordings,
     within_recordings,
@@ -60,7 +61,7 @@ class RankingSearch(SearchState):
         ranking = self._finals([candidates for candidates, _ in rough[: self.settings.finalists]])
         ranking += [self._against_functions(h, ranking) for h in lines]
         ranking += self._finals([own for of_kind in found[len(screening) :] for own in of_kind])
-        ranking += self._finals(parts)
+        ranking += self._finals(parts, refined=0)  # their shapes are refined already
         ranking += self._other_forms(ranking)
         # The least specific explanations are last: differences between recordings, and vibration.
         return sorted(
@@ -115,8 +116,7 @@ class RankingSearch(SearchState):
     def _holds_in_all(self, own: Hypothesis, ranking: Sequence[Hypothesis]) -> bool:
         """Whether an effect common to all recordings explains nearly as much as separate ones."""
         recordings = {k for c in own.candidates for k in c.term.trajectories or ()}
-        chosen = any(c.n_parts > 1 for c in own.candidates)
-        few = len(recordings) <= self.settings.most_recordings and not chosen
+        few = len(recordings) <= self.settings.most_recordings and not in_part(own)
         if few or not within_recordings(own):
             return False
         return any(
@@ -238,8 +238,19 @@ class RankingSearch(SearchState):
     def _parts(self) -> list[list[Candidate]]:
         """Effects of a part of the recordings, those that may be possible."""
         scan = PartScan(self.problem, self.blocks, self.sigma, self.target)
-        tester, least = self.tester(self.chosen), self.settings.least_gain
-        found = part_candidates(self.problem, self.pool, scan, tester, self.significant, least)
+
+        def refined(candidate: Candidate) -> Candidate:
+            return refine(self.problem, self.blocks, [candidate], self.sigma, self.target)[0]
+
+        found = part_candidates(
+            self.problem,
+            self.pool,
+            scan,
+            self.tester(self.chosen),
+            self.significant,
+            refined,
+            self.settings.least_gain,
+        )
         return [own for own in found if all(self.can_be(c, self.chosen) for c in own)]
 
     def _each_by_itself(self, candidate: Candidate) -> list[Candidate]:
