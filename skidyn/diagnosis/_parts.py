@@ -116,44 +116,68 @@ class PartScan:
                 own[i] += b.T @ b
                 score[i] += b.T @ self._residual[j][here]
                 cross[i, felt.places] += felt.rows[here].T @ b
-        size = np.sqrt(np.maximum(np.einsum("ikk->k", own), 1e-300))
-        own, score, cross = own / size[:, None] / size, score / size, cross / size
         shared = np.einsum("ipk,pq,jql->ijkl", cross, self._inverse, cross, optimize=True)
-        joint = -shared
-        joint[np.arange(n), np.arange(n)] += own
-        seen = np.flatnonzero(np.einsum("ikk->i", own) > BLIND * np.einsum("ikk->i", own).max())
-        best, all_of_them = None, self._drop(score, joint, np.arange(n))
-        for order in self._orders(score, own, joint, seen):
-            for m in range(1, len(order)):
-                inside = order[:m]
-                drop = self._drop(score, joint, inside) - price_of_part(n, m)
-                if best is None or drop > best.drop:
-                    names = tuple(sorted(int(self.names[i]) for i in inside))
-                    best = Part(names, drop)
-        return best if best is not None and all_of_them < MOST_IN_ALL * best.drop else None
+        return best_part(self.names, score, own, shared)
 
-    @staticmethod
-    def _drop(score: Array, joint: Array, inside: NDArray[np.int64]) -> float:
-        """Squared error removed with equal size in some recordings."""
-        gram, right = joint[np.ix_(inside, inside)].sum((0, 1)), score[inside].sum(0)
-        k = len(right)
-        return float(right @ np.linalg.solve(gram + 1e-9 * np.eye(k), right))
 
-    @staticmethod
-    def _orders(
-        score: Array, own: Array, joint: Array, seen: NDArray[np.int64]
-    ) -> list[NDArray[np.int64]]:
-        """Recordings in the order of their estimates, from both ends."""
-        n, k = len(seen), score.shape[1]
-        gram = joint[np.ix_(seen, seen)].transpose(0, 2, 1, 3).reshape(n * k, n * k)
-        # the model absorbs an effect of equal size in all recordings: only differences count
-        estimate = np.linalg.solve(gram + 1e-4 * np.eye(n * k), score[seen].ravel()).reshape(n, k)
-        along = estimate[:, 0]
-        if k > 1:
-            weight = np.sqrt(np.einsum("ikk->i", own[seen]))
-            along = estimate @ np.linalg.svd(estimate * weight[:, None], full_matrices=False)[2][0]
-        order = seen[np.argsort(-along, kind="stable")]
-        return [order, order[::-1]]
+def best_part(
+    names: NDArray[np.int64], score: Array, own: Array, shared: Array | None = None
+) -> Part | None:
+    """The best part of the recordings, None if the effect in all of them explains as much.
+
+    Parameters
+    ----------
+    names : ndarray of shape (n,)
+        Numbers of the trajectories.
+    score : ndarray of shape (n, k)
+        Products of an effect's columns and the residual in every trajectory.
+    own : ndarray of shape (n, k, k)
+        Products of the columns with themselves.
+    shared : ndarray of shape (n, n, k, k), optional
+        The part of them that the model can represent, of each trajectory with each.
+
+    Returns
+    -------
+    Part or None
+    """
+    n = len(names)
+    size = np.sqrt(np.maximum(np.einsum("ikk->k", own), 1e-300))
+    own, score = own / size[:, None] / size, score / size
+    joint = np.zeros((n, n, *own.shape[1:]))
+    if shared is not None:
+        joint -= shared / size[:, None] / size
+    joint[np.arange(n), np.arange(n)] += own
+    weight = np.einsum("ikk->i", own)
+    seen = np.flatnonzero(weight > BLIND * weight.max())
+    best, in_all = None, _drop(score, joint, np.arange(n))
+    for order in _orders(score, own, joint, seen):
+        for m in range(1, len(order)):
+            drop = _drop(score, joint, order[:m]) - price_of_part(n, m)
+            if best is None or drop > best.drop:
+                best = Part(tuple(sorted(int(names[i]) for i in order[:m])), drop)
+    return best if best is not None and in_all < MOST_IN_ALL * best.drop else None
+
+
+def _drop(score: Array, joint: Array, inside: NDArray[np.int64]) -> float:
+    """Squared error removed with equal size in some recordings."""
+    gram, right = joint[np.ix_(inside, inside)].sum((0, 1)), score[inside].sum(0)
+    return float(right @ np.linalg.solve(gram + 1e-9 * np.eye(len(right)), right))
+
+
+def _orders(
+    score: Array, own: Array, joint: Array, seen: NDArray[np.int64]
+) -> list[NDArray[np.int64]]:
+    """Recordings in the order of their estimates, from both ends."""
+    n, k = len(seen), score.shape[1]
+    gram = joint[np.ix_(seen, seen)].transpose(0, 2, 1, 3).reshape(n * k, n * k)
+    # the model absorbs an effect of equal size in all recordings: only differences count
+    estimate = np.linalg.solve(gram + 1e-4 * np.eye(n * k), score[seen].ravel()).reshape(n, k)
+    along = estimate[:, 0]
+    if k > 1:
+        weight = np.sqrt(np.einsum("ikk->i", own[seen]))
+        along = estimate @ np.linalg.svd(estimate * weight[:, None], full_matrices=False)[2][0]
+    order = seen[np.argsort(-along, kind="stable")]
+    return [order, order[::-1]]
 
 
 def price_of_part(n: int, m: int) -> float:

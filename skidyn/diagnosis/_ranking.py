@@ -371,9 +371,11 @@ class RankingSearch(SearchState):
             torque[:, joint] = line.torque
             variables = ("time",) if kind == UNKNOWN else ()
             rows = problem.term_rows(line.term)
-            candidates.append(Candidate(kind, line.term, rows, variables))
+            own = Candidate(kind, line.term, rows, variables, n_parts=line.n_parts)
+            candidates.append(own)
         count = 3 * len(candidates)
         score = float(gain.sum()) - 2 * count
+        score -= sum(2 * float(np.log(c.n_parts)) for c in candidates)
         chances = tuple(best[c.joints[0]].chance for c in candidates)
         return Hypothesis(kind, tuple(candidates), gain, score, count, chances, torque=torque)
 
