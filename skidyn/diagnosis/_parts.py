@@ -238,8 +238,8 @@ def part_candidates(
         inside = within(problem, candidate, part.recordings)
         if part.drop > least and significant(tester.test(inside.rows, inside.zeros).chance, inside):
             found[form].append(_settled(problem, scan, refined, part, inside))
-    own = sorted(found.values(), key=lambda own: -max(drop for drop, _ in own))
-    return [_same_part(of_form) for of_form in own]
+    best_first = sorted(found.values(), key=lambda of_form: -max(drop for drop, _ in of_form))
+    return [_same_part(of_form) for of_form in best_first]
 
 
 def _settled(
