@@ -230,10 +230,26 @@ class RankingSearch(SearchState):
         found = []
         for split in splits:
             if split.drop.sum() > 0:
-                own = [split.candidate]
-                own = self._each_by_itself(split.candidate) if split.apart else own
+                candidate = self._carried(split.candidate)
+                own = self._each_by_itself(candidate) if split.apart else [candidate]
                 found.append((own, -float(split.drop.sum()) + 2 * sum(c.width for c in own)))
         return found
+
+    def _carried(self, candidate: Candidate) -> Candidate:
+        """A payload, in the other recordings if its mass is negative in these.
+
+        The identified bodies contain what most recordings carry, so that both explain equally much.
+        """
+        if not candidate.term.effect.grows or candidate.term.trajectories is None:
+            return candidate
+        tester = self.tester(self.chosen)
+        if tester.test(candidate.rows).coefficients[0] >= 0:
+            return candidate
+        names = np.unique(np.concatenate(self.problem.rows.trajectory)).tolist()
+        rest = tuple(name for name in names if name not in candidate.term.trajectories)
+        term = candidate.term.with_shape(trajectories=rest)
+        other = replace(candidate, term=term, rows=self.problem.term_rows(term))
+        return other if tester.test(other.rows).coefficients[0] > 0 else candidate
 
     def _parts(self) -> list[list[Candidate]]:
         """Effects of a part of the recordings, those that may be possible."""
