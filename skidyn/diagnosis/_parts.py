@@ -35,6 +35,8 @@ FEWEST = 3
 SHAPES = 3
 #: Largest share of what the part explains that the same effect in all recordings may explain.
 MOST_IN_ALL = 0.8
+#: Share of the largest drop from which a shape is refined together with its part.
+NEAR = 0.5
 #: A recording whose information about an effect is a smaller share of the largest has no estimate.
 BLIND = 1e-3
 #: A kind, and the names of the shape entries that only one of its further forms has.
@@ -89,9 +91,9 @@ class PartScan:
         self._felt, self._sigma = felt, sigma
         self._residual = [y[j] - f.rows @ solution[f.places] for j, f in enumerate(felt)]
         self.names = np.unique(np.concatenate(problem.rows.trajectory))
-        place = [np.searchsorted(self.names, t) for t in problem.rows.trajectory]
-        self._rows = [[np.flatnonzero(p == i) for i in range(len(self.names))] for p in place]
-        self._place = place
+        inside = [t == self.names[:, None] for t in problem.rows.trajectory]
+        self._rows = [[np.flatnonzero(own) for own in of_joint] for of_joint in inside]
+        self._inside = [of_joint.astype(float) for of_joint in inside]
 
     def roughly(self, candidate: Candidate) -> float:
         """Squared error that separate sizes would remove if the model could not follow them."""
@@ -99,8 +101,8 @@ class PartScan:
         own, score = np.zeros((n, k)), np.zeros((n, k))
         for j, rows in candidate.rows.items():
             block = rows / self._sigma[j]
-            np.add.at(own, self._place[j], block**2)
-            np.add.at(score, self._place[j], block * self._residual[j][:, None])
+            own += self._inside[j] @ block**2
+            score += self._inside[j] @ (block * self._residual[j][:, None])
         seen = own > BLIND * own.max(axis=0)
         return float(np.sum(np.where(seen, score**2 / np.where(seen, own, 1.0), 0.0)))
 
@@ -149,19 +151,27 @@ def best_part(
     joint[np.arange(n), np.arange(n)] += own
     weight = np.einsum("ikk->i", own)
     seen = np.flatnonzero(weight > BLIND * weight.max())
-    best, in_all = None, _drop(score, joint, np.arange(n))
+    in_all = float(_drops(score.sum(0)[None], joint.sum((0, 1))[None])[0])
+    prices = np.array([price_of_part(n, m) for m in range(1, len(seen))])
+    best = None
     for order in _orders(score, own, joint, seen):
-        for m in range(1, len(order)):
-            drop = _drop(score, joint, order[:m]) - price_of_part(n, m)
-            if best is None or drop > best.drop:
-                best = Part(tuple(sorted(int(names[i]) for i in order[:m])), drop)
+        grams = (
+            joint[np.ix_(order, order)]
+            .cumsum(0)
+            .cumsum(1)[np.arange(len(order)), np.arange(len(order))]
+        )
+        drops = _drops(score[order].cumsum(0), grams)[:-1] - prices
+        m = int(np.argmax(drops)) if len(drops) else 0
+        if len(drops) and (best is None or drops[m] > best.drop):
+            best = Part(tuple(sorted(int(names[i]) for i in order[: m + 1])), float(drops[m]))
     return best if best is not None and in_all < MOST_IN_ALL * best.drop else None
 
 
-def _drop(score: Array, joint: Array, inside: NDArray[np.int64]) -> float:
-    """Squared error removed with equal size in some recordings."""
-    gram, right = joint[np.ix_(inside, inside)].sum((0, 1)), score[inside].sum(0)
-    return float(right @ np.linalg.solve(gram + 1e-9 * np.eye(len(right)), right))
+def _drops(scores: Array, grams: Array) -> Array:
+    """Squared error removed with equal size in each of some sets of recordings."""
+    ridge = 1e-9 * np.eye(scores.shape[1])
+    solution = np.linalg.solve(grams + ridge, scores[:, :, None])[:, :, 0]
+    return np.asarray(np.sum(scores * solution, axis=1))
 
 
 def _orders(
@@ -228,7 +238,7 @@ def part_candidates(
             if rough > least:
                 form = candidate.kind, effect.form_names & set(candidate.term.shape)
                 sites[form, candidate.joints].append((rough, candidate))
-    found: dict[_Form, list[tuple[float, Candidate]]] = defaultdict(list)
+    offered: list[tuple[_Form, Part, Candidate]] = []
     for (form, _), own in sites.items():
         own = sorted(own, key=lambda item: -item[0])[:SHAPES]
         parts = [(part, c) for _, c in own if (part := scan.part(c)) is not None]
@@ -237,7 +247,14 @@ def part_candidates(
         part, candidate = max(parts, key=lambda item: item[0].drop)
         inside = within(problem, candidate, part.recordings)
         if part.drop > least and significant(tester.test(inside.rows, inside.zeros).chance, inside):
-            found[form].append(_settled(problem, scan, refined, part, inside))
+            offered.append((form, part, inside))
+    largest = max((part.drop for _, part, _ in offered), default=0.0)
+    found: dict[_Form, list[tuple[float, Candidate]]] = defaultdict(list)
+    for form, part, inside in offered:
+        # the others are at best second findings, which the next round refines
+        near = part.drop > NEAR * largest
+        settled = _settled(problem, scan, refined, part, inside) if near else (part.drop, inside)
+        found[form].append(settled)
     best_first = sorted(found.values(), key=lambda of_form: -max(drop for drop, _ in of_form))
     return [_same_part(of_form) for of_form in best_first]
 
