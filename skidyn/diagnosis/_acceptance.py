@@ -15,6 +15,7 @@ from skidyn.diagnosis._hypothesis import (
     Hypothesis,
     family_of,
     grouped_by_joints,
+    in_part,
     simplicity_of,
     within_recordings,
 )
@@ -347,7 +348,8 @@ class JudgingSearch(RankingSearch):
         """Share of the removed squared error that imperfect formulas may leave, by joint.
 
         The formula of an oscillating link is of first order: it leaves more to an unknown function,
-        and to a delay, which is the first order of any lag.
+        and to a delay, which is the first order of any lag. A part of the recordings is chosen for
+        what the formula leaves there.
         """
         settings = self.settings
         first_order = beside.kind == UNKNOWN or any(
@@ -362,7 +364,7 @@ class JudgingSearch(RankingSearch):
                 if c.term.effect.is_exact:
                     continue
                 swings = c.term.effect.moves_link and first_order
-                loose = nameless or swings
+                loose = nameless or swings or in_part(beside)
                 share = settings.nameless_tolerance if loose else settings.form_tolerance
                 reached = list(c.rows)
                 shares[reached] = np.maximum(shares[reached], share)

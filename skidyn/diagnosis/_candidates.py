@@ -32,6 +32,8 @@ class Candidate:
         Signals on which an unknown function depends.
     n_shapes : int
         Shape parameters that are refined; they count as parameters.
+    n_parts : float
+        Number of parts of the recordings among which its own was chosen.
     """
 
     kind: str
@@ -39,6 +41,7 @@ class Candidate:
     rows: dict[int, Array]
     variables: tuple[str, ...] = ()
     n_shapes: int = 0
+    n_parts: float = 1.0
 
     @cached_property
     def width(self) -> int:

@@ -90,7 +90,7 @@ def conclude(
         comparisons, history, residual, own_torque = _steps(problem, result, torque, sliding)
         terms = [*problem.terms, *_found_terms(problem, result.findings)]
         fixed = parameter_intervals(problem, terms, result.fit.noise, shapes=False)
-        useless = _useless(result.findings, comparisons, history, least_drop)
+        useless = _useless(problem, result.findings, comparisons, history, least_drop)
         useless = useless or _vague(problem, result.findings, fixed)
         useless = useless or _impossible(result.findings, fixed)
         if useless is None:
@@ -216,6 +216,7 @@ def _found_terms(problem: Problem, findings: Sequence[Hypothesis]) -> list[Term]
 
 
 def _useless(
+    problem: Problem,
     findings: Sequence[Hypothesis],
     comparisons: Sequence[Comparison],
     history: Sequence[dict[str, Any]],
@@ -225,7 +226,7 @@ def _useless(
 
     They reduced the error of averaged rows. The squared error, which few samples may dominate, and
     the mean absolute one are both used; terms that do not lower the squared error at all are
-    included.
+    included. Terms of some recordings need to remove less, by the share of samples of these.
     """
     for k in reversed(range(len(findings))):
         errors = [(_mean_error(comparisons[i]), history[i]["rmse"]) for i in (k, k + 1)]
@@ -233,11 +234,19 @@ def _useless(
         for candidate in findings[k].candidates:
             # A compliant link moves everything that it carries: other joints may be affected more.
             drops = [_drop(a, b, tuple(candidate.rows)) for a, b in zip(*errors, strict=True)]
-            if float(np.mean(drops)) < least or drops[1] <= 0:
+            share = _share_of_samples(problem, candidate.term.trajectories)
+            if float(np.mean(drops)) < least * share or drops[1] <= 0:
                 terms.append(candidate)
         if terms:
             return findings[k], terms
     return None
+
+
+def _share_of_samples(problem: Problem, trajectories: tuple[int, ...] | None) -> float:
+    """Share of the samples that belong to some trajectories."""
+    if trajectories is None:
+        return 1.0
+    return float(np.isin(problem.signals.trajectory, trajectories).mean())
 
 
 def _vague(
@@ -324,7 +333,8 @@ def _guess(diagnosis: Diagnosis) -> tuple[Hypothesis, list[Candidate]] | None:
         likely = (finding.confidence or 1.0) * (2 if finding.alike else 1)
         likely *= 1 + len(finding.elsewhere)
         drop = max(f.error_drop for f in diagnosis.findings if f.kind == finding.kind)
-        if drop < LITTLE and likely < SURE_OF_LITTLE:
+        little = LITTLE * _share_of_samples(diagnosis.problem, finding.trajectories)
+        if drop < little and likely < SURE_OF_LITTLE:
             return False
         return max(likely, finding.error_drop) >= GUESS
 
@@ -464,6 +474,7 @@ def _sure(
         whole_recordings=whole,
         alike=finding.alike,
         rivalled=bool(finding.rivals),
+        in_some=finding.trajectories is not None,
         few=finding.trajectories is not None and all(t.effect.by_recording for t in finding.terms),
         stays=finding.kind != UNKNOWN and mostly_stays(before, after, alike * parts.noise[same]),
         has_name=finding.kind != UNKNOWN,

@@ -33,6 +33,8 @@ DOUBTED = -1.5
 #: Margins between which another explanation of the same joints is equally good or better; one that
 #: explains far more acts on other joints, too.
 EQUAL, ABOVE = 0.005, 0.1
+#: The same where an effect acts in some recordings only: these alone separate the explanations.
+EQUAL_IN_SOME = 0.05
 #: Inflation of the variance by coloured noise; range of the shares of the error.
 COLOURED, LEAST, ENOUGH = 1.7, 0.003, 0.3
 #: Highest confidence that the number of logs used for the weights permits.
@@ -51,6 +53,7 @@ def confidence(
     whole_recordings: bool = True,
     alike: bool = False,
     rivalled: bool = False,
+    in_some: bool = False,
     few: bool = False,
     stays: bool = False,
     has_name: bool = True,
@@ -73,6 +76,8 @@ def confidence(
         Whether a kind that acts on other joints explains the data equally well.
     rivalled : bool, default=False
         Whether the data cannot separate it from another explanation of its joints.
+    in_some : bool, default=False
+        Whether it acts in some recordings only.
     few : bool, default=False
         Whether it acts in few recordings only, and other forms of it were not tried there.
     stays : bool, default=False
@@ -90,12 +95,9 @@ def confidence(
     logit += CORRELATED * float(np.log(max(inflation / COLOURED, 1.0)))
     logit += REMOVED * float(np.log10(min(max(removed, LEAST), ENOUGH) / ENOUGH))
     logit += NAMELESS * nameless + BLOCKS * (not whole_recordings)
-    logit += (
-        STAYS * stays
-        + FEW * few
-        + ALIKE * alike
-        + EQUALLED * (rivalled and -ABOVE < margin < EQUAL)
-    )
+    logit += STAYS * stays + FEW * few + ALIKE * alike
+    equal = EQUAL_IN_SOME if in_some else EQUAL
+    logit += EQUALLED * (rivalled and -ABOVE < margin < equal)
     most = MOST if has_name and not stays else MOST_NAMELESS
     return min(most, float(1 / (1 + np.exp(-logit))))
 

@@ -35,7 +35,7 @@ class Hypothesis:
         Coefficients and shape parameters.
     chances : tuple of float
         P-value of every term at its acceptance, in the order of the candidates.
-    tried : int
+    tried : float
         Number of candidates among which it was chosen.
     margin : float
         Margin over the best other explanation of the same joints, as a share of its gain.
@@ -58,7 +58,7 @@ class Hypothesis:
     score: float
     n_parameters: int
     chances: tuple[float, ...] = ()
-    tried: int = 1
+    tried: float = 1
     margin: float = 1.0
     alike: bool = False
     elsewhere: tuple[tuple[int, ...], ...] = ()
@@ -138,9 +138,13 @@ def is_vibration(hypothesis: Hypothesis) -> bool:
 
 def says_little(hypothesis: Hypothesis) -> bool:
     """Whether an explanation has the lowest priority: a vibration or differences between runs."""
-    return is_vibration(hypothesis) or (
-        hypothesis.kind == UNKNOWN and within_recordings(hypothesis)
-    )
+    apart = hypothesis.kind == UNKNOWN and within_recordings(hypothesis)
+    return is_vibration(hypothesis) or (apart and not in_part(hypothesis))
+
+
+def in_part(hypothesis: Hypothesis) -> bool:
+    """Whether a term of it acts in a part of the recordings that was found together with it."""
+    return any(c.n_parts > 1 for c in hypothesis.candidates)
 
 
 def within_recordings(hypothesis: Hypothesis) -> bool:

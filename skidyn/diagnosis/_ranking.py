@@ -19,10 +19,12 @@ from skidyn.diagnosis._hypothesis import (
     UNKNOWN,
     Hypothesis,
     grouped_by_joints,
+    in_part,
     says_little,
     some_recordings,
     within_recordings,
 )
+from skidyn.diagnosis._parts import PartScan, part_candidates
 from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
 from skidyn.diagnosis._recordings import choose
 from skidyn.diagnosis._rule import (
@@ -51,13 +53,15 @@ class RankingSearch(SearchState):
     def rank(self) -> list[Hypothesis]:
         """Explanations of the residual, best first."""
         screening, recordings = self._screening(), self._by_kind_of_recording()
-        looks: list[Callable[[], Any]] = [self._lines, self._splits, *screening, *recordings]
+        once = [self._lines, self._splits, self._parts]
+        looks: list[Callable[[], Any]] = [*once, *screening, *recordings]
         text = f"{self._round}: screening effects"
-        lines, splits, *found = each(lambda look: look(), looks, text)
+        lines, splits, parts, *found = each(lambda look: look(), looks, text)
         rough = sorted(self._found(found[: len(screening)]) + splits, key=lambda item: item[1])
         ranking = self._finals([candidates for candidates, _ in rough[: self.settings.finalists]])
         ranking += [self._against_functions(h, ranking) for h in lines]
         ranking += self._finals([own for of_kind in found[len(screening) :] for own in of_kind])
+        ranking += self._finals(parts, refined=0)  # their shapes are refined already
         ranking += self._other_forms(ranking)
         # The least specific explanations are last: differences between recordings, and vibration.
         return sorted(
@@ -112,7 +116,8 @@ class RankingSearch(SearchState):
     def _holds_in_all(self, own: Hypothesis, ranking: Sequence[Hypothesis]) -> bool:
         """Whether an effect common to all recordings explains nearly as much as separate ones."""
         recordings = {k for c in own.candidates for k in c.term.trajectories or ()}
-        if len(recordings) <= self.settings.most_recordings or not within_recordings(own):
+        few = len(recordings) <= self.settings.most_recordings and not in_part(own)
+        if few or not within_recordings(own):
             return False
         return any(
             h.score > self.settings.recordings_share * own.score
@@ -225,10 +230,44 @@ class RankingSearch(SearchState):
         found = []
         for split in splits:
             if split.drop.sum() > 0:
-                own = [split.candidate]
-                own = self._each_by_itself(split.candidate) if split.apart else own
+                candidate = self._carried(split.candidate)
+                own = self._each_by_itself(candidate) if split.apart else [candidate]
                 found.append((own, -float(split.drop.sum()) + 2 * sum(c.width for c in own)))
         return found
+
+    def _carried(self, candidate: Candidate) -> Candidate:
+        """A payload, in the other recordings if its mass is negative in these.
+
+        The identified bodies contain what most recordings carry, so that both explain equally much.
+        """
+        if not candidate.term.effect.grows or candidate.term.trajectories is None:
+            return candidate
+        tester = self.tester(self.chosen)
+        if tester.test(candidate.rows).coefficients[0] >= 0:
+            return candidate
+        names = np.unique(np.concatenate(self.problem.rows.trajectory)).tolist()
+        rest = tuple(name for name in names if name not in candidate.term.trajectories)
+        term = candidate.term.with_shape(trajectories=rest)
+        other = replace(candidate, term=term, rows=self.problem.term_rows(term))
+        return other if tester.test(other.rows).coefficients[0] > 0 else candidate
+
+    def _parts(self) -> list[list[Candidate]]:
+        """Effects of a part of the recordings, those that may be possible."""
+        scan = PartScan(self.problem, self.blocks, self.sigma, self.target)
+
+        def refined(candidate: Candidate) -> Candidate:
+            return refine(self.problem, self.blocks, [candidate], self.sigma, self.target)[0]
+
+        found = part_candidates(
+            self.problem,
+            self.pool,
+            scan,
+            self.tester(self.chosen),
+            self.significant,
+            refined,
+            self.settings.least_gain,
+        )
+        return [own for own in found if all(self.can_be(c, self.chosen) for c in own)]
 
     def _each_by_itself(self, candidate: Candidate) -> list[Candidate]:
         """Effects of some recordings, with a separate size in each of them."""
@@ -348,9 +387,11 @@ class RankingSearch(SearchState):
             torque[:, joint] = line.torque
             variables = ("time",) if kind == UNKNOWN else ()
             rows = problem.term_rows(line.term)
-            candidates.append(Candidate(kind, line.term, rows, variables))
+            own = Candidate(kind, line.term, rows, variables, n_parts=line.n_parts)
+            candidates.append(own)
         count = 3 * len(candidates)
         score = float(gain.sum()) - 2 * count
+        score -= sum(2 * float(np.log(c.n_parts)) for c in candidates)
         chances = tuple(best[c.joints[0]].chance for c in candidates)
         return Hypothesis(kind, tuple(candidates), gain, score, count, chances, torque=torque)
 

@@ -19,7 +19,8 @@ variance by its autocorrelation. The first cannot judge an effect in a single bl
 not account for noise that changes; a finding must be significant by both.
 
 **Level.** ``Settings.level`` over all candidates that were tried (Bonferroni): the printed q-value
-is the p-value times the number of candidates.
+is the p-value times the number of candidates; for an effect in a part of the recordings also times
+the number of parts of that size and of sizes (``_parts.py``).
 
 References
 ----------
@@ -610,6 +611,6 @@ def variance_inflation(
     return inflation
 
 
-def false_discovery_rate(chance: float, n_tests: int) -> float:
+def false_discovery_rate(chance: float, n_tests: float) -> float:
     """The printed q-value: the p-value times the number of candidates, at most 1."""
     return min(1.0, chance * max(1, n_tests))

@@ -210,16 +210,17 @@ class SearchState:
         """Whether a candidate is significant among all that were tried."""
         return false_discovery_rate(chance, self.tried(candidate)) <= self.settings.level
 
-    def tried(self, candidate: Candidate | None = None) -> int:
+    def tried(self, candidate: Candidate | None = None) -> float:
         """Number of candidates tried.
 
         Unknown functions were also chosen among products of functions, and a further form of an
-        effect among all possible forms.
+        effect among all possible forms; an effect in a part of the recordings among all parts.
         """
         one_of_many = candidate is not None and (
             candidate.kind == UNKNOWN or candidate.is_further_form
         )
-        return self.n_tests * (self.settings.nameless_tried if one_of_many else 1)
+        tried = self.n_tests * (self.settings.nameless_tried if one_of_many else 1)
+        return tried * (1.0 if candidate is None else candidate.n_parts)
 
     def chance(self, candidate: Candidate, others: Sequence[Candidate]) -> float:
         """P-value of a candidate's coefficients given the model and other candidates."""

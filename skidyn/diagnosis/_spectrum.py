@@ -13,6 +13,8 @@ from scipy.optimize import minimize_scalar
 
 from skidyn._signals import Array
 from skidyn.diagnosis._clock import clock_line
+from skidyn.diagnosis._parts import FEWEST, best_part, n_parts
+from skidyn.diagnosis._profile import QUARTERS
 from skidyn.diagnosis._rule import SHORTEST_BLOCK, chance_of_score
 from skidyn.effects import Term
 from skidyn.evidence import Problem
@@ -51,11 +53,14 @@ class Line:
     term : Term
         Its sine and cosine.
     chance : float
-        Probability of a line of this height anywhere in the spectrum of the joint in noise.
+        Probability of a line of this height anywhere in the spectrum of the joint in noise, and in
+        any part of the recordings.
     gain : ndarray of shape (n_folds,)
         Twice the held-out log-likelihood gain, by fold.
     torque : ndarray of shape (n_samples,), N m or N
         The wave.
+    n_parts : float
+        Number of parts of the recordings among which its own was chosen.
     """
 
     joint: int
@@ -63,6 +68,7 @@ class Line:
     chance: float
     gain: Array
     torque: Array
+    n_parts: float = 1.0
 
 
 def _any(chance: float) -> bool:
@@ -102,9 +108,44 @@ def find_lines(
             waves = _refined_wave(q[use], r[use], waves)
             term = Term.at("torque_ripple", (joint,), {"N": waves / unit})
             line = _test_line(problem, term, chance, 2 * HIGHEST, use, r, fold)
+            line = _in_part(problem, line, chance, use, r) or line
             weak = _explained_share(r[use], line.torque[use]) <= 0.2
             lines.append(_capped(line, height) if weak else line)
     return lines
+
+
+def _in_part(
+    problem: Problem, line: Line, chance: float, use: NDArray[np.bool_], r: Array
+) -> Line | None:
+    """The line in a part of the recordings, if it explains more there than in all of them.
+
+    ``chance`` is that of its height in the spectrum of all of them.
+    """
+    trajectory, sigma = problem.signals.trajectory, np.std(r[use])
+    names = np.unique(trajectory)
+    if len(names) < FEWEST or sigma == 0:
+        return None
+    block = line.term.torque_columns(problem.signals)[line.joint] / sigma
+    parts = [(block[here], r[here] / sigma) for n in names for here in [use & (trajectory == n)]]
+    score, own = np.array([b.T @ y for b, y in parts]), np.array([b.T @ b for b, _ in parts])
+    part = best_part(names, score, own)
+    if part is None:
+        return None
+    inside = use & np.isin(trajectory, part.recordings)
+    unit = float(problem.signals.unit[line.joint])
+    q = problem.signals.q[:, line.joint] / unit
+    waves = line.term.shape["N"] * unit
+    if waves * np.ptp(q[inside]) < WITHIN_RANGE * 2 * np.pi:
+        return None  # these recordings can represent it by any function of position
+    waves = _refined_wave(q[inside], r[inside], waves)
+    term = line.term.with_shape(N=waves / unit, trajectories=part.recordings)
+    # Quarters of the samples are left out, since a single recording may contain the line.
+    fold = sample_blocks(problem)[0] % QUARTERS
+    found = _test_line(problem, term, chance, 2 * HIGHEST, use, r, fold)
+    if found.gain.sum() <= line.gain.sum():
+        return None
+    tried = n_parts(len(names), len(part.recordings))
+    return replace(found, chance=min(1.0, found.chance * tried), n_parts=tried)
 
 
 def find_vibrations(
@@ -224,11 +265,15 @@ def _refined_wave(q: Array, r: Array, waves: float) -> float:
     return float(found.x) if found.fun < left(waves) else waves
 
 
-def sample_blocks(problem: Problem) -> tuple[NDArray[np.int64], int]:
-    """Block of every sample, half a second long or less in a short log, and their number."""
+def sample_blocks(
+    problem: Problem, recordings: tuple[int, ...] | None = None
+) -> tuple[NDArray[np.int64], int]:
+    """Block of every sample and their number; half a second long, less in few recordings."""
     index: NDArray[np.int64] = np.zeros(problem.signals.n_samples, dtype=np.int64)
+    first = [problem.signals.trajectory[rows][0] for rows in problem.signals.segments]
     clocks = [problem.signals.clock[rows] for rows in problem.signals.segments]
-    span = sum(float(np.ptp(clock)) for clock in clocks)
+    judged = [recordings is None or name in recordings for name in first]
+    span = sum(float(np.ptp(clock)) for clock, own in zip(clocks, judged, strict=True) if own)
     length = min(SHORTEST_BLOCK, span / LINE_BLOCKS) or SHORTEST_BLOCK  # samples that stand alone
     count = 0
     for rows, clock in zip(problem.signals.segments, clocks, strict=True):
@@ -258,7 +303,10 @@ def _test_line(
     total, right = sum(grams), sum(cross)
     both = np.linalg.lstsq(total, right, rcond=None)[0]
     left = (r - block @ both)[use]
-    steps, count = problem.signals.once("blocks of samples", lambda: sample_blocks(problem))
+    part = term.trajectories
+    steps, count = problem.signals.once(
+        f"blocks of samples of {part}", lambda: sample_blocks(problem, part)
+    )
     sums: Array = np.stack([np.bincount(steps[use], z * left, count) for z in block[use].T], axis=1)
     by_blocks = chance_of_score(np.asarray(right), sums[np.any(sums != 0, axis=1)])
     chance = max(chance, min(1.0, tried * by_blocks))

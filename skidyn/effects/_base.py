@@ -224,6 +224,12 @@ class Effect:
         return plain or type(self).grid is not Effect.grid
 
     @property
+    def comes_and_goes(self) -> bool:
+        """Whether it may act in some recordings only, unlike inertia and elasticity of the arm."""
+        passing = self.drawn_against in ("q", "dq", "load") and not self.moves_link
+        return passing and self.search == "grid" and self.scope != "robot"
+
+    @property
     def form_names(self) -> frozenset[str]:
         """Names of shape entries that only further forms of the formula have."""
         return frozenset(name for form in self.forms for name in form)

@@ -90,13 +90,13 @@ class Velocity(Check):
                 constant,
             )
             return [told]
-        if measurement.stuck:
-            return [self._held(measurement, k, runs) for k, runs in measurement.stuck.items()]
         groups: dict[str, list[int]] = {}
         faults = []
         for k, (slope, correlation) in enumerate(measurement.velocities):
             slope /= measurement.clock
             if not np.isfinite(slope) or not measurement.excited[k]:
+                continue
+            if k in measurement.stuck and _cause(slope, correlation) == "other":
                 continue
             fault = _fault(measurement, k) if correlation < SURE else None
             if fault is not None:
@@ -109,6 +109,8 @@ class Velocity(Check):
             if measurement.clock != 1 and _cause(slope, correlation) in ("scale", "other"):
                 continue  # reported when time is in seconds
             groups.setdefault(_cause(slope, correlation), []).append(k)
+        if not groups:  # in another unit, the noise of a joint at rest looks like motion
+            faults += [self._held(measurement, k, runs) for k, runs in measurement.stuck.items()]
         return faults + [self._told(measurement, cause, joints) for cause, joints in groups.items()]
 
     def _faulty(self, measurement: Measurement, k: int, fault: Fault) -> Suspicion:

@@ -61,6 +61,17 @@ def test_an_encoder_that_is_stuck_in_one_recording(recorded, told_of):
     assert told.joints == (2,) and told.evidence.startswith(f"in {run};")
 
 
+def test_velocities_in_degrees_beside_a_joint_at_rest(recorded, told_of):
+    frame = recorded.frame.copy()
+    noise = np.random.default_rng(3).normal(0.0, 0.03, len(frame))
+    at_rest = frame["trajectory"] == frame["trajectory"].unique()[1]
+    frame.loc[at_rest, "q2"], frame.loc[at_rest, "dq2"] = 0.4, noise[at_rest]
+    frame[["dq1", "dq2"]] = np.rad2deg(frame[["dq1", "dq2"]])
+    told = told_of(frame)
+    assert all("does not change" not in s.suspicion for s in told.values())
+    assert told["velocity"].remedy.option == "--units dq=deg/s", told
+
+
 def test_an_encoder_that_loses_steps(signals, torque, found):
     q = signals.q.copy()
     for row in (500, 900, 1300):

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Effects of any kind that only a part of the recordings has."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.diagnosis import diagnose
+from skidyn.identification import RBDRegressor
+
+PART = (2, 5, 6, 9)
+
+
+@pytest.fixture(scope="module")
+def log():
+    return make_hidden_effect_log(load_planar_arm(), None, noise="low", random_state=21)
+
+
+def added(log, torque, trajectories):
+    """Torque of the log with another on joint 2 in some trajectories."""
+    y = np.array(log.y)
+    inside = np.isin(log.X["trajectory"].to_numpy(), trajectories)
+    y[:, 1] += np.where(inside, torque, 0.0)
+    return y
+
+
+def rising(log):
+    """A bar that pushes back from a certain position on."""
+    q = log.X["q2"].to_numpy()
+    return 0.4 * np.std(log.y[:, 1]) * np.maximum(0.0, q - np.quantile(q, 0.3))
+
+
+def falling(log):
+    """Friction that falls with the speed."""
+    dq = log.X["dq2"].to_numpy()
+    usual = np.quantile(np.abs(dq), 0.3)
+    return 0.2 * np.std(log.y[:, 1]) * np.sign(dq) * np.exp(-((dq / usual) ** 2))
+
+
+@pytest.mark.parametrize(
+    ("torque", "kinds"), [(rising, {"end_stop", "nonlinear_spring"}), (falling, {"stribeck"})]
+)
+def test_is_named_with_its_recordings(log, torque, kinds):
+    diagnosis = diagnose(RBDRegressor(log.robot), log.X, added(log, torque(log), PART))
+
+    (finding,) = diagnosis.findings
+    assert finding.kind in kinds
+    assert finding.joints == (2,)
+    assert set(finding.trajectories) <= set(PART)
+    assert len(finding.trajectories) >= 3
+    assert "in trajectories 2, 5" in finding.sentence
+
+
+def test_is_predicted_for_these_recordings_only(log):
+    y = added(log, rising(log), PART)
+    diagnosis = diagnose(RBDRegressor(log.robot), log.X, y)
+
+    truth = RBDRegressor(log.robot).fit(log.X, log.y).predict(log.X)[:, 1]
+    inside = np.isin(log.X["trajectory"].to_numpy(), diagnosis.findings[0].trajectories)
+    error = (diagnosis.model.predict(log.X)[:, 1] - truth)[~inside]
+    assert np.std(error) < 0.1 * np.std(rising(log)[inside])
+
+
+def test_an_effect_of_all_recordings_has_no_part(log):
+    everywhere = np.unique(log.X["trajectory"])
+    diagnosis = diagnose(RBDRegressor(log.robot), log.X, added(log, rising(log), everywhere))
+
+    assert all(f.trajectories is None for f in diagnosis.findings)
+
+
+def test_elastic_joints_and_inertias_are_not_tried_in_a_part(log):
+    from skidyn.effects import get_effect, list_effects
+
+    passing = {kind for kind in list_effects() if get_effect(kind).comes_and_goes}
+    assert {"stribeck", "end_stop", "coupling_spring", "saturation"} <= passing
+    assert not passing & {"joint_elasticity", "backlash", "rotor_inertia", "base_tilt", "payload"}
