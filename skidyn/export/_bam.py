@@ -17,7 +17,7 @@ from skidyn._exceptions import SkidynError
 from skidyn._signals import Array
 from skidyn._writing import write_json
 from skidyn.export._files import PathLike
-from skidyn.export._model import check_model, name_term
+from skidyn.export._model import check_model, is_lasting, name_term
 from skidyn.identification import RBDRegressor
 
 _SPEED = ("dtheta_stribeck", "alpha")
@@ -322,7 +322,7 @@ def _of_joint(
         if number not in term.places:
             continue
         size = float(model.effect_coefficients_[term][0])
-        whole = not {k for k in ("trajectory", "trajectories") if term.shape.get(k) is not None}
+        whole = is_lasting(term)
         if term.kind in places and whole:
             values[places[term.kind]] += size
         elif term.kind == "stribeck" and whole and "alpha" not in values:
