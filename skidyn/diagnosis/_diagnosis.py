@@ -180,6 +180,7 @@ def diagnose(
         )
         if controller is not None:
             found = diagnosis.findings
+            diagnosis.stated = None if servos is None else controller
             diagnosis.controller = with_settings(controller, found, len(diagnosis.joint_names))
         if opened.outer:
             diagnosis.opened = opened

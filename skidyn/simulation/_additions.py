@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,6 +25,7 @@ from skidyn.simulation._score import (
     pooled_errors,
     simulation_errors,
 )
+from skidyn.simulation._servo import servo_torque
 
 Rows = NDArray[np.intp]
 
@@ -93,6 +94,25 @@ def judge_additions(
 
 
 @dataclass(frozen=True)
+class Setting:
+    """A setting of the servo of one joint that differs from the stated one.
+
+    It changes both the torque of the servos, to which a model is fitted, and the controller that
+    drives the simulated motion.
+
+    Parameters
+    ----------
+    joint : int
+        Joint, counted from 1.
+    values : mapping of str to float
+        By name of the argument of :class:`Controller`.
+    """
+
+    joint: int
+    values: Mapping[str, float]
+
+
+@dataclass(frozen=True)
 class InTurn:
     """Results of additions one by one, and together.
 
@@ -120,16 +140,22 @@ class InTurn:
 
 def judge_in_turn(
     model: RBDRegressor,
-    additions: Sequence[Iterable[Any]],
+    additions: Sequence[Iterable[Any] | Setting],
     X: Any,
     y: Any,
     *,
     controller: Controller | None = None,
     horizon: float | None = HORIZON,
+    servos: Controller | None = None,
 ) -> InTurn:
-    """Judge additions like :func:`judge_additions`, and also their common result."""
+    """Judge additions like :func:`judge_additions`, and also their common result.
+
+    An addition may also be a setting of a servo. ``servos`` is then the controller as stated, whose
+    torque replaces y until a setting is added.
+    """
     folds = _folds(model, X)
-    torque = np.asarray(y, dtype=float)
+    torque = np.asarray(y, dtype=float) if servos is None else servo_torque(servos, X)
+    controller = controller if controller is None or servos is None else servos
     if model.consistent is False:
         model = clone(model).set_params(consistent=True)
     used: list[Any] = []
@@ -137,13 +163,17 @@ def judge_in_turn(
     verdicts: list[SimulationVerdict | None] = []
     added = []
     for addition in additions:
-        terms = [*used, *addition]
-        if len(terms) == len(used):  # a setting of the servo, which is no part of the model
-            verdicts.append(None)
-            added.append(True)
-            continue
+        terms, given, drive, stated = used, torque, controller, servos
+        if isinstance(addition, Setting):
+            assert servos is not None
+            n = torque.shape[1]
+            stated = servos.with_joint(n, addition.joint, **addition.values)
+            given = servo_torque(stated, X)
+            drive = None if controller is None else stated
+        else:
+            terms = [*used, *addition]
         try:
-            after = _held_out(model, terms, X, torque, folds, controller, horizon)
+            after = _held_out(model, terms, X, given, folds, drive, horizon)
         except SkidynError:
             verdicts.append(None)
             added.append(False)
@@ -152,7 +182,7 @@ def judge_in_turn(
         verdicts.append(verdict if min(_typical(errors), _typical(after)) < 1.0 else None)
         added.append(verdicts[-1] is None or not verdict.worsens)
         if added[-1]:
-            used, errors = terms, after
+            used, errors, torque, controller, servos = terms, after, given, drive, stated
     return InTurn(verdicts, added, compare_errors(first, errors))
 
 
