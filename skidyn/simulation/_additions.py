@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -126,11 +126,15 @@ class InTurn:
         cannot be simulated.
     together : SimulationVerdict
         The model with all added effects compared with the model without any.
+    compared : list of SimulationVerdict or None
+        Errors with and without every addition, also where they give no evidence; None if it cannot
+        be simulated.
     """
 
     verdicts: list[SimulationVerdict | None]
     added: list[bool]
     together: SimulationVerdict
+    compared: list[SimulationVerdict | None] = field(default_factory=list)
 
     @property
     def silent(self) -> bool:
@@ -161,6 +165,7 @@ def judge_in_turn(
     used: list[Any] = []
     first = errors = _held_out(model, used, X, torque, folds, controller, horizon)
     verdicts: list[SimulationVerdict | None] = []
+    compared: list[SimulationVerdict | None] = []
     added = []
     for addition in additions:
         terms, given, drive, stated = used, torque, controller, servos
@@ -176,14 +181,16 @@ def judge_in_turn(
             after = _held_out(model, terms, X, given, folds, drive, horizon)
         except SkidynError:
             verdicts.append(None)
+            compared.append(None)
             added.append(False)
             continue
         verdict = compare_errors(errors, after)
+        compared.append(verdict)
         verdicts.append(verdict if min(_typical(errors), _typical(after)) < 1.0 else None)
         added.append(verdicts[-1] is None or not verdict.worsens)
         if added[-1]:
             used, errors, torque, controller, servos = terms, after, given, drive, stated
-    return InTurn(verdicts, added, compare_errors(first, errors))
+    return InTurn(verdicts, added, compare_errors(first, errors), compared)
 
 
 def _folds(model: RBDRegressor, X: Any) -> list[tuple[Rows, Rows]]:
