@@ -5,7 +5,8 @@ Models are driven by the measured torque of recordings, or intervals of a single
 out of their fit, and are reset to the log every second. The error is that of the position of each
 joint relative to a model without forces: root mean square over the pieces, mean over the joints,
 and of the median piece; in mrad, mean over the joints of the finding; and the number of pieces
-whose motion grows without bound. Each finding is added to previous ones that do not worsen the motion.
+whose motion grows without bound. Each finding is added to previous ones that do not worsen the
+motion.
 
     python benchmarks/identification/findings_simulated.py FOLDER [--robots panda ur10e]
 """
