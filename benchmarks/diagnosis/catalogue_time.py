@@ -18,7 +18,7 @@ from skidyn.datasets import load_panda, make_hidden_effect_log
 from skidyn.diagnosis import Settings, read_signals
 from skidyn.diagnosis._reversals import look_at_reversals
 from skidyn.diagnosis._search import search
-from skidyn.effects import list_effects, make_terms
+from skidyn.effects import make_terms, searched_kinds
 from skidyn.evidence import make_problem
 
 
@@ -34,8 +34,8 @@ def main() -> None:
             terms = make_terms(("viscous", "coulomb"), 7)
             problem = make_problem(signals, torque, robot=log.robot, rigid_body=True, terms=terms)
             middle = time.perf_counter()
-            result = search(problem, list_effects(), Settings())
-            _, result = look_at_reversals(problem, result, list_effects(), Settings())
+            result = search(problem, searched_kinds(), Settings())
+            _, result = look_at_reversals(problem, result, searched_kinds(), Settings())
             end = time.perf_counter()
         found = [h.kind for h in result.findings]
         print(

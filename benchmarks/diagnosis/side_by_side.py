@@ -30,7 +30,7 @@ from sklearn.model_selection import GroupKFold
 from skidyn._signals import read_signals
 from skidyn.datasets import load_planar_arm, load_ur5, make_hidden_effect_log
 from skidyn.diagnosis import catalogue_candidates, diagnose
-from skidyn.effects import list_effects, make_terms
+from skidyn.effects import make_terms, searched_kinds
 from skidyn.evidence import Problem, make_problem
 from skidyn.identification import RBDRegressor
 
@@ -70,7 +70,7 @@ def columns_of(log) -> tuple[Problem, list[Columns]]:
     problem = make_problem(signals, torque, robot=log.robot, rigid_body=True, terms=terms)
     fit = problem.fit(terms, passes=3)
     problem.set_fit(fit)
-    pool = [c for c in catalogue_candidates(problem, list_effects()) if len(c.joints) == 1]
+    pool = [c for c in catalogue_candidates(problem, searched_kinds()) if len(c.joints) == 1]
     design = problem.design([problem.term_rows(t) for t in terms])
     last = np.unique(signals.trajectory)[-HELD_OUT]
     joints = []

@@ -3,8 +3,10 @@
 
 Models are driven by the measured torque of recordings, or intervals of a single one, that were left
 out of their fit, and are reset to the log every second. The error is that of the position of each
-joint relative to a model without forces, mean over the joints; each finding is added to previous
-ones that do not worsen the motion.
+joint relative to a model without forces: root mean square over the pieces, mean over the joints,
+and of the median piece; in mrad, mean over the joints of the finding; and the number of pieces
+whose motion grows without bound. Each finding is added to previous ones that do not worsen the
+motion.
 
     python benchmarks/identification/findings_simulated.py FOLDER [--robots panda ur10e]
 """
@@ -42,7 +44,9 @@ def main():
     parser.add_argument("--robots", nargs="*", default=["panda", "ur10e"])
     options = parser.parse_args()
     warnings.filterwarnings("ignore")  # remarks on the data
-    print(f"{'robot':6s} {'finding':50s} {'without':>8s} {'with':>8s}  verdict")
+    head = f"{'mean':>7s}{'median':>7s}{'mrad':>8s}{'lost':>8s}"
+    print(f"{'':67s} {'without':30s}  with")
+    print(f"{'robot':6s} {'finding':60s} {head} |{head}  verdict")
     for name in options.robots:
         robot, frame = read(options.folder, name)
         names = range(1, robot.n_joints + 1)
@@ -52,15 +56,24 @@ def main():
         diagnosis = diagnose(model, frame[columns], torque)
         if not diagnosis.findings:
             print(f"{name:6s} nothing is found", flush=True)
-        for finding, verdict in zip(
-            diagnosis.findings, diagnosis.judge_by_simulation(), strict=True
-        ):
-            title = f"{finding.title}, joint {', '.join(map(str, finding.joints))}"
-            if verdict is None:
-                print(f"{name:6s} {title:50s} {'':17s}  simulation says nothing", flush=True)
+        verdicts = diagnosis.judge_by_simulation()
+        compared = diagnosis.in_turn.compared
+        for finding, verdict, both in zip(diagnosis.findings, verdicts, compared, strict=True):
+            joints = ", ".join(map(str, finding.joints))
+            title = f"{finding.title}, joint {joints}"
+            if both is None:
+                print(f"{name:6s} {title:60s} {'':26s}  cannot be simulated", flush=True)
                 continue
-            before, after = verdict.before.score, verdict.after.score
-            print(f"{name:6s} {title:50s} {before:8.3f} {after:8.3f}  {verdict}", flush=True)
+            rows = []
+            for errors in (both.before, both.after):
+                size = 1e3 * float(np.mean([errors.position[j - 1] for j in finding.joints]))
+                share = errors.pieces / np.maximum(errors.resting, 1e-12)
+                median = float(np.median(np.sqrt(np.mean(share**2, axis=1))))
+                lost = f"{errors.n_lost}/{len(errors.pieces)}"
+                rows.append(f"{errors.score:7.3f}{median:7.3f}{size:8.2f}{lost:>8s}")
+            scores = " |".join(rows)
+            told = "no evidence: further off than without forces" if verdict is None else verdict
+            print(f"{name:6s} {title:60s} {scores}  {told}", flush=True)
 
 
 if __name__ == "__main__":

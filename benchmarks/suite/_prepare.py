@@ -16,7 +16,7 @@ from _log import HELD_OUT
 from skidyn._signals import read_signals
 from skidyn._writing import replacing
 from skidyn.diagnosis import catalogue_candidates
-from skidyn.effects import list_effects, make_terms
+from skidyn.effects import make_terms, searched_kinds
 from skidyn.evidence import make_problem
 from skidyn.logs import check_log, read_log
 from skidyn.robots import Robot
@@ -53,7 +53,7 @@ def prepare(case: Path) -> Path:
     terms = make_terms(base, robot.n_joints)
     problem = make_problem(recorded, torque, robot=robot, rigid_body=True, terms=terms)
     problem.set_fit(problem.fit(terms, passes=3))
-    pool = [c for c in catalogue_candidates(problem, list_effects()) if c.kind not in base]
+    pool = [c for c in catalogue_candidates(problem, searched_kinds()) if c.kind not in base]
     design = problem.design([problem.term_rows(t) for t in terms])
     signals = problem.signals  # smoothed
     motion = {"q": signals.q, "dq": signals.dq, "ddq": signals.ddq, "tau": torque}

@@ -42,7 +42,7 @@ from skidyn.diagnosis._servo_settings import (
     with_settings,
 )
 from skidyn.diagnosis._swift import look_at_swift
-from skidyn.effects import Term, get_effect, list_effects, make_terms
+from skidyn.effects import Term, get_effect, make_terms, searched_kinds
 from skidyn.evidence import Fit, Problem, make_problem
 from skidyn.measurement import (
     Measurement,
@@ -180,6 +180,7 @@ def diagnose(
         )
         if controller is not None:
             found = diagnosis.findings
+            diagnosis.stated = None if servos is None else controller
             diagnosis.controller = with_settings(controller, found, len(diagnosis.joint_names))
         if opened.outer:
             diagnosis.opened = opened
@@ -230,7 +231,7 @@ def _diagnose(
         weight = _check_sample_weight(
             sample_weight, torque, dtype=np.float64, ensure_non_negative=True
         )
-    wanted = list_effects() if effects is None else list(effects)
+    wanted = searched_kinds() if effects is None else list(effects)
     kinds, settings_tried = split_kinds(wanted, servos is not None)
     identified = getattr(model, "parameters", "identified") == "identified"
     if servos is not None and np.isfinite(servos.controller.checked(robot.n_joints).limit).all():

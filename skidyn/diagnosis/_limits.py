@@ -16,7 +16,7 @@ from skidyn._signals import Array
 from skidyn._text import inside
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._rule import Settings
-from skidyn.effects import get_effect, list_effects
+from skidyn.effects import get_effect, searched_kinds
 from skidyn.evidence import (
     Felt,
     Normal,
@@ -258,7 +258,7 @@ def without_withdrawn(limits: Sequence[Limit], withdrawn: Sequence[Candidate]) -
 def _not_shown(problem: Problem) -> list[Limit]:
     """Effects whose signal is missing or does not vary."""
     limits = []
-    for kind in list_effects():
+    for kind in searched_kinds():
         effect = get_effect(kind)
         if effect.scope != "joint" or effect.of_servo:
             continue

@@ -20,6 +20,7 @@ from skidyn.diagnosis._hypothesis import SearchResult
 from skidyn.diagnosis._limits import Limit
 from skidyn.diagnosis._notebook import notebook
 from skidyn.diagnosis._remainder import Remainder
+from skidyn.diagnosis._servo_settings import as_stated, setting_of, with_settings
 from skidyn.diagnosis._simulated import of_finding, report_of, simulated
 from skidyn.diagnosis._story import story
 from skidyn.diagnosis._unknown import UnknownTorque
@@ -104,7 +105,10 @@ class Diagnosis:
     servo_motion : list of ServoFinding or None
         Effects found by :meth:`explain_servo_motion`; None before it is called.
     controller : Controller or None
-        Controller given to :func:`diagnose`, with the settings of servos that were found.
+        Controller given to :func:`diagnose`, with the settings of servos that were found and that
+        are not in :attr:`vetoed`.
+    stated : Controller or None
+        The controller as given, for a log without torque.
 
     Examples
     --------
@@ -139,6 +143,7 @@ class Diagnosis:
     in_turn: InTurn | None = field(repr=False, default=None)
     servo_motion: list[ServoFinding] | None = None
     controller: Controller | None = field(default=None, repr=False)
+    stated: Controller | None = field(default=None, repr=False)
 
     def __repr__(self) -> str:
         units = ["N" if slides else "N m" for slides in self.problem.signals.prismatic]
@@ -252,7 +257,11 @@ class Diagnosis:
     def model(self) -> Any:
         """The given model with every finding added that is not vetoed, fitted to all data."""
         kept = [f for f in self.findings if not any(f is other for other in self.vetoed)]
-        return self._refitted([t for f in kept for t in f.terms])
+        terms = [t for f in kept for t in f.terms]
+        if self.controller is None or not any(map(setting_of, self.vetoed)):
+            return self._refitted(terms)
+        X, _, *weight = self.data  # whose torque has the settings that are vetoed
+        return self._refitted(terms, (X, servo_torque(self.controller, X), *weight))
 
     def judge_by_simulation(
         self, horizon: float | None = HORIZON, *, controller: Controller | None = None
@@ -264,6 +273,11 @@ class Diagnosis:
         worsen the motion. An effect that worsens it significantly is added to :attr:`vetoed`, with
         a sentence in :attr:`warnings`, and is not part of :attr:`model`; :meth:`add` adds it
         nevertheless.
+
+        A setting of a servo changes the torque of the servos: the model without it is fitted to the
+        torque of the servo as stated, the other to that with the setting. With a controller, each
+        is simulated in the loop of its own servo. A setting that is vetoed is no longer part of
+        :attr:`controller`.
 
         Parameters
         ----------
@@ -293,9 +307,18 @@ class Diagnosis:
                 f"the model is {type(self.base_model).__name__}; a simulation needs the inertia of "
                 "an RBDRegressor"
             )
-        additions = [finding.terms for finding in self.findings]
+        additions = [setting_of(finding) or finding.terms for finding in self.findings]
+        n, stated = len(self.joint_names), None
+        if self.stated is not None and any(map(setting_of, self.findings)):
+            given = self.stated if controller is None else controller
+            stated = as_stated(given, self.stated, self.findings, n)
         self.in_turn = judge_in_turn(
-            self.base_model, additions, *self.data[:2], controller=controller, horizon=horizon
+            self.base_model,
+            additions,
+            *self.data[:2],
+            controller=controller,
+            horizon=horizon,
+            servos=stated,
         )
         verdicts = self.in_turn.verdicts
         self.vetoed = [
@@ -306,6 +329,9 @@ class Diagnosis:
             if verdict is not None and verdict.worsens:
                 where = ", ".join(self.joint_names[j - 1] for j in finding.joints)
                 self.warnings.append(f"{_VETO} {finding.title} of {where}. {verdict.text}")
+        if self.stated is not None:
+            kept = [f for f in self.findings if not any(f is other for other in self.vetoed)]
+            self.controller = with_settings(self.stated, kept, n)
         self.__dict__.pop("model", None)
         return verdicts
 
@@ -461,17 +487,17 @@ class Diagnosis:
             )
         return [t for proposal in proposals for t in proposal.terms]
 
-    def _refitted(self, terms: Sequence[Term]) -> Any:
-        model = self.base_model
+    def _refitted(self, terms: Sequence[Term], data: tuple[Any, ...] | None = None) -> Any:
+        model, data = self.base_model, self.data if data is None else data
         if is_physics(model):
-            better = model.with_effects(terms).fit(*self.data)
+            better = model.with_effects(terms).fit(*data)
         else:
             if not isinstance(model, CorrectedRegressor):
                 assert self.problem.robot is not None
                 model = CorrectedRegressor(model, self.problem.robot)
             elif hasattr(model, "regressor_"):
                 model = CorrectedRegressor(model.regressor_, model.robot, model.effects)
-            better = model.with_effects(terms).fit_effects(*self.data)
+            better = model.with_effects(terms).fit_effects(*data)
         return better if self.opened is None else self.opened.closed(better)
 
     def to_dict(self) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from skidyn._signals import Array
 from skidyn.diagnosis._findings import Finding, notes, told_briefly
 from skidyn.effects import get_effect
 from skidyn.measurement import Measurement, ServoSetting, servo_settings
-from skidyn.simulation import Controller, servo_torque
+from skidyn.simulation import Controller, Setting, servo_torque
 
 
 @dataclass(frozen=True)
@@ -83,12 +83,29 @@ def settings_found(
     return [_finding(s, measurement, len(kinds)) for s in found]
 
 
+def setting_of(finding: Finding) -> Setting | None:
+    """The setting of a servo that a finding is about; None for a torque of the model."""
+    if finding.kind == "unknown" or not get_effect(finding.kind).of_servo:
+        return None
+    values = {name: row["value"] for name, row in finding.parameters.items()}
+    return Setting(finding.joints[0], values)
+
+
+def as_stated(
+    controller: Controller, stated: Controller, findings: Iterable[Finding], n_joints: int
+) -> Controller:
+    """Controller with the stated values of the settings that were found to be different."""
+    given = stated.checked(n_joints)
+    for setting in filter(None, map(setting_of, findings)):
+        values = {name: float(getattr(given, name)[setting.joint - 1]) for name in setting.values}
+        controller = controller.with_joint(n_joints, setting.joint, **values)
+    return controller
+
+
 def with_settings(controller: Controller, findings: Iterable[Finding], n_joints: int) -> Controller:
     """Controller with the settings that were found; other findings are ignored."""
-    for finding in findings:
-        if finding.kind != "unknown" and get_effect(finding.kind).of_servo:
-            values = {name: row["value"] for name, row in finding.parameters.items()}
-            controller = controller.with_joint(n_joints, finding.joints[0], **values)
+    for setting in filter(None, map(setting_of, findings)):
+        controller = controller.with_joint(n_joints, setting.joint, **setting.values)
     return controller
 
 

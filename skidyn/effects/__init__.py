@@ -38,12 +38,16 @@ __all__ = [
 # For other packages of skidyn; no part of the public interface.
 from skidyn._signals import Signals as Signals
 from skidyn.effects._hysteresis import Law as Law, PathMemory as PathMemory
+from skidyn.effects._motor_load import MotorLoadFriction as MotorLoadFriction
 from skidyn.effects._nameless import (
     FunctionOfSignals as FunctionOfSignals,
     FunctionOfSum as FunctionOfSum,
     NamelessEffect as NamelessEffect,
 )
-from skidyn.effects._registry import nameless_kinds as nameless_kinds
+from skidyn.effects._registry import (
+    nameless_kinds as nameless_kinds,
+    searched_kinds as searched_kinds,
+)
 
 
 def __getattr__(name: str) -> Any:

@@ -133,7 +133,11 @@ class Effect:
         Family of effects that are often separated only by special motion (``"hysteresis"``).
     needs : tuple of str
         Optional signals it needs: ``"temperature"``, ``"time"``, ``"load"``, ``"model_torque"``,
+        ``"motor_torque"`` (that of the model before the sensor, which includes the effect itself),
         ``"robot"``, ``"command"``.
+    automatic : bool
+        Whether the diagnosis and the explorer try it unless other kinds are asked for. False for
+        refinements of an effect that would take its place on many logs.
     leading : int
         With ``search="trajectories"``: number of first coefficients that every single trajectory
         determines; all of them if 0.
@@ -199,6 +203,7 @@ class Effect:
     drawn_against: ClassVar[str] = "q"
     family: ClassVar[str] = ""
     needs: ClassVar[tuple[str, ...]] = ()
+    automatic: ClassVar[bool] = True
     leading: ClassVar[int] = 0
     grows: ClassVar[bool] = False
     by_recording: ClassVar[bool] = False
@@ -253,6 +258,11 @@ class Effect:
     def sees_model(self) -> bool:
         """Whether it acts on the torque of the whole model, as a sensor does."""
         return "model_torque" in self.needs
+
+    @property
+    def sees_motor(self) -> bool:
+        """Whether it depends on the torque of the motor, of which it is a part itself."""
+        return "motor_torque" in self.needs
 
     @property
     def on_bodies(self) -> bool:

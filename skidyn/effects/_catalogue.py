@@ -22,6 +22,7 @@ from skidyn.effects._gravity import BaseTilt
 from skidyn.effects._hysteresis import Dahl, LuGre, MaxwellSlip
 from skidyn.effects._inertia import RotorInertia
 from skidyn.effects._load import LoadDependentFriction
+from skidyn.effects._motor_load import MOTOR_LOAD
 from skidyn.effects._nameless import NAMELESS
 from skidyn.effects._nameless_coupled import COUPLED
 from skidyn.effects._nameless_history import HISTORY
@@ -68,6 +69,7 @@ _CLASSES: tuple[type[Effect], ...] = (
     TemperatureOffset,
     ExternalWrench,
     EnvironmentContact,
+    *MOTOR_LOAD,
     *SERVO,
 )
 for _cls in (*_CLASSES, *NAMELESS, *HISTORY, *COUPLED, AccelerationNoise, Formula):

@@ -56,6 +56,11 @@ def get_effect(kind: str) -> Effect:
         raise EffectError(f"no effect {kind!r}; the catalogue has {', '.join(_EFFECTS)}") from None
 
 
+def searched_kinds() -> list[str]:
+    """Kinds of the catalogue that are tried if no others are asked for."""
+    return [kind for kind in list_effects() if _EFFECTS[kind].automatic]
+
+
 def nameless_kinds() -> list[str]:
     """Functions for unknown effects, which the diagnosis tries if no known effect fits."""
     return [kind for kind, e in _EFFECTS.items() if e.nameless and e.search != "given"]

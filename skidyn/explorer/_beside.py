@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.diagnosis import Candidate, find_lines, split_effects
-from skidyn.effects import Term, list_effects
+from skidyn.effects import Term, searched_kinds
 from skidyn.evidence import Problem, solve_left_out
 
 #: Chance above which a line of the spectrum is noise.
@@ -93,7 +93,7 @@ def loads(
     """
     design = problem.design(blocks)
     offers = []
-    for split in split_effects(problem, list_effects(), blocks, sigma, target):
+    for split in split_effects(problem, searched_kinds(), blocks, sigma, target):
         if split.apart:
             continue  # offered as one effect
         rows = split.candidate.rows

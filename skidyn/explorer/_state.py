@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from skidyn._exceptions import EffectError
 from skidyn._signals import Array, read_signals
 from skidyn.diagnosis import Candidate, catalogue_candidates, noise_level, own_terms
-from skidyn.effects import Term, TermSum, list_effects
+from skidyn.effects import Term, TermSum, searched_kinds
 from skidyn.evidence import make_problem
 from skidyn.explorer._beside import Offer, Ripple, fit_ripple, loads, ripples
 from skidyn.explorer._ranking import FoldedModel, HeldOutRows, Ranking
@@ -61,7 +61,7 @@ class State:
         )
         base = self.problem.fit_own()
         self._target = self.problem.target
-        self._pool = catalogue_candidates(self.problem, list_effects())
+        self._pool = catalogue_candidates(self.problem, searched_kinds())
         self._ranking = Ranking(self.problem, self._pool, self._target)
         self._samples = Samples(self.problem)
         self._steps = [self._step((), base.terms, base.sigma, None)]

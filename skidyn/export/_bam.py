@@ -16,8 +16,9 @@ import numpy as np
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Array
 from skidyn._writing import write_json
+from skidyn.effects import Term
 from skidyn.export._files import PathLike
-from skidyn.export._model import check_model, name_term
+from skidyn.export._model import check_model, is_lasting, name_term
 from skidyn.identification import RBDRegressor
 
 _SPEED = ("dtheta_stribeck", "alpha")
@@ -237,8 +238,10 @@ def write_bam(
     """Write the friction of a joint in the format of BAM.
 
     Viscous and Coulomb friction become BAM's model m1, with Stribeck friction m2; rotor inertia is
-    ``armature``. Friction that grows with the load, m3 to m6, depends on the motor's own torque,
-    which includes the friction: it is not linear in coefficients, and is fitted by :func:`fit_bam`.
+    ``armature``. Friction that grows with the load and the motor's own torque becomes m3
+    (``motor_load_friction``), m4 (``stribeck_load_friction``), m5 (``directional_load_friction``)
+    or m6 (``quadratic_load_friction``). ``load_dependent_friction``, which depends on the torque of
+    the bodies alone, is left out, since BAM has no such model.
 
     Parameters
     ----------
@@ -306,7 +309,7 @@ def joint_place(robot: Any, joint: str | int | None) -> int:
 def _of_joint(
     model: RBDRegressor, joint: str | int | None, actuator: str, motor: Mapping[str, float]
 ) -> tuple[BamModel, tuple[str, ...]]:
-    """Parameters of a joint in BAM's m1 or m2, and names of the joint's other effects."""
+    """Parameters of a joint in BAM's m1 to m6, and names of the joint's other effects."""
     check_model(model)
     if not isinstance(model, RBDRegressor):
         raise SkidynError("BAM's format holds friction; give a fitted RBDRegressor or a BamModel")
@@ -317,18 +320,48 @@ def _of_joint(
         "coulomb": "friction_base",
         "viscous": "friction_viscous",
     }
-    left = []
+    left, name = [], "m1"
     for term in model.effect_terms_:
         if number not in term.places:
             continue
-        size = float(model.effect_coefficients_[term][0])
-        whole = not {k for k in ("trajectory", "trajectories") if term.shape.get(k) is not None}
-        if term.kind in places and whole:
-            values[places[term.kind]] += size
-        elif term.kind == "stribeck" and whole and "alpha" not in values:
-            values |= {"friction_stribeck": size, "dtheta_stribeck": float(term.shape["vs"])}
-            values["alpha"] = float(term.shape["delta"])
+        sizes = list(map(float, model.effect_coefficients_[term]))
+        own = _LOADED.get(term.kind, "m2" if term.kind == "stribeck" else "")
+        if term.kind in places and is_lasting(term):
+            values[places[term.kind]] += sizes[0]
+        elif own and name == "m1" and is_lasting(term) and "lorentzian" not in term.shape:
+            name, values = own, values | _loaded(term, sizes)
         else:
             left.append(name_term(model.robot_, term))
-    name = "m2" if "alpha" in values else "m1"
     return BamModel(name, actuator, {**values, **motor}), tuple(left)
+
+
+#: Models of BAM by the effects of the catalogue that are their friction of the load.
+_LOADED = {
+    "motor_load_friction": "m3",
+    "stribeck_load_friction": "m4",
+    "directional_load_friction": "m5",
+    "quadratic_load_friction": "m6",
+}
+
+
+def _loaded(term: Term, sizes: list[float]) -> dict[str, float]:
+    """Parameters of m2 to m6 other than those of all models, from the effect of a joint."""
+    shape = {name: float(value) for name, value in term.shape.items() if value is not None}
+    if term.kind == "motor_load_friction":
+        return {"load_friction_base": sizes[0]}
+    exponent = shape["delta" if term.kind == "stribeck" else "alpha"]
+    values = {
+        "friction_stribeck": sizes[0],
+        "dtheta_stribeck": shape["vs"],
+        "alpha": exponent,
+    }
+    if term.kind == "stribeck_load_friction":
+        values |= {"load_friction_base": sizes[1], "load_friction_stribeck": sizes[2]}
+    elif term.kind != "stribeck":
+        shares = (shape["outside"], shape["slow_outside"])
+        for end, size, share in zip(("", "_stribeck"), sizes[1:3], shares, strict=True):
+            values[f"load_friction_motor{end}"] = size * (1.0 - share)
+            values[f"load_friction_external{end}"] = size * share
+    if term.kind == "quadratic_load_friction":
+        values |= {"load_friction_motor_quad": sizes[3], "load_friction_external_quad": sizes[4]}
+    return values

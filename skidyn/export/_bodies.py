@@ -12,7 +12,7 @@ import numpy as np
 from skidyn._exceptions import SkidynError
 from skidyn.dynamics import central_parts
 from skidyn.effects import Term, get_effect
-from skidyn.export._model import check_model, is_carried
+from skidyn.export._model import check_model, is_carried, is_lasting
 from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
 
@@ -110,7 +110,8 @@ def described(model: RBDRegressor | Robot, kinds: tuple[str, ...]) -> Descriptio
         values = model.effect_coefficients_[term]
         if is_carried(term):
             parameters[-1] += values
-        elif term.kind in kinds and values[0] >= 0.0:  # no format has negative friction or springs
+        # No format has negative friction or springs, or a spring of one recording.
+        elif term.kind in kinds and values[0] >= 0.0 and is_lasting(term):
             joints[term.kind][term.places[0]] += values
         else:
             left.append(term)

@@ -116,6 +116,12 @@ class Edits:
             new = b"\n" + deeper + text.encode()
             self._changes.append((element.head, element.head, new))
 
+    def insert_after(self, element: Element, text: str) -> None:
+        """Insert a sibling after an element, on a separate line with its indentation."""
+        indent = self._indentation(element)
+        new = (b"\n" + indent if indent else b"") + text.encode()
+        self._changes.append((element.end, element.end, new))
+
     def _indentation(self, element: Element) -> bytes:
         line = self.data.rfind(b"\n", 0, element.start) + 1
         before = self.data[line : element.start]

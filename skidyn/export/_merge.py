@@ -27,6 +27,7 @@ from skidyn.export._bodies import (
 )
 from skidyn.export._edits import Edits, Element
 from skidyn.export._files import PathLike, write_files
+from skidyn.export._series import insert_series, series_joints
 from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
 
@@ -156,6 +157,16 @@ def merge_mjcf(
     are unchanged. Frames of bodies may differ from those of the URDF; the axes of the joints are
     compared at several poses. Needs MuJoCo (``pip install skidyn[mujoco]``).
 
+    Joint elasticity and backlash become a passive joint in series, right after that of the motor in
+    the same body, named ``<joint>_elasticity`` or ``<joint>_backlash``. As in the effects, the
+    logged position is that of the motor: the joint of the file keeps its name, actuator, sensors,
+    friction and armature as the motor's side, and the position of the link is the sum of both. An
+    elastic gear has ``stiffness`` and ``damping``; its resonance follows from the stiffness and the
+    inertia of the link, while the effect has a fitted one. A gap has a ``range`` of half the play
+    to either side, whose ends are as soft as MuJoCo's limits. Passive joints of an earlier export
+    are replaced, and stay if the model has none. Keyframes store a number for every joint and are
+    not changed: in a file with keyframes the effect is left out and the keyframe is named.
+
     Parameters
     ----------
     model : RBDRegressor
@@ -169,13 +180,13 @@ def merge_mjcf(
     -------
     tuple of str
         Names of the effects that MJCF cannot represent, which are written to
-        ``<path>.skidyn.json``.
+        ``<path>.skidyn.json``, with a reason for elasticity and backlash.
 
     Raises
     ------
     SkidynError
-        A joint is not in the file, the kinematics differ, or a body would get a physically
-        inconsistent inertia.
+        A joint is not in the file, the kinematics differ, the name of a passive joint is taken, or
+        a body would get a physically inconsistent inertia.
     ImportError
         MuJoCo is not installed.
 
@@ -247,9 +258,12 @@ def merge_mjcf(
             edits.replace(inertial, text)
         else:
             edits.insert_first(element, text)
+    series, reasons = series_joints(model, own)
+    names = {world.joint(k).name for k in range(world.njnt)}
+    reasons |= insert_series(edits, joints, bodies, names, world.nkey, series, robot)
     data = edits.text()
     _check_loads(mujoco, data, edits.path)
-    return write_files(path, data, model, own.left)
+    return write_files(path, data, model, [t for t in own.left if t not in series], reasons)
 
 
 def _joints_in_bodies(root: Element) -> tuple[dict[str, Element], dict[str, Element]]:

@@ -18,6 +18,7 @@ from skidyn.export._bodies import (
     numbers,
 )
 from skidyn.export._files import PathLike, write_files
+from skidyn.export._series import series_joints
 from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
 
@@ -30,8 +31,9 @@ def write_mjcf(model: RBDRegressor | Robot, path: PathLike) -> tuple[str, ...]:
 
     Viscous and Coulomb friction become ``damping`` and ``frictionloss``, rotor inertia
     ``armature``, a spring ``stiffness`` and ``springref``; links fixed to a body become sites,
-    joints that mimic another are coupled to it by an equality constraint. Other effects are written
-    to ``<path>.skidyn.json``.
+    joints that mimic another are coupled to it by an equality constraint. Joint elasticity and
+    backlash become passive joints in series, as in :func:`merge_mjcf`. Other effects are written to
+    ``<path>.skidyn.json``.
 
     Parameters
     ----------
@@ -64,6 +66,8 @@ def write_mjcf(model: RBDRegressor | Robot, path: PathLike) -> tuple[str, ...]:
     own = described(model, MUJOCO)
     robot, values = own.robot, own.parameters
     dynamics = mujoco_attributes(own)
+    series, reasons = series_joints(model, own)
+    passive = {joint.place: joint for joint in series.values()}
     root = ElementTree.Element("mujoco", model=robot.name)
     # Angles and inertias are used unchanged: nothing is derived from shapes or rounded.
     ElementTree.SubElement(root, "compiler", angle="radian", inertiafromgeom="false")
@@ -73,12 +77,19 @@ def write_mjcf(model: RBDRegressor | Robot, path: PathLike) -> tuple[str, ...]:
     for body in range(robot.n_bodies):
         parent = int(robot.tree.parents[body])
         carrier = elements[parent] if parent >= 0 else world
-        elements.append(_add_body(carrier, robot, body, values[body], dynamics))
+        element = _add_body(carrier, robot, body, values[body], dynamics)
+        elements.append(element)
+        place = int(robot.tree.coordinates[body])
+        if place in passive:
+            motor = element[-1].attrib
+            placed = {key: motor[key] for key in ("type", "axis")}
+            ElementTree.SubElement(element, "joint", placed | passive[place].attributes())
     _add_sites(world, elements, robot)
     _add_ties(root, robot)
     ElementTree.indent(root)
     text = ElementTree.tostring(root, "unicode") + "\n"
-    return write_files(path, text, model, own.left)
+    left = [term for term in own.left if term not in series]
+    return write_files(path, text, model, left, reasons)
 
 
 def _add_body(

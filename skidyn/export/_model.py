@@ -94,6 +94,11 @@ def is_carried(term: Term) -> bool:
     return term.kind == "payload" and term.shape.get("trajectories") is None
 
 
+def is_lasting(term: Term) -> bool:
+    """Whether a term acts in all recordings, and not in some of them only."""
+    return all(term.shape.get(key) is None for key in ("trajectory", "trajectories"))
+
+
 def traced(model: RBDRegressor, terms: Sequence[Term]) -> Program:
     tape, n = Tape(), model.robot_.n_joints
     robot: Any = SymbolicRobot(model.robot_, tape)
@@ -112,8 +117,8 @@ def traced(model: RBDRegressor, terms: Sequence[Term]) -> Program:
 
 def is_static(model: RBDRegressor, term: Term) -> bool:
     """Whether an effect can be recorded with the same torque."""
-    if {"trajectory", "trajectories"} & {k for k, v in term.shape.items() if v is not None}:
-        return False  # acts in some of the recordings only
+    if not is_lasting(term):
+        return False
     try:
         program = traced(model, [term])
     except Exception:  # any error of an effect given symbols: it cannot be recorded

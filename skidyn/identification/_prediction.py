@@ -9,7 +9,7 @@ from typing import Any
 from sklearn.utils.validation import check_is_fitted
 
 from skidyn._signals import Array, Signals
-from skidyn.effects import Term
+from skidyn.effects import MotorLoadFriction, Term
 from skidyn.identification._reading import Reading
 from skidyn.identification._uncertainty import PredictionBands, find_bands
 
@@ -88,13 +88,18 @@ class Prediction(Reading):
     def _effects(self, signals: Signals, torque: Array) -> Iterator[tuple[Term, dict[int, Array]]]:
         """Columns of every effect, each computed with the torque of the effects before it.
 
+        Effects of the motor's torque follow those that need no fit, and solve for it.
+
         Effects on the transmission use the torque of the bodies: the rigid body's, given as
         ``torque``, and that of loads and contacts, which come first. Effects of the sensor come
         last and use the model's. The torque of each is added to ``torque``.
         """
-        order = sorted(
-            self.effect_terms_, key=lambda term: (not term.effect.on_bodies, term.effect.needs_fit)
-        )
+
+        def rank(term: Term) -> tuple[bool, bool, bool]:
+            effect = term.effect
+            return not effect.on_bodies, effect.needs_fit, not effect.sees_motor
+
+        order = sorted(self.effect_terms_, key=rank)
         on_sensor = any(term.effect.sees_model for term in order)
         smooth = torque.copy()
         signals = signals.with_(load=torque.copy(), inertial_parameters=self.inertial_parameters_)
@@ -102,6 +107,13 @@ class Prediction(Reading):
             state = signals
             if term.effect.sees_model:
                 state = signals.with_(model_torque=torque.copy(), smooth_torque=smooth.copy())
+            effect = term.effect
+            if isinstance(effect, MotorLoadFriction):
+                state = signals.with_(model_torque=torque.copy())
+                own, (j,) = self.effect_coefficients_[term], term.places
+                motor = torque.copy()
+                motor[:, j] = effect.motor_torque(state, j, own, term.shape)
+                state = state.with_(model_torque=motor)
             blocks = term.torque_columns(state)
             for j, block in blocks.items():
                 own = block @ self.effect_coefficients_[term]

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn.effects import Effect, get_effect, list_effects
+from skidyn.effects import Effect, get_effect, searched_kinds
 from skidyn.measurement._fits import Fits, Reading
 from skidyn.measurement._near_bodies import LOOSE, POWERS, ExtraColumns, Factored, NearBodies
 
@@ -135,7 +135,7 @@ def left_by_effects(fits: Fits, joint: int, rows: NDArray[np.bool_]) -> tuple[fl
 
 def _effects() -> Iterator[Effect]:
     """Effects of the catalogue that depend only on the present motion."""
-    for kind in list_effects():
+    for kind in searched_kinds():
         effect = get_effect(kind)
         plain = not set(effect.needs) - {"robot"} and effect.search != "spectrum"
         # the direction of gravity is a reading itself

@@ -36,6 +36,10 @@ __all__ = [
 ]
 
 # For other packages of skidyn; no part of the public interface.
-from skidyn.simulation._additions import InTurn as InTurn, judge_in_turn as judge_in_turn
+from skidyn.simulation._additions import (
+    InTurn as InTurn,
+    Setting as Setting,
+    judge_in_turn as judge_in_turn,
+)
 from skidyn.simulation._score import HORIZON as HORIZON
 from skidyn.simulation._servo_laws import LAWS as LAWS

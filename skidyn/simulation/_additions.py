@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,7 @@ from skidyn.simulation._score import (
     pooled_errors,
     simulation_errors,
 )
+from skidyn.simulation._servo import servo_torque
 
 Rows = NDArray[np.intp]
 
@@ -93,6 +94,25 @@ def judge_additions(
 
 
 @dataclass(frozen=True)
+class Setting:
+    """A setting of the servo of one joint that differs from the stated one.
+
+    It changes both the torque of the servos, to which a model is fitted, and the controller that
+    drives the simulated motion.
+
+    Parameters
+    ----------
+    joint : int
+        Joint, counted from 1.
+    values : mapping of str to float
+        By name of the argument of :class:`Controller`.
+    """
+
+    joint: int
+    values: Mapping[str, float]
+
+
+@dataclass(frozen=True)
 class InTurn:
     """Results of additions one by one, and together.
 
@@ -106,11 +126,15 @@ class InTurn:
         cannot be simulated.
     together : SimulationVerdict
         The model with all added effects compared with the model without any.
+    compared : list of SimulationVerdict or None
+        Errors with and without every addition, also where they give no evidence; None if it cannot
+        be simulated.
     """
 
     verdicts: list[SimulationVerdict | None]
     added: list[bool]
     together: SimulationVerdict
+    compared: list[SimulationVerdict | None] = field(default_factory=list)
 
     @property
     def silent(self) -> bool:
@@ -120,40 +144,53 @@ class InTurn:
 
 def judge_in_turn(
     model: RBDRegressor,
-    additions: Sequence[Iterable[Any]],
+    additions: Sequence[Iterable[Any] | Setting],
     X: Any,
     y: Any,
     *,
     controller: Controller | None = None,
     horizon: float | None = HORIZON,
+    servos: Controller | None = None,
 ) -> InTurn:
-    """Judge additions like :func:`judge_additions`, and also their common result."""
+    """Judge additions like :func:`judge_additions`, and also their common result.
+
+    An addition may also be a setting of a servo. ``servos`` is then the controller as stated, whose
+    torque replaces y until a setting is added.
+    """
     folds = _folds(model, X)
-    torque = np.asarray(y, dtype=float)
+    torque = np.asarray(y, dtype=float) if servos is None else servo_torque(servos, X)
+    controller = controller if controller is None or servos is None else servos
     if model.consistent is False:
         model = clone(model).set_params(consistent=True)
     used: list[Any] = []
     first = errors = _held_out(model, used, X, torque, folds, controller, horizon)
     verdicts: list[SimulationVerdict | None] = []
+    compared: list[SimulationVerdict | None] = []
     added = []
     for addition in additions:
-        terms = [*used, *addition]
-        if len(terms) == len(used):  # a setting of the servo, which is no part of the model
-            verdicts.append(None)
-            added.append(True)
-            continue
+        terms, given, drive, stated = used, torque, controller, servos
+        if isinstance(addition, Setting):
+            assert servos is not None
+            n = torque.shape[1]
+            stated = servos.with_joint(n, addition.joint, **addition.values)
+            given = servo_torque(stated, X)
+            drive = None if controller is None else stated
+        else:
+            terms = [*used, *addition]
         try:
-            after = _held_out(model, terms, X, torque, folds, controller, horizon)
+            after = _held_out(model, terms, X, given, folds, drive, horizon)
         except SkidynError:
             verdicts.append(None)
+            compared.append(None)
             added.append(False)
             continue
         verdict = compare_errors(errors, after)
+        compared.append(verdict)
         verdicts.append(verdict if min(_typical(errors), _typical(after)) < 1.0 else None)
         added.append(verdicts[-1] is None or not verdict.worsens)
         if added[-1]:
-            used, errors = terms, after
-    return InTurn(verdicts, added, compare_errors(first, errors))
+            used, errors, torque, controller, servos = terms, after, given, drive, stated
+    return InTurn(verdicts, added, compare_errors(first, errors), compared)
 
 
 def _folds(model: RBDRegressor, X: Any) -> list[tuple[Rows, Rows]]:

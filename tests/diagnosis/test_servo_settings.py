@@ -73,9 +73,27 @@ def test_a_finding_is_added_to_the_controller(weak, found):
         found.add("servo_gain", [2])
 
 
-def test_simulation_has_no_verdict_on_a_setting(found):
-    assert found.judge_by_simulation(controller=found.controller) == [None]
-    assert found.vetoed == []
+def test_a_correct_setting_improves_the_simulated_motion(found):
+    limited = found.controller
+    (verdict,) = found.judge_by_simulation(controller=found.controller)
+    assert verdict.improves and found.vetoed == []
+    assert found.controller.limit.tolist() == limited.limit.tolist()
+    assert found.to_dict()["effects"][0]["simulation"]["says"] == "improves"
+    assert "falls" in found.story()["simulation"]["text"]
+
+
+def test_a_setting_that_worsens_the_motion_is_told_and_not_added(servo_log, found):
+    fair = servo_log({})
+    wrong = diagnosed(fair)
+    wrong.findings = [finding] = found.findings  # a limit that these servos do not have
+    (verdict,) = wrong.judge_by_simulation(controller=fair.controller)
+    assert verdict.worsens and wrong.vetoed == [finding]
+    assert np.isinf(wrong.controller.checked(2).limit).all()
+    assert len([w for w in wrong.warnings if "worsens the simulated motion" in w]) == 1
+    torque = servo_torque(fair.controller, fair.log)
+    plain = RBDRegressor(fair.robot, FRICTION).fit(fair.log, torque)
+    assert wrong.model.predict(fair.log) == pytest.approx(plain.predict(fair.log))
+    assert "worsens the motion" in wrong.story()["simulation"]["text"]
 
 
 def test_a_voltage_is_told_from_a_current(servo_log):

@@ -37,12 +37,14 @@ KINDS = {
 }
 #: Six joints take most of the time, and a shorter log shows as much on them.
 SHORT = {"n_trajectories": 6, "duration": 6.0}
-#: Those of tests/diagnosis/test_diagnosis.py and test_servo_settings.py.
+#: Those of tests/diagnosis/test_diagnosis.py, test_servo_settings.py and test_motor_load.py.
 ELSEWHERE = {
     *("viscous", "coulomb", "offset", "asymmetric_friction", "stribeck", "nonlinear_viscous"),
     *("load_dependent_friction", "dahl", "rotor_inertia", "spring", "torque_ripple", "payload"),
     *("time_delay", "temperature_friction"),
     *("servo_gain", "servo_current", "servo_voltage", "servo_deadband"),
+    *("motor_load_friction", "stribeck_load_friction"),
+    *("directional_load_friction", "quadratic_load_friction"),
 }
 
 
