@@ -167,7 +167,7 @@ BASH = shutil.which("bash")
         ("skidyn diagnose ru", ["run1.csv", "run2.csv"]),
         ("skidyn diagnose run1.csv run2", ["run2.csv"]),
         ("skidyn diagnose run1.csv --urdf a", ["arm.urdf"]),
-        ("skidyn add --effect str", ["stribeck"]),
+        ("skidyn add --effect str", ["stribeck", "stribeck_load_friction"]),
         ("skidyn diagnose run1.csv --effects stribeck,dah", ["stribeck,dahl"]),
         ("skidyn export run1.csv --ur", ["--urdf"]),
     ],
