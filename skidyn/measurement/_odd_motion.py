@@ -135,7 +135,7 @@ def stuck_positions(signals: Signals) -> dict[int, list[int]]:
         rows = signals.trajectory == run
         for k in np.flatnonzero(np.ptp(signals.q[rows], axis=0) == 0):
             steps = signals.dq[rows, k][1:] * np.abs(np.diff(signals.clock[rows]))
-            swept = np.ptp(np.cumsum(steps))  # noise of the velocity cancels
+            swept = np.ptp(np.cumsum(np.append(0.0, steps)))  # noise of the velocity cancels
             if swept > LEAST_SWEPT and signals.dq[rows, k].std() > LEAST_SPEED:
                 found.setdefault(int(k), []).append(int(run))
     return found
