@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -113,6 +113,27 @@ def rows_together(candidates: Sequence[Candidate], counts: NDArray[np.int64]) ->
         return candidate.rows.get(joint, np.zeros((int(counts[joint]), candidate.width)))
 
     return {j: np.hstack([block(c, j) for c in candidates]) for j in reached}
+
+
+def rows_within(
+    problem: Problem, rows: Mapping[int, Array], recordings: Iterable[int]
+) -> dict[int, Array]:
+    """Averaged columns that are zero outside some recordings; windows do not cross their borders.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows.
+    rows : mapping of int to ndarray of shape (n_rows_j, k)
+        Columns in all recordings, per joint that they reach.
+    recordings : iterable of int
+        Numbers of trajectories.
+    """
+    own = list(recordings)
+    return {
+        j: np.where(np.isin(problem.rows.trajectory[j], own)[:, None], block, 0.0)
+        for j, block in rows.items()
+    }
 
 
 def catalogue_candidates(

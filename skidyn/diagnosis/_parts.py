@@ -24,13 +24,13 @@ from numpy.typing import NDArray
 from scipy.special import gammaln
 
 from skidyn._signals import Array
-from skidyn.diagnosis._candidates import Candidate
+from skidyn.diagnosis._candidates import Candidate, rows_within
 from skidyn.diagnosis._rule import ROUNDS, Tester
-from skidyn.effects import Term
-from skidyn.evidence import RIDGE, Problem, column_sizes, felt_columns, gram_of, products_with
+from skidyn.evidence import Problem
 
-#: Fewest recordings of which a part is looked for.
-FEWEST = 3
+#: Fewest recordings of which a part is looked for, and fewest recordings of a part: a single one
+#: does not show that an effect returns with the same shape.
+FEWEST, LEAST_PART = 3, 2
 #: Shapes of a kind on the same joints that are tried in full.
 SHAPES = 3
 #: Largest share of what the part explains that the same effect in all recordings may explain.
@@ -64,34 +64,18 @@ class PartScan:
 
     Parameters
     ----------
-    problem : Problem
-        Rows.
-    blocks : sequence of dict
-        Columns of the model beside the rigid body.
-    sigma : ndarray of shape (n_joints,)
-        Noise of one row.
-    target : sequence of ndarray
-        Averaged torque.
+    tester : Tester
+        Tests given the model.
+
+    Attributes
+    ----------
+    names : ndarray of shape (n,)
+        Numbers of the trajectories.
     """
 
-    def __init__(
-        self,
-        problem: Problem,
-        blocks: Sequence[dict[int, Array]],
-        sigma: Array,
-        target: Sequence[Array],
-    ) -> None:
-        felt, width = felt_columns(problem, blocks, sigma)
-        y = {j: t / s for j, (t, s) in enumerate(zip(target, sigma, strict=True))}
-        gram = gram_of(felt, width)
-        scale = column_sizes(gram)
-        normal = gram / scale[:, None] / scale + RIDGE * np.eye(width)
-        self._inverse = np.linalg.inv(normal) / scale[:, None] / scale
-        solution = self._inverse @ products_with(felt, y, width)
-        self._felt, self._sigma = felt, sigma
-        self._residual = [y[j] - f.rows @ solution[f.places] for j, f in enumerate(felt)]
-        self.names = np.unique(np.concatenate(problem.rows.trajectory))
-        inside = [t == self.names[:, None] for t in problem.rows.trajectory]
+    def __init__(self, tester: Tester) -> None:
+        self.tester, self.names = tester, tester.problem.rows.recordings
+        inside = [t == self.names[:, None] for t in tester.problem.rows.trajectory]
         self._rows = [[np.flatnonzero(own) for own in of_joint] for of_joint in inside]
         self._inside = [of_joint.astype(float) for of_joint in inside]
 
@@ -100,25 +84,25 @@ class PartScan:
         n, k = len(self.names), candidate.width
         own, score = np.zeros((n, k)), np.zeros((n, k))
         for j, rows in candidate.rows.items():
-            block = rows / self._sigma[j]
+            block = rows / self.tester.sigma[j]
             own += self._inside[j] @ block**2
-            score += self._inside[j] @ (block * self._residual[j][:, None])
+            score += self._inside[j] @ (block * self.tester.residual[j][:, None])
         seen = own > BLIND * own.max(axis=0)
         return float(np.sum(np.where(seen, score**2 / np.where(seen, own, 1.0), 0.0)))
 
     def part(self, candidate: Candidate) -> Part | None:
         """The best part of the recordings, None if the effect in all of them explains as much."""
-        n, k = len(self.names), candidate.width
-        score, cross = np.zeros((n, k)), np.zeros((n, len(self._inverse), k))
+        n, k, model = len(self.names), candidate.width, self.tester
+        score, cross = np.zeros((n, k)), np.zeros((n, len(model.inverse), k))
         own = np.zeros((n, k, k))
         for j, rows in candidate.rows.items():
-            block, felt = rows / self._sigma[j], self._felt[j]
+            block, felt = rows / model.sigma[j], model.felt[j]
             for i, here in enumerate(self._rows[j]):
                 b = block[here]
                 own[i] += b.T @ b
-                score[i] += b.T @ self._residual[j][here]
+                score[i] += b.T @ model.residual[j][here]
                 cross[i, felt.places] += felt.rows[here].T @ b
-        shared = np.einsum("ipk,pq,jql->ijkl", cross, self._inverse, cross, optimize=True)
+        shared = np.einsum("ipk,pq,jql->ijkl", cross, model.inverse, cross, optimize=True)
         return best_part(self.names, score, own, shared)
 
 
@@ -160,10 +144,11 @@ def best_part(
             .cumsum(0)
             .cumsum(1)[np.arange(len(order)), np.arange(len(order))]
         )
-        drops = _drops(score[order].cumsum(0), grams)[:-1] - prices
-        m = int(np.argmax(drops)) if len(drops) else 0
-        if len(drops) and (best is None or drops[m] > best.drop):
-            best = Part(tuple(sorted(int(names[i]) for i in order[: m + 1])), float(drops[m]))
+        drops = (_drops(score[order].cumsum(0), grams)[:-1] - prices)[LEAST_PART - 1 :]
+        m = LEAST_PART + int(np.argmax(drops)) if len(drops) else 0
+        if m and (best is None or drops[m - LEAST_PART] > best.drop):
+            recordings = tuple(sorted(int(names[i]) for i in order[:m]))
+            best = Part(recordings, float(drops[m - LEAST_PART]))
     return best if best is not None and in_all < MOST_IN_ALL * best.drop else None
 
 
@@ -201,9 +186,7 @@ def n_parts(n: int, m: int) -> float:
 
 
 def part_candidates(
-    problem: Problem,
     pool: Sequence[Candidate],
-    scan: PartScan,
     tester: Tester,
     significant: Callable[[float, Candidate], bool],
     refined: Callable[[Candidate], Candidate],
@@ -213,12 +196,8 @@ def part_candidates(
 
     Parameters
     ----------
-    problem : Problem
-        Rows.
     pool : sequence of Candidate
         Effects that may be missing, in all recordings.
-    scan : PartScan
-        Parts for the present model.
     tester : Tester
         Tests given the present model.
     significant : callable
@@ -228,6 +207,7 @@ def part_candidates(
     least : float
         Squared error that an effect must remove, in units of the noise.
     """
+    problem, scan = tester.problem, PartScan(tester)
     if len(scan.names) < FEWEST:
         return []
     sites: dict[tuple[_Form, tuple[int, ...]], list[tuple[float, Candidate]]] = defaultdict(list)
@@ -253,14 +233,13 @@ def part_candidates(
     for form, part, inside in offered:
         # the others are at best second findings, which the next round refines
         near = part.drop > NEAR * largest
-        settled = _settled(problem, scan, refined, part, inside) if near else (part.drop, inside)
+        settled = _settled(scan, refined, part, inside) if near else (part.drop, inside)
         found[form].append(settled)
     best_first = sorted(found.values(), key=lambda of_form: -max(drop for drop, _ in of_form))
     return [_same_part(of_form) for of_form in best_first]
 
 
 def _settled(
-    problem: Problem,
     scan: PartScan,
     refined: Callable[[Candidate], Candidate],
     part: Part,
@@ -270,9 +249,10 @@ def _settled(
 
     On the grid, the shape may hide the effect in recordings where it is weak.
     """
+    problem = scan.tester.problem
     for _ in range(ROUNDS if inside.n_shapes else 0):
-        term = refined(inside).term
-        everywhere = replace(inside, term=in_all(term), rows=problem.term_rows(in_all(term)))
+        term = refined(inside).term.everywhere
+        everywhere = replace(inside, term=term, rows=problem.term_rows(term))
         again = scan.part(everywhere)
         if again is None or again.drop <= part.drop:
             break
@@ -281,12 +261,6 @@ def _settled(
         if same:
             break
     return part.drop, inside
-
-
-def in_all(term: Term) -> Term:
-    """The same term in all recordings."""
-    shape = {name: value for name, value in term.shape.items() if name != "trajectories"}
-    return Term(term.kind, term.joints, shape)
 
 
 def _same_part(found: list[tuple[float, Candidate]]) -> list[Candidate]:
@@ -305,10 +279,11 @@ def _same_part(found: list[tuple[float, Candidate]]) -> list[Candidate]:
 
 def within(problem: Problem, candidate: Candidate, recordings: tuple[int, ...]) -> Candidate:
     """A candidate that acts in some recordings only."""
-    rows = {
-        j: np.where(np.isin(problem.rows.trajectory[j], recordings)[:, None], block, 0.0)
-        for j, block in candidate.rows.items()
-    }
-    n = len(np.unique(np.concatenate(problem.rows.trajectory)))
+    tried = n_parts(len(problem.rows.recordings), len(recordings))
     term = candidate.term.with_shape(trajectories=recordings)
-    return replace(candidate, term=term, rows=rows, n_parts=n_parts(n, len(recordings)))
+    return replace(
+        candidate,
+        term=term,
+        rows=rows_within(problem, candidate.rows, recordings),
+        n_parts=tried,
+    )

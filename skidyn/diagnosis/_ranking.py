@@ -24,7 +24,7 @@ from skidyn.diagnosis._hypothesis import (
     some_recordings,
     within_recordings,
 )
-from skidyn.diagnosis._parts import PartScan, part_candidates
+from skidyn.diagnosis._parts import part_candidates
 from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
 from skidyn.diagnosis._recordings import choose
 from skidyn.diagnosis._rule import (
@@ -245,7 +245,7 @@ class RankingSearch(SearchState):
         tester = self.tester(self.chosen)
         if tester.test(candidate.rows).coefficients[0] >= 0:
             return candidate
-        names = np.unique(np.concatenate(self.problem.rows.trajectory)).tolist()
+        names = self.problem.rows.recordings.tolist()
         rest = tuple(name for name in names if name not in candidate.term.trajectories)
         term = candidate.term.with_shape(trajectories=rest)
         other = replace(candidate, term=term, rows=self.problem.term_rows(term))
@@ -253,20 +253,12 @@ class RankingSearch(SearchState):
 
     def _parts(self) -> list[list[Candidate]]:
         """Effects of a part of the recordings, those that may be possible."""
-        scan = PartScan(self.problem, self.blocks, self.sigma, self.target)
 
         def refined(candidate: Candidate) -> Candidate:
             return refine(self.problem, self.blocks, [candidate], self.sigma, self.target)[0]
 
-        found = part_candidates(
-            self.problem,
-            self.pool,
-            scan,
-            self.tester(self.chosen),
-            self.significant,
-            refined,
-            self.settings.least_gain,
-        )
+        tester, least = self.tester(self.chosen), self.settings.least_gain
+        found = part_candidates(self.pool, tester, self.significant, refined, least)
         return [own for own in found if all(self.can_be(c, self.chosen) for c in own)]
 
     def _each_by_itself(self, candidate: Candidate) -> list[Candidate]:

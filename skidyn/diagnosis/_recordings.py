@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from skidyn.diagnosis._candidates import Candidate, rows_together
+from skidyn.diagnosis._candidates import Candidate, rows_together, rows_within
 from skidyn.diagnosis._rule import Tester
 from skidyn.effects import Term, get_effect
 from skidyn.evidence import Problem
@@ -37,7 +37,7 @@ def groups_of_recordings(problem: Problem) -> list[tuple[int, ...]]:
     list of tuple of int
         Numbers of trajectories; empty with fewer than two.
     """
-    names = [int(n) for n in np.unique(np.concatenate(problem.rows.trajectory))]
+    names = problem.rows.recordings.tolist()
     if len(names) < 2:
         return []
     later = [tuple(names[k:]) for k in range(1, len(names) - 1)]
@@ -67,11 +67,7 @@ def recording_candidates(problem: Problem, kinds: Iterable[str]) -> list[Candida
             whole = problem.term_rows(Term.at(kind, joints))
             for group in groups_of_recordings(problem):
                 term = Term.at(kind, joints, {"trajectories": group})
-                rows = {
-                    j: np.where(np.isin(problem.rows.trajectory[j], group)[:, None], block, 0.0)
-                    for j, block in whole.items()
-                }
-                candidates.append(Candidate(kind, term, rows))
+                candidates.append(Candidate(kind, term, rows_within(problem, whole, group)))
     return candidates
 
 

@@ -279,6 +279,15 @@ class Tester:
         Noise of one row, by which joints are weighted.
     target : sequence of ndarray
         Averaged torque of every joint.
+
+    Attributes
+    ----------
+    felt : list of Felt
+        The model's columns by joint, in units of the noise.
+    inverse : ndarray of shape (n_columns, n_columns)
+        Inverse of their products.
+    residual : list of ndarray of shape (n_rows_j,)
+        By joint, in units of the noise.
     """
 
     def __init__(
@@ -297,9 +306,9 @@ class Tester:
     def _fit(self, felt: list[Felt], gram: Array, right: Array, target: list[Array]) -> None:
         scale = column_sizes(gram)
         normal = gram / scale[:, None] / scale + RIDGE * np.eye(len(scale))
-        self._felt, self._gram, self._right, self._target = felt, gram, right, target
-        self._inverse = np.linalg.inv(normal) / scale[:, None] / scale
-        solution = self._inverse @ right
+        self.felt, self._gram, self._right, self._target = felt, gram, right, target
+        self.inverse = np.linalg.inv(normal) / scale[:, None] / scale
+        solution = self.inverse @ right
         self.residual = [t - f.rows @ solution[f.places] for f, t in zip(felt, target, strict=True)]
         self._free = max(1, int(self.problem.rows.counts.sum()) - len(scale))
 
@@ -312,7 +321,7 @@ class Tester:
             Averaged columns, per joint they reach.
         """
         wider = copy(self)
-        felt, gram, right = list(self._felt), self._gram, self._right
+        felt, gram, right = list(self.felt), self._gram, self._right
         for block in blocks:
             scaled = {j: rows / self.sigma[j] for j, rows in block.items()}
             cross = products_with(felt, scaled, len(gram))
@@ -358,7 +367,7 @@ class Tester:
         """Tests with the same model and a multiple of the noise of every joint."""
         other = copy(self)
         other.sigma = self.sigma * shares
-        felt = [Felt(f.places, f.rows / x) for f, x in zip(self._felt, shares, strict=True)]
+        felt = [Felt(f.places, f.rows / x) for f, x in zip(self.felt, shares, strict=True)]
         target = [y / x for y, x in zip(self._target, shares, strict=True)]
         width = len(self._gram)
         other._fit(
@@ -437,8 +446,8 @@ class Tester:
     def _swept(self, rows: dict[int, Array]) -> list[Array]:
         """Columns minus the part that the model can represent, on the rows of every joint."""
         scaled = {j: b / self.sigma[j] for j, b in rows.items()}
-        mimic = self._inverse @ products_with(self._felt, scaled, len(self._inverse))
-        return [scaled.get(j, 0.0) - f.rows @ mimic[f.places] for j, f in enumerate(self._felt)]
+        mimic = self.inverse @ products_with(self.felt, scaled, len(self.inverse))
+        return [scaled.get(j, 0.0) - f.rows @ mimic[f.places] for j, f in enumerate(self.felt)]
 
     def _stationary(self, new: list[Array], left: list[Array], drop: float, k: int) -> float:
         """P-value of the drop for a stationary residual."""

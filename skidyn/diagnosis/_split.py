@@ -7,7 +7,7 @@ its load. They are judged on interleaved quarters of every trajectory instead.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array
-from skidyn.diagnosis._candidates import Candidate
+from skidyn.diagnosis._candidates import Candidate, rows_within
 from skidyn.diagnosis._profile import QUARTERS
 from skidyn.effects import Term, get_effect
 from skidyn.evidence import Felt, Problem, column_sizes, felt_columns, left_out_errors
@@ -67,7 +67,7 @@ def split_effects(
     target : sequence of ndarray
         Averaged torque.
     """
-    names = np.unique(np.concatenate(problem.rows.trajectory))
+    names = problem.rows.recordings
     if problem.robot is None or len(names) < 2:
         return []
     y = [t / s for t, s in zip(target, sigma, strict=True)]
@@ -91,18 +91,9 @@ def split_effects(
                 continue
             drop, chosen = max(drops, key=lambda item: float(item[0].sum()))
             split = term.with_shape(trajectories=tuple(sorted(int(name) for name in chosen)))
-            rows = _within(problem, term, chosen)
+            rows = rows_within(problem, problem.term_rows(term), chosen)
             found.append(Split(Candidate(kind, split, rows), drop, is_apart))
     return found
-
-
-def _within(problem: Problem, term: Term, names: Iterable[Any]) -> dict[int, Array]:
-    """Averaged columns of a term in some trajectories only; windows do not cross their borders."""
-    own = list(names)
-    return {
-        j: np.where(np.isin(problem.rows.trajectory[j], own)[:, None], block, 0.0)
-        for j, block in problem.term_rows(term).items()
-    }
 
 
 @dataclass(frozen=True)

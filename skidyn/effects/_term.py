@@ -104,6 +104,11 @@ class Term:
         return {k: v for k, v in self.shape.items() if k != "trajectories"}
 
     @property
+    def everywhere(self) -> Term:
+        """The same term in all trajectories."""
+        return Term(self.kind, self.joints, self._own_shape)
+
+    @property
     def is_further_form(self) -> bool:
         """Whether the formula differs from the plain one of its kind."""
         return not self.effect.form_names.isdisjoint(self.shape)

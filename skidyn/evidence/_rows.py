@@ -71,6 +71,11 @@ class Rows:
         return np.array([w.shape[0] for w in self.weights])
 
     @cached_property
+    def recordings(self) -> NDArray[np.int64]:
+        """Numbers of the trajectories of the rows of all joints, ascending."""
+        return np.unique(np.concatenate(self.trajectory))
+
+    @cached_property
     def spans(self) -> tuple[NDArray[np.intp], Array, Array]:
         """Positions of the rows of all joints, one joint after another, in their trajectories.
 
