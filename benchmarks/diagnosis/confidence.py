@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reliability of the stated confidence of findings, and weights fitted to it.
 
-    python benchmarks/diagnosis/confidence.py TRUTH.json REPORTS [TRUTH.json REPORTS ...]
+    python benchmarks/diagnosis/confidence.py TRUTH REPORTS [TRUTH REPORTS ...]
 
-``REPORTS`` contains one report per log, written by ``practice.py --reports`` and named after its
-case. An effect on several joints counts once.
+``TRUTH`` is a file with the truths of all logs, or a folder with one file for each; ``REPORTS``
+contains one report per log, written by ``practice.py --reports`` and named after its case. An
+effect on several joints counts once.
 """
 
 from __future__ import annotations
 
+import argparse
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -35,10 +36,17 @@ def right(effect: dict, hidden: dict) -> bool:
     return False
 
 
+def truths(path: Path) -> dict[str, dict]:
+    """What is hidden in every log, by its name."""
+    if path.is_dir():
+        return {file.stem: json.loads(file.read_text()) for file in path.glob("*_*.json")}
+    cases = json.loads(path.read_text())
+    return {t["case"]: t for t in (cases.values() if isinstance(cases, dict) else cases)}
+
+
 def names(truth: Path, reports: Path) -> list[tuple[float, bool, list[float]]]:
     """Stated probability, whether the name is right, and what tells, of every name."""
-    cases = json.loads(truth.read_text())
-    table = {t["case"]: t for t in (cases.values() if isinstance(cases, dict) else cases)}
+    table = truths(truth)
     rows = []
     for file in sorted(reports.glob("*.json")):
         if file.stem not in table:
@@ -66,7 +74,15 @@ def names(truth: Path, reports: Path) -> list[tuple[float, bool, list[float]]]:
 
 
 def main() -> None:
-    paths = [Path(p) for p in sys.argv[1:]]
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "paths", nargs="+", type=Path, metavar="TRUTH REPORTS", help="any number of pairs"
+    )
+    paths = parser.parse_args().paths
+    if len(paths) % 2:
+        parser.error(f"expected pairs of truths and reports, got {len(paths)} paths")
     rows = []
     for truth, reports in zip(paths[::2], paths[1::2], strict=True):
         rows += names(truth, reports)
