@@ -10,6 +10,7 @@ import numpy as np
 
 from skidyn._signals import SIGN_BLUR, Signals
 from skidyn.effects._base import Array, Coefficient, Effect, Shape
+from skidyn.effects._springs import stiffens
 
 _RATIO = Shape(
     "ratio", "1", (1.0, -1.0), -np.inf, np.inf, spacing="linear", scales=False, has_interval=False
@@ -156,20 +157,32 @@ class CouplingSpring(_PairEffect):
                 shape["x0"] = float(x.min() + x.max()) / 2
             for name in {"stiffening", "softening"} & set(shape):
                 shape[name] *= float(signals.unit[i])
-        return shapes
+        # with a guessed ratio, the coordinate may be far larger than the unit of its joint
+        return [shape for shape in shapes if self._finite(signals, joints, shape)]
 
     def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
         if not super().admissible(signals, joints, shape):
             return False
         if "x0" not in shape:
             return True
-        x = signals.q[:, joints[0]] + shape["ratio"] * signals.q[:, joints[1]]
-        return bool(x.min() < shape["x0"] < x.max())  # the slack position is within the log
+        x = self._stretch(signals, joints, shape)
+        # the slack position is within the log
+        return bool(x.min() < 0 < x.max()) and self._finite(signals, joints, shape)
+
+    def _finite(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
+        x = self._stretch(signals, joints, shape)
+        return stiffens(x, shape.get("stiffening", np.inf))
+
+    @staticmethod
+    def _stretch(signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> Array:
+        """The coupled coordinate, from where the spring is slack."""
+        i, j = joints
+        return signals.q[:, i] + shape["ratio"] * signals.q[:, j] - shape.get("x0", 0.0)
 
     def coupled_columns(
         self, signals: Signals, i: int, j: int, ratio: float, **form: float
     ) -> Array:
-        x = signals.q[:, i] + ratio * signals.q[:, j] - form.get("x0", 0.0)
+        x = self._stretch(signals, (i, j), form | {"ratio": ratio})
         if "stiffening" in form:
             force = form["stiffening"] * np.sinh(x / form["stiffening"])
         elif "softening" in form:

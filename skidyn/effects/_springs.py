@@ -18,6 +18,15 @@ FEWEST_TOUCHING, MOST_TOUCHING = 0.001, 0.6
 NARROW, ONE_SIDED = 0.1, 0.15
 
 
+def stiffens(distance: Array, scale: float) -> bool:
+    """Whether a hyperbolic sine with this scale is a spring over these distances.
+
+    Beyond the logarithm of the precision of a number, the largest force exceeds that of most rows
+    so far that they no longer count, and the force soon overflows.
+    """
+    return bool(np.abs(distance).max() < -np.log(np.finfo(float).eps) * scale)
+
+
 class Offset(Effect):
     """Constant torque: a sensor or current zero, an unbalanced drive."""
 
@@ -114,7 +123,13 @@ class NonlinearSpring(Effect):
             {name: self._start(name, x, signals, joints[0]) for name, x in form.items()}
             for form in self.forms
         ]
-        return [{"q_middle": float((q.min() + q.max()) / 2)}, *forms]
+        finite = [form for form in forms if self._finite(signals, joints, form)]
+        return [{"q_middle": float((q.min() + q.max()) / 2)}, *finite]
+
+    @staticmethod
+    def _finite(signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
+        rest, scale = shape.get("rest", 0.0), shape.get("scale", np.inf)
+        return stiffens(signals.q[:, joints[0]] - rest, scale)
 
     @staticmethod
     def _start(name: str, value: float, signals: Signals, joint: int) -> float:
@@ -128,7 +143,8 @@ class NonlinearSpring(Effect):
         q = signals.q[:, joints[0]]
         if "rest" in shape:
             share = (shape["rest"] - q.min()) / (q.max() - q.min())
-            return bool(ONE_SIDED < share < 1 - ONE_SIDED)
+            inside = bool(ONE_SIDED < share < 1 - ONE_SIDED)
+            return inside and self._finite(signals, joints, shape)
         if "low" not in shape:
             return True
         least = float(np.mean(q < shape["low"])), float(np.mean(q > shape["high"]))

@@ -22,6 +22,10 @@ def test_a_slider_and_a_rotary_joint_can_be_coupled():
     scara = Signals(zero, zero, zero, trajectory=np.zeros(3), prismatic=slides)
     spring = get_effect("coupling_spring")
     assert (2, 3) in spring.sites(scara)
+    travel = zero + np.array([[0.0], [1.0], [3.0]])
+    far = Signals(travel, zero, zero, trajectory=np.zeros(3), prismatic=slides)
+    for shape in spring.grid(far, (1, 2)):  # with a ratio of 100, the hyperbolic sine overflows
+        assert np.abs(spring.torque_columns(far, (1, 2), **shape)[1]).max() < 1e20
     for pair, expected in (((2, 3), (0.01, 0.1, 1.0)), ((0, 1), (1.0,))):
         ratios = sorted({abs(shape["ratio"]) for shape in spring.grid(scara, pair)})
         assert ratios == pytest.approx(expected)
@@ -75,3 +79,11 @@ def test_a_cable_between_two_joints_only_pulls(signals):
         columns = effect.torque_columns(signals, (0, 1), ratio=0.5, x0=0.1, side=side)
         np.testing.assert_allclose(columns[0][:, 0], np.where(side * x > 0, x, 0.0))
         np.testing.assert_allclose(columns[1], 0.5 * columns[0])
+
+
+def test_a_spring_does_not_stiffen_within_a_tiny_share_of_its_travel(signals):
+    effect, x = get_effect("coupling_spring"), signals.q[:, 0] - 10 * signals.q[:, 1]
+    shape = {"ratio": -10.0, "x0": float(np.median(x))}
+    reach = float(np.abs(x - shape["x0"]).max())
+    assert effect.admissible(signals, (0, 1), shape | {"stiffening": reach / 3})
+    assert not effect.admissible(signals, (0, 1), shape | {"stiffening": reach / 400})

@@ -81,3 +81,13 @@ def test_dampers_at_both_ends(signals, columns_of):
     side = np.sign(plain)
     factor = np.maximum(0.0, 1.0 + 0.5 * side * signals.dq[:, 0])
     np.testing.assert_allclose(damped, plain * factor)
+
+
+def test_rubber_is_not_tried_where_its_torque_would_overflow():
+    turns = np.linspace(-200.0, 200.0, 50)[:, None]
+    signals = Signals(turns, 0 * turns, 0 * turns, trajectory=np.zeros(50))
+    effect = get_effect("nonlinear_spring")
+    for shape in effect.grid(signals, (0,)):
+        assert np.abs(effect.torque_columns(signals, (0,), **shape)[0]).max() < 1e20
+    assert effect.admissible(signals, (0,), {"rest": 0.0, "scale": 20.0})
+    assert not effect.admissible(signals, (0,), {"rest": 0.0, "scale": 0.3})
