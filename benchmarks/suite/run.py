@@ -31,6 +31,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.stats import binomtest
 
 from skidyn._writing import write_json
 from skidyn.datasets import SuiteCase, hidden_effect_suite, score_answers, wilson_interval
@@ -154,23 +155,35 @@ def score(peer: str, truths: list[dict], answers: list[dict], motions: dict[str,
 
 @dataclass(frozen=True)
 class Figure:
-    """A column of the table: a share of logs with its interval, or a number, less being better."""
+    """A column of the table: of every log a share or a number, None where there is none."""
 
     title: str
-    of: Callable[[list[dict]], list[float]]
+    of: Callable[[dict], float | None]
     share: bool = False
     middle: Callable[[list[float]], float] = np.mean
     digits: int = 2
 
+    def values(self, cases: list[dict]) -> dict[str, float]:
+        """By log, where there is a value."""
+        every = {c["case"]: self.of(c) for c in cases}
+        return {case: value for case, value in every.items() if value is not None}
 
-def _solved(*contents: str) -> Callable[[list[dict]], list[float]]:
-    return lambda cases: [
-        c["solved"] for c in cases if c["counts"] and c["content"] in (contents or CONTENTS)
-    ]
+    def number(self, values: list[float]) -> float:
+        """The figure of some logs as it is printed; less is better."""
+        number = round(float(self.middle(values)), self.digits)
+        return -number if self.share else number
 
 
-def _kept(name: str) -> Callable[[list[dict]], list[float]]:
-    return lambda cases: [c[name] for c in cases if c.get(name) is not None]
+def _solved(*contents: str, tier: str = "", key: str = "solved") -> Callable[[dict], float | None]:
+    return lambda c: (
+        c[key]
+        if c["counts"] and c["content"] in (contents or CONTENTS) and tier in ("", c["tier"])
+        else None
+    )
+
+
+def _kept(name: str) -> Callable[[dict], float | None]:
+    return lambda c: c.get(name)
 
 
 def _geometric(values: list[float]) -> float:
@@ -182,7 +195,7 @@ FIGURES = (
     Figure("named", _solved("one", "two", "once"), share=True),
     Figure("unknown told", _solved("nameless"), share=True),
     Figure("silent", _solved("nothing"), share=True),
-    Figure("clean", lambda cases: [c["clean"] for c in cases if c["counts"]], share=True),
+    Figure("clean", _solved(key="clean"), share=True),
     Figure("false", _kept("false_claims")),
     Figure("value", _kept("parameter_error"), middle=np.median, digits=3),
     Figure("error", _kept("error_held_out"), middle=_geometric),
@@ -192,6 +205,8 @@ FIGURES = (
 _SECONDS = ("seconds", "seconds_again")
 #: Says nothing, ever: it is printed, but nobody is compared with it.
 YARDSTICK = "silence"
+#: Probability of a difference by chance, from which on two peers are tied.
+CHANCE = 0.05
 
 
 def print_table(peers: dict[str, dict]) -> None:
@@ -200,28 +215,24 @@ def print_table(peers: dict[str, dict]) -> None:
     common = {key: _judged_by_all(peers, key) for key in ("error_held_out", "error_motion")}
     first = next(iter(peers.values()))["cases"]
     counted = [c for c in first if c["counts"]]
+    cases = {
+        name: [
+            c | {key: None for key, logs in common.items() if c["case"] not in logs}
+            for c in peer["cases"]
+        ]
+        for name, peer in peers.items()
+    }
     print(f"{len(first)} logs, {len(counted)} count; shares with Wilson intervals of 95 %")
     print(f"error: on the {len(common['error_held_out'])} logs where all that predict have it")
     print(f"motion: on the {len(common['error_motion'])} logs where all that run have it\n")
     print(f"{'':18s}" + "".join(f"{f.title:>{17 if f.share else 8}s}" for f in FIGURES))
-    cells = {}
     for name, peer in peers.items():
-        cases = [
-            c | {key: None for key, logs in common.items() if c["case"] not in logs}
-            for c in peer["cases"]
-        ]
-        values = [f.of(cases) for f in FIGURES]
-        told = [_cell(f, v) for f, v in zip(FIGURES, values, strict=True)]
+        told = [_cell(f, list(f.values(cases[name]).values())) for f in FIGURES]
         print(f"{name:18s}" + "".join(told))
-        for figure, value in zip(FIGURES, values, strict=True):
-            if value:
-                number = round(float(figure.middle(value)), figure.digits)
-                cells.setdefault(figure.title, {})[name] = -number if figure.share else number
         faults = [c for c in peer["cases"] if c.get("fault")]
         if faults:
             print(f"{'':20s}failed on {len(faults)}, first: {faults[0]['fault'][:90]}")
-    cells |= _print_groups(peers)
-    _print_best(next(iter(peers)), cells)
+    _print_best((*FIGURES, *_print_groups(cases)), cases)
     versions = sorted({p["version"] for p in peers.values() if p["version"]})
     print("versions: " + ", ".join(versions))
     every = [c.get(k, 0.0) for p in peers.values() for c in p["cases"] for k in _SECONDS]
@@ -244,41 +255,63 @@ def _cell(figure: Figure, values: list[float]) -> str:
     return f"{f'{told} ({low:.2f} {high:.2f})':>17s}"
 
 
-def _print_groups(peers: dict[str, dict]) -> dict[str, dict[str, float]]:
-    """Share solved by what is hidden and by tier; returned with its sign turned."""
-    names = list(peers)
-    groups: dict[str, list[int]] = {}
-    for k, case in enumerate(peers[names[0]]["cases"]):
-        if case["counts"]:
-            for group in (case["content"], f"tier {case['tier']}"):
-                groups.setdefault(group, []).append(k)
+def _print_groups(cases: dict[str, list[dict]]) -> list[Figure]:
+    """Share solved by what is hidden and by tier; those that the first table does not have."""
+    counted = [c for c in next(iter(cases.values())) if c["counts"]]
+    groups = [Figure(c, _solved(c), share=True) for c in sorted({c["content"] for c in counted})]
+    groups += [
+        Figure(f"tier {tier}", _solved(tier=tier), share=True)
+        for tier in sorted({c["tier"] for c in counted})
+    ]
     print("\nsolved, by what is hidden and by tier (logs that count)")
-    print(f"{'':20s}" + "".join(f"{n[:13]:>14s}" for n in names))
-    cells = {}
-    for group in sorted(groups):
-        rows = groups[group]
-        shares = [np.mean([peers[n]["cases"][k]["solved"] for k in rows]) for n in names]
-        print(f"{group:16s}{len(rows):4d}" + "".join(f"{s:14.2f}" for s in shares))
-        if group not in ("nothing", "nameless"):  # which the first table has
-            cells[group] = {n: -round(float(s), 2) for n, s in zip(names, shares, strict=True)}
-    return cells
+    print(f"{'':20s}" + "".join(f"{n[:13]:>14s}" for n in cases))
+    for group in groups:
+        values = [list(group.values(own).values()) for own in cases.values()]
+        shares = "".join(f"{np.mean(v):14.2f}" for v in values)
+        print(f"{group.title:16s}{len(values[0]):4d}{shares}")
+    return [group for group in groups if group.title not in ("nothing", "nameless")]
 
 
-def _print_best(name: str, cells: dict[str, dict[str, float]]) -> None:
-    """In how many cells, of those in which another has a figure, a peer is best or tied."""
-    rivals = {
-        title: {n: v for n, v in row.items() if n not in (name, YARDSTICK)}
-        for title, row in cells.items()
-        if name in row
-    }
-    met = {title: row for title, row in rivals.items() if row}
-    lost = [title for title, row in met.items() if cells[title][name] > min(row.values())]
-    print(f"\n{name} is best or tied in {len(met) - len(lost)} of {len(met)} cells")
-    for title in lost:
-        other, value = min(met[title].items(), key=lambda item: item[1])
-        print(f"  lost: {title}, {abs(cells[title][name]):g} against {abs(value):g} of {other}")
-    if alone := [title for title in rivals if title not in met]:
-        print(f"  no other has a figure: {', '.join(alone)}")
+def _print_best(figures: Iterable[Figure], cases: dict[str, list[dict]]) -> None:
+    """In how many cells, of those in which another has a figure, the first peer is best or tied.
+
+    Two peers are compared on the logs on which both have a value. They are tied if the better of
+    them is so on no more of these logs than a coin would be (sign test).
+    """
+    name, *others = cases
+    lines, best, tied, met = [], 0, 0, 0
+    for figure in figures:
+        own = figure.values(cases[name])
+        better, lost, known = [], False, False
+        for other in others:
+            theirs = figure.values(cases[other])
+            if other == YARDSTICK or not (both := sorted(own.keys() & theirs.keys())):
+                continue
+            known = True
+            a, b = [own[c] for c in both], [theirs[c] for c in both]
+            if figure.number(a) > figure.number(b):
+                chance = _chance(np.subtract(a, b))
+                lost |= chance < CHANCE
+                told = [f"{abs(figure.number(x)):g}" for x in (a, b)]
+                better.append(
+                    (figure.number(b), f"{told[0]} against {told[1]} of {other}", len(a), chance)
+                )
+        met += known
+        best += known and not better
+        tied += bool(better) and not lost
+        if better:
+            _, told, n, chance = min(better)
+            word = "lost" if lost else "tied"
+            lines.append(f"  {word}: {figure.title}, {told} on {n} logs (p = {chance:.2g})")
+    print(f"\n{name} is best in {best} of {met} cells and tied in {tied}")
+    print("\n".join(lines))
+
+
+def _chance(differences: np.ndarray) -> float:
+    """Probability that signs of differences are as uneven by chance."""
+    signs = np.sign(differences)
+    n = int(np.count_nonzero(signs))
+    return float(binomtest(int(np.sum(signs > 0)), n).pvalue) if n else 1.0
 
 
 def main() -> None:
