@@ -140,7 +140,7 @@ def _divided_torques(fits: Fits, joints: list[int]) -> Iterator[Division]:
         after = _spread(mended.residual[k]) / _spread(fits.average(torque[:, k])[use])
         drop = 1 - after / (_spread(here.residual[k]) / _spread(y[use]))
         gain = float(margin.sum())
-        if gain > SURE and drop > DROP:
+        if gain > SURE and drop > DROP and _unlike_effects(fits, k, np.isin(number, out), drop):
             kind = "sign" if USUAL[0] < -value < USUAL[1] else "scale"
             yield Division(kind, k, tuple(map(int, out)), value, gain, drop)
 
@@ -247,10 +247,16 @@ def _divided_zeros(fits: Fits) -> Iterator[Division]:
     there = mended(k, angle, out).identified(Reading())
     worst = int(np.argmax(there.margin(here)))
     drop = 1 - float(_spread(there.residual[worst]) / _spread(here.residual[worst]))
-    rows = np.isin(number, out)
-    without, left = left_by_effects(fits, worst, rows)
-    if drop > DROP and 1 - drop < BETTER * left / without:
+    if drop > DROP and _unlike_effects(fits, worst, np.isin(number, out), drop):
         yield Division("zero", k, tuple(map(int, out)), angle, value, drop)
+
+
+def _unlike_effects(fits: Fits, joint: int, rows: NDArray[np.bool_], drop: float) -> bool:
+    """Whether an effect in these recordings, such as a payload, leaves clearly more than a mistake.
+
+    A payload multiplies the weight that a wrist carries.
+    """
+    return 1 - drop < BETTER * left_by_effects(fits, joint, rows)[2]
 
 
 def _set_apart(change: Array) -> tuple[NDArray[np.bool_], float]:

@@ -102,7 +102,9 @@ def duel_of(
     return duel
 
 
-def left_by_effects(fits: Fits, joint: int, rows: NDArray[np.bool_]) -> tuple[float, float]:
+def left_by_effects(
+    fits: Fits, joint: int, rows: NDArray[np.bool_]
+) -> tuple[float, float, float]:
     """Residual of some rows, and the least residual with an effect on their joint.
 
     Parameters
@@ -118,7 +120,9 @@ def left_by_effects(fits: Fits, joint: int, rows: NDArray[np.bool_]) -> tuple[fl
     Returns
     -------
     without, least : float
-        Root mean squares of the residual over its scale.
+        Root mean squares of the residual over its scale in all rows.
+    share : float
+        The least root mean square that an effect leaves, as a share of that without effects.
     """
     reading = Reading()
     gains = np.nan_to_num(fits.nominal(reading).gain)
@@ -126,11 +130,10 @@ def left_by_effects(fits: Fits, joint: int, rows: NDArray[np.bool_]) -> tuple[fl
     k = here.joints.index(joint)
     own = rows[here.rows[k]]
     effects = [*_likely(here, [joint]), *_likely(here, [joint], rows)]
-    left = [
-        float(np.sqrt(np.mean(fit.residuals[k][own] ** 2))) / fit.scales[k]
-        for fit in (here.plain, *(here.fit(columns) for _, columns, _ in effects))
-    ]
-    return left[0], min(left)
+    fits_of = [here.plain, *(here.fit(columns) for _, columns, _ in effects)]
+    left = [float(np.sqrt(np.mean(fit.residuals[k][own] ** 2))) for fit in fits_of]
+    scaled = [x / fit.scales[k] for x, fit in zip(left, fits_of, strict=True)]
+    return scaled[0], min(scaled), min(left) / left[0]
 
 
 def _effects() -> Iterator[Effect]:

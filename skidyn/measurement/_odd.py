@@ -106,7 +106,7 @@ class OddRecording(Check):
                     scaled.append(one)
                 elif one.gain > LEAST and one.larger > LARGER and one.likeness < UNLIKE:
                     # a contact, or a payload of one recording, would look like it
-                    without, left = left_by_effects(seen.fits, k, _rows_of(seen.fits, one.run))
+                    without, left, _ = left_by_effects(seen.fits, k, _rows_of(seen.fits, one.run))
                     if left > max(LARGER, LEFT * without):
                         unlike.append(one)
         shifted = {}
@@ -223,7 +223,7 @@ def _zero_of(fits: Fits, run: int) -> tuple[int, float, float] | None:
         for k in known
         if k in elsewhere and k in here
     )
-    without, left = left_by_effects(fits, worst, rows)
+    without, left, _ = left_by_effects(fits, worst, rows)
     if gain < (SURE if after[worst] > BETTER * left else LEAST):
         return None
     share = after[worst] / before[worst]
