@@ -14,7 +14,6 @@ from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import COARSE, position_step
 from skidyn.measurement._suspicion import Suspicion
-from skidyn.measurement._torque import cut_columns
 
 #: Share of rows at the extreme torque from which it is reported.
 CLIPPED = 0.002
@@ -104,7 +103,7 @@ class ConstantTorque(Check):
             )
         number = measurement.signals.trajectory
         runs = np.unique(number)
-        lost = cut_columns(measurement)
+        lost = measurement.clipped
         for k in range(measurement.n_joints):
             torque = measurement.torque[:, k]
             if k in lost:

@@ -294,6 +294,13 @@ class Measurement:
         return {k: x for k, x in shares.items() if x > HELD_BY_ONE and self.excited[k] and free}
 
     @cached_property
+    def clipped(self) -> list[int]:
+        """Joints whose torque lost one sign, from 0."""
+        from skidyn.measurement._torque import cut_columns
+
+        return cut_columns(self)
+
+    @cached_property
     def overflowed(self) -> dict[int, int]:
         """Joints whose torque overflows, from 0, and how often it jumps."""
         from skidyn.measurement._overflow import overflowed_columns

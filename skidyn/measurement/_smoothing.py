@@ -208,8 +208,10 @@ def _likelihood(f: Array, y: Array) -> tuple[float, Array]:
     weight = np.ones(len(y))
     scale, rest = 1.0, y
     for _ in range(5):
-        size = max(0.0, float((weight * f) @ y) / max(float((weight * f) @ f), 1e-300))
+        weighted = weight * f
+        size = max(0.0, float(weighted @ y) / max(float(weighted @ f), 1e-300))
         rest = y - size * f
-        scale = float(np.sqrt(np.mean(weight * rest**2))) + 1e-12
-        weight = 5.0 / (4.0 + (rest / scale) ** 2)
+        square = rest * rest
+        scale = float(np.sqrt(weight @ square / len(y))) + 1e-12
+        weight = 5.0 / (4.0 + square / scale**2)
     return student(rest, scale), rest

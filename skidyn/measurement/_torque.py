@@ -71,7 +71,7 @@ class UnsignedTorque(Check):
     misnames = True
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
-        cut = cut_columns(measurement)
+        cut = measurement.clipped
         if cut:
             names = ", ".join(measurement.joint(k) for k in cut)
             shares = ", ".join(f"{np.mean(measurement.torque[:, k] == 0):.0%}" for k in cut)
@@ -149,7 +149,7 @@ def unsigned_columns(measurement: Measurement) -> tuple[list[int], dict[int, flo
 
 def _unsigned(measurement: Measurement) -> tuple[list[int], dict[int, float]]:
     torque = measurement.torque
-    cut = cut_columns(measurement)
+    cut = measurement.clipped
     one_sided = [
         k
         for k in range(measurement.n_joints)
@@ -379,7 +379,7 @@ def _lost_columns(measurement: Measurement) -> list[int]:
     copies = copied_columns(measurement)
     copied = [k for k, _, _ in copies]
     originals = [j for _, what, j in copies if what == "torque"]  # either may be the copy
-    lost = [*unsigned, *cut_columns(measurement), *measurement.overflowed]
+    lost = [*unsigned, *measurement.clipped, *measurement.overflowed]
     return [*lost, *copied, *originals]
 
 
