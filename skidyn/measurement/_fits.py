@@ -536,7 +536,7 @@ def make_fits(signals: Signals, torque: Array, robot: Robot) -> Fits | None:
     robot : Robot
         As described.
     """
-    motion = smooth_motion(signals)
+    motion = signals.once("smooth motion", lambda: smooth_motion(signals))
     every = max(1, round(motion.rate * WIDTH / SAMPLES))
     mean = running_mean(torque, every | 1)  # an even number would be half a sample late
     parts = []

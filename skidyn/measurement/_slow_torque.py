@@ -80,11 +80,16 @@ def _periods(measurement: Measurement, order: int) -> dict[int, tuple[int, float
         if rows.stop - rows.start > 4 * FEWEST
     ]
     parts = [part - part.mean(axis=0) for part in parts]  # for squares without cancellation
+    squares = [np.sum(part**2, axis=0) for part in parts]
     best = dict.fromkeys(joints.tolist(), (0, 0.0, 1.0))
     if max(map(len, parts), default=0) < 4 * FEWEST:
         return best
     for period in PERIODS:
-        sizes = [_sizes(part, period) for part in parts if len(part) >= period * FEWEST]
+        sizes = [
+            _sizes(part, square, period)
+            for part, square in zip(parts, squares, strict=True)
+            if len(part) >= period * FEWEST
+        ]
         if not sizes:
             continue
         counts = np.array([n for _, n, _ in sizes])
@@ -97,21 +102,22 @@ def _periods(measurement: Measurement, order: int) -> dict[int, tuple[int, float
     return best
 
 
-def _sizes(logs: Array, period: int) -> tuple[Array, int, Array]:
+def _sizes(logs: Array, square: Array, period: int) -> tuple[Array, int, Array]:
     """Mean logarithms by phase from the largest on, their number, and what phases gain.
 
     Parameters
     ----------
     logs : ndarray of shape (n_differences, n_joints)
         Logarithms of the sizes of differences, less their mean.
+    square : ndarray of shape (n_joints,)
+        Sum of their squares.
     period : int
         Number of phases.
     """
-    rows = logs[: len(logs) // period * period].reshape(-1, period, logs.shape[1])
-    means = rows.mean(axis=0)
-    total = np.mean(rows**2, axis=0).mean(axis=0) - means.mean(axis=0) ** 2
+    count = len(logs) // period * period
+    means = logs[:count].reshape(-1, period, logs.shape[1]).mean(axis=0)
+    total = (square - np.sum(logs[count:] ** 2, axis=0)) / count - means.mean(axis=0) ** 2
     within = total - means.var(axis=0)
-    count = rows.shape[0] * period
     gain = 0.5 * count * np.log(np.maximum(total, 1e-12) / np.maximum(within, 1e-12))
     # recordings begin at any row of the slower bus, and its values are evenly long
     phases = (np.argmax(means, axis=0) + np.arange(period)[:, None]) % period

@@ -96,7 +96,8 @@ class SmoothedTorque(Check):
         if delay is not None and delay.common > LATE:
             return  # a filter with delay is reported by another check
         found = {}
-        motion = smooth_motion(measurement.signals)  # noise would shift reversals
+        signals = measurement.signals  # noise would shift reversals
+        motion = signals.once("smooth motion", lambda: smooth_motion(signals))
         step = column_step(motion, AROUND, motion.half_width)
         index, few = motion.thinned(step)
         torque = running_mean(measurement.torque, step)[index]
