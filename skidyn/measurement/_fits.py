@@ -238,7 +238,7 @@ class Fits:
 
     def motion(self, reading: Reading) -> Signals:
         """Motion in a reading."""
-        order = list(reading.order or range(self.n_joints))
+        order = slice(None) if reading.order is None else list(reading.order)
         sign = np.ones(self.n_joints)
         sign[list(reading.flip_motion)] = -1
         zero = np.zeros(self.n_joints)
