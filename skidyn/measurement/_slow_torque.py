@@ -82,7 +82,7 @@ def _periods(measurement: Measurement, order: int) -> dict[int, tuple[int, float
     parts = [part - part.mean(axis=0) for part in parts]  # for squares without cancellation
     squares = [np.sum(part**2, axis=0) for part in parts]
     best = dict.fromkeys(joints.tolist(), (0, 0.0, 1.0))
-    if max(map(len, parts), default=0) < 4 * FEWEST:
+    if not best or max(map(len, parts), default=0) < 4 * FEWEST:
         return best
     for period in PERIODS:
         sizes = [
