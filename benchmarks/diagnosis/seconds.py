@@ -4,9 +4,10 @@
 Usage: python benchmarks/diagnosis/seconds.py [--old CHECKOUT] [--only NAME ...] [--rows 300000]
 
 Every case runs in a fresh process: CPU seconds including the start of Python (modules were compiled
-before, as after an installation), wall seconds and peak memory. ``--old`` is the root of another
-version (made by ``git worktree add``), which is run alternately with this one, for the ratio of CPU
-seconds. On a shared machine, only CPU seconds and ratios of one run can be compared.
+before, as after an installation), wall seconds to the first output and to the end, and peak memory.
+``--old`` is the root of another version (made by ``git worktree add``), which is run alternately
+with this one, for the ratio of CPU seconds. On a shared machine, only CPU seconds and ratios of one
+run can be compared.
 """
 
 from __future__ import annotations
@@ -93,8 +94,8 @@ def prepare(folder: Path, rows: int) -> dict[str, list[str]]:
     }
 
 
-def measure(command: list[str], root: Path) -> tuple[float, float, float, int]:
-    """CPU seconds, wall seconds, peak GB and exit code of a command."""
+def measure(command: list[str], root: Path) -> tuple[float, float, float, float, int]:
+    """CPU seconds, wall seconds to the first output and to the end, peak GB and exit code."""
     environment = os.environ | {
         "PYTHONPATH": str(root),
         "OMP_NUM_THREADS": "1",
@@ -105,13 +106,17 @@ def measure(command: list[str], root: Path) -> tuple[float, float, float, int]:
         [sys.executable, "-m", "skidyn", *command],
         cwd=root,
         env=environment,
-        stdout=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
     )
+    assert process.stdout is not None
+    process.stdout.read(1)
+    first = time.perf_counter() - start
+    process.stdout.read()
     _, status, used = os.wait4(process.pid, 0)
     wall = time.perf_counter() - start
     cpu = used.ru_utime + used.ru_stime
-    return cpu, wall, used.ru_maxrss / 1024**2, os.waitstatus_to_exitcode(status)
+    return cpu, first, wall, used.ru_maxrss / 1024**2, os.waitstatus_to_exitcode(status)
 
 
 def main() -> None:
@@ -126,13 +131,14 @@ def main() -> None:
         for root in roots:
             compileall.compile_dir(root / "skidyn", quiet=2)
         print(
-            f"{'':<28}{'CPU s':>8}{'wall s':>8}{'GB':>7}" + "  old CPU s  ratio" * bool(options.old)
+            f"{'':<28}{'CPU s':>8}{'first s':>9}{'wall s':>8}{'GB':>7}"
+            + "  old CPU s  ratio" * bool(options.old)
         )
         for case, command in cases.items():
             if options.only and not case.startswith(tuple(options.only)):
                 continue
-            cpu, wall, peak, code = measure(command, HERE)
-            line = f"{case:<28}{cpu:8.2f}{wall:8.1f}{peak:7.2f}"
+            cpu, first, wall, peak, code = measure(command, HERE)
+            line = f"{case:<28}{cpu:8.2f}{first:9.2f}{wall:8.1f}{peak:7.2f}"
             if options.old:
                 # each version reads its own reports
                 own = [word.replace("/a.json", "/old.json") for word in command]

@@ -285,7 +285,7 @@ def check_log(frame: pd.DataFrame, robot: Robot | None = None) -> LogQuality:
 
 
 def _joints(measurement: Measurement) -> list[JointQuality]:
-    from skidyn.measurement import measured_delay, position_step, rest_share, reversals
+    from skidyn.measurement import measured_delay, rest_share, reversals
 
     signals, robot = measurement.signals, measurement.robot
     found = measured_delay(measurement)
@@ -301,7 +301,7 @@ def _joints(measurement: Measurement) -> list[JointQuality]:
         joints.append(
             JointQuality(
                 name=name,
-                resolution=position_step(q),
+                resolution=measurement.position_steps[k],
                 position_range=(float(q.min()), float(q.max())),
                 position_coverage=float(coverage),
                 largest_velocity=float(np.abs(dq).max()),

@@ -15,7 +15,7 @@ from skidyn.measurement._fits import SAMPLES, Fits, Reading
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import position_step, runs_of
 from skidyn.measurement._suspicion import Suspicion
-from skidyn.measurement._torque import cut_columns, readable_fits
+from skidyn.measurement._torque import readable_fits
 
 Rows: TypeAlias = NDArray[np.intp]
 #: Dead band: least share of rows with zero torque; least length and number of their runs (drives
@@ -54,7 +54,7 @@ class DeadBand(Check):
 
 def dead_bands(measurement: Measurement) -> dict[int, float]:
     """Joints whose torque has a dead band, from 0, and the share of rows in which it is zero."""
-    told = set(cut_columns(measurement)) | set(np.flatnonzero(measurement.missing.any(axis=0)))
+    told = set(measurement.clipped) | set(np.flatnonzero(measurement.missing.any(axis=0)))
     moving = np.flatnonzero(measurement.excited).tolist()
     shares = {k: _zeros(measurement, k) for k in moving if k not in told}
     return {k: share for k, share in shares.items() if share > BAND}

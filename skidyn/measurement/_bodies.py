@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -323,17 +323,22 @@ def joint_gain(fits: Fits, k: int, gain: float) -> tuple[float, float, float]:
         other = fits.scaled({k: float(np.exp(log))}).identified(Reading())
         # the density of a torque is that of the scaled torque divided by the gain
         change = other.margin(plain)
-        change[k] -= rows * log / max(other.inflation[k], 1.0)
+        change[k] -= rows * log / max(other.inflation_of(k), 1.0)
         return float(change.sum())
 
-    step = 0.08  # maxima are narrow if the noise is small
-    best, log = max((gained(x), x) for x in np.log(gain) + step * np.arange(-5, 6))
-    while step > 0.005:
-        near, other = max((gained(x), x) for x in (log - step, log + step))
+    @cache  # a search comes back to where it was
+    def at(place: int) -> float:
+        return gained(np.log(gain) + 0.01 * place)
+
+    step = 8  # maxima are narrow if the noise is small
+    best, place = max((at(x), x) for x in range(-5 * step, 6 * step, step))
+    while step:
+        near, other = max((at(x), x) for x in (place - step, place + step))
         if near > best:
-            best, log = near, other
+            best, place = near, other
         else:
-            step /= 2
+            step //= 2
+    log = np.log(gain) + 0.01 * place
     far = max(gained(log + x) for x in (-np.log(4), np.log(4)))
     return float(np.exp(log)), best, best - far
 

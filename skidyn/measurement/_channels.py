@@ -12,9 +12,8 @@ from skidyn.evidence import broken_notes
 from skidyn.measurement._around_zero import dead_bands
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._measures import COARSE, position_step
+from skidyn.measurement._measures import COARSE, step_of_values
 from skidyn.measurement._suspicion import Suspicion
-from skidyn.measurement._torque import cut_columns
 
 #: Share of rows at the extreme torque from which it is reported.
 CLIPPED = 0.002
@@ -55,7 +54,7 @@ class CoarsePosition(Check):
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         q = measurement.signals.q
         steps = {
-            k: position_step(q[:, k])
+            k: measurement.position_steps[k]
             for k in range(measurement.n_joints)
             if not measurement.signals.prismatic[k]
         }
@@ -104,7 +103,7 @@ class ConstantTorque(Check):
             )
         number = measurement.signals.trajectory
         runs = np.unique(number)
-        lost = cut_columns(measurement)
+        lost = measurement.clipped
         for k in range(measurement.n_joints):
             torque = measurement.torque[:, k]
             if k in lost:
@@ -156,7 +155,7 @@ def torque_step(torque: Array) -> float:
     values = np.unique(torque)
     if 2 < len(values) <= FEW_VALUES:
         return float(np.median(np.diff(values)))
-    return position_step(torque)
+    return step_of_values(values)
 
 
 def _is_coarse_extreme(torque: Array) -> bool:
@@ -175,7 +174,7 @@ class CoarseTorque(Check):
     suspects = "torque in coarse steps"
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
-        for k, (step, share) in coarse_torques(measurement).items():
+        for k, (step, share) in measurement.coarse_torques.items():
             unit = "N" if measurement.signals.prismatic[k] else "N m"
             yield self.suspicion(
                 f"the torque of {measurement.joint(k)} comes in coarse steps",
@@ -205,7 +204,7 @@ class SmoothTorque(Check):
     suspects = "torque that was filtered before it was recorded, so that its noise is unknown"
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
-        scatter = torque_scatter(measurement)
+        scatter = measurement.torque_scatter
         if scatter < NOISELESS and not measurement.computed:
             yield self.suspicion(
                 "the torque has no noise",

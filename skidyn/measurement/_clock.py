@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from skidyn._signals import Array, Signals, find_segments
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._measures import is_repeated, position_step
+from skidyn.measurement._measures import is_repeated
 from skidyn.measurement._suspicion import Suspicion
 
 #: Stamps closer to a regular clock than this share of a step do not jitter.
@@ -151,6 +151,16 @@ class Jitter:
     ratio: float
 
 
+def distance_from_regular(
+    time: Array, trajectory: NDArray[np.int64]
+) -> tuple[Array, list[slice], float]:
+    """The regular clock, its parts, and the root mean square distance of the stamps from it, s."""
+    regular = regular_clock(time, trajectory)
+    segments = find_segments(trajectory, time)
+    away = [time[r] - regular[r] - np.mean(time[r] - regular[r]) for r in segments]
+    return regular, segments, float(np.sqrt(np.mean(np.concatenate(away) ** 2)))
+
+
 def find_jitter(
     time: Array,
     q: Array,
@@ -173,10 +183,7 @@ def find_jitter(
     repeated : ndarray of shape (n_samples,) of bool, optional
         Rows that repeat the previous one; their neighbours agree with neither clock.
     """
-    regular = regular_clock(time, trajectory)
-    segments = find_segments(trajectory, time)
-    away = [time[r] - regular[r] - np.mean(time[r] - regular[r]) for r in segments]
-    spread = float(np.sqrt(np.mean(np.concatenate(away) ** 2)))
+    regular, segments, spread = distance_from_regular(time, trajectory)
     margin, ratios = 0.0, []
     errors = []
     for clock in (time, regular):
@@ -244,10 +251,10 @@ class ClockJitter(Check):
         if measurement.repeated > MANY * measurement.n_samples:
             return  # the clock of the rows that are left may be even
         step = float(np.mean(measurement.steps[measurement.steps < 2.5 / measurement.rate]))
+        if distance_from_regular(signals.clock, signals.trajectory)[2] < REGULAR * step:
+            return
         again = is_repeated(signals.q, signals.dq, signals.trajectory)
         found = find_jitter(signals.clock, signals.q, signals.trajectory, again)
-        if found.spread < REGULAR * step:
-            return
         size = (
             f"{1e3 * found.spread:.3g} ms"
             if found.spread > 1e-4
@@ -341,8 +348,7 @@ def _coarse(measurement: Measurement) -> bool:
     s = measurement.signals
     sizes = []
     for k in range(measurement.n_joints):
-        changes = np.abs(np.diff(s.q[:, k]))
-        step = position_step(s.q[:, k])
+        changes, step = np.abs(np.diff(s.q[:, k])), measurement.position_steps[k]
         if np.isfinite(step) and changes.any():
             sizes.append(float(np.median(changes[changes > 0])) / step)
     if not sizes or np.median(sizes) > STEPS:

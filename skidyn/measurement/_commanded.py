@@ -37,9 +37,10 @@ class CommandedMotion(Check):
         parts = [rows for rows in s.segments if rows.stop - rows.start > ENOUGH]
         if measurement.stale or measurement.computed or not moving or not parts:
             return
-        positions = _scatter(s.q[:, moving], s.clock, parts)
         torque = measurement.torque[:, moving]
-        noise = _scatter(torque, s.clock, parts) / (np.std(torque, axis=0) + 1e-300)
+        scatter = _scatter(np.hstack([s.q[:, moving], torque]), s.clock, parts)
+        positions, noise = np.split(scatter, 2)
+        noise = noise / (np.std(torque, axis=0) + 1e-300)
         if positions.max() > NOISELESS or noise.min() < NOISY:
             return
         delay = measured_delay(measurement)

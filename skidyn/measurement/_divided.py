@@ -136,7 +136,7 @@ def _divided_torques(fits: Fits, joints: list[int]) -> Iterator[Division]:
         mended = fits.with_torque(torque).identified(Reading())
         margin = mended.margin(here)
         changed = float(np.isin(number[use], out).sum())
-        margin[k] -= changed * np.log(abs(value)) / max(float(mended.inflation[k]), 1.0)
+        margin[k] -= changed * np.log(abs(value)) / max(mended.inflation_of(k), 1.0)
         after = _spread(mended.residual[k]) / _spread(fits.average(torque[:, k])[use])
         drop = 1 - after / (_spread(here.residual[k]) / _spread(y[use]))
         gain = float(margin.sum())
@@ -281,8 +281,8 @@ def _by_run(fits: Fits, q: Array, number: NDArray[np.int64], runs: NDArray[np.in
         scale = float(outcome.scale[k])
         for i, run in enumerate(runs):
             rest = outcome.residual[k][own == run] / scale
-            total[i] -= 2.5 * float(np.log1p(rest**2 / 4).sum()) / float(outcome.inflation[k])
-            total[i] -= len(rest) * np.log(scale) / float(outcome.inflation[k])
+            total[i] -= 2.5 * float(np.log1p(rest**2 / 4).sum()) / outcome.inflation_of(k)
+            total[i] -= len(rest) * np.log(scale) / outcome.inflation_of(k)
     return total
 
 

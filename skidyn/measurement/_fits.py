@@ -89,15 +89,15 @@ class Outcome:
         Residual of the rows of every column, N m or N.
     scale : ndarray of shape (n_joints,)
         Scale of the residual.
-    inflation : ndarray of shape (n_joints,)
-        Overestimation of the likelihood due to correlated neighbouring rows.
+    fits : dict of int to RobustFit
+        Fits by column; of the others, all is zero, and scales are one.
     """
 
     likelihood: Array
     gain: Array
     residual: list[Array]
     scale: Array
-    inflation: Array
+    fits: dict[int, RobustFit]
 
     def margin(self, other: Outcome) -> Array:
         """Log-likelihood gain of this reading over another, by joint.
@@ -106,8 +106,18 @@ class Outcome:
         other over this one is the same with the opposite sign.
         """
         change = self.likelihood - other.likelihood
-        inflation = np.where(change > 0, self.inflation, other.inflation)
-        return np.asarray(change / np.maximum(inflation, 1.0))
+        for column, gained in enumerate(change > 0):
+            change[column] /= max((self if gained else other).inflation_of(column), 1.0)
+        return np.asarray(change)
+
+    def inflation_of(self, column: int) -> float:
+        """Overestimation of a likelihood due to correlated neighbouring rows; few are needed."""
+        return self.fits[column].inflation if column in self.fits else 1.0
+
+    @property
+    def inflation(self) -> Array:
+        """The same of every column, shape (n_joints,)."""
+        return np.array([self.inflation_of(column) for column in range(len(self.gain))])
 
 
 @dataclass(frozen=True)
@@ -150,8 +160,10 @@ class Fits:
     recorded: Recorded
     left_out: frozenset[int] = frozenset()
     backend: str = "numpy"
+    _fewer: dict[frozenset[int], Fits] = field(default_factory=dict, repr=False)
     _known: dict[Reading, Outcome] = field(default_factory=dict, repr=False)
     _moved: dict[Reading, Array] = field(default_factory=dict, repr=False)
+    _rubbed: dict[Reading, list[Array]] = field(default_factory=dict, repr=False)
     _parts: dict[Reading, tuple[Array, Array]] = field(default_factory=dict, repr=False)
     _fitted: dict[tuple[Any, ...], RobustFit] = field(default_factory=dict, repr=False)
     _felt: dict[Reading, list[tuple[Array, NDArray[np.int64]]]] = field(
@@ -168,7 +180,11 @@ class Fits:
         left_out = self.left_out | frozenset(joints)
         if left_out == self.left_out:
             return self  # with all that was fitted so far
-        return Fits(self.robot, self.signals, self.torque, self.moving, self.recorded, left_out)
+        if left_out not in self._fewer:
+            self._fewer[left_out] = Fits(
+                self.robot, self.signals, self.torque, self.moving, self.recorded, left_out
+            )
+        return self._fewer[left_out]
 
     def of(self, robot: Robot) -> Fits:
         """The same rows, for another robot with the same joints, which is only tried."""
@@ -189,7 +205,7 @@ class Fits:
 
     def with_torque(self, torque: Array) -> Fits:
         """The same rows with another torque, (n_samples, n_joints); what motion implies is kept."""
-        return replace(self, torque=torque, _known={}, _fitted={})
+        return replace(self, torque=torque, _fewer={}, _known={}, _fitted={})
 
     def scaled(self, gains: Mapping[int, float]) -> Fits:
         """The same rows with columns of the torque divided by gains."""
@@ -222,7 +238,7 @@ class Fits:
 
     def motion(self, reading: Reading) -> Signals:
         """Motion in a reading."""
-        order = list(reading.order or range(self.n_joints))
+        order = slice(None) if reading.order is None else list(reading.order)
         sign = np.ones(self.n_joints)
         sign[list(reading.flip_motion)] = -1
         zero = np.zeros(self.n_joints)
@@ -311,13 +327,21 @@ class Fits:
         """Mean columns of every joint, shape (n_rows, 4, n_joints)."""
         if motion not in self._moved:
             s = self.motion(motion)
-            own = self._own_torque(motion, s)
-            sign = np.tanh(s.dq / (SIGN_BLUR * s.unit))
-            parts = [own, *(self.average(x) for x in (s.dq, sign, s.ddq))]
+            parts = [self._own_torque(motion, s), *self._friction(motion, s)]
             while len(self._moved) >= KEPT:  # readings are tried one after another
                 del self._moved[next(iter(self._moved))]
             self._moved[motion] = np.stack(parts, axis=1)
         return self._moved[motion]
+
+    def _friction(self, motion: Reading, s: Signals) -> list[Array]:
+        """Mean columns of friction and rotor inertia, which no zero and no gravity changes."""
+        motion = replace(motion, zero=(), gravity=None)
+        if motion not in self._rubbed:
+            sign = np.tanh(s.dq / (SIGN_BLUR * s.unit))
+            while len(self._rubbed) >= KEPT:
+                del self._rubbed[next(iter(self._rubbed))]
+            self._rubbed[motion] = [self.average(x) for x in (s.dq, sign, s.ddq)]
+        return self._rubbed[motion]
 
     def _own_torque(self, motion: Reading, s: Signals) -> Array:
         """Mean torque of the robot as described, in rows."""
@@ -345,8 +369,10 @@ class Fits:
         motion = replace(motion, gravity=None, **_PLAIN)
         if motion not in self._parts:
             s = self.motion(motion)
-            still = self.robot.inverse_dynamics(s.q, s.dq, s.ddq, gravity=(0.0, 0.0, 0.0))
-            pulls = [self.robot.gravity_torque(s.q, gravity=tuple(axis)) for axis in np.eye(3)]
+            robot, none = self.robot, (0.0, 0.0, 0.0)
+            still = robot.inverse_dynamics(s.q, s.dq, s.ddq, gravity=none, backend="once")
+            axes = map(tuple, np.eye(3))
+            pulls = [robot.gravity_torque(s.q, gravity=axis, backend="once") for axis in axes]
             self._parts.clear()
             self._parts[motion] = self.average(still), np.array([self.average(p) for p in pulls])
         return self._parts[motion]
@@ -483,12 +509,12 @@ class Fits:
 
     def _spread(self, columns: Sequence[int], fits: Sequence[RobustFit]) -> Outcome:
         n = self.n_joints
-        likelihood, scale, inflation = np.zeros(n), np.ones(n), np.ones(n)
+        likelihood, scale = np.zeros(n), np.ones(n)
         residual = [np.zeros(0) for _ in range(n)]
         for c, fit in zip(columns, fits, strict=True):
             likelihood[c], scale[c], residual[c] = fit.likelihood, fit.scale, fit.residual
-            inflation[c] = fit.inflation
-        return Outcome(likelihood, np.full(n, np.nan), residual, scale, inflation)
+        of = dict(zip(columns, fits, strict=True))
+        return Outcome(likelihood, np.full(n, np.nan), residual, scale, of)
 
 
 def friction(signals: Signals, joint: int) -> Array:
@@ -510,7 +536,7 @@ def make_fits(signals: Signals, torque: Array, robot: Robot) -> Fits | None:
     robot : Robot
         As described.
     """
-    motion = smooth_motion(signals)
+    motion = signals.once("smooth motion", lambda: smooth_motion(signals))
     every = max(1, round(motion.rate * WIDTH / SAMPLES))
     mean = running_mean(torque, every | 1)  # an even number would be half a sample late
     parts = []

@@ -11,7 +11,6 @@ from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import is_held, position_step
 from skidyn.measurement._suspicion import Suspicion
-from skidyn.measurement._torque import cut_columns
 
 #: Least share of rows with the torque of the previous row, for a torque that is not coarse.
 HELD = 0.3
@@ -47,7 +46,7 @@ class HeldTorque(Check):
                 remedy=("--drop-repeated", "drop_repeated=True"),
             )
             return
-        shares, lost = np.zeros(measurement.n_joints), cut_columns(measurement)
+        shares, lost = np.zeros(measurement.n_joints), measurement.clipped
         for k in range(measurement.n_joints):
             torque = measurement.torque[:, k]
             share = np.mean(torque[1:][moved] == torque[:-1][moved])

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from skidyn._signals import Array
-from skidyn.measurement._channels import NOISELESS, coarse_torques, torque_scatter
+from skidyn.measurement._channels import NOISELESS
 from skidyn.measurement._check import Check
 from skidyn.measurement._duel import duel_of
 from skidyn.measurement._fits import Fits, Reading
@@ -78,9 +78,9 @@ class Lengths(Check):
             return
         if measurement.stale or measurement.computed or measurement.odd:
             return
-        if torque_scatter(measurement) < NOISELESS:
+        if measurement.torque_scatter < NOISELESS:
             return  # without noise, errors of the derivatives are significant
-        fits = fits.without(list(coarse_torques(measurement)))  # rounding is not white noise
+        fits = fits.without(list(measurement.coarse_torques))  # rounding is not white noise
         found = find_lengths(fits)
         if found is None or found.gain < LEAST:
             return

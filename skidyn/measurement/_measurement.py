@@ -20,6 +20,7 @@ from skidyn.measurement._measures import (
     is_repeated,
     longest_plateau_share,
     missing_values,
+    position_step,
     velocity_consistency,
 )
 
@@ -288,10 +289,37 @@ class Measurement:
         """Joints whose position holds its last value, from 0, and in what share of their rows."""
         s = self.signals
         within = s.trajectory[1:] == s.trajectory[:-1]
-        shares = {k: held_share(s.q[:, k], within) for k in range(self.n_joints)}
+        steps = self.position_steps
+        shares = {k: held_share(s.q[:, k], within, steps[k]) for k in range(self.n_joints)}
         free = [k for k, share in shares.items() if share < HELD_BY_ONE / 2 and self.excited[k]]
         # if all hold, rows repeat, or the sensors are coarse
         return {k: x for k, x in shares.items() if x > HELD_BY_ONE and self.excited[k] and free}
+
+    @cached_property
+    def position_steps(self) -> list[float]:
+        """Step of every position sensor, rad or m; NaN where it is not visible."""
+        return [position_step(column) for column in self.signals.q.T]
+
+    @cached_property
+    def coarse_torques(self) -> dict[int, tuple[float, float]]:
+        """Joints, from 0, with torque in coarse steps: the step, and its share of the spread."""
+        from skidyn.measurement._channels import coarse_torques
+
+        return coarse_torques(self)
+
+    @cached_property
+    def torque_scatter(self) -> float:
+        """Largest scatter of a torque from sample to sample, as a share of its spread."""
+        from skidyn.measurement._channels import torque_scatter
+
+        return torque_scatter(self)
+
+    @cached_property
+    def clipped(self) -> list[int]:
+        """Joints whose torque lost one sign, from 0."""
+        from skidyn.measurement._torque import cut_columns
+
+        return cut_columns(self)
 
     @cached_property
     def overflowed(self) -> dict[int, int]:

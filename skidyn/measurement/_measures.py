@@ -39,11 +39,17 @@ def position_step(position: np.ndarray) -> float:
 
     Gaps between neighbouring distinct values are whole multiples of the step of the sensor.
     """
-    gaps = np.diff(np.unique(position))
+    return step_of_values(np.unique(position))
+
+
+def step_of_values(position: np.ndarray) -> float:
+    """The same from distinct values in ascending order."""
+    gaps = np.diff(position)
     gaps = gaps[gaps > 1e-12]
     if len(gaps) < 20:
         return np.nan
-    smallest = np.sort(gaps)[: max(len(gaps) // 50, 5)]
+    count = max(len(gaps) // 50, 5)
+    smallest = np.sort(np.partition(gaps, count - 1)[:count])
     step = float(np.median(smallest))
     if step < 0.8 * smallest[-1] or smallest[0] < 0.8 * step:
         return np.nan
@@ -93,7 +99,7 @@ def _caught_up(
     return caught
 
 
-def held_share(position: np.ndarray, within: np.ndarray) -> float:
+def held_share(position: np.ndarray, within: np.ndarray, step: float) -> float:
     """Share of steps in which a moving position does not change, and then catches up.
 
     Parameters
@@ -102,6 +108,8 @@ def held_share(position: np.ndarray, within: np.ndarray) -> float:
         Of one joint.
     within : ndarray of shape (n_samples - 1,) of bool
         Steps within a trajectory.
+    step : float, rad or m
+        Of the sensor, as of :func:`position_step`.
 
     Returns
     -------
@@ -120,7 +128,6 @@ def held_share(position: np.ndarray, within: np.ndarray) -> float:
     jumps = moved[moves & (moved > 0)]
     if len(jumps) < 20:
         return 0.0
-    step = position_step(position)
     if np.isfinite(step) and np.median(jumps) < CATCHES * step:
         return 0.0
     return float(np.mean(moved[moves] == 0))

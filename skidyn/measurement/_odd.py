@@ -255,7 +255,7 @@ def _multiples(seen: Explained) -> list[Multiple]:
             found = _multiple(y[own], predicted, scale) if own.sum() >= FEWEST else None
             if found is not None:
                 size, likeness, gain, larger = found
-                gain /= max(1.0, float(outcome.inflation[k]))
+                gain /= max(1.0, outcome.inflation_of(k))
                 spoils = scale < outcome.scale[k] / 2
                 told.append(Multiple(k, int(run), size, likeness, gain, larger, bool(spoils)))
     return told

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import product
 from math import lgamma
 
@@ -78,17 +78,17 @@ def fit_at_once(columns: Array, y: Array, use: NDArray[np.bool_]) -> list[Robust
     """
     weight = use.astype(float)
     total = weight.sum(1)
-    a = columns * weight[:, :, None]
-    size = np.sqrt(np.sum(a**2, axis=1))
+    a = np.ascontiguousarray(columns.transpose(0, 2, 1)) * weight[:, None]
+    size = np.sqrt(np.sum(a**2, axis=2))
     size[size == 0] = 1.0
-    a = a / size[:, None]
-    b = a - weight[:, :, None] * (a.sum(1) / total[:, None])[:, None]
+    a = a / size[:, :, None]
+    b = a - weight[:, None] * (a.sum(2) / total[:, None])[:, :, None]
     z = weight * (y - np.sum(weight * y, axis=1, keepdims=True) / total[:, None])
-    gram = b.transpose(0, 2, 1) @ b
+    gram = b @ b.transpose(0, 2, 1)
     p = gram.shape[1]
     gram += (1e-9 * np.trace(gram, axis1=1, axis2=2) / p + 1e-300)[:, None, None] * np.eye(p)
-    coefficients = _not_negative(gram, np.matmul(z[:, None], b)[:, 0])
-    residual = z - np.matmul(b, coefficients[:, :, None])[:, :, 0]
+    coefficients = _not_negative(gram, np.matmul(b, z[:, :, None])[:, :, 0])
+    residual = z - np.matmul(coefficients[:, None], b)[:, 0]
     scale = np.sqrt(np.sum(residual**2, axis=1) / total) + 1e-12
     return [
         RobustFit(c, float(s), r[w], student(r[w], float(s)))
@@ -108,15 +108,20 @@ def _not_negative(gram: Array, right: Array) -> Array:
     -------
     ndarray of shape (n_fits, p)
     """
-    p = gram.shape[1]
-    sets = np.array(list(product((0.0, 1.0), repeat=p)))  # (2**p, p)
-    left_out = np.eye(p) * (1 - sets)[:, None, :]
+    sets, both, left_out = _sets(gram.shape[1])
     solved = np.linalg.solve(
-        gram[:, None] * (sets[:, :, None] * sets[:, None]) + left_out,
+        gram[:, None] * both + left_out,
         (right[:, None] * sets)[..., None],
     )[..., 0]
     drop = np.where((solved >= 0).all(2), np.sum(solved * right[:, None], axis=2), -np.inf)
     return np.asarray(solved[np.arange(len(gram)), np.argmax(drop, axis=1)])
+
+
+@cache
+def _sets(p: int) -> tuple[Array, Array, Array]:
+    """All sets of p columns, pairs of columns in a set, and a diagonal for the others."""
+    sets = np.array(list(product((0.0, 1.0), repeat=p)))
+    return sets, sets[:, :, None] * sets[:, None], np.eye(p) * (1 - sets)[:, None, :]
 
 
 def fit_together(
@@ -139,7 +144,11 @@ def fit_together(
         size[place] += (d**2).sum(axis=0)
     size = np.sqrt(size)
     size[size == 0] = 1.0
-    scaled = [d / size[place] for d, place in zip(designs, places, strict=True)]
+    # rows of a joint in the direction of memory: every step below goes along it
+    scaled = [
+        np.divide(d.T, size[p][:, None], order="C") for d, p in zip(designs, places, strict=True)
+    ]
+    corners = [np.ix_(place, place) for place in places]
     scales = [float(np.std(y)) + 1e-12 for y in targets]
     weights = [np.ones(len(y)) for y in targets]
     residuals = list(targets)
@@ -147,16 +156,18 @@ def fit_together(
     for _ in range(ROUNDS + 2):
         gram = 1e-9 * np.eye(len(size)) * sum(float(w.sum()) for w in weights)
         cross = np.zeros(len(size))
-        for d, place, y, s, w in zip(scaled, places, targets, scales, weights, strict=True):
+        for d, corner, place, y, s, w in zip(
+            scaled, corners, places, targets, scales, weights, strict=True
+        ):
             root = np.sqrt(w) / s
-            weighted = d * root[:, None]
-            gram[np.ix_(place, place)] += weighted.T @ weighted  # symmetric: half the work
-            cross[place] += weighted.T @ (root * y)
+            weighted = d * root
+            gram[corner] += weighted @ weighted.T  # symmetric: half the work
+            cross[place] += weighted @ (root * y)
         diagonal = np.sqrt(np.diag(gram))
         gram = gram / diagonal[:, None] / diagonal + 1e-10 * np.eye(len(size))
         coefficients = cho_solve(cho_factor(gram), cross / diagonal) / diagonal
         residuals = [
-            y - d @ coefficients[place] for d, place, y in zip(scaled, places, targets, strict=True)
+            y - coefficients[place] @ d for d, place, y in zip(scaled, places, targets, strict=True)
         ]
         scales = [
             float(np.sqrt(np.mean(w * r**2))) + 1e-12

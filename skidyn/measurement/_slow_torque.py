@@ -40,11 +40,11 @@ class SlowTorque(Check):
         if measurement.stale or measurement.smoothed or measurement.lost:
             return  # reported by another check, or rows have no number
         for order in ORDERS:
-            found = {}
-            for k in np.flatnonzero(measurement.excited).tolist():
-                period, gain, times = _period(measurement, k, order)
-                if gain > SURE and times > TIMES:
-                    found[k] = (period, gain, times)
+            found = {
+                k: (period, gain, times)
+                for k, (period, gain, times) in _periods(measurement, order).items()
+                if gain > SURE and times > TIMES
+            }
             periods = [period for period, _, _ in found.values()]
             common = max(set(periods), key=periods.count) if periods else 0
             alike = {k: one for k, one in found.items() if one[0] == common}
@@ -66,41 +66,61 @@ class SlowTorque(Check):
             return
 
 
-def _period(measurement: Measurement, joint: int, order: int) -> tuple[int, float, float]:
-    """Period of a torque's differences, its log-likelihood gain, and their largest ratio."""
-    s, torque = measurement.signals, measurement.torque[:, joint]
+def _periods(measurement: Measurement, order: int) -> dict[int, tuple[int, float, float]]:
+    """Period of every torque's differences, its log-likelihood gain, and their largest ratio.
+
+    Joints, from 0, that do not move and torques that never change are left out.
+    """
+    s, spread = measurement.signals, np.std(measurement.torque, axis=0)
+    joints = np.flatnonzero(measurement.excited & (spread > 0))
+    torque, rounding = measurement.torque[:, joints], ROUNDING * spread[joints]
     parts = [
-        np.abs(divided_differences(torque[rows], s.clock[rows], order))
+        np.log(np.abs(divided_differences(torque[rows], s.clock[rows], order)) + rounding)
         for rows in s.segments
         if rows.stop - rows.start > 4 * FEWEST
     ]
-    if not parts:
-        return 0, 0.0, 1.0
-    longest = max(parts, key=len)
-    spread = float(np.std(torque))
-    if spread == 0 or len(longest) < 4 * FEWEST:
-        return 0, 0.0, 1.0
-    best = (0, 0.0, 1.0)
+    parts = [part - part.mean(axis=0) for part in parts]  # for squares without cancellation
+    squares = [np.sum(part**2, axis=0) for part in parts]
+    best = dict.fromkeys(joints.tolist(), (0, 0.0, 1.0))
+    if not best or max(map(len, parts), default=0) < 4 * FEWEST:
+        return best
     for period in PERIODS:
-        sizes = [_sizes(part, period, spread) for part in parts if len(part) >= period * FEWEST]
+        sizes = [
+            _sizes(part, square, period)
+            for part, square in zip(parts, squares, strict=True)
+            if len(part) >= period * FEWEST
+        ]
         if not sizes:
             continue
-        # recordings begin at any row of the slower bus, and its values are evenly long
-        turned = [np.roll(logs, -int(np.argmax(logs))) for logs, _, _ in sizes]
         counts = np.array([n for _, n, _ in sizes])
-        gain = float(sum(g for _, _, g in sizes)) - 0.5 * np.log(counts.sum()) * (period - 1)
-        logs = np.average(turned, axis=0, weights=counts)
-        if gain > max(best[1] * 1.1, best[1] + 5.0):  # multiples of the period gain as much
-            best = (period, gain, float(np.exp(np.ptp(logs))))
+        gains = sum(gain for _, _, gain in sizes) - 0.5 * np.log(counts.sum()) * (period - 1)
+        logs = np.average([logs for logs, _, _ in sizes], axis=0, weights=counts)
+        times = np.exp(np.ptp(logs, axis=0))
+        for k, gain, ratio in zip(best, gains.tolist(), times.tolist(), strict=True):
+            if gain > max(best[k][1] * 1.1, best[k][1] + 5.0):  # multiples of it gain as much
+                best[k] = (period, gain, ratio)
     return best
 
 
-def _sizes(differences: Array, period: int, spread: float) -> tuple[Array, int, float]:
-    """Logarithms of the sizes of differences by phase, their number, and what phases gain."""
-    logs = np.log(differences + ROUNDING * spread)
-    rows = logs[: len(logs) // period * period].reshape(-1, period)
-    means = rows.mean(axis=0)
-    total, within = float(np.var(rows)), float(np.mean(rows.var(axis=0)))
-    gain = 0.5 * rows.size * np.log(total / max(within, 1e-12)) if total > 0 else 0.0
+def _sizes(logs: Array, square: Array, period: int) -> tuple[Array, int, Array]:
+    """Mean logarithms by phase from the largest on, their number, and what phases gain.
+
+    Parameters
+    ----------
+    logs : ndarray of shape (n_differences, n_joints)
+        Logarithms of the sizes of differences, less their mean.
+    square : ndarray of shape (n_joints,)
+        Sum of their squares.
+    period : int
+        Number of phases.
+    """
+    count = len(logs) // period * period
+    means = logs[:count].reshape(-1, period, logs.shape[1]).mean(axis=0)
+    total = (square - np.sum(logs[count:] ** 2, axis=0)) / count - means.mean(axis=0) ** 2
+    within = total - means.var(axis=0)
+    gain = 0.5 * count * np.log(np.maximum(total, 1e-12) / np.maximum(within, 1e-12))
+    # recordings begin at any row of the slower bus, and its values are evenly long
+    phases = (np.argmax(means, axis=0) + np.arange(period)[:, None]) % period
+    means = np.take_along_axis(means, phases, axis=0)
     # one phase and size of every recording that is fitted
-    return means, rows.size, gain - 0.5 * (period - 1) * (1 + np.log(period))
+    return means, count, gain - 0.5 * (period - 1) * (1 + np.log(period))

@@ -96,7 +96,8 @@ class SmoothedTorque(Check):
         if delay is not None and delay.common > LATE:
             return  # a filter with delay is reported by another check
         found = {}
-        motion = smooth_motion(measurement.signals)  # noise would shift reversals
+        signals = measurement.signals  # noise would shift reversals
+        motion = signals.once("smooth motion", lambda: smooth_motion(signals))
         step = column_step(motion, AROUND, motion.half_width)
         index, few = motion.thinned(step)
         torque = running_mean(measurement.torque, step)[index]
@@ -208,8 +209,10 @@ def _likelihood(f: Array, y: Array) -> tuple[float, Array]:
     weight = np.ones(len(y))
     scale, rest = 1.0, y
     for _ in range(5):
-        size = max(0.0, float((weight * f) @ y) / max(float((weight * f) @ f), 1e-300))
+        weighted = weight * f
+        size = max(0.0, float(weighted @ y) / max(float(weighted @ f), 1e-300))
         rest = y - size * f
-        scale = float(np.sqrt(np.mean(weight * rest**2))) + 1e-12
-        weight = 5.0 / (4.0 + (rest / scale) ** 2)
+        square = rest * rest
+        scale = float(np.sqrt(weight @ square / len(y))) + 1e-12
+        weight = 5.0 / (4.0 + square / scale**2)
     return student(rest, scale), rest

@@ -15,7 +15,7 @@ from skidyn.measurement._delay import Delay, RunDelay, find_delay, refined_lag
 from skidyn.measurement._fits import Fits, Reading, friction
 from skidyn.measurement._lowpass import lowpass_of_torque, suspect_lowpass
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._measures import COARSE, position_step, reversals
+from skidyn.measurement._measures import COARSE, reversals
 from skidyn.measurement._readings import DECISIVE, HALF, Change, find_changes
 from skidyn.measurement._robust import fit_admissible
 from skidyn.measurement._suspicion import Certainty, Suspicion
@@ -71,7 +71,7 @@ class UnsignedTorque(Check):
     misnames = True
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
-        cut = cut_columns(measurement)
+        cut = measurement.clipped
         if cut:
             names = ", ".join(measurement.joint(k) for k in cut)
             shares = ", ".join(f"{np.mean(measurement.torque[:, k] == 0):.0%}" for k in cut)
@@ -149,7 +149,7 @@ def unsigned_columns(measurement: Measurement) -> tuple[list[int], dict[int, flo
 
 def _unsigned(measurement: Measurement) -> tuple[list[int], dict[int, float]]:
     torque = measurement.torque
-    cut = cut_columns(measurement)
+    cut = measurement.clipped
     one_sided = [
         k
         for k in range(measurement.n_joints)
@@ -379,7 +379,7 @@ def _lost_columns(measurement: Measurement) -> list[int]:
     copies = copied_columns(measurement)
     copied = [k for k, _, _ in copies]
     originals = [j for _, what, j in copies if what == "torque"]  # either may be the copy
-    lost = [*unsigned, *cut_columns(measurement), *measurement.overflowed]
+    lost = [*unsigned, *measurement.clipped, *measurement.overflowed]
     return [*lost, *copied, *originals]
 
 
@@ -520,7 +520,7 @@ def _lowpass(fits: Fits, lag: float, late: Sequence[int]) -> float | None:
 def _least_lag(measurement: Measurement) -> float:
     """Smallest lag of the torque that is reported, s; coarse positions cause lags of their own."""
     s = measurement.signals
-    steps = [position_step(s.q[:, k]) for k in np.flatnonzero(~s.prismatic)]
+    steps = [measurement.position_steps[k] for k in np.flatnonzero(~s.prismatic)]
     return SMALLEST_COARSE if any(step > COARSE for step in steps) else SMALLEST
 
 

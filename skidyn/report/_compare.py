@@ -213,7 +213,9 @@ def _coefficients(both: Sequence[Diagnosis], same: bool) -> list[dict[str, Any]]
 
     On two logs the estimates are independent, so that a difference can be tested.
     """
-    tables = [_table(diagnosis) for diagnosis in both]
+    first, second = both
+    tables = [_table(first)]
+    tables.append(tables[0] if second is first else _table(second))
     rows = []
     for name in dict.fromkeys([*tables[0], *tables[1]]):
         sides = [table.get(name) for table in tables]

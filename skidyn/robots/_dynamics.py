@@ -99,7 +99,12 @@ class RigidBodyDynamics:
         )
 
     def gravity_torque(
-        self, q: Any, *, parameters: Any = None, gravity: Sequence[float] | None = None
+        self,
+        q: Any,
+        *,
+        parameters: Any = None,
+        gravity: Sequence[float] | None = None,
+        backend: str = "numpy",
     ) -> np.ndarray:
         """Joint torques that hold the robot at rest.
 
@@ -111,14 +116,17 @@ class RigidBodyDynamics:
             Inertial parameters in place of those of the URDF.
         gravity : sequence of 3 floats, default=None
             Gravitational acceleration in the base frame in place of the robot's, m/s^2.
+        backend : {"numpy", "once", "compiled"}, default="numpy"
+            As of :meth:`inverse_dynamics`.
 
         Returns
         -------
         ndarray of shape (n_samples, n_joints)
             N m; N for prismatic joints.
         """
+        _check_backend(backend, np.float64, "once")
         return self._engine.inverse_dynamics(
-            self._signals(q=q), gravity, parameters=self._parameters(parameters)
+            self._signals(q=q), gravity, parameters=self._parameters(parameters), backend=backend
         )
 
     def coriolis_torque(self, q: Any, dq: Any, *, parameters: Any = None) -> np.ndarray:
