@@ -281,7 +281,13 @@ def part_candidates(
             continue
         part, candidate = max(parts, key=lambda item: item[0].drop)
         inside = within(problem, candidate, part.recordings)
-        if part.drop > least and significant(tester.test(inside.rows, inside.zeros).chance, inside):
+        if part.drop <= least:
+            continue
+
+        def passes(chance: float, inside: Candidate = inside) -> bool:
+            return significant(chance, inside)
+
+        if passes(tester.test(inside.rows, inside.zeros, passes).chance):
             offered.append((form, part, inside))
     largest = max((part.drop for _, part, _ in offered), default=0.0)
     found: dict[_Form, list[tuple[float, Candidate]]] = defaultdict(list)

@@ -266,6 +266,11 @@ class Test:
     drop: float
 
 
+def _any(_: float) -> bool:
+    """Every p-value is wanted."""
+    return True
+
+
 class Tester:
     """Tests of candidates in addition to one model.
 
@@ -334,7 +339,12 @@ class Tester:
         wider._fit(felt, gram, right, self._target)
         return wider
 
-    def test(self, rows: dict[int, Array], zeros: NDArray[np.bool_] | None = None) -> Test:
+    def test(
+        self,
+        rows: dict[int, Array],
+        zeros: NDArray[np.bool_] | None = None,
+        significant: Callable[[float], bool] = _any,
+    ) -> Test:
         """Test the coefficients of some columns together.
 
         Parameters
@@ -344,12 +354,17 @@ class Tester:
         zeros : ndarray of shape (n_coefficients,) of bool, optional
             Coefficients that only define the zero of the effect. The others must be significant in
             addition to them, too: the constant of a spring is no evidence for a spring.
+        significant : callable, optional
+            Function that returns whether a p-value is small enough. Larger ones are not exact.
         """
-        test = self._tested(rows, zeros)
+        test = self._tested(rows, zeros, significant)
         error = sum(float(self.residual[j] @ self.residual[j]) for j in rows)
-        if SURE < test.chance < 1.0 and test.drop > MASKED * error:
-            again = self._unmasked(rows)._tested(rows, zeros)
-            test = replace(test, chance=min(test.chance, again.chance))
+        if test.drop > MASKED * error:
+            if not significant(test.chance):
+                test = self._tested(rows, zeros)
+            if SURE < test.chance < 1.0:
+                again = self._unmasked(rows)._tested(rows, zeros)
+                test = replace(test, chance=min(test.chance, again.chance))
         return test
 
     def _unmasked(self, rows: dict[int, Array]) -> Tester:
@@ -375,11 +390,16 @@ class Tester:
         )
         return other
 
-    def _tested(self, rows: dict[int, Array], zeros: NDArray[np.bool_] | None) -> Test:
+    def _tested(
+        self,
+        rows: dict[int, Array],
+        zeros: NDArray[np.bool_] | None,
+        significant: Callable[[float], bool] = _any,
+    ) -> Test:
         """As :meth:`test`, with the present noise."""
         new = self._swept(rows)
-        test = self._test(rows, new, self.residual)
-        if zeros is None or not zeros.any() or test.chance == 1.0:
+        test = self._test(rows, new, self.residual, significant)
+        if zeros is None or not zeros.any() or test.chance == 1.0 or not significant(test.chance):
             return test
         own = {j: block[:, ~zeros] for j, block in rows.items()}
         aside = np.concatenate([z[:, zeros] for z in new])
@@ -387,7 +407,8 @@ class Tester:
         both -= aside @ np.linalg.lstsq(aside, both, rcond=NEW_SHARE)[0]
         ends = np.cumsum([len(e) for e in self.residual])[:-1]
         parts = np.split(both, ends)
-        alone = self._test(own, [part[:, 1:] for part in parts], [part[:, 0] for part in parts])
+        columns, left = [part[:, 1:] for part in parts], [part[:, 0] for part in parts]
+        alone = self._test(own, columns, left, significant)
         return replace(test, chance=max(test.chance, alone.chance))
 
     def test_each(
@@ -419,7 +440,7 @@ class Tester:
         rows: dict[int, Array],
         new: list[Array],
         residual: Sequence[Array],
-        significant: Callable[[float], bool] = lambda _: True,
+        significant: Callable[[float], bool] = _any,
     ) -> Test:
         """Test columns from which the part that the model can represent has been removed."""
         k = next(iter(rows.values())).shape[1]
