@@ -81,8 +81,9 @@ def _period(measurement: Measurement, joint: int, order: int) -> tuple[int, floa
     if spread == 0 or len(longest) < 4 * FEWEST:
         return 0, 0.0, 1.0
     best = (0, 0.0, 1.0)
+    logs_of = [np.log(part + ROUNDING * spread) for part in parts]
     for period in PERIODS:
-        sizes = [_sizes(part, period, spread) for part in parts if len(part) >= period * FEWEST]
+        sizes = [_sizes(logs, period) for logs in logs_of if len(logs) >= period * FEWEST]
         if not sizes:
             continue
         # recordings begin at any row of the slower bus, and its values are evenly long
@@ -95,12 +96,13 @@ def _period(measurement: Measurement, joint: int, order: int) -> tuple[int, floa
     return best
 
 
-def _sizes(differences: Array, period: int, spread: float) -> tuple[Array, int, float]:
-    """Logarithms of the sizes of differences by phase, their number, and what phases gain."""
-    logs = np.log(differences + ROUNDING * spread)
+def _sizes(logs: Array, period: int) -> tuple[Array, int, float]:
+    """Mean logarithms of differences by phase, their number, and what phases gain."""
     rows = logs[: len(logs) // period * period].reshape(-1, period)
     means = rows.mean(axis=0)
-    total, within = float(np.var(rows)), float(np.mean(rows.var(axis=0)))
+    apart = (rows - means).ravel()
+    within = float(apart @ apart) / rows.size
+    total = within + float(np.var(means))
     gain = 0.5 * rows.size * np.log(total / max(within, 1e-12)) if total > 0 else 0.0
     # one phase and size of every recording that is fitted
     return means, rows.size, gain - 0.5 * (period - 1) * (1 + np.log(period))
