@@ -89,15 +89,23 @@ class Outcome:
         Residual of the rows of every column, N m or N.
     scale : ndarray of shape (n_joints,)
         Scale of the residual.
-    inflation : ndarray of shape (n_joints,)
-        Overestimation of the likelihood due to correlated neighbouring rows.
+    fits : dict of int to RobustFit
+        By column.
     """
 
     likelihood: Array
     gain: Array
     residual: list[Array]
     scale: Array
-    inflation: Array
+    fits: dict[int, RobustFit]
+
+    @cached_property
+    def inflation(self) -> Array:
+        """Overestimation of the likelihood due to correlated neighbouring rows, (n_joints,)."""
+        return np.array([self._inflation(column) for column in range(len(self.scale))])
+
+    def _inflation(self, column: int) -> float:
+        return self.fits[column].inflation if column in self.fits else 1.0
 
     def margin(self, other: Outcome) -> Array:
         """Log-likelihood gain of this reading over another, by joint.
@@ -106,7 +114,8 @@ class Outcome:
         other over this one is the same with the opposite sign.
         """
         change = self.likelihood - other.likelihood
-        inflation = np.where(change > 0, self.inflation, other.inflation)
+        likelier = [self if gains else other for gains in change > 0]
+        inflation = [outcome._inflation(column) for column, outcome in enumerate(likelier)]
         return np.asarray(change / np.maximum(inflation, 1.0))
 
 
@@ -483,12 +492,12 @@ class Fits:
 
     def _spread(self, columns: Sequence[int], fits: Sequence[RobustFit]) -> Outcome:
         n = self.n_joints
-        likelihood, scale, inflation = np.zeros(n), np.ones(n), np.ones(n)
+        likelihood, scale = np.zeros(n), np.ones(n)
         residual = [np.zeros(0) for _ in range(n)]
         for c, fit in zip(columns, fits, strict=True):
             likelihood[c], scale[c], residual[c] = fit.likelihood, fit.scale, fit.residual
-            inflation[c] = fit.inflation
-        return Outcome(likelihood, np.full(n, np.nan), residual, scale, inflation)
+        by_column = dict(zip(columns, fits, strict=True))
+        return Outcome(likelihood, np.full(n, np.nan), residual, scale, by_column)
 
 
 def friction(signals: Signals, joint: int) -> Array:

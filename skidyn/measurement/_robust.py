@@ -140,34 +140,31 @@ def fit_together(
     size = np.sqrt(size)
     size[size == 0] = 1.0
     scaled = [d / size[place] for d, place in zip(designs, places, strict=True)]
-    scales = [float(np.std(y)) + 1e-12 for y in targets]
-    weights = [np.ones(len(y)) for y in targets]
-    residuals = list(targets)
-    coefficients = np.zeros(len(size))
+    into = [np.ix_(place, place) for place in places]
+    y, counts = np.concatenate(targets), np.array([len(target) for target in targets])
+    joint, starts = np.repeat(np.arange(len(counts)), counts), np.cumsum(counts) - counts
+    parts = [slice(start, start + n) for start, n in zip(starts.tolist(), counts, strict=True)]
+    scales = np.array([float(np.std(target)) for target in targets]) + 1e-12
+    weight, residual, coefficients = np.ones(len(y)), y, np.zeros(len(size))
     for _ in range(ROUNDS + 2):
-        gram = 1e-9 * np.eye(len(size)) * sum(float(w.sum()) for w in weights)
+        gram = 1e-9 * np.eye(len(size)) * float(weight.sum())
         cross = np.zeros(len(size))
-        for d, place, y, s, w in zip(scaled, places, targets, scales, weights, strict=True):
-            root = np.sqrt(w) / s
-            weighted = d * root[:, None]
-            gram[np.ix_(place, place)] += weighted.T @ weighted  # symmetric: half the work
-            cross[place] += weighted.T @ (root * y)
+        root = np.sqrt(weight) / scales[joint]
+        right = root * y
+        for d, place, square, rows in zip(scaled, places, into, parts, strict=True):
+            weighted = d * root[rows, None]
+            gram[square] += weighted.T @ weighted  # symmetric: half the work
+            cross[place] += weighted.T @ right[rows]
         diagonal = np.sqrt(np.diag(gram))
         gram = gram / diagonal[:, None] / diagonal + 1e-10 * np.eye(len(size))
         coefficients = cho_solve(cho_factor(gram), cross / diagonal) / diagonal
-        residuals = [
-            y - d @ coefficients[place] for d, place, y in zip(scaled, places, targets, strict=True)
-        ]
-        scales = [
-            float(np.sqrt(np.mean(w * r**2))) + 1e-12
-            for w, r in zip(weights, residuals, strict=True)
-        ]
-        weights = [
-            (FREEDOM + 1) / (FREEDOM + (r / s) ** 2) for r, s in zip(residuals, scales, strict=True)
-        ]
+        fitted = [d @ coefficients[place] for d, place in zip(scaled, places, strict=True)]
+        residual = y - np.concatenate(fitted)
+        scales = np.sqrt(np.add.reduceat(weight * residual**2, starts) / counts) + 1e-12
+        weight = (FREEDOM + 1) / (FREEDOM + (residual / scales[joint]) ** 2)
     return [
-        RobustFit(coefficients[place] / size[place], s, r, student(r, s))
-        for place, r, s in zip(places, residuals, scales, strict=True)
+        RobustFit(coefficients[place] / size[place], s, residual[rows], student(residual[rows], s))
+        for place, rows, s in zip(places, parts, scales.tolist(), strict=True)
     ]
 
 
@@ -191,8 +188,18 @@ def _inflation(residual: Array) -> float:
     """Variance inflation of a mean of rows, from the correlation of neighbouring rows."""
     if len(residual) < FEWEST:
         return 1.0
-    r = residual - np.median(residual)
-    r = np.clip(r, *(np.array([-3, 3]) * (1.4826 * np.median(np.abs(r)) + 1e-300)))
+    r = residual - _median(residual)
+    far = 3 * (1.4826 * _median(np.abs(r)) + 1e-300)
+    r = np.clip(r, -far, far)
     alike = float(r[1:] @ r[:-1] / (r @ r)) if r @ r > 0 else 0.0
     alike = float(np.clip(alike, 0.0, MOST_ALIKE))
     return (1 + alike) / (1 - alike)
+
+
+def _median(values: Array) -> float:
+    """The median; NumPy's spends most of its time on looking for values that are not finite."""
+    half = len(values) // 2
+    if len(values) % 2:
+        return float(np.partition(values, half)[half])
+    parts = np.partition(values, (half - 1, half))
+    return 0.5 * float(parts[half - 1] + parts[half])
