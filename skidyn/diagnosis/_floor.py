@@ -78,15 +78,18 @@ def _held_out_share(features: Array, r: Array, fold: NDArray[np.int64], n_folds:
     parts = [(features[rows], r[rows]) for rows in fold_slices(fold, n_folds)]
     grams = np.array([x.T @ x for x, _ in parts])
     cross = np.array([x.T @ y for x, y in parts])
-    total, right = grams.sum(0), cross.sum(0)
+    held, right = grams.sum(0) - grams, cross.sum(0) - cross
+    diagonal = np.arange(features.shape[1])
     best, behind = 0.0, 0
     for ridge in RIDGES[::-1]:
         drop = 0.0
-        for gram, own in zip(grams, cross, strict=True):
+        for gram, own, others, along in zip(grams, cross, held, right, strict=True):
             # Triangular factors take a small part of the time of eigenvectors, which would serve
             # all ridges.
-            held = total - gram + ridge * len(r) / n_folds * np.eye(len(gram))
-            b = cho_solve(cho_factor(held, check_finite=False), right - own, check_finite=False)
+            normal = others.copy()
+            normal[diagonal, diagonal] += ridge * len(r) / n_folds
+            factor = cho_factor(normal, overwrite_a=True, check_finite=False)
+            b = cho_solve(factor, along, check_finite=False)
             drop += float(2 * b @ own - b @ gram @ b)
         best, behind = max(best, drop), 0 if drop > best else behind + 1
         if behind == WORSE:

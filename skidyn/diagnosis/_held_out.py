@@ -125,5 +125,6 @@ def shares_of_folds(problem: Problem, rows: Mapping[int, Array]) -> Array:
     """
     energy = np.zeros(problem.n_folds)
     for j, columns in rows.items():
-        energy += np.bincount(problem.fold[j], np.sum(columns**2, axis=1), problem.n_folds)
+        squares = np.einsum("ik,ik->i", columns, columns)
+        energy += np.bincount(problem.fold[j], squares, problem.n_folds)
     return np.asarray(energy / max(float(energy.sum()), 1e-300))

@@ -16,8 +16,9 @@ References
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +40,8 @@ MOST_IN_ALL = 0.8
 NEAR = 0.5
 #: A recording whose information about an effect is a smaller share of the largest has no estimate.
 BLIND = 1e-3
+#: Approximate number of products of columns that are computed at a time.
+MOST_VALUES = 2**20
 #: A kind, and the names of the shape entries that only one of its further forms has.
 _Form = tuple[str, frozenset[str]]
 
@@ -76,103 +79,152 @@ class PartScan:
     def __init__(self, tester: Tester) -> None:
         self.tester, self.names = tester, tester.problem.rows.recordings
         inside = [t == self.names[:, None] for t in tester.problem.rows.trajectory]
-        self._rows = [[np.flatnonzero(own) for own in of_joint] for of_joint in inside]
         self._inside = [of_joint.astype(float) for of_joint in inside]
+        self._rows = [[np.flatnonzero(own) for own in of_joint] for of_joint in inside]
+        pairs = list(zip(self._rows, tester.felt, strict=True))
+        self._felt = [[felt.rows[here] for here in of_joint] for of_joint, felt in pairs]
 
-    def roughly(self, candidate: Candidate) -> float:
+    def roughly(self, candidates: Sequence[Candidate]) -> Array:
         """Squared error that separate sizes would remove if the model could not follow them."""
-        n, k = len(self.names), candidate.width
-        own, score = np.zeros((n, k)), np.zeros((n, k))
-        for j, rows in candidate.rows.items():
-            block = rows / self.tester.sigma[j]
-            own += self._inside[j] @ block**2
-            score += self._inside[j] @ (block * self.tester.residual[j][:, None])
-        seen = own > BLIND * own.max(axis=0)
-        return float(np.sum(np.where(seen, score**2 / np.where(seen, own, 1.0), 0.0)))
+        n, drops = len(self.names), np.zeros(len(candidates))
+        for index, joints, k in self._batches(candidates):
+            own, score = np.zeros((n, len(index) * k)), np.zeros((n, len(index) * k))
+            for j in joints:
+                block = self._block([candidates[i] for i in index], j)
+                score += self._inside[j] @ (block * self.tester.residual[j][:, None])
+                own += self._inside[j] @ np.square(block, out=block)
+            seen = own > BLIND * own.max(axis=0)
+            removed = np.where(seen, score**2 / np.where(seen, own, 1.0), 0.0)
+            drops[index] = removed.sum(0).reshape(-1, k).sum(1)
+        return drops
 
-    def part(self, candidate: Candidate) -> Part | None:
-        """The best part of the recordings, None if the effect in all of them explains as much."""
-        n, k, model = len(self.names), candidate.width, self.tester
-        score, cross = np.zeros((n, k)), np.zeros((n, len(model.inverse), k))
-        own = np.zeros((n, k, k))
-        for j, rows in candidate.rows.items():
-            block, felt = rows / model.sigma[j], model.felt[j]
-            for i, here in enumerate(self._rows[j]):
-                b = block[here]
-                own[i] += b.T @ b
-                score[i] += b.T @ model.residual[j][here]
-                cross[i, felt.places] += felt.rows[here].T @ b
-        shared = np.einsum("ipk,pq,jql->ijkl", cross, model.inverse, cross, optimize=True)
-        return best_part(self.names, score, own, shared)
+    def parts(self, candidates: Sequence[Candidate]) -> list[Part | None]:
+        """The best part for each candidate, None if the effect in all explains as much."""
+        n, model = len(self.names), self.tester
+        found: list[Part | None] = [None] * len(candidates)
+        for index, joints, k in self._batches(candidates):
+            count, width = len(index), len(model.inverse)
+            score, own = np.zeros((n, count, k)), np.zeros((n, count, k, k))
+            cross = np.zeros((n, width, count * k))
+            for j in joints:
+                block = self._block([candidates[i] for i in index], j)
+                for i, here in enumerate(self._rows[j]):
+                    b = block[here]
+                    apart = b.reshape(len(b), count, k).transpose(1, 0, 2)
+                    own[i] += apart.transpose(0, 2, 1) @ apart
+                    score[i] += (model.residual[j][here] @ b).reshape(count, k)
+                    cross[i, model.felt[j].places] += self._felt[j][i].T @ b
+            mimic = model.inverse @ cross
+            parted = [x.reshape(n, width, count, k).transpose(2, 0, 3, 1) for x in (cross, mimic)]
+            left, right = (x.reshape(count, n * k, width) for x in parted)
+            shared = (left @ right.transpose(0, 2, 1)).reshape(count, n, k, n, k)
+            products = score.transpose(1, 0, 2), own.transpose(1, 0, 2, 3)
+            best = best_parts(self.names, *products, shared.transpose(0, 1, 3, 2, 4))
+            for place, part in zip(index, best, strict=True):
+                found[place] = part
+        return found
+
+    def _batches(
+        self, candidates: Sequence[Candidate]
+    ) -> Iterator[tuple[list[int], tuple[int, ...], int]]:
+        """Indices of candidates on the same joints with the same number of columns."""
+        groups: dict[tuple[tuple[int, ...], int], list[int]] = defaultdict(list)
+        for i, candidate in enumerate(candidates):
+            groups[tuple(candidate.rows), candidate.width].append(i)
+        for (joints, k), index in groups.items():
+            columns = len(self.names) * k
+            most = max(1, MOST_VALUES // (columns * (columns + len(self.tester.inverse))))
+            for start in range(0, len(index), most):
+                yield index[start : start + most], joints, k
+
+    def _block(self, candidates: Sequence[Candidate], joint: int) -> Array:
+        """Columns of candidates side by side, in units of the noise."""
+        block = np.hstack([c.rows[joint] for c in candidates])
+        block /= self.tester.sigma[joint]
+        return block
 
 
-def best_part(
+def best_parts(
     names: NDArray[np.int64], score: Array, own: Array, shared: Array | None = None
-) -> Part | None:
-    """The best part of the recordings, None if the effect in all of them explains as much.
+) -> list[Part | None]:
+    """The best part of the recordings for each of some effects with as many columns.
+
+    It is None if the effect in all of them explains as much.
 
     Parameters
     ----------
     names : ndarray of shape (n,)
         Numbers of the trajectories.
-    score : ndarray of shape (n, k)
+    score : ndarray of shape (n_effects, n, k)
         Products of an effect's columns and the residual in every trajectory.
-    own : ndarray of shape (n, k, k)
+    own : ndarray of shape (n_effects, n, k, k)
         Products of the columns with themselves.
-    shared : ndarray of shape (n, n, k, k), optional
+    shared : ndarray of shape (n_effects, n, n, k, k), optional
         The part of them that the model can represent, of each trajectory with each.
 
     Returns
     -------
-    Part or None
+    list of Part or None
     """
-    n = len(names)
-    size = np.sqrt(np.maximum(np.einsum("ikk->k", own), 1e-300))
-    own, score = own / size[:, None] / size, score / size
-    joint = np.zeros((n, n, *own.shape[1:]))
-    if shared is not None:
-        joint -= shared / size[:, None] / size
-    joint[np.arange(n), np.arange(n)] += own
-    weight = np.einsum("ikk->i", own)
-    seen = np.flatnonzero(weight > BLIND * weight.max())
-    in_all = float(_drops(score.sum(0)[None], joint.sum((0, 1))[None])[0])
-    prices = np.array([price_of_part(n, m) for m in range(1, len(seen))])
-    best = None
-    for order in _orders(score, own, joint, seen):
-        grams = (
-            joint[np.ix_(order, order)]
-            .cumsum(0)
-            .cumsum(1)[np.arange(len(order)), np.arange(len(order))]
-        )
-        drops = (_drops(score[order].cumsum(0), grams)[:-1] - prices)[LEAST_PART - 1 :]
-        m = LEAST_PART + int(np.argmax(drops)) if len(drops) else 0
-        if m and (best is None or drops[m - LEAST_PART] > best.drop):
-            recordings = tuple(sorted(int(names[i]) for i in order[:m]))
-            best = Part(recordings, float(drops[m - LEAST_PART]))
-    return best if best is not None and in_all < MOST_IN_ALL * best.drop else None
+    count, n, k = score.shape
+    size = np.sqrt(np.maximum(np.einsum("eikk->ek", own), 1e-300))
+    scale = size[:, :, None] * size[:, None]
+    own, score = own / scale[:, None], score / size[:, None]
+    joint = np.zeros((count, n, n, k, k)) if shared is None else -shared / scale[:, None, None]
+    joint[:, np.arange(n), np.arange(n)] += own
+    weight = np.einsum("eikk->ei", own)
+    seen = weight > BLIND * weight.max(axis=1, keepdims=True)
+    in_all = _drops(score.sum(1), joint.sum((1, 2)))
+    orders = _orders(score, weight, joint, seen)
+    effect = np.arange(count)[:, None, None]
+    # what each recording adds to the products of those before it, in both orders
+    rank = np.argsort(orders, axis=2).transpose(0, 2, 1)
+    before = rank[:, None] < rank[:, :, None]
+    mixed = before.transpose(0, 1, 3, 2) @ joint.reshape(count, n, n, k * k)
+    mixed = mixed.reshape(count, n, 2, k, k)
+    added = mixed + mixed.transpose(0, 1, 2, 4, 3)
+    added += joint[:, np.arange(n), np.arange(n)][:, :, None]
+    grams = added[effect, orders, np.arange(2)[:, None]].cumsum(2)
+    sizes = np.arange(1, n + 1)
+    prices = np.array([price_of_part(n, m) for m in sizes])
+    drops = _drops(score[effect, orders].cumsum(2), grams) - prices
+    possible = (sizes >= LEAST_PART) & (sizes < seen.sum(1, keepdims=True))
+    drops = np.where(possible[:, None], drops, -np.inf).reshape(count, 2 * n)
+    found: list[Part | None] = []
+    for e, best in enumerate(drops.argmax(axis=1)):
+        drop, (way, m) = float(drops[e, best]), divmod(int(best), n)
+        recordings = tuple(sorted(names[orders[e, way, : m + 1]].tolist()))
+        own_part = np.isfinite(drop) and in_all[e] < MOST_IN_ALL * drop
+        found.append(Part(recordings, drop) if own_part else None)
+    return found
 
 
 def _drops(scores: Array, grams: Array) -> Array:
     """Squared error removed with equal size in each of some sets of recordings."""
-    ridge = 1e-9 * np.eye(scores.shape[1])
-    solution = np.linalg.solve(grams + ridge, scores[:, :, None])[:, :, 0]
-    return np.asarray(np.sum(scores * solution, axis=1))
+    ridge = 1e-9 * np.eye(scores.shape[-1])
+    solution = np.linalg.solve(grams + ridge, scores[..., None])[..., 0]
+    return np.asarray(np.sum(scores * solution, axis=-1))
 
 
-def _orders(
-    score: Array, own: Array, joint: Array, seen: NDArray[np.int64]
-) -> list[NDArray[np.int64]]:
-    """Recordings in the order of their estimates, from both ends."""
-    n, k = len(seen), score.shape[1]
-    gram = joint[np.ix_(seen, seen)].transpose(0, 2, 1, 3).reshape(n * k, n * k)
+def _orders(score: Array, weight: Array, joint: Array, seen: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Recordings in the order of their estimates, from both ends, shape (n_effects, 2, n).
+
+    Those without an estimate are last.
+    """
+    count, n, k = score.shape
+    both = (seen[:, :, None] & seen[:, None])[:, :, :, None, None]
+    gram = np.where(both, joint, 0.0).transpose(0, 1, 3, 2, 4).reshape(count, n * k, n * k)
+    score = np.where(seen[:, :, None], score, 0.0).reshape(count, n * k, 1)
     # the model absorbs an effect of equal size in all recordings: only differences count
-    estimate = np.linalg.solve(gram + 1e-4 * np.eye(n * k), score[seen].ravel()).reshape(n, k)
-    along = estimate[:, 0]
+    estimate = np.linalg.solve(gram + 1e-4 * np.eye(n * k), score).reshape(count, n, k)
+    along = estimate[:, :, 0]
     if k > 1:
-        weight = np.sqrt(np.einsum("ikk->i", own[seen]))
-        along = estimate @ np.linalg.svd(estimate * weight[:, None], full_matrices=False)[2][0]
-    order = seen[np.argsort(-along, kind="stable")]
-    return [order, order[::-1]]
+        spread = np.linalg.svd(estimate * np.sqrt(weight)[:, :, None], full_matrices=False)[2]
+        along = (estimate @ spread[:, 0, :, None])[:, :, 0]
+    order = np.argsort(np.where(seen, -along, np.inf), axis=1, kind="stable")
+    place, last = np.arange(n), seen.sum(1, keepdims=True) - 1
+    back = np.take_along_axis(order, np.where(place <= last, last - place, place), axis=1)
+    return np.stack([order, back], axis=1)
 
 
 def price_of_part(n: int, m: int) -> float:
@@ -211,22 +263,31 @@ def part_candidates(
     if len(scan.names) < FEWEST:
         return []
     sites: dict[tuple[_Form, tuple[int, ...]], list[tuple[float, Candidate]]] = defaultdict(list)
-    for candidate in pool:
-        effect = candidate.term.effect
-        if effect.comes_and_goes and candidate.term.trajectories is None:
-            rough = scan.roughly(candidate)
-            if rough > least:
-                form = candidate.kind, effect.form_names & set(candidate.term.shape)
-                sites[form, candidate.joints].append((rough, candidate))
+    passing = [c for c in pool if c.term.effect.comes_and_goes and c.term.trajectories is None]
+    for rough, candidate in zip(scan.roughly(passing).tolist(), passing, strict=True):
+        if rough > least:
+            form = candidate.kind, candidate.term.effect.form_names & set(candidate.term.shape)
+            sites[form, candidate.joints].append((rough, candidate))
+    best = {
+        site: [c for _, c in sorted(own, key=lambda item: -item[0])[:SHAPES]]
+        for site, own in sites.items()
+    }
+    tried = list(chain.from_iterable(best.values()))
+    part_of = dict(zip(tried, scan.parts(tried), strict=True))
     offered: list[tuple[_Form, Part, Candidate]] = []
-    for (form, _), own in sites.items():
-        own = sorted(own, key=lambda item: -item[0])[:SHAPES]
-        parts = [(part, c) for _, c in own if (part := scan.part(c)) is not None]
+    for (form, _), own in best.items():
+        parts = [(part, c) for c in own if (part := part_of[c]) is not None]
         if not parts:
             continue
         part, candidate = max(parts, key=lambda item: item[0].drop)
         inside = within(problem, candidate, part.recordings)
-        if part.drop > least and significant(tester.test(inside.rows, inside.zeros).chance, inside):
+        if part.drop <= least:
+            continue
+
+        def passes(chance: float, inside: Candidate = inside) -> bool:
+            return significant(chance, inside)
+
+        if passes(tester.test(inside.rows, inside.zeros, passes).chance):
             offered.append((form, part, inside))
     largest = max((part.drop for _, part, _ in offered), default=0.0)
     found: dict[_Form, list[tuple[float, Candidate]]] = defaultdict(list)
@@ -253,7 +314,7 @@ def _settled(
     for _ in range(ROUNDS if inside.n_shapes else 0):
         term = refined(inside).term.everywhere
         everywhere = replace(inside, term=term, rows=problem.term_rows(term))
-        again = scan.part(everywhere)
+        (again,) = scan.parts([everywhere])
         if again is None or again.drop <= part.drop:
             break
         same = again.recordings == part.recordings

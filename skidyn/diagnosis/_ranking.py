@@ -194,7 +194,8 @@ class RankingSearch(SearchState):
             n_rows = int(self.problem.rows.counts[list(candidate.joints)].sum())
             if not drops[i] > self.settings.least_share * n_rows:
                 continue
-            if self.significant(tester.test(candidate.rows, candidate.zeros).chance, candidate):
+            passes = partial(self.significant, candidate=candidate)
+            if passes(tester.test(candidate.rows, candidate.zeros, passes).chance):
                 return int(i)
         return None
 

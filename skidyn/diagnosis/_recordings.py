@@ -93,7 +93,8 @@ def choose(
         tester = tester_beside(chosen)
         drops = np.array([_drop_alone(tester, c) for c in left])
         tests = [
-            (left[i], tester.test(left[i].rows, left[i].zeros)) for i in np.argsort(-drops)[:TESTED]
+            (left[i], tester.test(left[i].rows, left[i].zeros, significant))
+            for i in np.argsort(-drops)[:TESTED]
         ]
         found = [(t.drop, c) for c, t in tests if significant(t.chance)]
         if not found:

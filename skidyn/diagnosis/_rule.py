@@ -54,6 +54,8 @@ FEWEST_BLOCKS, ENOUGH_BLOCKS = 6, 8
 RESOLVED = 40.0
 #: A column of which less than this share is new to the model is not tested.
 NEW_SHARE = 1e-6
+#: Relative rounding error of what a column removes, found from products.
+ROUNDING = 1e-6
 #: Share of an effect below which a coefficient of the wrong sign is negligible.
 NEGLIGIBLE = 0.05
 #: A candidate that removes more than this share of the squared error of its joints was weighted by
@@ -266,6 +268,11 @@ class Test:
     drop: float
 
 
+def _any(_: float) -> bool:
+    """Every p-value is wanted."""
+    return True
+
+
 class Tester:
     """Tests of candidates in addition to one model.
 
@@ -310,6 +317,8 @@ class Tester:
         self.inverse = np.linalg.inv(normal) / scale[:, None] / scale
         solution = self.inverse @ right
         self.residual = [t - f.rows @ solution[f.places] for f, t in zip(felt, target, strict=True)]
+        self._left = right - gram @ solution  # rounding, and the ridge
+        self._square = sum(float(r @ r) for r in self.residual)
         self._free = max(1, int(self.problem.rows.counts.sum()) - len(scale))
 
     def beside(self, blocks: Sequence[dict[int, Array]]) -> Tester:
@@ -334,7 +343,12 @@ class Tester:
         wider._fit(felt, gram, right, self._target)
         return wider
 
-    def test(self, rows: dict[int, Array], zeros: NDArray[np.bool_] | None = None) -> Test:
+    def test(
+        self,
+        rows: dict[int, Array],
+        zeros: NDArray[np.bool_] | None = None,
+        significant: Callable[[float], bool] = _any,
+    ) -> Test:
         """Test the coefficients of some columns together.
 
         Parameters
@@ -344,12 +358,17 @@ class Tester:
         zeros : ndarray of shape (n_coefficients,) of bool, optional
             Coefficients that only define the zero of the effect. The others must be significant in
             addition to them, too: the constant of a spring is no evidence for a spring.
+        significant : callable, optional
+            Function that returns whether a p-value is small enough. Larger ones are not exact.
         """
-        test = self._tested(rows, zeros)
+        test = self._tested(rows, zeros, significant)
         error = sum(float(self.residual[j] @ self.residual[j]) for j in rows)
-        if SURE < test.chance < 1.0 and test.drop > MASKED * error:
-            again = self._unmasked(rows)._tested(rows, zeros)
-            test = replace(test, chance=min(test.chance, again.chance))
+        if test.drop > MASKED * error:
+            if not significant(test.chance):
+                test = self._tested(rows, zeros)
+            if SURE < test.chance < 1.0:
+                again = self._unmasked(rows)._tested(rows, zeros)
+                test = replace(test, chance=min(test.chance, again.chance))
         return test
 
     def _unmasked(self, rows: dict[int, Array]) -> Tester:
@@ -375,11 +394,20 @@ class Tester:
         )
         return other
 
-    def _tested(self, rows: dict[int, Array], zeros: NDArray[np.bool_] | None) -> Test:
+    def _tested(
+        self,
+        rows: dict[int, Array],
+        zeros: NDArray[np.bool_] | None,
+        significant: Callable[[float], bool] = _any,
+    ) -> Test:
         """As :meth:`test`, with the present noise."""
-        new = self._swept(rows)
-        test = self._test(rows, new, self.residual)
-        if zeros is None or not zeros.any() or test.chance == 1.0:
+        mimic = self._mimic(rows)
+        least = self._least(rows, *mimic)
+        if not significant(least.chance):
+            return least
+        new = self._swept(rows, mimic[1])
+        test = self._test(rows, new, self.residual, significant)
+        if zeros is None or not zeros.any() or test.chance == 1.0 or not significant(test.chance):
             return test
         own = {j: block[:, ~zeros] for j, block in rows.items()}
         aside = np.concatenate([z[:, zeros] for z in new])
@@ -387,7 +415,8 @@ class Tester:
         both -= aside @ np.linalg.lstsq(aside, both, rcond=NEW_SHARE)[0]
         ends = np.cumsum([len(e) for e in self.residual])[:-1]
         parts = np.split(both, ends)
-        alone = self._test(own, [part[:, 1:] for part in parts], [part[:, 0] for part in parts])
+        columns, left = [part[:, 1:] for part in parts], [part[:, 0] for part in parts]
+        alone = self._test(own, columns, left, significant)
         return replace(test, chance=max(test.chance, alone.chance))
 
     def test_each(
@@ -400,9 +429,14 @@ class Tester:
         rows : dict of int to ndarray of shape (n_rows_j, n_coefficients)
             Averaged columns, per joint they reach.
         significant : callable
-            Function that returns whether a p-value is small enough. Larger ones are not exact.
+            Function that returns whether a p-value is small enough. Larger ones are not exact, and
+            columns that are not significant together are not tested alone.
         """
-        new = self._swept(rows)
+        mimic = self._mimic(rows)
+        least = self._least(rows, *mimic)
+        if not significant(least.chance):
+            return least, iter(())
+        new = self._swept(rows, mimic[1])
         alone = (
             self._test(
                 {j: block[:, [c]] for j, block in rows.items()},
@@ -419,7 +453,7 @@ class Tester:
         rows: dict[int, Array],
         new: list[Array],
         residual: Sequence[Array],
-        significant: Callable[[float], bool] = lambda _: True,
+        significant: Callable[[float], bool] = _any,
     ) -> Test:
         """Test columns from which the part that the model can represent has been removed."""
         k = next(iter(rows.values())).shape[1]
@@ -443,11 +477,40 @@ class Tester:
         coefficients[told] = b / size
         return Test(chance, coefficients, drop)
 
-    def _swept(self, rows: dict[int, Array]) -> list[Array]:
+    def _mimic(self, rows: dict[int, Array]) -> tuple[Array, Array]:
+        """Products with the model's columns, and its coefficients that approximate some columns."""
+        scaled = {j: b / self.sigma[j] for j, b in rows.items()}
+        cross = products_with(self.felt, scaled, len(self.inverse))
+        return cross, self.inverse @ cross
+
+    def _swept(self, rows: dict[int, Array], mimic: Array) -> list[Array]:
         """Columns minus the part that the model can represent, on the rows of every joint."""
         scaled = {j: b / self.sigma[j] for j, b in rows.items()}
-        mimic = self.inverse @ products_with(self.felt, scaled, len(self.inverse))
         return [scaled.get(j, 0.0) - f.rows @ mimic[f.places] for j, f in enumerate(self.felt)]
+
+    def _least(self, rows: dict[int, Array], cross: Array, mimic: Array) -> Test:
+        """The smallest p-value that some columns can have, from products alone.
+
+        That of a white residual: its correlation can only raise the p-value.
+        """
+        scaled = {j: b / self.sigma[j] for j, b in rows.items()}
+        own = np.asarray(sum(b.T @ b for b in scaled.values()))
+        score = np.asarray(sum(b.T @ self.residual[j] for j, b in scaled.items()))
+        both = cross.T @ mimic
+        gram = own - both - both.T + mimic.T @ (self._gram @ mimic)
+        score = score - mimic.T @ self._left
+        told = np.diag(gram) > np.maximum(NEW_SHARE * np.diag(own), 0.0)
+        coefficients, k = np.zeros(len(told)), int(told.sum())
+        if not k:
+            return Test(1.0, coefficients, 0.0)
+        size = np.sqrt(np.diag(gram)[told])
+        gram, score = gram[np.ix_(told, told)] / size[:, None] / size, score[told] / size
+        b = np.linalg.solve(gram + RIDGE * np.eye(k), score)
+        coefficients[told] = b / size
+        drop = float(score @ b)
+        most = drop * (1 + ROUNDING)
+        mean = max((self._square - most) / self._free, 1e-300)
+        return Test(_tail(most / k / mean, k, self._free), coefficients, drop)
 
     def _stationary(self, new: list[Array], left: list[Array], drop: float, k: int) -> float:
         """P-value of the drop for a stationary residual."""

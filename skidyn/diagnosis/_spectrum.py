@@ -13,7 +13,7 @@ from scipy.optimize import minimize_scalar
 
 from skidyn._signals import Array
 from skidyn.diagnosis._clock import clock_line
-from skidyn.diagnosis._parts import FEWEST, best_part, n_parts
+from skidyn.diagnosis._parts import FEWEST, best_parts, n_parts
 from skidyn.diagnosis._profile import QUARTERS
 from skidyn.diagnosis._rule import SHORTEST_BLOCK, chance_of_score
 from skidyn.effects import Term
@@ -128,7 +128,7 @@ def _in_part(
     block = line.term.torque_columns(problem.signals)[line.joint] / sigma
     parts = [(block[here], r[here] / sigma) for n in names for here in [use & (trajectory == n)]]
     score, own = np.array([b.T @ y for b, y in parts]), np.array([b.T @ b for b, _ in parts])
-    part = best_part(names, score, own)
+    (part,) = best_parts(names, score[None], own[None])
     if part is None:
         return None
     inside = use & np.isin(trajectory, part.recordings)

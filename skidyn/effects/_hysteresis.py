@@ -79,7 +79,7 @@ def cut_strokes(position: Array, segments: list[slice]) -> Strokes:
             continue
         # At rest a stroke continues: fill zeros with the direction before them (at the start,
         # after).
-        last = np.searchsorted(moving, np.arange(len(direction)), side="right") - 1
+        last = np.cumsum(direction != 0) - 1
         direction = direction[moving[np.maximum(last, 0)]]
         first = np.r_[0, np.flatnonzero(np.diff(direction)) + 1]
         steps = np.diff(np.r_[first, len(direction)])
@@ -101,10 +101,14 @@ def cut_strokes(position: Array, segments: list[slice]) -> Strokes:
     return Strokes(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
-def strokes_of(signals: Signals, joint: int) -> Strokes:
-    """Strokes of a joint, from 0, cut once for all states that depend on its path."""
+def strokes_of(signals: Signals, joint: int, name: str = "q") -> Strokes:
+    """Strokes of a joint, from 0, cut once for all states that depend on its path.
+
+    Those of its velocity if ``name`` is ``"dq"``.
+    """
     strokes: Strokes = signals.once(
-        ("strokes", joint), lambda: cut_strokes(signals.q[:, joint], signals.segments)
+        ("strokes", joint, name),
+        lambda: cut_strokes(getattr(signals, name)[:, joint], signals.segments),
     )
     return strokes
 
@@ -199,7 +203,12 @@ def stop_state(position: Array, segments: list[slice], presliding: float) -> Arr
     >>> stop_state(np.array([0.0, 0.1, 0.3]), [slice(0, 3)], 0.2).tolist()
     [0.0, 0.5, 1.0]
     """
-    return _run(cut_strokes(position, segments), len(position), _stop_law(presliding))
+    return stop_along(cut_strokes(position, segments), len(position), presliding)
+
+
+def stop_along(strokes: Strokes, n_samples: int, presliding: float) -> Array:
+    """As :func:`stop_state`, along a path that was cut into strokes."""
+    return _run(strokes, n_samples, _stop_law(presliding))
 
 
 def _stop_law(presliding: float) -> Law:

@@ -484,7 +484,8 @@ class TorqueBetweenTwoJoints(NamelessEffect):
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
         unit = self.travel(signals, joints, {})
-        ranges = [supported_range(signals, signals.q[:, j]) for j in joints]
+        every = signals.once("ranges of q", lambda: supported_ranges(signals, signals.q))
+        ranges = [every[j] for j in joints]
         middle = tuple((low + high) / 2 for low, high in ranges)
         half = tuple((high - low) / 2 for low, high in ranges)
         found = []

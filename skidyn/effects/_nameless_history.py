@@ -12,7 +12,7 @@ from numpy.polynomial.legendre import legvander
 
 from skidyn._signals import Array, Signals
 from skidyn.effects._base import Shape
-from skidyn.effects._hysteresis import dahl_state, stop_state, strokes_of
+from skidyn.effects._hysteresis import dahl_state, stop_along, strokes_of
 from skidyn.effects._nameless import (
     NamelessEffect,
     splines,
@@ -182,7 +182,8 @@ class FunctionOfLaggingPosition(NamelessEffect):
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         x, play = getattr(signals, self.signal)[:, joint], shape["play"]
-        lagging = x - play * stop_state(x, signals.segments, play)
+        strokes = strokes_of(signals, joint, self.signal)
+        lagging = x - play * stop_along(strokes, len(x), play)
         return splines(lagging, shape["low"], shape["high"], _LAGGING)
 
 

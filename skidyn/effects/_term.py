@@ -78,7 +78,11 @@ class Term:
         return tuple(joint - 1 for joint in self.joints)
 
     def __hash__(self) -> int:
-        return hash((self.kind, self.joints, tuple(sorted(map(str, self.shape.items())))))
+        shape = self.shape.items()
+        try:
+            return hash((self.kind, self.joints, frozenset(shape)))
+        except TypeError:  # a value that is a list
+            return hash((self.kind, self.joints, frozenset(map(str, shape))))
 
     def __str__(self) -> str:
         shape = "".join(f", {k}={_short(v)}" for k, v in self.shape.items())

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache, partial
 from typing import Any
 
@@ -75,12 +75,23 @@ _FAST, _FEWEST = 4.0, 20
 _STEP = 1e-6
 
 
+def _shared(signals: Signals, joint: int, name: str, make: Callable[[], Array]) -> Array:
+    """A quantity of a joint that does not depend on the shape.
+
+    Shapes only change the motion of the link. Quantities are cached for the last joint: shapes of
+    one joint are evaluated in succession, and all joints together would take many times the memory
+    of the log.
+    """
+    kept: dict[tuple[int, str], Array] = signals.once("shared by shapes", dict)
+    if (joint, name) not in kept:
+        for other in [key for key in kept if key[0] != joint]:
+            del kept[other]
+        kept[joint, name] = make()
+    return kept[joint, name]
+
+
 def _slope(signals: Signals, joint: int, by: str) -> Array:
     """Change of all torques per change of a joint's position, velocity or acceleration.
-
-    Shapes only change the motion of the link, so they share these slopes. They are cached for the
-    last joint: shapes of one joint are evaluated in succession, and all joints together would take
-    many times the memory of the log.
 
     Parameters
     ----------
@@ -93,15 +104,14 @@ def _slope(signals: Signals, joint: int, by: str) -> Array:
 
     Returns
     -------
-    ndarray of shape (n_samples, n_joints)
+    ndarray of shape (n_joints, n_samples)
         N m/rad, N m s/rad or kg m^2, or the corresponding units for sliders.
     """
-    kept: dict[tuple[int, str], Array] = signals.once("torque slopes", dict)
-    if (joint, by) not in kept:
-        for other in [key for key in kept if key[0] != joint]:
-            del kept[other]
-        kept[joint, by] = _differentiate_torque(signals, joint, by)
-    return kept[joint, by]
+
+    def make() -> Array:
+        return np.ascontiguousarray(_differentiate_torque(signals, joint, by).T)
+
+    return _shared(signals, joint, by, make)
 
 
 def _differentiate_torque(signals: Signals, joint: int, by: str) -> Array:
@@ -126,10 +136,15 @@ def _differentiate_torque(signals: Signals, joint: int, by: str) -> Array:
 
 def _link_inertia(signals: Signals, joint: int) -> Array:
     """Inertia of the free link at its own joint, kg m^2 or kg."""
-    inertia = _slope(signals, joint, "acceleration")[:, joint]
-    # Identified parameters need not be consistent; a link without inertia would move away at once.
-    inertia = np.maximum(inertia, 0.05 * np.abs(np.median(inertia)))
-    return np.asarray(np.maximum(inertia, np.finfo(float).tiny))
+
+    def make() -> Array:
+        inertia = _slope(signals, joint, "acceleration")[joint]
+        # Identified parameters need not be consistent; a link without inertia would move away at
+        # once.
+        inertia = np.maximum(inertia, 0.05 * np.abs(np.median(inertia)))
+        return np.asarray(np.maximum(inertia, np.finfo(float).tiny))
+
+    return _shared(signals, joint, "inertia", make)
 
 
 class _LinkSideEffect(Effect):
@@ -155,13 +170,10 @@ class _LinkSideEffect(Effect):
         (joint,) = joints
         moves = self.moves(signals, joint, **shape)
         slopes = [_slope(signals, joint, by) for by in ("position", "velocity", "acceleration")]
-        columns = {}
-        for j in range(signals.n_joints):
-            change = np.zeros(signals.n_samples)
-            for slope, move in zip(slopes, moves, strict=True):
-                change -= slope[:, j] * move
-            columns[j] = change[:, None]
-        return columns
+        change = np.zeros((signals.n_joints, signals.n_samples))
+        for slope, move in zip(slopes, moves, strict=True):
+            change -= slope * move
+        return {j: own[:, None] for j, own in enumerate(change)}
 
 
 class AccelerationNoise(NamelessEffect):
@@ -186,7 +198,7 @@ class AccelerationNoise(NamelessEffect):
         (joint,) = joints
         fast = _fast_part(signals.ddq[:, joint], signals)
         by_acceleration = _slope(signals, joint, "acceleration")
-        return {j: (by_acceleration[:, j] * fast)[:, None] for j in range(signals.n_joints)}
+        return {j: own[:, None] for j, own in enumerate(by_acceleration * fast)}
 
 
 def _fast_part(values: Array, signals: Signals) -> Array:
