@@ -8,9 +8,10 @@ bodies have to exist, the step is the optimum among those that do; to correct on
 move coefficients on which the motion depends strongly in favour of others.
 
 A joint whose torque hardly explains its motion has the smallest error if it hardly moves: inertia
-and friction would grow without bound. Bodies are therefore drawn to the URDF, with its relative
-error that least squares of the torque has found, and effects to the solution of the least squares,
-with a standard deviation at which the torque of the effect would be as large as that of the joint.
+and friction would grow without bound. Bodies of a consistent model are therefore drawn to the URDF,
+with its relative error that least squares of the torque has found, and effects to the solution of
+the least squares, with a standard deviation at which the torque of the effect would be as large as
+that of the joint.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from skidyn.identification._weak_directions import prior_root
 from skidyn.robots import find_base_parameters
 
 #: Damping of a step, as shares of the largest curvature.
-DAMPING = (1e-6, 1e-2, 1e-1, 1.0, 10.0)
+DAMPING = (0.0, 1e-2, 1e-1, 1.0, 10.0)
 #: Directions with less influence on the motion, relative to the largest, are not estimated.
 WEAK = 1e-3
 
@@ -91,6 +92,8 @@ class MotionSteps:
             bodies = np.asarray(np.linalg.inv(prior_root(model.robot_)) / solution.urdf_std, float)
         centre = np.r_[np.zeros(n), solution.coefficients[free[n:]]]
         pull = block_diag(bodies, np.diag(np.sqrt(share)))
+        if not model.consistent:
+            pull = np.zeros_like(pull)  # the data only, as other estimators without a prior
         index = regression.rigid_index[:n]
         return cls(model, TermSum(inside).signs, index, pull, centre)
 
@@ -127,7 +130,11 @@ class MotionSteps:
         """Least squares over the coefficients that the model allows."""
         model, n = self.model, len(self.rigid_index)
         if not model.consistent:
-            return np.asarray(np.linalg.lstsq(factor, target, rcond=None)[0], dtype=float), None
+            # A change from the present model, so that weak directions are left as they are.
+            size = np.linalg.norm(factor, axis=0)
+            size[size == 0] = 1.0
+            step = np.linalg.lstsq(factor / size, target - factor @ near, rcond=WEAK)[0]
+            return np.asarray(near + step / size, dtype=float), None
         if n == 0:
             low = np.where(self.signs > 0, 0.0, -np.inf)
             return lsq_linear(factor, target, (low, np.inf)).x, model.inertial_parameters_

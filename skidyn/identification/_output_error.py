@@ -34,7 +34,7 @@ from skidyn.robots import find_base_parameters
 #: Step of the simulation, s; faster logs are thinned, with averaged torque.
 STEP = 5e-3
 #: Most Gauss-Newton steps, and the decrease of the logarithm of the errors that ends them.
-ROUNDS, SMALL = 30, 1e-3
+ROUNDS, SMALL = 30, 5e-4
 
 
 def refine_by_simulation(
