@@ -3,9 +3,9 @@
 
 Least squares of the torque treats the motion as exact and is biased by its errors. Here the model
 is driven by the torque, or by commands through a controller, and the motions are compared [1]_.
-Gauss-Newton steps start from the least-squares solution; the sensitivities are differences of
-models that are simulated together, with the same steps and the same exchanges of sticking and
-sliding.
+Gauss-Newton steps, among the models that the constraints allow, start from the least-squares
+solution; the sensitivities are differences of models that are simulated together, with the same
+steps and the same exchanges of sticking and sliding.
 
 References
 ----------
@@ -27,17 +27,14 @@ from skidyn._progress import tell
 from skidyn._signals import Array, Signals
 from skidyn.effects import TermSum
 from skidyn.forward import Controller, ForwardModel, Task, commanded, make_windows, run
+from skidyn.identification._motion_steps import MotionSteps
 from skidyn.identification._regression import Regression, Solution
 from skidyn.robots import find_base_parameters
 
 #: Step of the simulation, s; faster logs are thinned, with averaged torque.
 STEP = 5e-3
-#: Most Gauss-Newton steps, and the relative decrease of the error that ends them.
-ROUNDS, SMALL = 12, 1e-3
-#: Damping of a step, as shares of the curvature; all are tried at once.
-DAMPING = (0.0, 1e-2, 1e-1, 1.0, 10.0)
-#: Directions with less influence on the motion, relative to the largest, are not changed.
-WEAK = 1e-3
+#: Most Gauss-Newton steps, and the decrease of the logarithm of the errors that ends them.
+ROUNDS, SMALL = 30, 5e-4
 
 
 def refine_by_simulation(
@@ -67,31 +64,39 @@ def refine_by_simulation(
     else:
         task = commanded(thin, windows, controller, reference[rows])
     error = _OutputError.of(model, regression, solution, task)
-    theta = np.zeros(len(error.free))
+    length = 1.0 if horizon is None else min(horizon, 1.0)
+    span = float(windows.steps[windows.valid[:, 1:]].sum())
+    steps = MotionSteps.of(model, error.forward.inside, regression, solution, error.free, torque)
+    steps = replace(steps, count=max(span / length, 1.0))
+    theta, bodies = solution.coefficients[error.free], model.inertial_parameters_
     residual = error.residuals(theta[None])[0]
-    # Joints are weighted by the size of their errors at the start.
-    size = np.sqrt(np.mean(residual**2, axis=(0, 1), keepdims=True)) + 1e-12
-    cost = float(np.mean((residual / size) ** 2))
     for round_ in range(ROUNDS):
         tell("Refining by simulation", round_ / ROUNDS)
-        moved = error.residuals(np.vstack([theta, theta + np.diag(error.steps)])) / size
-        slopes = (moved[1:] - moved[0]) / error.steps[:, None, None, None]
-        slope = slopes.reshape(len(theta), -1).T
-        steps = _steps(slope, moved[0].ravel())
-        tried = error.residuals(theta + steps) / size
-        costs = np.mean(tried**2, axis=(1, 2, 3))
+        moved = error.residuals(theta + np.diag(error.steps))
+        slopes = (moved - residual) / error.steps[:, None, None, None]
+        tried, there = steps.tried(theta, slopes, residual)
+        left = error.residuals(tried)
+        costs = steps.cost(tried, left)
         best = int(np.argmin(costs))
-        if not costs[best] < cost:
+        fall = float(steps.cost(theta, residual) - costs[best])
+        if not fall > 0.0:
             break
-        fall, cost, theta = 1 - costs[best] / cost, float(costs[best]), theta + steps[best]
-        if fall < SMALL:
+        theta, residual, bodies = tried[best], left[best], there[best]
+        if fall < SMALL * steps.count * residual.shape[-1]:
             break
-    left = error.left_out(theta, slopes, (error.residuals(theta[None])[0] / size))
+    left_out = steps.left_out(theta, slopes, residual, error.fold, error.n_folds)
     coefficients = error.coefficients(theta)
     others = solution.left_out - solution.coefficients
     spread = coefficients + others  # others keep their spread
-    spread[:, error.free] = left
-    return replace(solution, coefficients=coefficients, left_out=spread, parameters=None)
+    spread[:, error.free] = left_out
+    consistent = bool(model.consistent)
+    return replace(
+        solution,
+        coefficients=coefficients,
+        left_out=spread,
+        parameters=bodies if consistent else None,
+        consistent=consistent,
+    )
 
 
 def _as_stored(model: Any, regression: Regression, solution: Solution) -> Solution:
@@ -102,20 +107,6 @@ def _as_stored(model: Any, regression: Regression, solution: Solution) -> Soluti
     coefficients[: regression.n_rigid] -= base.values(model.robot_.inertial_parameters)[where]
     moved = coefficients - solution.coefficients
     return replace(solution, coefficients=coefficients, left_out=solution.left_out + moved)
-
-
-def _steps(slope: Array, residual: Array) -> Array:
-    """Gauss-Newton steps with every damping, shape (n_dampings, n_free)."""
-    size = np.linalg.norm(slope, axis=0)
-    size[size == 0] = 1.0
-    left, values, right = np.linalg.svd(slope / size, full_matrices=False)
-    seen = values > WEAK * values[0]
-    along = left.T @ -residual
-    steps = []
-    for damping in DAMPING:
-        share = values / (values**2 + damping * values[0] ** 2)
-        steps.append(right.T @ np.where(seen, share * along, 0.0) / size)
-    return np.array(steps)
 
 
 @dataclass
@@ -168,9 +159,9 @@ class _OutputError:
         )
 
     def coefficients(self, theta: Array) -> Array:
-        """All coefficients with the free ones changed."""
+        """All coefficients with these free ones."""
         whole = self.start.copy()
-        whole[self.free] += theta
+        whole[self.free] = theta
         return whole
 
     def residuals(self, thetas: Array) -> Array:
@@ -192,26 +183,6 @@ class _OutputError:
         bound = 10.0 * (np.ptp(logged, axis=(0, 1)) + 1e-9)
         error = np.clip(np.where(np.isfinite(error), error, bound), -bound, bound)
         return np.asarray(error * windows.valid[..., None])
-
-    def left_out(self, theta: Array, slopes: Array, residual: Array) -> Array:
-        """Free coefficients after one Gauss-Newton step without each fold."""
-        p = len(theta)
-        grams, sides = [], []
-        for k in range(self.n_folds):
-            own = self.fold == k
-            a = slopes[:, own].reshape(p, -1)
-            grams.append(a @ a.T)
-            sides.append(a @ residual[own].ravel())
-        gram, side = np.array(grams), np.array(sides)
-        size = np.sqrt(np.diag(gram.sum(0)))
-        size[size == 0] = 1.0
-        found = []
-        for k in range(len(gram)):
-            whole = (gram.sum(0) - gram[k]) / np.outer(size, size)
-            inverse = np.linalg.pinv(whole, rcond=WEAK**2, hermitian=True)
-            step = inverse @ ((side.sum(0) - side[k]) / size) / size
-            found.append(self.start[self.free] + theta - step)
-        return np.array(found)
 
 
 def _folds(signals: Signals, n_folds: int) -> NDArray[np.int64]:

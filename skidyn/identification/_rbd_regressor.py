@@ -544,7 +544,7 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
             change[regression.rigid_index] = solution.coefficients[:n_rigid]
             parameters = robot.inertial_parameters + change.reshape(-1, 10)
         self.effect_terms_ = list(regression.terms)
-        if self.consistent:
+        if self.consistent and not solution.consistent:
             parameters, effects = self._consistent(parameters, effects, solution)
         self.inertial_parameters_ = parameters
         self.effect_coefficients_ = {}

@@ -242,6 +242,10 @@ class Solution:
         Further attributes of the fitted model.
     open : ndarray of shape (k, n_coefficients) or None
         Undetermined changes of the coefficients, one standard deviation each.
+    consistent : bool
+        Whether the estimator has already satisfied the constraints of a consistent model.
+    urdf_std : float
+        Relative error of the bodies of the URDF according to the data; inf if it is not used.
     """
 
     coefficients: Array
@@ -251,6 +255,8 @@ class Solution:
     prior: Array | None = None
     attributes: dict[str, Any] = field(default_factory=dict)
     open: Array | None = None
+    consistent: bool = False
+    urdf_std: float = np.inf
 
     @property
     def std(self) -> Array:

@@ -86,7 +86,7 @@ def keep_weak_directions(
     size[size == 0] = 1.0
     inner = total[n:, n:] / size[:, None] / size
     follow = np.linalg.lstsq(inner, total[n:, :n] / size[:, None], rcond=1e-10)[0] / size[:, None]
-    root = _prior_root(whole.robot)
+    root = prior_root(whole.robot)
     information = total[:n, :n] - total[:n, n:] @ follow
     values, vectors = np.linalg.eigh(root.T @ information @ root)
     values = np.where(values > ROUNDING * values[-1], values, 0.0)
@@ -125,11 +125,12 @@ def keep_weak_directions(
         solution,
         coefficients=coefficients,
         left_out=left,
+        urdf_std=spread if trusted else np.inf,
         open=np.hstack([open_.T, -open_.T @ follow.T]),
     )
 
 
-def _prior_root(robot: Robot) -> Array:
+def prior_root(robot: Robot) -> Array:
     """Root of the base parameters' covariance when all bodies change relatively by 1."""
     units, _ = local_units(*2 * (existing_bodies(robot.inertial_parameters),))
     spread = find_base_parameters(robot).regrouping @ block_diag(*units)
