@@ -102,9 +102,7 @@ def duel_of(
     return duel
 
 
-def left_by_effects(
-    fits: Fits, joint: int, rows: NDArray[np.bool_]
-) -> tuple[float, float, float]:
+def left_by_effects(fits: Fits, joint: int, rows: NDArray[np.bool_]) -> tuple[float, float, float]:
     """Residual of some rows, and the least residual with an effect on their joint.
 
     Parameters
