@@ -8,9 +8,6 @@ import pytest
 
 from skidyn.datasets import load_scara, load_ur5, make_hidden_effect_log
 from skidyn.logs import check_log
-from skidyn.measurement import _torque
-from skidyn.measurement._fits import Reading
-from skidyn.measurement._readings import Change
 
 
 @pytest.mark.parametrize("joint", [0, 1])
@@ -81,15 +78,14 @@ def test_torque_of_one_joint_that_is_late(arm, told_of):
     assert told.joints == (2,) and told.remedy.option.startswith("--late tau2=0.0")
 
 
-def test_a_torque_that_is_turned_round_twice_is_as_it_was(monkeypatch, recorded, told_of):
-    every, one = frozenset([0, 1]), frozenset([1])
-    changes = [
-        Change("torque_sign", (0, 1), Reading(flip_torque=every), gain=80.0, drop=0.6),
-        Change("torque_sign", (0,), Reading(flip_torque=one), gain=50.0, drop=0.5),
-    ]
-    monkeypatch.setattr(_torque, "find_changes", lambda fits: changes)
-    told = told_of(recorded.frame)["reading"]
-    assert told.joints == (2,) and told.remedy.option == "--flip tau2"
+def test_a_torque_that_is_turned_round_twice_is_as_it_was():
+    """The sign of all torques is found first, and then that of joint 1 again."""
+    robot = load_ur5()
+    log = make_hidden_effect_log(robot, None, n_trajectories=4, duration=6.0, random_state=2)
+    others = {f"tau{k}": -log.frame[f"tau{k}"] for k in range(2, 7)}
+    told = {s.check: s for s in check_log(log.frame.assign(**others), robot).checks}["reading"]
+    assert told.joints == (2, 3, 4, 5, 6)
+    assert told.remedy.option == "--flip tau2,tau3,tau4,tau5,tau6"
 
 
 def test_a_description_without_gravity(arm, recorded, told_of):
