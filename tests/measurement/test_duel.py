@@ -28,6 +28,11 @@ PLAIN = log_of()
 SPRUNG = log_of("coupling_spring", [3, 4])
 
 
+@pytest.fixture(scope="module")
+def short(arm):
+    return make_hidden_effect_log(arm, None, n_trajectories=4, duration=4.0, random_state=3).frame
+
+
 def readings(frame, robot=ROBOT):
     """Other readings of a log that are told."""
     return [s for s in check_log(frame, robot).checks if s.check == "reading"]
@@ -42,21 +47,26 @@ def test_no_effect_takes_the_place_of_a_sign(frame):
     assert "another cause" not in told.suspicion
 
 
-def test_what_an_effect_explains_far_better_is_not_told():
-    """A spring between two joints looks like another sign of the second."""
+def test_what_an_effect_explains_far_better_is_not_told(arm, short):
+    """A spring between the joints looks like another sign of the first."""
     assert readings(SPRUNG) == []
+    pull = 2.0 * (short["q1"] - short["q2"])
+    pulled = short.assign(tau1=short["tau1"] + pull, tau2=short["tau2"] - pull)
+    assert readings(pulled, arm) == []
 
 
-def test_bodies_near_those_of_the_description_are_no_other_zero():
-    bodies = np.asarray(ROBOT.inertial_parameters, dtype=float).reshape(-1, 10).copy()
-    bodies[-1, 1:4] = bodies[-1, 1:4] + 0.2 * np.linalg.norm(bodies[-1, 1:4])
-    assert readings(PLAIN, replace(ROBOT, inertial_parameters=bodies)) == []
+def test_bodies_near_those_of_the_description_are_no_other_zero(arm, short):
+    """A centre of mass aside of its link looks like a zero of the joint that is off by 14 deg."""
+    bodies = np.asarray(arm.inertial_parameters, dtype=float).reshape(-1, 10).copy()
+    aside = np.array([1.0, -1.0, 0.0]) / np.sqrt(2)
+    bodies[0, 1:4] += 0.8 * np.linalg.norm(bodies[0, 1:4]) * aside
+    assert readings(short, replace(arm, inertial_parameters=bodies)) == []
 
 
 def test_one_of_two_is_a_note():
     """Six seconds do not show whether a sign is wrong or a second spring acts."""
-    short = log_of("spring", [3], n_trajectories=2, duration=3.0, random_state=5)
-    (told,) = readings(short.assign(tau4=-short["tau4"]))
+    frame = log_of("spring", [3], n_trajectories=2, duration=3.0, random_state=5)
+    (told,) = readings(frame.assign(tau4=-frame["tau4"]))
     assert told.certainty == "noted" and told.remedy.option == "--flip tau4"
     assert told.suspicion.startswith("either the torque of joint 4")
     assert told.suspicion.endswith("or there is another cause: coupling spring")
