@@ -60,3 +60,24 @@ def nameless(request):
         formula=formula,
         size=log.parameters[size],
     )
+
+
+@pytest.fixture(scope="session")
+def arm_log():
+    return make_hidden_effect_log(load_planar_arm(), None, noise="low", random_state=4)
+
+
+@pytest.fixture(scope="session")
+def found_in():
+    """Kinds and joints of what is named where the model has some effects."""
+
+    def found(robot, X, y, effects=("viscous", "coulomb")):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            diagnosis = diagnose(RBDRegressor(robot, effects=list(effects)), X, y)
+        together = {}
+        for finding in diagnosis.findings:
+            together.setdefault(finding.kind, set()).update(finding.joints)
+        return together
+
+    return found
