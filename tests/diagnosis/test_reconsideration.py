@@ -113,9 +113,7 @@ def test_friction_that_falls_while_a_gear_warms_up_is_one_drift(arm_log, found_i
     assert kinds == {"friction_drift": {1}}
 
 
-def test_a_narrow_bump_is_one_function_and_not_a_spring_and_a_stop(
-    arm_log, found_in
-):
+def test_a_narrow_bump_is_one_function_and_not_a_spring_and_a_stop(arm_log, found_in):
     q = arm_log.X["q1"].to_numpy()
     middle, span = np.median(q), np.ptp(q)
     torque = np.array(arm_log.y)
