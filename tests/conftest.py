@@ -88,15 +88,24 @@ def signals_of():
 @pytest.fixture(scope="session")
 def servo_log():
     """Makes the log of a planar arm behind servos, by the coefficients of what it hides."""
-    return _servo_log
+    made = {}
+
+    def make(terms, **untold):
+        key = repr((list(terms.items()), untold))  # a simulation takes seconds
+        if key not in made:
+            made[key] = _servo_log(terms, **untold)
+        servo = made[key]
+        return SimpleNamespace(**vars(servo) | {"log": servo.log.copy()})
+
+    return make
 
 
 @pytest.fixture(scope="session")
-def sticky_servo():
+def sticky_servo(servo_log):
     """An arm behind servos whose second joint sticks: robot, log, controller."""
     from skidyn.effects import Term
 
-    return _servo_log({Term("stribeck", (2,), {"vs": 0.1, "delta": 2.0}): 0.15})
+    return servo_log({Term("stribeck", (2,), {"vs": 0.1, "delta": 2.0}): 0.15})
 
 
 def _servo_log(terms, **untold):

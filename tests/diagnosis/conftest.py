@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Diagnoses on which several tests look: a spring is missing, nothing is, something unknown is."""
 
+import warnings
 from types import SimpleNamespace
 
 import pytest
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
+from skidyn.exceptions import LogWarning
 from skidyn.identification import RBDRegressor
 
 #: What the simulator hides, the signals it depends on, the formula of its torque, and its size.
@@ -33,6 +35,19 @@ def complete():
     return diagnose(RBDRegressor(log.robot), log.X, log.y)
 
 
+@pytest.fixture(scope="session")
+def pushed(complete):
+    """Joint 2 is pushed in recording 3, from 4.0 to 4.6 s after its start."""
+    X, y = complete.data
+    y = y.copy()
+    run = (X["trajectory"] == 3).to_numpy()
+    time = X["time"].to_numpy() - X["time"][run].iloc[0]
+    y[run & (time > 4.0) & (time < 4.6), 1] += 3.0
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", LogWarning)  # the torque leaps there
+        return diagnose(complete.base_model, X, y, effects=[])
+
+
 @pytest.fixture(scope="session", params=HIDDEN)
 def nameless(request):
     """A torque that no name fits: its log, its diagnosis, its signals and its formula."""
@@ -45,3 +60,24 @@ def nameless(request):
         formula=formula,
         size=log.parameters[size],
     )
+
+
+@pytest.fixture(scope="session")
+def arm_log():
+    return make_hidden_effect_log(load_planar_arm(), None, noise="low", random_state=4)
+
+
+@pytest.fixture(scope="session")
+def found_in():
+    """Kinds and joints of what is named where the model has some effects."""
+
+    def found(robot, X, y, effects=("viscous", "coulomb")):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            diagnosis = diagnose(RBDRegressor(robot, effects=list(effects)), X, y)
+        together = {}
+        for finding in diagnosis.findings:
+            together.setdefault(finding.kind, set()).update(finding.joints)
+        return together
+
+    return found

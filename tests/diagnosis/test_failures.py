@@ -6,10 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from skidyn.datasets import load_planar_arm, make_hidden_effect_log
-from skidyn.diagnosis import Comparison, diagnose
-from skidyn.diagnosis._failures import find_failures, find_rest_errors
-from skidyn.identification import RBDRegressor
+from skidyn.diagnosis import Comparison
 
 NOISE = 0.2
 
@@ -22,6 +19,16 @@ def bare(complete):
     return replace(comparison, predicted=comparison.measured - noise)
 
 
+@pytest.fixture(scope="module")
+def told(complete):
+    """Makes a diagnosis of a comparison at a noise of each joint."""
+
+    def make(comparison, *noise):
+        return replace(complete, comparison=comparison, noise_floor=np.array(noise))
+
+    return make
+
+
 def failing(bare: Comparison, excess, joint=1):
     """The same with an excess torque on one joint."""
     predicted = bare.predicted.copy()
@@ -29,22 +36,22 @@ def failing(bare: Comparison, excess, joint=1):
     return replace(bare, predicted=predicted)
 
 
-def test_nothing_is_listed_where_the_error_is_the_noise(bare):
-    assert find_failures(bare, [NOISE] * 2) == []
+def test_nothing_is_listed_where_the_error_is_the_noise(bare, told):
+    assert told(bare, NOISE, NOISE).failures == []
 
 
-def test_joints_are_ranked_by_error_over_noise_not_by_error(bare):
+def test_joints_are_ranked_by_error_over_noise_not_by_error(bare, told):
     both = failing(failing(bare, 0.5, 0), 0.4, 1)
-    found = find_failures(both, [NOISE, NOISE / 4])
+    found = told(both, NOISE, NOISE / 4).failures
     assert [f.joint for f in found] == [2, 1]
     assert found[0].ratio == pytest.approx(found[0].rmse / found[0].noise)
     assert "(joint 2)" in found[0].sentence and "N m" in found[0].sentence
 
 
-def test_an_error_at_rest_or_at_reversals_is_no_failure(bare):
+def test_an_error_at_rest_or_at_reversals_is_no_failure(bare, told):
     away = np.where(bare.judged_samples[:, 1], 0.0, 5.0)
     comparison = failing(bare, away)
-    assert find_failures(comparison, [NOISE] * 2) == []
+    assert told(comparison, NOISE, NOISE).failures == []
 
 
 def place(failures, kind):
@@ -52,55 +59,54 @@ def place(failures, kind):
     return next(p for p in failure.places if p.kind == kind)
 
 
-def test_the_regime_of_the_excess(bare):
+def test_the_regime_of_the_excess(bare, told):
     speed = np.abs(bare.signals.dq[:, 1])
     fast = speed > 0.8 * np.quantile(speed, 0.95)
-    found = find_failures(failing(bare, np.where(fast, 2.0, 0.0)), [NOISE] * 2)
+    found = told(failing(bare, np.where(fast, 2.0, 0.0)), NOISE, NOISE).failures
     assert place(found, "regime").regime == "fast"
     assert place(found, "regime").share_of_excess > 0.9
 
 
-def test_the_range_of_position(bare):
+def test_the_range_of_position(bare, told):
     q = bare.signals.q[:, 1]
     low, high = np.quantile(q, [0.6, 0.8])
-    found = find_failures(failing(bare, np.where((q > low) & (q < high), 2.0, 0.0)), [NOISE] * 2)
+    found = told(failing(bare, np.where((q > low) & (q < high), 2.0, 0.0)), NOISE, NOISE).failures
     assert place(found, "position").low == pytest.approx(low, abs=0.1)
     assert place(found, "position").high == pytest.approx(high, abs=0.1)
 
 
-def test_the_trajectories(bare):
+def test_the_trajectories(bare, told):
     names = np.unique(bare.signals.trajectory)
     acts = bare.signals.trajectory == names[2]
-    found = find_failures(failing(bare, np.where(acts, 2.0, 0.0)), [NOISE] * 2)
+    found = told(failing(bare, np.where(acts, 2.0, 0.0)), NOISE, NOISE).failures
     assert place(found, "trajectory").trajectories == (int(names[2]),)
 
 
-def test_the_seconds(bare):
+def test_the_seconds(bare, told):
     clock, trajectory = bare.signals.clock, bare.signals.trajectory
     name = np.unique(trajectory)[1]
     here = clock[trajectory == name]
     low, high = here[0] + 0.4 * np.ptp(here), here[0] + 0.5 * np.ptp(here)
     acts = (trajectory == name) & (clock > low) & (clock < high)
-    found = find_failures(failing(bare, np.where(acts, 5.0, 0.0)), [NOISE] * 2)
+    found = told(failing(bare, np.where(acts, 5.0, 0.0)), NOISE, NOISE).failures
     when = place(found, "time")
     assert when.trajectories == (int(name),)
     assert [when.low, when.high] == pytest.approx([low - here[0], high - here[0]], abs=0.5)
 
 
-def test_an_excess_that_is_everywhere_has_no_place(bare):
-    found = find_failures(failing(bare, 1.0), [NOISE] * 2)
+def test_an_excess_that_is_everywhere_has_no_place(bare, told):
+    found = told(failing(bare, 1.0), NOISE, NOISE).failures
     assert found[0].places == ()
     assert "whole motion" in found[0].sentence
 
 
-def test_a_log_without_noise_is_not_judged_by_rounding():
-    log = make_hidden_effect_log(load_planar_arm(), None)
-    comparison = diagnose(RBDRegressor(log.robot), log.X, log.y).comparison
+def test_a_log_without_noise_is_not_judged_by_rounding(complete, told):
+    comparison = complete.comparison
     exact = replace(comparison, predicted=comparison.measured * (1 + 1e-12))
-    assert find_failures(exact, [0.0, 0.0]) == []
+    assert told(exact, 0.0, 0.0).failures == []
 
 
-def test_dry_friction_may_hold_any_torque_at_rest(bare):
+def test_dry_friction_may_hold_any_torque_at_rest(bare, told):
     still = np.zeros_like(bare.sliding)
     signals = bare.signals
     stopped = signals.dq.copy()
@@ -114,16 +120,17 @@ def test_dry_friction_may_hold_any_torque_at_rest(bare):
         predicted=bare.measured - held,
         dry_friction=friction,
     )
-    error = find_rest_errors(comparison)[1]
+    error = told(comparison, NOISE, NOISE).rest_errors[1]
     assert error.stiction == pytest.approx(1.5)
     assert error.rmse > 0.2 and error.beyond == 0.0
     stronger = replace(comparison, predicted=bare.measured - 3 * held)
-    assert find_rest_errors(stronger)[1].beyond > 0.5
+    assert told(stronger, NOISE, NOISE).rest_errors[1].beyond > 0.5
 
 
-def test_a_model_without_friction_terms_does_not_tell_what_friction_holds(bare):
+def test_a_model_without_friction_terms_does_not_tell_what_friction_holds(bare, told):
     stopped = bare.signals.dq.copy()
     stopped[:100] = 0.0
     signals = bare.signals.with_(dq=stopped)
-    error = find_rest_errors(replace(bare, signals=signals, dry_friction=None))[0]
+    comparison = replace(bare, signals=signals, dry_friction=None)
+    error = told(comparison, NOISE, NOISE).rest_errors[0]
     assert error.stiction is None and error.beyond is None

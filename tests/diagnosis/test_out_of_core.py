@@ -9,8 +9,6 @@ import pytest
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import diagnose_parquet
-from skidyn.diagnosis._out_of_core import _confirm, _sample
-from skidyn.evidence import evidence_from_parquet
 from skidyn.exceptions import LogError, SkidynError
 from skidyn.identification import RBDRegressor
 
@@ -48,15 +46,21 @@ def test_the_search_and_the_judgement_share_no_trajectory(result):
     assert result.evidence.trajectories == list(range(10))
 
 
-def test_an_effect_that_the_rest_does_not_show_is_not_confirmed(result, tmp_path):
-    finding = result.confirmations[0].finding
+def test_an_effect_that_the_rest_does_not_show_is_not_confirmed(folder, result, tmp_path):
+    """The joint was freed after the recordings in which the search finds its friction."""
+    _, torque = result.diagnosis.data
     healthy = make_hidden_effect_log(
-        ROBOT, None, n_trajectories=12, duration=8.0, rate=100.0, random_state=5
-    )
-    healthy.frame.to_parquet(tmp_path / "log.parquet")
-    terms = [*("viscous", "coulomb"), *finding.terms]
-    answer = _confirm(finding, evidence_from_parquet(tmp_path, ROBOT, terms), True)
-    assert answer.confirmed is False and answer.error_drop < 0.01
+        ROBOT, None, n_trajectories=18, duration=8.0, rate=100.0, random_state=5
+    ).frame
+    whole = pd.concat(pd.read_parquet(folder / f"{k}.parquet") for k in range(3))
+    drawn = set(whole["trajectory"][whole["tau1"].isin(torque[:, 0])])
+    freed = whole.where(whole["trajectory"].isin(drawn), healthy.set_index(whole.index))
+    freed.to_parquet(tmp_path / "log.parquet")
+    again = diagnose_parquet(RBDRegressor(ROBOT), tmp_path, sample_rows=7000, effects=TRIED)
+    assert np.array_equal(again.diagnosis.data[1], torque)
+    (only,) = again.confirmations
+    assert only.confirmed is False and only.error_drop < 0.01
+    assert "stribeck" not in [t.kind for t in again.model.effect_terms_]
 
 
 def test_what_cannot_be_judged_out_of_core_is_refused(folder, tmp_path):
@@ -69,24 +73,28 @@ def test_what_cannot_be_judged_out_of_core_is_refused(folder, tmp_path):
         diagnose_parquet(RBDRegressor(ROBOT), tmp_path)
 
 
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_memory_is_that_of_the_sample_whatever_it_is_drawn_from(tmp_path):
-    """Ten trajectories are drawn, from one file or from ten of ten trajectories each."""
+    """Ten trajectories are drawn, of twenty in one file or of two hundred in ten.
+
+    No joint moves, so that the diagnosis is refused as soon as they are read.
+    """
     n = 1000
-    columns = ["time", "q1", "q2", "dq1", "dq2", "tau1", "tau2"]
-    table = pd.DataFrame(np.random.default_rng(0).normal(size=(10 * n, 7)), columns=columns)
-    table["time"], table["trajectory"] = np.arange(10 * n) / 100, np.arange(10 * n) // n
-    table.to_parquet(tmp_path / "log.parquet")
-    held = []
-    for drawn, n_files in ((range(10), 1), ([4], 10)):
-        sources = [(tmp_path / "log.parquet", frozenset(drawn))] * n_files
-        _sample(sources, 10 * n, ROBOT, None, 10 * n)  # imports and caches
+    table = pd.DataFrame({"time": np.arange(20 * n) / 100, "trajectory": np.arange(20 * n) // n})
+    table[["q1", "q2"]] = 0.1
+    table[["dq1", "dq2", "tau1", "tau2"]] = 0.0
+    peak = {}
+    for n_files in (1, 1, 10):  # imports and caches first
+        folder = tmp_path / f"{n_files}"
+        folder.mkdir(exist_ok=True)
+        for k in range(n_files):
+            table.to_parquet(folder / f"{k}.parquet")
         tracemalloc.start()
-        result = _sample(sources, 10 * n, ROBOT, None, 10 * n)
-        held.append(tracemalloc.get_traced_memory())
+        with pytest.raises(LogError, match="no joint moves long enough"):
+            diagnose_parquet(RBDRegressor(ROBOT), folder, sample_rows=10 * n)
+        peak[n_files] = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
-        assert result[0].shape == (10 * n, 6)
-    (small, small_peak), (large, large_peak) = held
-    assert large < 1.1 * small and large_peak < 1.5 * small_peak
+    assert peak[10] < 1.5 * peak[1]
 
 
 def test_files_of_other_columns_are_told_apart(folder, tmp_path):

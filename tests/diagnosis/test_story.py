@@ -5,8 +5,6 @@ import dataclasses
 
 import numpy as np
 
-from skidyn.diagnosis._episodes import Episode
-
 
 def test_says_what_is_missing_and_where_in_the_headline(missing):
     story = missing.story()
@@ -64,11 +62,10 @@ def test_unknown_noise_leaves_numbers_out(missing):
     assert "noise –" in story["joints"][1]["text"]
 
 
-def test_when_a_torque_comes_and_goes_is_said(missing):
-    episode = Episode(3, 2.0, 2.5, (2,), (1.2,), None, None)
-    finding = dataclasses.replace(missing.findings[0], when=[episode])
-    story = dataclasses.replace(missing, findings=[finding]).story()
-    assert story["findings"][0]["when"] == "from 2.0 to 2.5 s of trajectory 3"
+def test_when_a_torque_comes_and_goes_is_said(pushed):
+    (line,) = pushed.story()["findings"]
+    (episode,) = pushed.findings[0].when
+    assert line["when"] == f"from {episode.start:.1f} to {episode.end:.1f} s of trajectory 3"
 
 
 def test_confidence_is_said_where_it_is_known(missing):

@@ -26,8 +26,3 @@ def test_what_was_added_is_told_with_its_interval(session):
     assert told.startswith("k = ") and "±" in told and "N m/rad" in told
     (sure,) = session.sure()
     assert sure.startswith("confidence ")
-
-
-def test_a_name_that_another_effect_beats_is_not_sure(session):
-    session.add("offset", joint=2)
-    assert session.sure() == ["low confidence: spring removes more of the error"]

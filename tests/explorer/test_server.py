@@ -7,19 +7,20 @@ import http.client
 import json
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import threading
 import time
 import warnings
 from contextlib import contextmanager
+from queue import SimpleQueue
+from types import SimpleNamespace
+from urllib.parse import parse_qs, urlsplit
 
 import pytest
 
 from skidyn import load_model
-from skidyn.explorer import Session
-from skidyn.explorer._server import Explorer, make_app, page
+from skidyn.explorer import Session, serve
 from skidyn.identification import RBDRegressor
 from skidyn.logs import load_recording
 from skidyn.robots import Robot
@@ -35,7 +36,7 @@ ARGUMENTS = (
 
 @pytest.fixture
 def explorer(session, tmp_path):
-    return Explorer(session, tmp_path)
+    return SimpleNamespace(session=session, folder=tmp_path)
 
 
 @pytest.fixture
@@ -51,7 +52,7 @@ def ur10e(data_dir, tmp_path):
     robot = Robot.from_urdf(folder / "ur10e_min.urdf")
     model = RBDRegressor(robot, ("viscous", "coulomb", "offset", "rotor_inertia"))
     tau = log[[f"tau{j}" for j in range(1, 7)]].to_numpy()
-    return Explorer(Session(model, log[columns], tau), tmp_path)
+    return SimpleNamespace(session=Session(model, log[columns], tau), folder=tmp_path)
 
 
 @pytest.fixture
@@ -63,17 +64,28 @@ def port(explorer):
 
 @contextmanager
 def served(explorer):
-    listener = socket.socket()
-    listener.bind(("127.0.0.1", 0))
-    port = listener.getsockname()[1]
-    server = uvicorn.Server(uvicorn.Config(make_app(explorer, port), log_level="error"))
-    thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]}, daemon=True)
-    thread.start()
-    while not server.started:
-        time.sleep(0.01)
-    yield port
-    server.should_exit = True
-    thread.join(10)
+    """The port on which a session is served; its token is then known."""
+    servers, addresses = [], SimpleQueue()
+
+    class Stoppable(uvicorn.Server):
+        def run(self, *arguments, **options):
+            servers.append(self)
+            super().run(*arguments, **options)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(uvicorn, "Server", Stoppable)
+        words = {"args": (explorer.session, explorer.folder), "kwargs": {"ready": addresses.put}}
+        thread = threading.Thread(target=serve, daemon=True, **words)
+        thread.start()
+        address = urlsplit(addresses.get(timeout=60))
+        explorer.token = parse_qs(address.query)["token"][0]
+        try:
+            yield address.port
+        finally:
+            while not servers:
+                time.sleep(0.01)
+            servers[0].should_exit = True
+            thread.join(10)
 
 
 def ask(port, path, body=None, token="", host=None):
@@ -158,17 +170,28 @@ def test_ctrl_c_does_not_wait_for_a_report(tmp_path):
     code = (
         "import json, signal, sys, threading, time, urllib.request\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-        "from skidyn.explorer import _server\n"
-        "def answer(self, question, words):\n"
+        "import skidyn\n"
+        "from skidyn import diagnosis, explorer\n"
+        "def diagnose(*words, **options):\n"
         "    print('working', flush=True)\n"
         "    time.sleep(60)\n"
-        "_server.Explorer.answer = answer\n"
+        "diagnosis.diagnose = diagnose\n"
+        "skidyn.save_model = lambda path, model: path\n"
+        "class Explored:\n"
+        "    data = ()\n"
+        "    def refine(self): ...\n"
+        "    def fitted_model(self): return 'a model'\n"
+        "    def script(self, **words): return ''\n"
         "def ready(address):\n"
         "    token, base = address.partition('=')[2], address.partition('?')[0]\n"
-        "    ask = urllib.request.Request(base + 'api/report', b'{}', {'X-Token': token})\n"
-        "    call = lambda: (time.sleep(0.5), urllib.request.urlopen(ask))\n"
+        "    def call():\n"
+        "        for question in ('save', 'report'):\n"
+        "            where = base + 'api/' + question\n"
+        "            urllib.request.urlopen(\n"
+        "                urllib.request.Request(where, b'{}', {'X-Token': token})\n"
+        "            )\n"
         "    threading.Thread(target=call, daemon=True).start()\n"
-        "_server.serve(None, sys.argv[1], ready=ready)\n"
+        "explorer.serve(Explored(), sys.argv[1], ready=ready)\n"
     )
     words = [sys.executable, "-c", code, str(tmp_path)]
     process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
@@ -177,9 +200,10 @@ def test_ctrl_c_does_not_wait_for_a_report(tmp_path):
     process.communicate(timeout=30)  # half of what the answer takes
 
 
-def test_the_page_holds_all_it_needs():
-    text = page()
+def test_the_page_holds_all_it_needs(port, explorer):
+    status, text = ask(port, f"/?token={explorer.token}")
 
+    assert status == 200
     assert "uPlot" in text
     assert 'src="' not in text
     assert 'rel="stylesheet"' not in text

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import pickle
 import re
+from dataclasses import replace
 from importlib import resources
 from importlib.resources import files
 
@@ -14,7 +15,6 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
-from skidyn._columns import Columns
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.effects import Term
 from skidyn.exceptions import ColumnError
@@ -38,8 +38,9 @@ class AnyColumns(RBDRegressor):
 
     def _resolve(self, n_features):
         n = self.robot_.n_joints
-        at = [k % n_features for k in range(3 * n)]
-        return Columns(tuple(at[:n]), tuple(at[n : 2 * n]), tuple(at[2 * n :]))
+        at = tuple(k % n_features for k in range(3 * n))
+        usual = super()._resolve(3 * n)
+        return replace(usual, q=at[:n], dq=at[n : 2 * n], ddq=at[2 * n :])
 
     def __sklearn_tags__(self):
         # A pendulum does not follow the made-up data of the checks.

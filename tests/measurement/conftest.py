@@ -72,3 +72,9 @@ def only():
         assert (told[0].remedy and told[0].remedy.option) == remedy
 
     return asserted
+
+
+@pytest.fixture(scope="session")
+def short(arm):
+    """A short log that hides nothing."""
+    return make_hidden_effect_log(arm, None, n_trajectories=4, duration=4.0, random_state=3).frame

@@ -2,15 +2,14 @@
 """A joint about another axis than the description says."""
 
 from dataclasses import replace
+from importlib.resources import files
 
 import numpy as np
 import pytest
 
 from skidyn.datasets import load_panda, make_hidden_effect_log
-from skidyn.effects import Signals
 from skidyn.logs import check_log
-from skidyn.measurement import Measurement
-from skidyn.measurement._axes import find_axis, turned
+from skidyn.robots import Robot
 
 
 @pytest.fixture(scope="module")
@@ -18,9 +17,16 @@ def log():
     return make_hidden_effect_log(load_panda(), "payload", n_trajectories=4, duration=5.0)
 
 
+def turned(robot, joint, direction):
+    """The robot with a joint, from 1, about another axis of its frame."""
+    axes = np.array(robot.tree.axes)
+    axes[joint - 1] = direction
+    return replace(robot, tree=replace(robot.tree, axes=axes))
+
+
 @pytest.mark.parametrize("joint, direction", [(2, (0, 1, 0)), (4, (-1, 0, 0))])
 def test_another_axis_of_a_joint_is_told_alone(log, joint, direction):
-    claimed = turned(log.robot, joint - 1, np.array(direction, dtype=float))
+    claimed = turned(log.robot, joint, direction)
     told = [s for s in check_log(log.frame, claimed).checks if s.certainty != "noted"]
     assert [s.check for s in told] == ["axes"]
     assert told[0].certainty == "certain" and told[0].joints == (joint,)
@@ -38,10 +44,15 @@ def test_a_sign_is_no_axis(log):
 
 
 def test_bodies_that_mimic_others_are_left_out(log):
-    blocks = ([f"{quantity}{k + 1}" for k in range(7)] for quantity in ("q", "dq", "tau"))
-    q, dq, tau = (log.frame[names].to_numpy() for names in blocks)
-    number, time = (log.frame[name].to_numpy() for name in ("trajectory", "time"))
-    signals = Signals(q, dq, 0 * q, number, time=time)
-    fits = Measurement(signals, tau, log.robot, list("abcdefg")).fits
-    doubled = replace(log.robot.tree, parents=np.append(log.robot.tree.parents, 0))
-    assert find_axis(fits.of(replace(log.robot, tree=doubled))) is None
+    """They have no columns of their own, so that nothing is said of any axis."""
+    finger = (
+        '<link name="finger"><inertial><mass value="1e-3"/>'
+        '<inertia ixx="1e-6" iyy="1e-6" izz="1e-6" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+        '<joint name="grip" type="prismatic"><parent link="panda_link7"/><child link="finger"/>'
+        '<axis xyz="1 0 0"/><mimic joint="panda_joint7"/><limit effort="9" velocity="9"/></joint>'
+    )
+    text = (files("skidyn.datasets") / "robots" / "panda.urdf").read_text()
+    robot = Robot.from_urdf(text.replace("</robot>", f"{finger}</robot>"))
+    assert (robot.n_joints, robot.n_bodies) == (7, 8)
+    told = check_log(log.frame, turned(robot, 2, (0, 1, 0))).checks
+    assert "axes" not in {s.check for s in told}

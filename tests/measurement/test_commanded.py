@@ -33,6 +33,26 @@ def test_commands_ahead_of_the_motion():
     assert found["torque_delay"].remedy.option.startswith("--late tau=0.0")
 
 
+def test_positions_of_uneven_samples_scatter_by_their_noise():
+    """A smooth motion has next to none, whatever the steps of the clock."""
+    rng = np.random.default_rng(0)
+    frame, lead = FRAME.copy(), 0.02
+    for _, own in FRAME.groupby("trajectory"):
+        t = own["time"].to_numpy()
+        at = t + rng.uniform(-0.25, 0.25, t.size) * np.median(np.diff(t))
+        frame.loc[own.index, "time"] = at
+        for k in (1, 2):
+            path = CubicSpline(t, gaussian_filter1d(own[f"q{k}"].to_numpy(), 3))
+            frame.loc[own.index, f"q{k}"] = path(at + lead)
+            frame.loc[own.index, f"dq{k}"] = path(at + lead, 1)
+            frame.loc[own.index, f"tau{k}"] = np.interp(at, t, own[f"tau{k}"])
+    noise = rng.normal(size=len(frame))
+    for size, scatter in ((0.0, "2e-09"), (6e-8, "6e-08")):
+        one = told(frame.assign(q1=frame["q1"] + size * noise))["commanded_motion"]
+        assert f"scatter by at most {scatter} rad" in one.evidence
+    assert "commanded_motion" not in told(frame.assign(q1=frame["q1"] + 2e-7 * noise))
+
+
 def test_measured_positions():
     noise = np.random.default_rng(0).normal(0, 1e-5, (len(FRAME), 2))
     assert "commanded_motion" not in told(FRAME.assign(q1=FRAME["q1"] + noise[:, 0]))

@@ -2,7 +2,6 @@
 """Plain measures of recorded columns."""
 
 import numpy as np
-import pytest
 
 from skidyn.measurement import (
     find_leaps,
@@ -12,7 +11,6 @@ from skidyn.measurement import (
     rest_share,
     reversals,
 )
-from skidyn.measurement._measures import divided_differences
 
 TIME = np.arange(2000) * 0.01
 WAVE = np.sin(TIME)
@@ -43,13 +41,3 @@ def test_rest_reversals_and_leaps():
     leaping = WAVE[:, None].copy()
     leaping[1200:] += 2.0
     assert find_leaps(leaping, TIME, np.zeros(2000, dtype=int)).tolist() == [1200]
-
-
-def test_differences_of_uneven_samples():
-    rng = np.random.default_rng(0)
-    t = np.cumsum(rng.uniform(0.5, 1.5, 2000)) * 1e-3
-    line, parabola = np.column_stack([t, 1 - t]), t**2
-    assert np.abs(divided_differences(line, t, 2)).max() < 1e-12
-    assert np.abs(divided_differences(parabola, t, 3)).max() < 1e-9
-    noise = rng.normal(size=2000)
-    assert np.std(divided_differences(noise, t, 4)) == pytest.approx(1.0, rel=0.1)

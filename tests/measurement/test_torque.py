@@ -1,33 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Signs, order and delay of the torque, and gravity in it."""
-
-from dataclasses import replace
+"""Torque without a sign, and torque that is late."""
 
 import numpy as np
 import pytest
 
-from skidyn.datasets import load_scara, load_ur5, make_hidden_effect_log
+from skidyn.datasets import load_scara, make_hidden_effect_log
 from skidyn.logs import check_log
-from skidyn.measurement import _torque
-from skidyn.measurement._fits import Reading
-from skidyn.measurement._readings import Change
-
-
-@pytest.mark.parametrize("joint", [0, 1])
-def test_torque_with_the_other_sign(joint, signals, torque, found, only):
-    sign = np.where(np.arange(2) == joint, -1, 1)
-    only(found(signals, torque * sign), "reading", "certain", f"--flip tau{joint + 1}")
-
-
-def test_exchanged_torques(recorded, told_of):
-    frame = recorded.frame.assign(tau1=recorded.frame["tau2"], tau2=recorded.frame["tau1"])
-    reading = told_of(frame)["reading"]
-    assert reading.certainty == "certain" and reading.remedy.option == "--order tau=2,1"
-
-
-def test_torque_without_gravity(arm, signals, torque, found, only):
-    told = found(signals, torque - arm.gravity_torque(signals.q))
-    only(told, "reading", told[0].certainty, "--gravity=0,0,0")
 
 
 def test_torque_without_sign():
@@ -51,20 +29,6 @@ def test_late_torque(recorded, told_of):
     assert float(delay.remedy.option.partition("=")[2]) == pytest.approx(0.02, abs=0.003)
 
 
-def test_zero_of_a_joint(signals, torque, found):
-    told = found(signals.with_(q=signals.q + [0.0, 1.0]), torque)
-    assert [s.check for s in told] == ["reading"]
-    name, value = told[0].remedy.option.split("=")
-    assert name == "--zero q2" and float(value) == pytest.approx(1.0, abs=0.02)
-
-
-def test_a_joint_that_counts_the_other_way_from_another_zero(signals, torque, found):
-    sign, zero = np.array([1, -1]), np.array([0, np.pi / 2])
-    turned = signals.with_(q=zero + sign * signals.q, dq=sign * signals.dq, ddq=sign * signals.ddq)
-    told = [s for s in found(turned, sign * torque) if s.certainty != "noted"]
-    assert [s.remedy.option for s in told] == ["--flip q2,tau2", "--zero q2=-1.5708"]
-
-
 def test_torque_cut_at_zero(signals, torque, found):
     cut = torque.copy()
     cut[:, 1] = np.maximum(cut[:, 1], 0)
@@ -79,37 +43,3 @@ def test_torque_of_one_joint_that_is_late(arm, told_of):
     late = frame.groupby("trajectory")["tau2"].shift(3).bfill()
     told = told_of(frame.assign(tau2=late))["torque_delay"]
     assert told.joints == (2,) and told.remedy.option.startswith("--late tau2=0.0")
-
-
-def test_a_torque_that_is_turned_round_twice_is_as_it_was(monkeypatch, recorded, told_of):
-    every, one = frozenset([0, 1]), frozenset([1])
-    changes = [
-        Change("torque_sign", (0, 1), Reading(flip_torque=every), gain=80.0, drop=0.6),
-        Change("torque_sign", (0,), Reading(flip_torque=one), gain=50.0, drop=0.5),
-    ]
-    monkeypatch.setattr(_torque, "find_changes", lambda fits: changes)
-    told = told_of(recorded.frame)["reading"]
-    assert told.joints == (2,) and told.remedy.option == "--flip tau2"
-
-
-def test_a_description_without_gravity(arm, recorded, told_of):
-    told = told_of(recorded.frame, replace(arm, gravity=np.zeros(3)))["reading"]
-    assert told.remedy.option.startswith("--gravity=")
-    x, y, z = (float(v) for v in told.remedy.option.partition("=")[2].split(","))
-    assert z == pytest.approx(-9.8, abs=0.3) and abs(y) < 0.1 and abs(x) < 2
-
-
-@pytest.mark.parametrize("joint", [3, 4])
-def test_an_angle_against_the_base(joint):
-    log = make_hidden_effect_log(load_ur5(), None, n_trajectories=4, duration=4.0)
-    frame = log.frame
-    sums = {f"{x}{joint}": frame[f"{x}{joint}"] + frame[f"{x}{joint - 1}"] for x in ("q", "dq")}
-    told = {s.check: s for s in check_log(log.frame.assign(**sums), log.robot).checks}["reading"]
-    assert told.remedy.option == f"--summed q{joint}=q{joint - 1}"
-    assert told.joints == (joint,) and told.certainty == "certain"
-
-
-def test_upside_down_goes_before_a_first_joint_half_a_turn_off(arm, recorded, told_of):
-    told = told_of(recorded.frame, replace(arm, gravity=-arm.gravity))["reading"]
-    assert told.remedy.option == "--gravity=0,0,-9.81" and told.certainty == "suspected"
-    assert "zero" in told.evidence

@@ -38,24 +38,6 @@ def test_adamw_by_default_and_verbose(log, capsys):
     assert "train_loss" in capsys.readouterr().out
 
 
-def test_callback_follows_every_epoch_and_can_stop(log):
-    callback = pytest.importorskip("sklearn.callback")
-    epochs = []
-
-    class StopAfterTwo:
-        def setup(self, estimator, context): ...
-        def teardown(self, estimator, context): ...
-        def on_fit_task_begin(self, estimator, context, **kwargs): ...
-
-        def on_fit_task_end(self, estimator, context, **kwargs):
-            epochs.append(context.task_name)
-            return len(epochs) == 2
-
-    assert isinstance(StopAfterTwo(), callback.FitCallback)
-    model = LSTMRegressor(**SMALL).set_callbacks(StopAfterTwo()).fit(*log)
-    assert model.n_iter_ == 2 and epochs == ["epoch", "epoch", "fit"]
-
-
 def test_divergence_is_an_error(log):
     X, y = log
     with pytest.raises(ValueError, match="lower learning_rate"):

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import pickle
+from copy import copy
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,8 +10,6 @@ from sklearn.model_selection import GroupKFold
 from sklearn.utils.estimator_checks import parametrize_with_checks
 from skorch.callbacks import Checkpoint, EarlyStopping
 
-from skidyn._columns import Columns
-from skidyn._keys import Keys
 from skidyn.identification import RBDRegressor
 from skidyn.model_selection import LeakageWarning
 from skidyn.neural_network import SDLRegressor
@@ -27,11 +27,13 @@ class AnyWidth(SDLRegressor):
     """For the common tests, whose tables are of any width: one joint, columns taken in turn."""
 
     def _keys(self):
-        return Keys(None, None, tuple(range(self.n_features_in_)))
+        return replace(super()._keys(), features=tuple(range(self.n_features_in_)))
 
     def _resolve(self):
+        usual = copy(self)
+        usual.n_features_in_ = 3
         q, dq, ddq = np.resize(np.arange(self.n_features_in_), 3)
-        return Columns((q,), (dq,), (ddq,))
+        return replace(super(AnyWidth, usual)._resolve(), q=(q,), dq=(dq,), ddq=(ddq,))
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()

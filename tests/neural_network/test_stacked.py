@@ -1,41 +1,38 @@
 # SPDX-License-Identifier: BSD-3-Clause
+"""Members of an ensemble trained as one computation are what they are alone.
+
+A callback that does nothing keeps members from being trained together.
+"""
+
 import numpy as np
 import pytest
-import torch
+from sklearn.base import clone
+from skorch.callbacks import Callback
 
-from skidyn.neural_network._network import LSTMNetwork, Members, from_arrays
-from skidyn.neural_network._stacked import StackedNetwork
+from skidyn.neural_network import BLLRegressor, LSTMRegressor, NDLRegressor
 
-
-@pytest.fixture(params=[0, 4], ids=["plain", "dense"])
-def networks(request):
-    return [LSTMNetwork(3, 2, 4, 5, request.param, seed=seed) for seed in range(3)]
-
-
-def test_outputs_and_gradients_are_those_of_torch(networks):
-    generator = torch.Generator().manual_seed(0)
-    x = torch.randn(3, 6, 7, 3, generator=generator)
-    outer = torch.randn(3, 6, 3, 2, generator=generator)
-    stacked, members = StackedNetwork(networks), Members(networks)
-    torch.testing.assert_close(stacked(x), members(x))
-    (stacked(x) * outer).sum().backward()
-    (members(x) * outer).sum().backward()
-    for k, network in enumerate(networks):
-        lstm, own = network.lstm, stacked.lstm.grad[k].mT
-        torch.testing.assert_close(own[:, :3], lstm.weight_ih_l0.grad)
-        torch.testing.assert_close(own[:, 3], lstm.bias_ih_l0.grad)
-        torch.testing.assert_close(own[:, 4:], lstm.weight_hh_l0.grad)
-        output = stacked.layers["output"].weight.grad[k]
-        torch.testing.assert_close(output, network.output.weight.grad)
+SMALL = {"window": 6, "hidden_size": 4, "max_epochs": 2}
+MEMBERS = {
+    "plain": LSTMRegressor(**SMALL),
+    "dense": NDLRegressor(**SMALL, dense_size=5, dropout=0.0),
+    "per joint": LSTMRegressor(**SMALL, per_joint=True),
+}
 
 
-def test_each_network_can_be_taken_out_again(networks):
-    x = torch.randn(3, 1, 7, 3, generator=torch.Generator().manual_seed(0))
-    stacked = StackedNetwork(networks)
-    with torch.no_grad():
-        expected = stacked(x)
-        for network, weights, own, output in zip(
-            networks, stacked.arrays(), x, expected, strict=True
-        ):
-            from_arrays(network, weights)
-            np.testing.assert_allclose(network(own), output, atol=1e-6)
+@pytest.mark.parametrize("name", MEMBERS)
+@pytest.mark.parametrize("resample", ["trajectory", "window"])
+def test_weights_and_predictions_are_those_of_each_alone(name, resample, log):
+    """Bootstraps keep another number of rows for each member."""
+    X, y = log
+    bll = BLLRegressor(MEMBERS[name], n_estimators=3, resample=resample, random_state=0)
+    together = bll.fit(X, y).bagging_.estimators_
+    single = clone(bll).set_params(estimator__callbacks=[Callback()]).fit(X, y)
+    signals = X.to_numpy()
+    for one, other in zip(together, single.bagging_.estimators_, strict=True):
+        for own, alone in zip(one.weights_, other.weights_, strict=True):
+            assert set(own) == set(alone)
+            for key, weights in own.items():
+                np.testing.assert_allclose(weights, alone[key], rtol=1e-5, atol=1e-5)
+        np.testing.assert_allclose(one.predict(signals), other.predict(signals), atol=1e-5)
+    first, second = (member.weights_[0]["output.weight"] for member in together[:2])
+    assert np.abs(first - second).max() > 1e-2

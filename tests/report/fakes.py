@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A diagnosis as the report sees it, made up without any fit."""
 
-from dataclasses import replace
-from types import SimpleNamespace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from skidyn.diagnosis import REGIMES, Comparison, Diagnosis, Finding, Limit, error_map
-from skidyn.diagnosis._failures import find_failures, find_rest_errors
+from skidyn.diagnosis import Comparison, Diagnosis, Finding, Limit
 from skidyn.effects import Signals, Term
 from skidyn.fleet import DriftReport, FleetComparison
 
@@ -70,6 +68,13 @@ def _finding(joints, kind, title, drop, scale):
     )  # fmt: skip
 
 
+@dataclass(repr=False)
+class Fake(Diagnosis):
+    """The shares of the error, which follow from a search, are stated."""
+
+    budget: list | None = None
+
+
 def make_diagnosis(verdict="missing", joint_names=("shoulder", "elbow", "slider"), n_samples=3000):
     """A diagnosis with two findings (none if ``verdict`` is ``"complete"``)."""
     n = len(joint_names)
@@ -98,23 +103,12 @@ def make_diagnosis(verdict="missing", joint_names=("shoulder", "elbow", "slider"
         Limit("end_stop", 2, None, "N m", "an end stop on joint 2: this data cannot show it"),
     ]
     share = {"noise": 1.0} if complete else {"dahl": 0.6, "spring": 0.1, "noise": 0.3}
-    result = SimpleNamespace(
-        verdict=verdict, joint_names=tuple(joint_names), comparison=comparison,
-        comparison_after=after, failures=find_failures(comparison, np.full(n, 0.2)),
-        rest_errors=find_rest_errors(comparison), noise=np.full(n, 0.2), findings=findings,
-        unexplained=unexplained, limits=limits, history=history, noise_floor=np.full(n, 0.2),
-        rmse_before=np.array(history[0]["rmse"]), rmse_after=np.array(history[-1]["rmse"]),
-        budget=[dict(share) for _ in range(n)], warnings=["one trajectory has 3 repeated rows"],
-        regimes=REGIMES, base_model=None, data=(), checks=[], parts=None,
-        sensor_noise=np.full(n, 0.2), remainder=np.zeros(n), remainder_inflation=np.ones(n),
-        in_turn=None, servo_motion=None, noise_is_coloured=False,
+    return Fake(
+        verdict=verdict, joint_names=tuple(joint_names), findings=findings, comparison=comparison,
+        comparison_after=after, history=history, noise_floor=np.full(n, 0.2),
+        unexplained=unexplained, limits=limits, warnings=["one trajectory has 3 repeated rows"],
+        base_model=None, data=(), problem=None, result=None, budget=[dict(share) for _ in range(n)],
     )  # fmt: skip
-    result.error_map = lambda after=False: error_map(
-        result.comparison_after if after else result.comparison
-    )
-    result.story = lambda: Diagnosis.story(result)
-    result.to_dict = lambda: Diagnosis.to_dict(result)
-    return result
 
 
 def make_fleet(hostile="robot 8"):

@@ -9,12 +9,8 @@ import pytest
 pytest.importorskip("mujoco", reason="the suite is simulated by MuJoCo")
 pytest.importorskip("pandas")
 
-from skidyn.datasets import SuiteCase, hidden_effect_suite
+from skidyn.datasets import hidden_effect_suite
 from skidyn.exceptions import SkidynError
-
-
-def planar_case(content, *kinds, tier="short"):
-    return SuiteCase("case_007", "planar_arm", tier, content, kinds, (3, 7))
 
 
 def test_a_seed_draws_the_same_logs_and_a_larger_suite_goes_on():
@@ -43,9 +39,8 @@ def test_only_what_was_asked_for():
         hidden_effect_suite(1, 0)
 
 
-def test_files_say_nothing_of_the_truth(tmp_path):
-    truth = planar_case("one", "offset").write(tmp_path)
-    case = tmp_path / "cases" / "case_007"
-    assert sorted(p.name for p in case.iterdir()) == ["log.parquet", "meta.json", "robot.urdf"]
-    assert "offset" not in (case / "meta.json").read_text()
-    assert json.loads(truth.read_text())["effects"][0]["kind"] == "offset"
+def test_files_say_nothing_of_the_truth(written):
+    names = sorted(p.name for p in written.case.iterdir())
+    assert names == ["log.parquet", "meta.json", "robot.urdf"]
+    assert "offset" not in (written.case / "meta.json").read_text()
+    assert json.loads(written.truth.read_text())["effects"][0]["kind"] == "offset"

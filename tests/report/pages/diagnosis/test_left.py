@@ -18,7 +18,9 @@ def diagnosis(fakes):
         position_noise=2 * size,
         predictable=3 * size,
         left=5 * size,
+        inflation=np.ones(3),
         material=np.zeros(3, dtype=bool),
+        coloured=False,
     )
     return made
 

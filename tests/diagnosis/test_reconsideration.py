@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A second effect is found beside the first."""
+"""Findings judged together: a second effect beside the first, one in place of two."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from skidyn.datasets import load_planar_arm
+from skidyn.datasets import load_planar_arm, load_ur5, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
 from skidyn.identification import RBDRegressor
 
@@ -83,3 +83,40 @@ def test_friction_of_the_last_recording_is_no_drift(plain):
 
     said = [(f.kind, f.joints, f.trajectories) for f in findings]
     assert said == [("coulomb", (2,), (6,))]
+
+
+def test_a_tilted_base_is_found_beside_large_friction_that_is_missing(found_in):
+    robot = load_ur5()
+    log = make_hidden_effect_log(
+        robot, None, noise="low", n_trajectories=4, duration=4.0, random_state=6
+    )
+    q = log.X[[f"q{j}" for j in range(1, 7)]].to_numpy()
+    still = np.zeros_like(q)
+    tilted = (9.81 * np.sin(np.deg2rad(3)), 0.0, -9.81 * np.cos(np.deg2rad(3)))
+    tilt = robot.inverse_dynamics(q, still, still, gravity=tilted)
+    tilt -= robot.inverse_dynamics(q, still, still)
+
+    kinds = found_in(robot, log.X, log.y + tilt, effects=["coulomb", ("viscous", [4, 5, 6])])
+
+    assert kinds == {"viscous": {1, 2, 3}, "base_tilt": {1, 2, 3, 4, 5, 6}}
+
+
+def test_friction_that_falls_while_a_gear_warms_up_is_one_drift(arm_log, found_in):
+    time, dq = arm_log.X["time"].to_numpy(), arm_log.X["dq1"].to_numpy()
+    since = time - time.min()
+    warm = 1 - np.exp(-since / (0.3 * np.ptp(time)))
+    torque = np.array(arm_log.y)
+    torque[:, 0] -= 0.8 * warm * dq
+
+    kinds = found_in(load_planar_arm(), arm_log.X, torque)
+
+    assert kinds == {"friction_drift": {1}}
+
+
+def test_a_narrow_bump_is_one_function_and_not_a_spring_and_a_stop(arm_log, found_in):
+    q = arm_log.X["q1"].to_numpy()
+    middle, span = np.median(q), np.ptp(q)
+    torque = np.array(arm_log.y)
+    torque[:, 0] += np.std(torque[:, 0]) * np.exp(-(((q - middle) / (0.12 * span)) ** 2))
+
+    assert found_in(load_planar_arm(), arm_log.X, torque) == {"unknown": {1}}

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What is accepted of equal, bounded and nearly equal explanations."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+from skidyn.datasets import load_planar_arm, load_scara, make_hidden_effect_log
+from skidyn.diagnosis import diagnose
+from skidyn.identification import RBDRegressor
+
+
+def test_friction_whose_presliding_is_too_short_to_be_seen_is_coulomb_friction(arm_log, found_in):
+    kinds = found_in(load_planar_arm(), arm_log.X, arm_log.y, effects=["viscous"])
+
+    assert kinds == {"coulomb": {1, 2}}
+
+
+def test_a_limit_of_the_drive_is_read_although_the_friction_had_bent_toward_it(arm_log):
+    torque = np.array(arm_log.y)
+    limit = 0.55 * np.abs(torque[:, 1]).max()
+    torque[:, 1] = np.clip(torque[:, 1], -limit, limit)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        (finding,) = diagnose(RBDRegressor(load_planar_arm()), arm_log.X, torque).findings
+
+    assert (finding.kind, finding.joints) == ("saturation", (2,))
+    assert finding.parameters["limit"]["value"] == pytest.approx(limit, rel=0.02)
+    assert finding.parameters["share"]["value"] == pytest.approx(1.0, abs=0.05)
+
+
+def test_stops_of_two_joints_are_stops_where_one_recording_alone_reaches_one_of_them(found_in):
+    robot = load_scara()
+    log = make_hidden_effect_log(robot, "end_stop", joints=(1, 4), noise="high", random_state=0)
+
+    assert found_in(robot, log.X, log.y) == {"end_stop": {1, 4}}
+
+
+def test_a_coupling_that_bodies_make_the_same_on_another_pair_of_joints_names_both_pairs():
+    robot = load_scara()
+    log = make_hidden_effect_log(
+        robot, "coupled_inertia", joints=(1, 4), noise="low", random_state=3
+    )
+    model = RBDRegressor(robot, effects=["viscous", "coulomb", "rotor_inertia"])
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        (finding,) = diagnose(model, log.X, log.y).findings
+
+    assert {finding.joints, *finding.elsewhere} == {(1, 4), (2, 4)}
+    assert finding.confidence < 0.5
+    assert "equally well on joints 2 and 4" in finding.sentence

@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Signs, order and zeros of the columns, and gravity in them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from skidyn.datasets import load_ur5, make_hidden_effect_log
+from skidyn.logs import check_log
+
+
+@pytest.mark.parametrize("joint", [0, 1])
+def test_torque_with_the_other_sign(joint, signals, torque, found, only):
+    sign = np.where(np.arange(2) == joint, -1, 1)
+    only(found(signals, torque * sign), "reading", "certain", f"--flip tau{joint + 1}")
+
+
+def test_exchanged_torques(recorded, told_of):
+    frame = recorded.frame.assign(tau1=recorded.frame["tau2"], tau2=recorded.frame["tau1"])
+    reading = told_of(frame)["reading"]
+    assert reading.certainty == "certain" and reading.remedy.option == "--order tau=2,1"
+
+
+def test_torque_without_gravity(arm, signals, torque, found, only):
+    told = found(signals, torque - arm.gravity_torque(signals.q))
+    only(told, "reading", told[0].certainty, "--gravity=0,0,0")
+
+
+def test_zero_of_a_joint(signals, torque, found):
+    told = found(signals.with_(q=signals.q + [0.0, 1.0]), torque)
+    assert [s.check for s in told] == ["reading"]
+    name, value = told[0].remedy.option.split("=")
+    assert name == "--zero q2" and float(value) == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_joint_that_counts_the_other_way_from_another_zero(signals, torque, found):
+    sign, zero = np.array([1, -1]), np.array([0, np.pi / 2])
+    turned = signals.with_(q=zero + sign * signals.q, dq=sign * signals.dq, ddq=sign * signals.ddq)
+    told = [s for s in found(turned, sign * torque) if s.certainty != "noted"]
+    assert [s.remedy.option for s in told] == ["--flip q2,tau2", "--zero q2=-1.5708"]
+
+
+def test_a_torque_that_is_turned_round_twice_is_as_it_was():
+    """The sign of all torques is found first, and then that of joint 1 again."""
+    robot = load_ur5()
+    log = make_hidden_effect_log(robot, None, n_trajectories=4, duration=6.0, random_state=2)
+    others = {f"tau{k}": -log.frame[f"tau{k}"] for k in range(2, 7)}
+    told = {s.check: s for s in check_log(log.frame.assign(**others), robot).checks}["reading"]
+    assert told.joints == (2, 3, 4, 5, 6)
+    assert told.remedy.option == "--flip tau2,tau3,tau4,tau5,tau6"
+
+
+def test_a_description_without_gravity(arm, recorded, told_of):
+    told = told_of(recorded.frame, replace(arm, gravity=np.zeros(3)))["reading"]
+    assert told.remedy.option.startswith("--gravity=")
+    x, y, z = (float(v) for v in told.remedy.option.partition("=")[2].split(","))
+    assert z == pytest.approx(-9.8, abs=0.3) and abs(y) < 0.1 and abs(x) < 2
+
+
+@pytest.mark.parametrize("joint", [3, 4])
+def test_an_angle_against_the_base(joint):
+    log = make_hidden_effect_log(load_ur5(), None, n_trajectories=4, duration=4.0)
+    frame = log.frame
+    sums = {f"{x}{joint}": frame[f"{x}{joint}"] + frame[f"{x}{joint - 1}"] for x in ("q", "dq")}
+    told = {s.check: s for s in check_log(log.frame.assign(**sums), log.robot).checks}["reading"]
+    assert told.remedy.option == f"--summed q{joint}=q{joint - 1}"
+    assert told.joints == (joint,) and told.certainty == "certain"
+
+
+def test_upside_down_goes_before_a_first_joint_half_a_turn_off(arm, recorded, told_of):
+    told = told_of(recorded.frame, replace(arm, gravity=-arm.gravity))["reading"]
+    assert told.remedy.option == "--gravity=0,0,-9.81" and told.certainty == "suspected"
+    assert "zero" in told.evidence
