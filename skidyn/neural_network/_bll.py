@@ -91,7 +91,8 @@ class BLLRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEst
         Number of processes. Each trains ten networks side by side, since most of the time of a
         small network's step is overhead that they can share; more processes therefore help only
         with more than ten members. Members with callbacks, an optimiser of their own or ``verbose``
-        are trained one by one, with the same result.
+        are trained one by one, with the same result without dropout, and another random draw of
+        the dropped units with it.
     trajectory, time : int, str or None, default="auto"
         Key columns of X.
     random_state : int, RandomState or None, default=None
