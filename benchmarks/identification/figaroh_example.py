@@ -4,9 +4,11 @@
     git clone https://github.com/thanhndv212/figaroh-examples
     python benchmarks/identification/figaroh_example.py figaroh-examples
 
-The example's configuration has an older format, which figaroh's own tool converts, and the URDF names
-meshes that are not in the repository, so that visual and collision elements are removed. All else
-is the example's: data, filters, sampling and the call of ``solve``.
+The example's configuration has an older format, which figaroh's own tool converts, and the URDF
+names meshes that are not in the repository, so that visual and collision elements are removed. All
+else is the example's: data, filters, sampling and the call of ``solve``. The example of a UR10,
+with simulated data, does not run with figaroh 1.0.2: it imports ``get_param_from_yaml``, which that
+version no longer has.
 """
 
 from __future__ import annotations
