@@ -177,7 +177,8 @@ class CouplingSpring(_PairEffect):
     def _stretch(signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> Array:
         """The coupled coordinate, from where the spring is slack."""
         i, j = joints
-        return np.asarray(signals.q[:, i] + shape["ratio"] * signals.q[:, j] - shape.get("x0", 0.0))
+        stretch: Array = signals.q[:, i] + shape["ratio"] * signals.q[:, j] - shape.get("x0", 0.0)
+        return stretch  # also symbols, for exports
 
     def coupled_columns(
         self, signals: Signals, i: int, j: int, ratio: float, **form: float
