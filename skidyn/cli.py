@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import argparse
 import codecs
-import gc
 import os
 import sys
 import warnings
@@ -18,9 +17,6 @@ from skidyn._exceptions import LogWarning, SkidynError
 
 #: Exit codes: success; failed gate; error in the input; stopped by the user.
 DONE, FAILED, BAD_INPUT, STOPPED = 0, 1, 2, 130
-#: New objects after which Python looks for unreachable ones. Imports and programs of robots make
-#: hundreds of thousands that stay, so that its default takes a twentieth of the time of a command.
-MANY_OBJECTS = 10_000
 
 _DESCRIPTION = """\
 Robot inverse dynamics: compare a model with measurements, see where it fails, identify missing
@@ -62,7 +58,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     command = "skidyn"
     try:  # imports too: they take a second, in which the user may press Ctrl-C
-        gc.set_threshold(MANY_OBJECTS, 10, 10)
         from skidyn._commands._arguments import check_files
         from skidyn._writing import keeping_inputs
 

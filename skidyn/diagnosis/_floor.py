@@ -13,11 +13,10 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from skidyn._cores import each
 from skidyn._signals import Array
-from skidyn.diagnosis._variables import average_at_rows
+from skidyn.diagnosis._variables import average_at_rows, ridge_solution
 from skidyn.evidence import Problem, fold_slices
 
 FEATURES = 200
@@ -79,17 +78,11 @@ def _held_out_share(features: Array, r: Array, fold: NDArray[np.int64], n_folds:
     grams = np.array([x.T @ x for x, _ in parts])
     cross = np.array([x.T @ y for x, y in parts])
     held, right = grams.sum(0) - grams, cross.sum(0) - cross
-    diagonal = np.arange(features.shape[1])
     best, behind = 0.0, 0
     for ridge in RIDGES[::-1]:
         drop = 0.0
         for gram, own, others, along in zip(grams, cross, held, right, strict=True):
-            # Triangular factors take a small part of the time of eigenvectors, which would serve
-            # all ridges.
-            normal = others.copy()
-            normal[diagonal, diagonal] += ridge * len(r) / n_folds
-            factor = cho_factor(normal, overwrite_a=True, check_finite=False)
-            b = cho_solve(factor, along, check_finite=False)
+            b = ridge_solution(others, along, ridge * len(r) / n_folds)
             drop += float(2 * b @ own - b @ gram @ b)
         best, behind = max(best, drop), 0 if drop > best else behind + 1
         if behind == WORSE:

@@ -332,7 +332,7 @@ class Tester:
         wider = copy(self)
         felt, gram, right = list(self.felt), self._gram, self._right
         for block in blocks:
-            scaled = {j: rows / self.sigma[j] for j, rows in block.items()}
+            scaled = self._scaled(block)
             cross = products_with(felt, scaled, len(gram))
             own = np.asarray(sum(rows.T @ rows for rows in scaled.values()))
             along = sum(rows.T @ self._target[j] for j, rows in scaled.items())
@@ -401,11 +401,12 @@ class Tester:
         significant: Callable[[float], bool] = _any,
     ) -> Test:
         """As :meth:`test`, with the present noise."""
-        mimic = self._mimic(rows)
-        least = self._least(rows, *mimic)
+        scaled = self._scaled(rows)
+        mimic = self._mimic(scaled)
+        least = self._least(scaled, *mimic)
         if not significant(least.chance):
             return least
-        new = self._swept(rows, mimic[1])
+        new = self._swept(scaled, mimic[1])
         test = self._test(rows, new, self.residual, significant)
         if zeros is None or not zeros.any() or test.chance == 1.0 or not significant(test.chance):
             return test
@@ -432,11 +433,12 @@ class Tester:
             Function that returns whether a p-value is small enough. Larger ones are not exact, and
             columns that are not significant together are not tested alone.
         """
-        mimic = self._mimic(rows)
-        least = self._least(rows, *mimic)
+        scaled = self._scaled(rows)
+        mimic = self._mimic(scaled)
+        least = self._least(scaled, *mimic)
         if not significant(least.chance):
             return least, iter(())
-        new = self._swept(rows, mimic[1])
+        new = self._swept(scaled, mimic[1])
         alone = (
             self._test(
                 {j: block[:, [c]] for j, block in rows.items()},
@@ -477,23 +479,24 @@ class Tester:
         coefficients[told] = b / size
         return Test(chance, coefficients, drop)
 
-    def _mimic(self, rows: dict[int, Array]) -> tuple[Array, Array]:
+    def _scaled(self, rows: dict[int, Array]) -> dict[int, Array]:
+        """Columns in units of the noise."""
+        return {j: b / self.sigma[j] for j, b in rows.items()}
+
+    def _mimic(self, scaled: dict[int, Array]) -> tuple[Array, Array]:
         """Products with the model's columns, and its coefficients that approximate some columns."""
-        scaled = {j: b / self.sigma[j] for j, b in rows.items()}
         cross = products_with(self.felt, scaled, len(self.inverse))
         return cross, self.inverse @ cross
 
-    def _swept(self, rows: dict[int, Array], mimic: Array) -> list[Array]:
+    def _swept(self, scaled: dict[int, Array], mimic: Array) -> list[Array]:
         """Columns minus the part that the model can represent, on the rows of every joint."""
-        scaled = {j: b / self.sigma[j] for j, b in rows.items()}
         return [scaled.get(j, 0.0) - f.rows @ mimic[f.places] for j, f in enumerate(self.felt)]
 
-    def _least(self, rows: dict[int, Array], cross: Array, mimic: Array) -> Test:
+    def _least(self, scaled: dict[int, Array], cross: Array, mimic: Array) -> Test:
         """The smallest p-value that some columns can have, from products alone.
 
         That of a white residual: its correlation can only raise the p-value.
         """
-        scaled = {j: b / self.sigma[j] for j, b in rows.items()}
         own = np.asarray(sum(b.T @ b for b in scaled.values()))
         score = np.asarray(sum(b.T @ self.residual[j] for j, b in scaled.items()))
         both = cross.T @ mimic

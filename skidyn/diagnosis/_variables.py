@@ -227,13 +227,34 @@ def _ridge_errors(features: Array, residual: Array, fold: NDArray[np.int64], n_f
     cross = np.array([a.T @ y for a, y in parts])
     total, right = grams.sum(0), cross.sum(0)
     errors = np.zeros((len(RIDGES), n_folds))
-    diagonal = np.arange(len(total))
     for f, (a, y) in enumerate(parts):
+        others, along = total - grams[f], right - cross[f]
         for k, ridge in enumerate(RIDGES):
-            # Triangular factors for every ridge take a part of the time of eigenvectors for all.
-            normal = total - grams[f]
-            normal[diagonal, diagonal] += ridge * len(residual) / n_folds
-            factor = cho_factor(normal, overwrite_a=True, check_finite=False)
-            weight = cho_solve(factor, right - cross[f], check_finite=False)
+            weight = ridge_solution(others, along, ridge * len(residual) / n_folds)
             errors[k, f] = np.sum((y - a @ weight) ** 2)
     return errors
+
+
+def ridge_solution(gram: Array, right: Array, ridge: float) -> Array:
+    """Coefficients of least squares with a ridge, from products of columns.
+
+    Triangular factors for every ridge take a part of the time of eigenvectors, which would serve
+    all ridges.
+
+    Parameters
+    ----------
+    gram : ndarray of shape (k, k)
+        Products of the columns with themselves.
+    right : ndarray of shape (k,)
+        Products of the columns and the residual.
+    ridge : float
+        Added to the diagonal.
+
+    Returns
+    -------
+    ndarray of shape (k,)
+    """
+    normal, diagonal = gram.copy(), np.arange(len(gram))
+    normal[diagonal, diagonal] += ridge
+    factor = cho_factor(normal, overwrite_a=True, check_finite=False)
+    return np.asarray(cho_solve(factor, right, check_finite=False))

@@ -153,7 +153,7 @@ class CouplingSpring(_PairEffect):
         shapes = super().grid(signals, joints)
         for shape in shapes:
             if "x0" in shape:
-                x = signals.q[:, i] + shape["ratio"] * signals.q[:, j]
+                x = self._stretch(signals, joints, {"ratio": shape["ratio"]})
                 shape["x0"] = float(x.min() + x.max()) / 2
             for name in {"stiffening", "softening"} & set(shape):
                 shape[name] *= float(signals.unit[i])

@@ -21,8 +21,9 @@ NARROW, ONE_SIDED = 0.1, 0.15
 def stiffens(distance: Array, scale: float) -> bool:
     """Whether a hyperbolic sine with this scale is a spring over these distances.
 
-    Beyond the logarithm of the precision of a number, the largest force exceeds that of most rows
-    so far that they no longer count, and the force soon overflows.
+    Distances, shape (n_samples,), and scale are in rad or m. Beyond the logarithm of the precision
+    of a number, the largest force exceeds that of most rows so far that they no longer count, and
+    the force soon overflows.
     """
     return bool(np.abs(distance).max() < -np.log(np.finfo(float).eps) * scale)
 

@@ -39,7 +39,10 @@ WEAK = 1e-3
 
 
 def sizes(residual: Array) -> Array:
-    """Root mean square of the error of every position and velocity."""
+    """Root mean square of the error of every position and velocity, with axes of length 1.
+
+    Errors have the shape (..., n_pieces, n_samples, n_joints or twice that).
+    """
     return np.asarray(np.sqrt(np.mean(residual**2, axis=(-3, -2), keepdims=True)) + 1e-12)
 
 
@@ -68,7 +71,7 @@ class MotionSteps:
     rigid_index: NDArray[np.int64]
     pull: Array
     centre: Array
-    count: float = 1.0
+    count: float
 
     @classmethod
     def of(
@@ -79,6 +82,7 @@ class MotionSteps:
         solution: Solution,
         free: NDArray[Any],
         torque: Array,
+        count: float,
     ) -> MotionSteps:
         """Steps from a least-squares solution; ``inside`` are the effects that are estimated."""
         n = int(np.sum(free < regression.n_rigid))
@@ -95,7 +99,7 @@ class MotionSteps:
         if not model.consistent:
             pull = np.zeros_like(pull)  # the data only, as other estimators without a prior
         index = regression.rigid_index[:n]
-        return cls(model, TermSum(inside).signs, index, pull, centre)
+        return cls(model, TermSum(inside).signs, index, pull, centre, count)
 
     def cost(self, thetas: Array, residuals: Array) -> Array:
         """Negative logarithm of the likelihood, of one model or several."""

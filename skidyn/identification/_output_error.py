@@ -66,8 +66,8 @@ def refine_by_simulation(
     error = _OutputError.of(model, regression, solution, task)
     length = 1.0 if horizon is None else min(horizon, 1.0)
     span = float(windows.steps[windows.valid[:, 1:]].sum())
-    steps = MotionSteps.of(model, error.forward.inside, regression, solution, error.free, torque)
-    steps = replace(steps, count=max(span / length, 1.0))
+    inside, count = error.forward.inside, max(span / length, 1.0)
+    steps = MotionSteps.of(model, inside, regression, solution, error.free, torque, count)
     theta, bodies = solution.coefficients[error.free], model.inertial_parameters_
     residual = error.residuals(theta[None])[0]
     for round_ in range(ROUNDS):

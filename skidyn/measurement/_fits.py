@@ -524,6 +524,12 @@ def friction(signals: Signals, joint: int) -> Array:
     return np.column_stack([dq, sign, signals.ddq[:, joint]])
 
 
+def smoothed(signals: Signals) -> Signals:
+    """Smoothed motion of a recording, computed once for all checks."""
+    motion: Signals = signals.once("smooth motion", lambda: smooth_motion(signals))
+    return motion
+
+
 def make_fits(signals: Signals, torque: Array, robot: Robot) -> Fits | None:
     """Rows of a measurement; None if no interval of it is long enough.
 
@@ -536,7 +542,7 @@ def make_fits(signals: Signals, torque: Array, robot: Robot) -> Fits | None:
     robot : Robot
         As described.
     """
-    motion = signals.once("smooth motion", lambda: smooth_motion(signals))
+    motion = smoothed(signals)
     every = max(1, round(motion.rate * WIDTH / SAMPLES))
     mean = running_mean(torque, every | 1)  # an even number would be half a sample late
     parts = []

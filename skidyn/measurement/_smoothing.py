@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array, Signals
 from skidyn.effects import get_effect
-from skidyn.evidence import column_step, smooth_motion
+from skidyn.evidence import column_step
 from skidyn.measurement._check import Check
-from skidyn.measurement._fits import running_mean
+from skidyn.measurement._fits import running_mean, smoothed
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._robust import student
 from skidyn.measurement._suspicion import Suspicion
@@ -96,8 +96,7 @@ class SmoothedTorque(Check):
         if delay is not None and delay.common > LATE:
             return  # a filter with delay is reported by another check
         found = {}
-        signals = measurement.signals  # noise would shift reversals
-        motion = signals.once("smooth motion", lambda: smooth_motion(signals))
+        motion = smoothed(measurement.signals)  # noise would shift reversals
         step = column_step(motion, AROUND, motion.half_width)
         index, few = motion.thinned(step)
         torque = running_mean(measurement.torque, step)[index]
