@@ -65,5 +65,5 @@ def test_a_payload_that_multiplies_the_load_of_a_wrist_is_no_mistake():
 
 
 def test_a_robot_of_sliders_alone_has_no_zeros_to_divide():
-    frame = make_hidden_effect_log(GANTRY, "coulomb", joints=[2], **OPTIONS).frame
+    frame = make_hidden_effect_log(GANTRY, "friction_drift", **OPTIONS).frame
     assert not [s for s in check_log(frame, GANTRY).checks if s.certainty != "noted"]
