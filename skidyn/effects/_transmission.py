@@ -330,6 +330,16 @@ class Backlash(_LinkSideEffect):
             position[rows] = _flight(free[rows], step, shape["gap"] / 2)
         return smooth_derivatives(position, signals)
 
+    def bounded(
+        self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any], share: float
+    ) -> dict[str, Any]:
+        return {**shape, "share": share}
+
+    def least(self, shape: Mapping[str, Any]) -> float:
+        # The times of the crossings determine the gap: rounded positions resemble a play of another
+        # size.
+        return float(shape.get("share", 0.0))
+
     def parameters(
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
     ) -> dict[str, Any]:
