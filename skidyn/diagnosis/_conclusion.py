@@ -134,7 +134,11 @@ def conclude(
         findings.append(_episodic(episodes, inside, result.fit.residual))
     errors = np.array(history[0]["rmse"]), rmse
     whole = problem.whole_trajectories
-    findings = [_sure(f, findings, parts, errors, whole) for f in findings]
+    scores = {h.kind: h.score for h in result.findings}
+    findings = [
+        _sure(f, findings, parts, errors, whole, f.margin * scores.get(f.kind, np.inf))
+        for f in findings
+    ]
     diagnosis = Diagnosis(
         _verdict(findings, parts),
         robot.joint_names,
@@ -453,6 +457,7 @@ def _sure(
     parts: Remainder,
     errors: tuple[Array, Array],
     whole: bool,
+    lead: float,
 ) -> Finding:
     """The finding with the probability that it is identified correctly."""
     if not finding.terms:
@@ -470,6 +475,7 @@ def _sure(
         finding.margin,
         float(parts.inflation[joints].max()),
         max(f.error_drop for f in findings if f.kind == finding.kind),
+        lead=lead,
         nameless=finding.kind != UNKNOWN and (beside or bool(parts.material[joints].any())),
         whole_recordings=whole,
         alike=finding.alike,
