@@ -237,9 +237,11 @@ def _diagnose(
     if servos is not None and np.isfinite(servos.controller.checked(robot.n_joints).limit).all():
         kinds = [kind for kind in kinds if kind != "saturation"]
 
+    logged = signals  # with copied rows, which are left out below
+
     def measured() -> Measurement:
         return Measurement(
-            signals,
+            logged,
             torque,
             robot,
             robot.joint_names,
@@ -248,13 +250,12 @@ def _diagnose(
         )
 
     # first, since all other effects and checks are judged by the torque that they determine
-    of_servos = settings_found(measured(), servos, settings_tried)
+    of_servos = [] if servos is None else settings_found(measured(), servos, settings_tried)
     if servos is not None and of_servos:
         tau = torque = servos.with_findings(of_servos, robot.n_joints).torque
         # what is left of a setting that is known within an error would have their name
         alike = {rival for f in of_servos for rival in get_effect(f.kind).rivals}
         kinds = [kind for kind in kinds if kind not in alike]
-    measurement = measured()
     once = ~copied_rows(signals, torque)
     judged, kept_weight = torque, weight
     if not once.all():
@@ -262,7 +263,7 @@ def _diagnose(
         kept_weight = None if weight is None else weight[once]
 
     def checked() -> list[Suspicion]:
-        checks = check_measurement(measurement) if known is None else list(known)
+        checks = check_measurement(measured()) if known is None else list(known)
         if not force:
             refuse_certain(checks)
         return checks
