@@ -16,6 +16,7 @@ from threadpoolctl import threadpool_limits
 from skidyn._columns import ColumnSpec
 from skidyn._cores import alone, aside, cores
 from skidyn._exceptions import ColumnError, EffectError, LogError, LogWarning
+from skidyn._memory import give_back
 from skidyn._order import refuse_shuffled
 from skidyn._signals import Array, Signals, read_signals
 from skidyn.diagnosis._conclusion import conclude
@@ -315,6 +316,7 @@ def _diagnose(
         found = _search(problem, kinds, settings, vibration=steady)
     result, wider, completed = found
     limits = _limits(problem, result, completed, settings)
+    give_back()
     sliding = problem.rows.sliding
     least = settings.least_drop
     data = (X, tau) if weight is None else (X, tau, weight)
@@ -350,8 +352,10 @@ def _search(
     logger.
     """
     result = search(problem, kinds, settings, vibration=vibration)
+    give_back()  # what the unknown functions took: the next searches need fewer columns
     wider, completed = look_at_reversals(problem, result, kinds, settings)
     if wider is problem:
+        give_back()
         wider, completed = look_at_swift(problem, result, kinds, settings)
     return result, wider, completed
 
