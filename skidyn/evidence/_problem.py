@@ -206,6 +206,8 @@ class Problem:
         """
         of = self.screening_rows if screening else self.term_rows
         new = [t for t in dict.fromkeys(terms) if t not in self._cache]
+        if any({"model_torque", "motor_torque"} & set(t.effect.needs) for t in new):
+            _ = self.few.model_torque  # before processes start, which would all compute it
         groups = [list(g) for _, g in groupby(new, key=lambda t: (t.effect.needs, t.places))]
         found = each(lambda group: [of(term) for term in group], groups, text)
         rows = dict(zip(chain(*groups), chain(*found), strict=True))
@@ -364,12 +366,8 @@ class Problem:
         torque = np.zeros_like(self.torque)
         for term, own in fit.terms.slices(len(self.rigid_index)):
             if wanted is None or term in wanted:
-                self._add(torque, term, fit.coefficients[own])
+                _add(torque, self.signals, term, fit.coefficients[own])
         return torque
-
-    def _add(self, torque: Array, term: Term, coefficients: Array) -> None:
-        for j, block in term.torque_columns(self.signals).items():
-            torque[:, j] += block @ coefficients
 
     def explained(self, fit: Fit) -> Array:
         """Part of :attr:`torque` that a fit explains at every sample, N m or N; read only."""
@@ -392,20 +390,47 @@ class Problem:
     def set_fit(self, fit: Fit) -> None:
         """Set the load and the model torque of a fit for the effects that need them."""
         load = self.rigid_torque(fit)
-        # An effect of the torque sensor acts on the torque before the sensor.
-        dry, smooth = np.zeros_like(self.torque), np.zeros_like(self.torque)
-        for term, own in fit.terms.slices(len(self.rigid_index)):
+        places = list(fit.terms.slices(len(self.rigid_index)))
+        shares = [(term, fit.coefficients[own]) for term, own in places]
+        for term, coefficients in shares:
             if term.effect.on_bodies:
-                self._add(load, term, fit.coefficients[own])
-            elif not term.effect.sees_model:
-                self._add(dry if term.is_dry else smooth, term, fit.coefficients[own])
+                _add(load, self.signals, term, coefficients)
+        # An effect of the torque sensor acts on the torque before the sensor.
+        others = [(t, b) for t, b in shares if not (t.effect.on_bodies or t.effect.sees_model)]
+        torques = _Torques(self.signals, load, others)
         self.signals = self.signals.with_(
             load=load,
-            model_torque=load + dry + smooth,
-            smooth_torque=load + smooth,
+            model_torque=lambda: torques()[0],
+            smooth_torque=lambda: torques()[1],
             inertial_parameters=self.inertial_parameters(fit),
         )
         self._cache = {t: rows for t, rows in self._cache.items() if not t.effect.follows_fit}
+
+
+class _Torques:
+    """Torque of a model with and without dry friction, computed once if it is needed.
+
+    Effects that move a link need only the load, and short windows of a long log much memory.
+    """
+
+    def __init__(self, signals: Signals, load: Array, shares: Sequence[tuple[Term, Array]]) -> None:
+        self._made_of: Any = (signals, load, shares)
+        self._found: tuple[Array, Array] | None = None
+
+    def __call__(self) -> tuple[Array, Array]:
+        if self._found is None:
+            signals, load, shares = self._made_of
+            dry, smooth = np.zeros_like(load), np.zeros_like(load)
+            for term, coefficients in shares:
+                _add(dry if term.is_dry else smooth, signals, term, coefficients)
+            self._found = load + dry + smooth, load + smooth
+            self._made_of = None  # the previous signals are not needed any more
+        return self._found
+
+
+def _add(torque: Array, signals: Signals, term: Term, coefficients: Array) -> None:
+    for j, block in term.torque_columns(signals).items():
+        torque[:, j] += block @ coefficients
 
 
 def hysteresis_joints(terms: Iterable[Term]) -> list[int]:
