@@ -51,6 +51,29 @@ def _gaps(steps: Array) -> NDArray[np.intp]:
     return np.flatnonzero((steps < 0) | (steps > longest))
 
 
+class _Later:
+    """Field whose value may be given as a function, which is called when it is first read."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = f"_{name}"
+
+    def __get__(self, signals: Signals | None, owner: type) -> Array | None:
+        if signals is None:
+            return None  # default of the field
+        value = self.stored(signals)
+        if callable(value):
+            value = signals.__dict__[self._name] = value()
+        found: Array | None = value
+        return found
+
+    def __set__(self, signals: Signals, value: Any) -> None:
+        signals.__dict__[self._name] = value
+
+    def stored(self, signals: Signals) -> Any:
+        """The value, or the function if it was not read yet."""
+        return signals.__dict__[self._name]
+
+
 @dataclass(frozen=True)
 class Signals:
     """Motion of a robot and accompanying signals, one row per sample.
@@ -95,8 +118,8 @@ class Signals:
     prismatic: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
     robot: Robot | None = None
     load: Array | None = None
-    model_torque: Array | None = None
-    smooth_torque: Array | None = None
+    model_torque: Array | None = _Later()  # type: ignore[assignment]
+    smooth_torque: Array | None = _Later()  # type: ignore[assignment]
     inertial_parameters: Array | None = None
     valid: NDArray[np.bool_] | None = None
     half_width: int = 0
@@ -168,6 +191,8 @@ class Signals:
         return kept[name]
 
     def __getstate__(self) -> dict[str, Any]:
+        for name in _LATER:
+            getattr(self, name)
         return {name: value for name, value in self.__dict__.items() if name != "_kept"}
 
     def named(self, name: str) -> Array:
@@ -183,18 +208,15 @@ class Signals:
         return np.asarray(table[:, int(name[len(kind) :]) - 1])
 
     def with_(self, **changes: Any) -> Signals:
-        """Copy with some fields replaced."""
-        return replace(self, **changes)
+        """Copy with some fields replaced; a torque of the model may be a function returning it."""
+        return replace(self, **{k: f.stored(self) for k, f in _LATER.items()} | changes)
 
     def take(self, rows: slice | NDArray[Any]) -> Signals:
         """The same signals on some rows."""
-        per_sample = (
-            *("q", "dq", "ddq", "trajectory", "time", "temperature"),
-            *("load", "model_torque", "smooth_torque", "valid"),
-        )
+        per_sample = ("q", "dq", "ddq", "trajectory", "time", "temperature", "load", "valid")
         values = {name: getattr(self, name) for name in per_sample}
-        taken: dict[str, Any] = {k: None if v is None else v[rows] for k, v in values.items()}
-        return replace(self, **taken)
+        values |= {name: field.stored(self) for name, field in _LATER.items()}
+        return replace(self, **{name: _rows(value, rows) for name, value in values.items()})
 
     def thinned(self, step: int) -> tuple[NDArray[np.int64], Signals]:
         """The middle one of every few (an odd number) successive samples, segment by segment.
@@ -208,6 +230,17 @@ class Signals:
         ends = np.cumsum([0, *map(len, parts)]).tolist()
         few.__dict__["segments"] = [slice(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
         return index, few
+
+
+#: Fields that are computed when they are first read.
+_LATER: dict[str, _Later] = {k: v for k, v in vars(Signals).items() if isinstance(v, _Later)}
+
+
+def _rows(value: Any, rows: slice | NDArray[Any]) -> Any:
+    """Some rows of a field, or a function that returns them."""
+    if callable(value):
+        return lambda: value()[rows]
+    return None if value is None else value[rows]
 
 
 def signals_from(

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Signals out of tables, and the segments that nothing may cross."""
 
+import pickle
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -68,3 +70,18 @@ def test_what_is_not_finite_is_named_with_its_row_and_joint():
     X.loc[1, "dq2"] = np.nan
     with pytest.raises(LogError, match=r"dq of joint 2 \(joint2\) is not finite in row 1"):
         diagnosed(X)
+
+
+def test_a_torque_of_the_model_is_computed_when_it_is_first_read():
+    calls = []
+
+    def torque():
+        calls.append(1)
+        return np.arange(12.0).reshape(6, 2)
+
+    motion = Signals(*np.zeros((3, 6, 2)), trajectory=np.zeros(6), model_torque=torque)
+    moved = motion.with_(load=np.ones((6, 2))).take(np.array([1, 3]))
+    assert not calls and motion.smooth_torque is None
+    np.testing.assert_array_equal(moved.model_torque, [[2.0, 3.0], [6.0, 7.0]])
+    assert moved.model_torque is moved.model_torque and len(calls) == 1
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(motion)).named("tau2"), torque()[:, 1])

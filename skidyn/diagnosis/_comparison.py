@@ -95,11 +95,11 @@ class Comparison:
             With ``joint`` (from 1), ``name``, ``trajectory``, ``rmse``, ``mae`` (N m or N) and
             ``relative`` (rmse over the rms of the measured torque).
         """
-        rows = []
+        rows, residual = [], self.residual
         for name in np.unique(self.signals.trajectory):
             here = self.signals.trajectory == name
             for j, joint in enumerate(self.joint_names):
-                r, tau = self.residual[here, j], self.measured[here, j]
+                r, tau = residual[here, j], self.measured[here, j]
                 rmse = float(np.sqrt(np.mean(r**2)))
                 scale = float(np.sqrt(np.mean(tau**2)))
                 rows.append(

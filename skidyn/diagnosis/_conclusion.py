@@ -205,7 +205,13 @@ def _refitted(
 
 def _steps(
     problem: Problem, result: SearchResult, torque: Array, sliding: NDArray[np.bool_]
-) -> tuple[list[Comparison], list[dict[str, Any]], list[list[float]], Array, dict[Term, Array]]:
+) -> tuple[
+    list[Comparison],
+    list[dict[str, Any]],
+    list[list[float]],
+    Array,
+    dict[Term, dict[int, Array]],
+]:
     """Comparison and errors of the given model and after each finding.
 
     Also returns the errors of averaged rows, the held-out residual of the last model, and the
@@ -422,7 +428,7 @@ def _unknowns(problem: Problem, result: SearchResult, terms: Sequence[Term]) -> 
 
 def _held_out(
     problem: Problem, terms: Sequence[Term], result: SearchResult, keep: Sequence[Term]
-) -> tuple[Array, dict[Term, Array]]:
+) -> tuple[Array, dict[Term, dict[int, Array]]]:
     """Held-out residual; a line's coefficients come from the residual at the full rate."""
     waves = [t for t in terms if _on_samples(t)]
     rest = [t for t in terms if not _on_samples(t)]
@@ -435,9 +441,7 @@ def _held_out(
         if hypothesis.torque is None:
             continue
         for t in (c.term for c in hypothesis.candidates if c.term in waves):
-            own = np.zeros_like(torque)
-            own[:, t.places[0]] = hypothesis.torque[:, t.places[0]]
-            held[t] = own
+            held[t] = {t.places[0]: hypothesis.torque[:, t.places[0]]}
     return residual, held
 
 
@@ -451,9 +455,15 @@ def _comparison(
     torque: Array,
     residual: Array,
     sliding: NDArray[np.bool_],
-    dry: Sequence[Array],
+    dry: Sequence[dict[int, Array]],
 ) -> Comparison:
     assert problem.robot is not None
+    friction = None
+    if dry:
+        friction = np.zeros_like(torque)
+        for own in dry:
+            for j, part in own.items():
+                friction[:, j] += part
     return Comparison(
         problem.signals,
         torque,
@@ -461,7 +471,7 @@ def _comparison(
         sliding,
         problem.robot.joint_names,
         problem.rows.sliding,
-        sum(dry, np.zeros_like(torque)) if dry else None,
+        friction,
     )
 
 

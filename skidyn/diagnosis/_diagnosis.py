@@ -16,6 +16,7 @@ from threadpoolctl import threadpool_limits
 from skidyn._columns import ColumnSpec
 from skidyn._cores import alone, aside, cores
 from skidyn._exceptions import ColumnError, EffectError, LogError, LogWarning
+from skidyn._memory import give_back
 from skidyn._order import refuse_shuffled
 from skidyn._signals import Array, Signals, read_signals
 from skidyn.diagnosis._conclusion import conclude
@@ -238,9 +239,11 @@ def _diagnose(
     if servos is not None and np.isfinite(servos.controller.checked(robot.n_joints).limit).all():
         kinds = [kind for kind in kinds if kind != "saturation"]
 
+    logged = signals  # with copied rows, which are left out below
+
     def measured() -> Measurement:
         return Measurement(
-            signals,
+            logged,
             torque,
             robot,
             robot.joint_names,
@@ -249,13 +252,12 @@ def _diagnose(
         )
 
     # first, since all other effects and checks are judged by the torque that they determine
-    of_servos = settings_found(measured(), servos, settings_tried)
+    of_servos = [] if servos is None else settings_found(measured(), servos, settings_tried)
     if servos is not None and of_servos:
         tau = torque = servos.with_findings(of_servos, robot.n_joints).torque
         # what is left of a setting that is known within an error would have their name
         alike = {rival for f in of_servos for rival in get_effect(f.kind).rivals}
         kinds = [kind for kind in kinds if kind not in alike]
-    measurement = measured()
     once = ~copied_rows(signals, torque)
     judged, kept_weight = torque, weight
     if not once.all():
@@ -263,7 +265,7 @@ def _diagnose(
         kept_weight = None if weight is None else weight[once]
 
     def checked() -> list[Suspicion]:
-        checks = check_measurement(measurement) if known is None else list(known)
+        checks = check_measurement(measured()) if known is None else list(known)
         if not force:
             refuse_certain(checks)
         return checks
@@ -316,6 +318,7 @@ def _diagnose(
         found = _search(problem, kinds, settings, vibration=steady)
     result, wider, completed = found
     limits = _limits(problem, result, completed, settings)
+    give_back()
     sliding = problem.rows.sliding
     least = settings.least_drop
     data = (X, tau) if weight is None else (X, tau, weight)
@@ -351,8 +354,10 @@ def _search(
     logger.
     """
     result = search(problem, kinds, settings, vibration=vibration)
+    give_back()  # what the unknown functions took: the next searches need fewer columns
     wider, completed = look_at_reversals(problem, result, kinds, settings)
     if wider is problem:
+        give_back()
         wider, completed = look_at_swift(problem, result, kinds, settings)
     return result, wider, completed
 

@@ -298,7 +298,7 @@ def _value(name: str, row: dict[str, Any]) -> str:
 
 
 def effect_curves(
-    problem: Problem, terms: Sequence[Term], torque: dict[Term, Array], residual: Array
+    problem: Problem, terms: Sequence[Term], torque: dict[Term, dict[int, Array]], residual: Array
 ) -> list[dict[str, Any]]:
     """Effect and partial residual against the effect's main signal, binned.
 
@@ -308,8 +308,8 @@ def effect_curves(
         Motion.
     terms : sequence of Term
         Terms of one finding.
-    torque : dict of Term to ndarray of shape (n_samples, n_joints)
-        Contribution of each term, N m or N.
+    torque : dict of Term to dict of int to ndarray of shape (n_samples,)
+        Contribution of each term to the joints that it reaches, N m or N.
     residual : ndarray of shape (n_samples, n_joints)
         Held-out residual of the final model, N m or N.
 
@@ -320,10 +320,10 @@ def effect_curves(
         ``low`` and ``high`` (its quartiles).
     """
     curves = []
-    reached = sorted({j for t in terms for j in _reached(torque[t])})
-    for j in reached:
-        own = [t for t in terms if np.any(torque[t][:, j])]
-        effect = sum(torque[t][:, j] for t in own)
+    acting = {t: {j: own for j, own in torque[t].items() if np.any(own)} for t in terms}
+    for j in sorted({j for own in acting.values() for j in own}):
+        own = [t for t in terms if j in acting[t]]
+        effect = sum(acting[t][j] for t in own)
         name, x, unit = _main_signal(problem, own[0], j)
         use = problem.rows.sliding[:, j]
         if use.sum() < 5 * BINS:
@@ -353,10 +353,6 @@ def effect_curves(
             }
         )
     return curves
-
-
-def _reached(torque: Array) -> list[int]:
-    return [int(j) for j in np.flatnonzero(np.any(torque != 0, axis=0))]
 
 
 def _main_signal(problem: Problem, term: Term, joint: int) -> tuple[str, Array, str]:

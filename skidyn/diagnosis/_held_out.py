@@ -16,7 +16,7 @@ from skidyn.evidence import Problem, left_out_coefficients
 
 def held_out_residual(
     problem: Problem, terms: Sequence[Term], sigma: Array, keep: Sequence[Term] = ()
-) -> tuple[Array, dict[Term, Array]]:
+) -> tuple[Array, dict[Term, dict[int, Array]]]:
     """Residual of every sample under the model fitted without its fold.
 
     Parameters
@@ -34,8 +34,8 @@ def held_out_residual(
     -------
     residual : ndarray of shape (n_samples, n_joints), N m or N
         Torque less the prediction of a model fitted without the sample's fold.
-    torque : dict of Term to ndarray of shape (n_samples, n_joints), N m or N
-        Contributions of these terms, fitted to all data.
+    torque : dict of Term to dict of int to ndarray of shape (n_samples,), N m or N
+        Contributions of these terms, fitted to all data, by the joints that they reach.
     """
     design = problem.design([problem.term_rows(t) for t in terms])
     whole, left = left_out_coefficients(
@@ -58,13 +58,11 @@ def held_out_residual(
     torque = {}
     wanted = set(keep)
     for term, place in TermSum(terms).slices(len(problem.rigid_index)):
-        own = np.zeros_like(problem.torque) if term in wanted else None
-        for j, block in term.torque_columns(problem.signals).items():
+        columns = term.torque_columns(problem.signals)
+        for j, block in columns.items():
             prediction[:, j] += (block * left[fold, place]).sum(1)
-            if own is not None:
-                own[:, j] += block @ whole[place]
-        if own is not None:
-            torque[term] = own
+        if term in wanted:
+            torque[term] = {j: block @ whole[place] for j, block in columns.items()}
     return problem.torque - prediction, torque
 
 

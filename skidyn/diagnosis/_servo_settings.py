@@ -62,21 +62,19 @@ def split_kinds(kinds: Iterable[str], of_servos: bool) -> tuple[list[str], list[
     return torques, settings
 
 
-def settings_found(
-    measurement: Measurement, servos: Servos | None, kinds: Sequence[str]
-) -> list[Finding]:
+def settings_found(measurement: Measurement, servos: Servos, kinds: Sequence[str]) -> list[Finding]:
     """Settings of the servos that differ from the stated ones.
 
     Parameters
     ----------
     measurement : Measurement
         Motion, and the torque computed from the servos as stated.
-    servos : Servos or None
-        The servos as stated; None for a measured torque, of which nothing is found.
+    servos : Servos
+        The servos as stated.
     kinds : sequence of str
         Kinds of settings to try.
     """
-    if servos is None or not kinds:
+    if not kinds:
         return []
     stiffness = servos.controller.checked(measurement.n_joints).stiffness
     found = [s for s in servo_settings(measurement, stiffness) if s.kind in kinds]

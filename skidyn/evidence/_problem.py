@@ -6,6 +6,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, groupby
+from operator import is_
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,6 +119,8 @@ class Problem:
     rigid_rows: list[Array] = field(default_factory=list)
     logged: Signals | None = None
     _cache: dict[Term, dict[int, Array]] = field(default_factory=dict, repr=False)
+    #: Last results that are asked for again; shared by copies, since they state what they are of.
+    _last: dict[str, tuple[list[Any], Any]] = field(default_factory=dict, repr=False)
     _thinned: dict[int, list[csr_matrix]] = field(default_factory=dict, repr=False)
 
     @property
@@ -202,6 +206,8 @@ class Problem:
         """
         of = self.screening_rows if screening else self.term_rows
         new = [t for t in dict.fromkeys(terms) if t not in self._cache]
+        if any({"model_torque", "motor_torque"} & set(t.effect.needs) for t in new):
+            _ = self.few.model_torque  # before processes start, which would all compute it
         groups = [list(g) for _, g in groupby(new, key=lambda t: (t.effect.needs, t.places))]
         found = each(lambda group: [of(term) for term in group], groups, text)
         rows = dict(zip(chain(*groups), chain(*found), strict=True))
@@ -250,10 +256,11 @@ class Problem:
             Number of times that the noise is estimated from the residual and the fit repeated.
         """
         terms = TermSum(terms)
-        design = self.design([self.term_rows(t) for t in terms])
-        target = self.target
+        blocks = [self.term_rows(t) for t in terms]
+        design, target = self.design(blocks), self.target
         if sigma is None:
-            sigma = np.array([own_noise(a, y, len(y)) for a, y in zip(design, target, strict=True)])
+            alone = self._fitted_alone(blocks, target, design)
+            sigma = np.array([own.noise(len(y)) for own, y in zip(alone, target, strict=True)])
         fit = _weighted(terms, design, target, sigma)
         for k in range(1, passes):
             tell("Fitting", k / passes)
@@ -272,9 +279,30 @@ class Problem:
         terms : iterable of Term
             Every effect of the model.
         """
-        design = self.design([self.term_rows(t) for t in terms])
-        pairs = zip(design, self.target, strict=True)
-        return np.array([own_noise(a, y, max(1, len(y) - a.shape[1]), len(y)) for a, y in pairs])
+        blocks, target = [self.term_rows(t) for t in terms], self.target
+        used = self.rigid_rows[0].shape[1] + sum(map(width, blocks))
+        alone = self._fitted_alone(blocks, target)
+        return np.array(
+            [own.noise(max(1, len(y) - used), len(y)) for own, y in zip(alone, target, strict=True)]
+        )
+
+    def _fitted_alone(
+        self,
+        blocks: Sequence[dict[int, Array]],
+        target: list[Array],
+        design: list[Array] | None = None,
+    ) -> list[FittedAlone]:
+        """Fit of every joint by itself; a search asks for the same one several times."""
+        made_of = [*self.rigid_rows, *(b[j] for b in blocks for j in b)]
+        kept, found = self._last.get("alone", ([], ()))
+        if len(kept) == len(made_of) and all(map(is_, kept, made_of)):
+            before, fits = found
+            if all(map(np.array_equal, before, target)):
+                return list(fits)
+        pairs = zip(self.design(blocks) if design is None else design, target, strict=True)
+        fits = [FittedAlone.of(a, y) for a, y in pairs]
+        self._last["alone"] = made_of, (target, fits)
+        return fits
 
     def sample_folds(self, joint: int, rows: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
         """Fold of samples, that of the nearest averaged row of a joint.
@@ -338,40 +366,71 @@ class Problem:
         torque = np.zeros_like(self.torque)
         for term, own in fit.terms.slices(len(self.rigid_index)):
             if wanted is None or term in wanted:
-                self._add(torque, term, fit.coefficients[own])
+                _add(torque, self.signals, term, fit.coefficients[own])
         return torque
 
-    def _add(self, torque: Array, term: Term, coefficients: Array) -> None:
-        for j, block in term.torque_columns(self.signals).items():
-            torque[:, j] += block @ coefficients
-
     def explained(self, fit: Fit) -> Array:
-        """Part of :attr:`torque` that a fit explains at every sample, N m or N."""
+        """Part of :attr:`torque` that a fit explains at every sample, N m or N; read only."""
+        s = self.signals
+        made_of = [fit.coefficients, self.rigid_index, s.q, s.dq, s.ddq, s.time, s.trajectory]
+        if any(t.effect.follows_fit or "robot" in t.effect.needs for t in fit.terms):
+            made_of += [s.load, s.model_torque, s.inertial_parameters]
+        kept, found = self._last.get("explained", ([], ()))
+        if len(kept) == len(made_of) and all(map(is_, kept, made_of)) and found[0] == fit.terms:
+            return np.asarray(found[1])
         torque = self.term_torque(fit)
         if self.rigid_body:
             assert self.robot is not None
-            s = self.signals
             change = self.correction(fit.coefficients)
             torque += self.robot.inverse_dynamics(s.q, s.dq, s.ddq, parameters=change)
+        torque.flags.writeable = False  # it is returned again
+        self._last["explained"] = made_of, (fit.terms, torque)
         return torque
 
     def set_fit(self, fit: Fit) -> None:
         """Set the load and the model torque of a fit for the effects that need them."""
         load = self.rigid_torque(fit)
-        # An effect of the torque sensor acts on the torque before the sensor.
-        dry, smooth = np.zeros_like(self.torque), np.zeros_like(self.torque)
-        for term, own in fit.terms.slices(len(self.rigid_index)):
+        places = list(fit.terms.slices(len(self.rigid_index)))
+        shares = [(term, fit.coefficients[own]) for term, own in places]
+        for term, coefficients in shares:
             if term.effect.on_bodies:
-                self._add(load, term, fit.coefficients[own])
-            elif not term.effect.sees_model:
-                self._add(dry if term.is_dry else smooth, term, fit.coefficients[own])
+                _add(load, self.signals, term, coefficients)
+        # An effect of the torque sensor acts on the torque before the sensor.
+        others = [(t, b) for t, b in shares if not (t.effect.on_bodies or t.effect.sees_model)]
+        torques = _Torques(self.signals, load, others)
         self.signals = self.signals.with_(
             load=load,
-            model_torque=load + dry + smooth,
-            smooth_torque=load + smooth,
+            model_torque=lambda: torques()[0],
+            smooth_torque=lambda: torques()[1],
             inertial_parameters=self.inertial_parameters(fit),
         )
         self._cache = {t: rows for t, rows in self._cache.items() if not t.effect.follows_fit}
+
+
+class _Torques:
+    """Torque of a model with and without dry friction, computed once if it is needed.
+
+    Effects that move a link need only the load, and short windows of a long log much memory.
+    """
+
+    def __init__(self, signals: Signals, load: Array, shares: Sequence[tuple[Term, Array]]) -> None:
+        self._made_of: Any = (signals, load, shares)
+        self._found: tuple[Array, Array] | None = None
+
+    def __call__(self) -> tuple[Array, Array]:
+        if self._found is None:
+            signals, load, shares = self._made_of
+            dry, smooth = np.zeros_like(load), np.zeros_like(load)
+            for term, coefficients in shares:
+                _add(dry if term.is_dry else smooth, signals, term, coefficients)
+            self._found = load + dry + smooth, load + smooth
+            self._made_of = None  # the previous signals are not needed any more
+        return self._found
+
+
+def _add(torque: Array, signals: Signals, term: Term, coefficients: Array) -> None:
+    for j, block in term.torque_columns(signals).items():
+        torque[:, j] += block @ coefficients
 
 
 def hysteresis_joints(terms: Iterable[Term]) -> list[int]:
@@ -578,7 +637,10 @@ def independent_columns(rows: Array) -> NDArray[np.int64]:
     moved = np.flatnonzero(size > 1e-9 * max(size.max(initial=0.0), 1e-300))
     if not len(moved):
         return moved
-    triangle, pivots = qr(rows[:, moved] / size[moved], mode="r", pivoting=True)
+    scaled = np.empty((len(rows), len(moved)), order="F")  # in the order of LAPACK: no copy
+    for k, column in enumerate(moved):
+        np.divide(rows[:, column], size[column], out=scaled[:, k])
+    triangle, pivots = qr(scaled, overwrite_a=True, mode="r", pivoting=True)
     diagonal = np.abs(np.diag(triangle))
     rank = int(np.sum(diagonal > RANK_TOLERANCE * diagonal[0]))
     return np.sort(moved[pivots[:rank]])
@@ -632,24 +694,52 @@ RANK = 1e-7
 ROWS_A_DIRECTION = 2.0
 
 
-def own_noise(design: Array, target: Array, count: float, rows: float | None = None) -> float:
-    """Residual of a joint fitted alone, so that errors of other joints have no influence.
+@dataclass(frozen=True)
+class FittedAlone:
+    """Residual of a joint fitted by itself, so that errors of other joints have no influence.
 
-    The rows may be a triangular factor; ``rows`` is their true number, and ``count``, by default
-    the same, that by which the squared residual is divided. With too few rows to determine the
-    noise, the torque itself is its bound.
+    Attributes
+    ----------
+    left, whole : float
+        Squared residual and squared torque.
+    rank : int
+        Number of directions of the columns that the rows determine.
     """
-    rows = count if rows is None else rows
-    if not count:
-        return 1.0
-    size = np.linalg.norm(design, axis=0)
-    used = size > 0
-    scaled = design[:, used] / size[used]
-    solution, _, rank, _ = np.linalg.lstsq(scaled, target, rcond=RANK)
-    left, whole = np.sum((target - scaled @ solution) ** 2), np.sum(target**2)
-    if rows <= ROWS_A_DIRECTION * rank:
-        left = whole  # of a joint that hardly slides: a few rows are fitted by anything
-    return float(np.sqrt(max(left, RANK**2 * whole) / count)) or 1.0
+
+    left: float
+    whole: float
+    rank: int
+
+    @classmethod
+    def of(cls, design: Array, target: Array) -> FittedAlone:
+        """Fit rows, or their triangular factor."""
+        if not len(target):
+            return cls(0.0, 0.0, 0)
+        size = np.linalg.norm(design, axis=0)
+        used = size > 0
+        scaled = design[:, used] / size[used]
+        solution, _, rank, _ = np.linalg.lstsq(scaled, target, rcond=RANK)
+        left, whole = np.sum((target - scaled @ solution) ** 2), np.sum(target**2)
+        return cls(float(left), float(whole), int(rank))
+
+    def noise(self, count: float, rows: float | None = None) -> float:
+        """Root of the squared residual divided by ``count``.
+
+        ``rows``, by default the same, is the number of rows that were fitted. With too few rows to
+        determine the noise, the torque itself is its bound; without any, the noise is 1.
+        """
+        if not count:
+            return 1.0
+        rows = count if rows is None else rows
+        left = self.left
+        if rows <= ROWS_A_DIRECTION * self.rank:
+            left = self.whole  # of a joint that hardly slides: a few rows are fitted by anything
+        return float(np.sqrt(max(left, RANK**2 * self.whole) / count)) or 1.0
+
+
+def own_noise(design: Array, target: Array, count: float, rows: float | None = None) -> float:
+    """Noise of a joint fitted alone (:meth:`FittedAlone.noise`)."""
+    return FittedAlone.of(design, target).noise(count, rows)
 
 
 def weighted_least_squares(design: list[Array], target: list[Array], sigma: Array) -> Array:
@@ -658,7 +748,10 @@ def weighted_least_squares(design: list[Array], target: list[Array], sigma: Arra
 
 
 def _weighted(terms: TermSum, design: list[Array], target: list[Array], sigma: Array) -> Fit:
-    a = np.vstack([block / s for block, s in zip(design, sigma, strict=True)])
+    a = np.empty((sum(map(len, design)), design[0].shape[1]))
+    ends = np.cumsum([0, *map(len, design)])
+    for block, s, start, stop in zip(design, sigma, ends[:-1], ends[1:], strict=True):
+        np.divide(block, s, out=a[start:stop])
     y = np.concatenate([t / s for t, s in zip(target, sigma, strict=True)])
     size = np.linalg.norm(a, axis=0)
     size[size == 0] = 1.0

@@ -37,11 +37,14 @@ class CommandedMotion(Check):
         parts = [rows for rows in s.segments if rows.stop - rows.start > ENOUGH]
         if measurement.stale or measurement.computed or not moving or not parts:
             return
+        positions: list[float] = []
+        for k in moving:
+            positions += _scatter(s.q[:, [k]], s.clock, parts).tolist()
+            if positions[-1] > NOISELESS:
+                return  # mostly the first one
         torque = measurement.torque[:, moving]
-        scatter = _scatter(np.hstack([s.q[:, moving], torque]), s.clock, parts)
-        positions, noise = np.split(scatter, 2)
-        noise = noise / (np.std(torque, axis=0) + 1e-300)
-        if positions.max() > NOISELESS or noise.min() < NOISY:
+        noise = _scatter(torque, s.clock, parts) / (np.std(torque, axis=0) + 1e-300)
+        if noise.min() < NOISY:
             return
         delay = measured_delay(measurement)
         if delay is None or not delay.common > max(SMALLEST, ERRORS * delay.error):
@@ -49,7 +52,7 @@ class CommandedMotion(Check):
         unit = "m" if s.prismatic[moving[int(np.argmax(positions))]] else "rad"
         yield self.suspicion(
             "positions were commanded, not measured",
-            f"they scatter by at most {positions.max():.1g} {unit} from sample to sample, less "
+            f"they scatter by at most {max(positions):.1g} {unit} from sample to sample, less "
             f"than any encoder, and are ahead of the torque by {1e3 * delay.common:.0f} ms; "
             "commands differ from the motion by the error of the controller, so record measured "
             "positions",

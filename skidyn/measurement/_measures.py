@@ -366,20 +366,9 @@ def find_leaps(q: np.ndarray, time: np.ndarray, trajectory: np.ndarray) -> np.nd
     usual = float(np.median(step[step > 0])) if np.any(step > 0) else 1.0
     together = (trajectory[1:] == trajectory[:-1]) & (step < 3 * usual) & (step > 0)
     moved = np.where(together[:, None], np.diff(q, axis=0), 0.0)
-    # how fast it is before and after, and not the recorded velocity, whose unit may be another
-    middle, most = np.empty_like(moved), np.empty_like(moved)
-    for joint, steps in enumerate(moved.T):
-        around = np.stack([np.roll(steps, shift) for shift in (-3, -2, -1, 1, 2, 3)])
-        most[:, joint] = np.abs(around).max(axis=0)
-        around.sort(axis=0)
-        middle[:, joint] = (around[2] + around[3]) / 2
-    beyond = np.abs(moved - middle)
-    # a position that was held catches up in one step
-    far = np.abs(moved) > FARTHER * (1 + _held_before(moved)) * most
-    far &= beyond > BEYOND * np.quantile(beyond, 0.995, axis=0)
-    far &= beyond > RANGE * np.ptp(q, axis=0)
-    turns = np.abs(moved - 2 * np.pi * np.round(moved / (2 * np.pi))) < 0.05 * 2 * np.pi
-    far &= ~(turns & (np.abs(moved) > np.pi))
+    far = np.zeros(moved.shape, dtype=bool)
+    for joint in range(moved.shape[1]):
+        far[:, joint] = _jumps(moved[:, joint], q[:, joint])
     kept = []
     for row in np.flatnonzero(far.any(axis=1) & together):
         ends = np.array([max(0, row - 4), min(n - 1, row + 5)], dtype=np.intp)
@@ -393,6 +382,25 @@ def find_leaps(q: np.ndarray, time: np.ndarray, trajectory: np.ndarray) -> np.nd
         if any(stay):
             kept.append(row + 1)
     return np.array(kept if len(kept) <= max(PLACES * n, 2) else [], dtype=np.intp)
+
+
+def _jumps(moved: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Steps of a position that are far longer than those before and after."""
+    # not than by the recorded velocity, whose unit may be another
+    around = np.stack([np.roll(moved, shift) for shift in (-3, -2, -1, 1, 2, 3)])
+    most = np.abs(around).max(axis=0)
+    far = np.abs(moved) > FARTHER * most
+    if not far.any():
+        return np.asarray(far)  # as in most logs
+    # a position that was held catches up in one step
+    far &= np.abs(moved) > FARTHER * (1 + _held_before(moved)) * most
+    around.sort(axis=0)
+    beyond = np.abs(moved - (around[2] + around[3]) / 2)
+    far &= beyond > BEYOND * np.quantile(beyond, 0.995)
+    far &= beyond > RANGE * np.ptp(q)
+    turns = np.abs(moved - 2 * np.pi * np.round(moved / (2 * np.pi))) < 0.05 * 2 * np.pi
+    far &= ~(turns & (np.abs(moved) > np.pi))
+    return np.asarray(far)
 
 
 def divided_differences(values: np.ndarray, time: np.ndarray, order: int) -> np.ndarray:

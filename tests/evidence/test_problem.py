@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -98,3 +100,25 @@ def test_without_a_clock_every_sample_is_a_row():
     )
     assert bare.rows.counts.tolist() == [signals.n_samples] * 2
     np.testing.assert_array_equal(bare.rows.average(signals.q, 0), signals.q)
+
+
+def test_what_a_fit_explains_is_computed_again_where_the_fit_or_the_load_changes():
+    made, other = problem(6), problem(6)
+    gain = Term("torque_gain", (1,))
+    fit = made.fit_own()
+    first = made.explained(fit)
+    np.testing.assert_array_equal(made.explained(fit), first)
+    wider = made.fit([*made.terms, gain])
+    assert np.any(made.explained(wider) != first)
+    other.fit_own()
+    before, changed = other.explained(wider), replace(wider, coefficients=1.5 * wider.coefficients)
+    other.set_fit(changed)  # the gain acts on the torque of the model
+    assert np.any(other.explained(wider) != before)
+
+
+def test_noise_of_joints_follows_the_torque():
+    made = problem(6)
+    noise = made.own_noise(made.terms)
+    louder = replace(made, torque=made.torque + np.random.default_rng(0).normal(size=(7200, 2)))
+    assert np.all(louder.own_noise(made.terms) > 2 * noise)
+    np.testing.assert_array_equal(made.own_noise(made.terms), noise)
