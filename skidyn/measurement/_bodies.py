@@ -376,7 +376,7 @@ class Bodies(Check):
         wrong = (stated > WRONG) & (stated > TIMES * identified)
         gain = seen.stated.gain[seen.joints]
         heavy = (seen.shares[0] > HEAVY) & (stated < WRONG)
-        odd = heavy & ((gain < USUAL[0]) | (gain > USUAL[1]))
+        odd = heavy & ((gain < CLEARLY[0]) | (gain > CLEARLY[1]))
         if not wrong.any() and odd.sum() < 2:
             return
         joints = [k for k, bad in zip(seen.joints, wrong | odd, strict=True) if bad]
@@ -450,7 +450,8 @@ class NoFriction(Check):
         seen = explained(measurement)
         if seen is None:
             return
-        rubs = seen.shares[1]
+        bodies, rubs = seen.shares
+        rubs = rubs[bodies > HEAVY]  # the rest of a light joint is small beside nothing
         if len(rubs) > 1 and rubs.max() < FRICTIONLESS and np.median(rubs) < HARDLY:
             measurement.frictionless = True
             yield self.suspicion(

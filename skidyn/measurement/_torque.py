@@ -13,9 +13,10 @@ from skidyn.measurement._check import Check
 from skidyn.measurement._copies import copied_columns
 from skidyn.measurement._delay import Delay, RunDelay, find_delay, refined_lag
 from skidyn.measurement._fits import Fits, Reading, friction
+from skidyn.measurement._late_motion import LateMotion, find_late_motion
 from skidyn.measurement._lowpass import lowpass_of_torque, suspect_lowpass
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._measures import COARSE, reversals
+from skidyn.measurement._measures import reversals
 from skidyn.measurement._readings import DECISIVE, HALF, Change, find_changes
 from skidyn.measurement._robust import fit_admissible
 from skidyn.measurement._suspicion import Certainty, Suspicion
@@ -289,7 +290,7 @@ class Columns(Check):
 
 
 #: Kinds of changes that exchange columns.
-ORDERS = ("order", "torque_order")
+ORDERS = ("order", "motion_order", "torque_order")
 
 
 def _ordered(measurement: Measurement, final: Reading) -> tuple[str, tuple[str, str]]:
@@ -327,6 +328,7 @@ _RIVALS = {
     "joint_sign": "position and torque with the opposite sign",
     "convention": "a position that counts in the opposite direction from another zero",
     "order": "a different order of all columns",
+    "motion_order": "a different order of the positions and velocities",
     "torque_order": "a different order of the torques",
     "summed": "a position relative to another link",
     "zero": "a different zero of a position",
@@ -467,7 +469,13 @@ class TorqueDelay(Check):
                 remedy=(f"--late tau={late:g}", f"late={{'tau': {late:g}}}"),
             )
             return
-        for k in late_joints(found):
+        late = late_joints(found)
+        moved = find_late_motion(fits) if found.gains.max() > LEAST else None
+        if moved and abs(moved.lag) > APART and moved.gain > SURE:
+            if moved.gain > max(moved.torque_gain, float(found.gains[late].sum())) + LEAST:
+                yield self._late_motion(measurement, moved)
+                return
+        for k in late:
             lag = refined_lag(fits, found.joints[k], found.errors[k], [k])
             constant = _lowpass(fits, lag, [k])
             if constant is not None:
@@ -486,6 +494,23 @@ class TorqueDelay(Check):
                 [k],
                 (f"--late tau{k + 1}={lag:g}", f"late={{'tau{k + 1}': {lag:g}}}"),
             )
+
+    def _late_motion(self, measurement: Measurement, moved: LateMotion) -> Suspicion:
+        """Position and velocity of one joint that are late."""
+        lag, k = float(f"{_whole(measurement, moved.lag):.5f}"), moved.joint
+        late = {f"q{k + 1}": lag, f"dq{k + 1}": lag}
+        words = ",".join(f"{name}={value:g}" for name, value in late.items())
+        return self.suspicion(
+            f"position and velocity of {measurement.joint(k)} are "
+            f"{'late' if lag > 0 else 'early'} by about {abs(1e3 * lag):.1f} ms relative to those "
+            "of the other joints and to the torque",
+            "without this delay, bodies, friction and rotor inertia explain all torques better by "
+            f"{moved.gain:.0f} (log-likelihood), and with one of its torque instead by "
+            f"{moved.torque_gain:.0f}",
+            "suspected",
+            [k],
+            (f"--late {words}", f"late={late}"),
+        )
 
     def _late_command(self, lag: float, error: float, n_alike: int) -> Suspicion:
         """A torque of servos that is early, since commands are used before their arrival."""
@@ -519,9 +544,7 @@ def _lowpass(fits: Fits, lag: float, late: Sequence[int]) -> float | None:
 
 def _least_lag(measurement: Measurement) -> float:
     """Smallest lag of the torque that is reported, s; coarse positions cause lags of their own."""
-    s = measurement.signals
-    steps = [measurement.position_steps[k] for k in np.flatnonzero(~s.prismatic)]
-    return SMALLEST_COARSE if any(step > COARSE for step in steps) else SMALLEST
+    return SMALLEST_COARSE if measurement.coarse else SMALLEST
 
 
 def _whole(measurement: Measurement, lag: float) -> float:
