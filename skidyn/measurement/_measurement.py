@@ -278,8 +278,8 @@ class Measurement:
         if out.all():
             return None
         if not out.any():
-            return make_fits(self.whole, self.torque, self.robot)
-        return make_fits(self.whole.take(~out), self.torque[~out], self.robot)
+            return make_fits(self.whole, self.filled, self.robot)
+        return make_fits(self.whole.take(~out), self.filled[~out], self.robot)
 
     @cached_property
     def stuck(self) -> dict[int, list[int]]:
@@ -351,7 +351,7 @@ class Measurement:
         """Joints whose torque overflows, from 0, and how often it jumps."""
         from skidyn.measurement._overflow import overflowed_columns
 
-        return overflowed_columns(self.signals, self.torque)
+        return overflowed_columns(self.signals, self.filled)
 
     @cached_property
     def idle(self) -> NDArray[np.bool_]:
@@ -363,3 +363,14 @@ class Measurement:
     def missing(self) -> NDArray[np.bool_]:
         """Zeros in the place of missing torques, as a mask of rows and joints."""
         return missing_values(self.torque, self.idle)
+
+    @cached_property
+    def filled(self) -> Array:
+        """Torque in which missing values are interpolated."""
+        if not self.missing.any():
+            return self.torque
+        filled, rows = self.torque.astype(float), np.arange(self.n_samples)
+        for k in np.flatnonzero(self.missing.any(axis=0)).tolist():
+            lost = self.missing[:, k]
+            filled[lost, k] = np.interp(rows[lost], rows[~lost], filled[~lost, k])
+        return filled

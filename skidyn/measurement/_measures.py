@@ -29,6 +29,10 @@ IDLE_ROWS, IDLE_TIME = 8, 0.05
 #: Fewest places with zeros instead of missing torques; least ratio of the torque beside them to
 #: the median torque: near a true zero it is small.
 FEWEST_MISSING, JUMPS = 5, 0.4
+#: Least share of rows in a dead band, and least edge of it, as a share of the large torques.
+BAND = 0.05
+#: Fewest values of a torque that is not coarse.
+FINE = 50
 #: Most steps that a position may be held before it catches up, and the share of the distance that
 #: its velocity implies by which it then moves on.
 CATCH_UP, CAUGHT = 5, 0.3
@@ -233,10 +237,13 @@ def missing_values(torque: np.ndarray, idle: np.ndarray) -> np.ndarray:
         begins, ends = begins[inside], ends[inside]
         if not len(begins) or zero.mean() > MOSTLY_ZERO:
             continue
+        least = float(values[values > 0].min())
+        if zero.mean() > BAND and least > BAND * float(np.quantile(values, 0.95)):
+            continue  # no torque between zero and the edge of a dead band
         beside = np.minimum(values[begins - 1], values[ends])
+        usual = JUMPS * float(np.median(values[~zero]))
         # a coarse torque is one step away from zero
-        least = max(JUMPS * float(np.median(values[~zero])), 1.5 * float(values[~zero].min()))
-        jump = beside > least
+        jump = beside > (max(usual, 1.5 * least) if len(np.unique(values)) < FINE else usual)
         for a, b in zip(begins[jump], ends[jump], strict=True):
             missing[a:b, k] = True
         if jump.sum() < FEWEST_MISSING or missing[:, k].sum() < 0.5 * zero.sum():
