@@ -39,16 +39,19 @@ def remedies(told: Sequence[Suspicion]) -> list[str]:
 
 def correct(
     frame: pd.DataFrame, robot: Robot, codes: list[str], done: Callable[[pd.DataFrame, Robot], bool]
-) -> list[list[str]]:
-    """Remedies to apply one after the other, until the check asks for none or it is done."""
+) -> tuple[list[list[str]], bool]:
+    """Remedies to apply one after the other, and whether it is done with them.
+
+    They are those that the check asks for, and then asks for in the corrected log.
+    """
     rounds: list[list[str]] = []
     while codes and len(rounds) < ROUNDS:
         rounds.append(codes)
         frame, robot = read_again(frame, robot, codes)
         if done(frame, robot):
-            break
+            return rounds, True
         codes = remedies([c for c in check_log(frame, robot).checks if c.certainty != "noted"])
-    return rounds
+    return rounds, False
 
 
 def read_again(

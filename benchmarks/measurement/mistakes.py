@@ -123,8 +123,7 @@ def counted(seed: int, fix: bool, place: Place) -> Result | None:
     asked = remedies(told)  # what is only noted is no mistake
     if fix and asked and set(mended) & set(asked):
         done = partial(gives_back, CASES[i])
-        result["remedies"] = correct(spoiled.frame, spoiled.robot, asked, done)
-        result["exact"] = done(*replayed(spoiled, result["remedies"]))
+        result["remedies"], result["exact"] = correct(spoiled.frame, spoiled.robot, asked, done)
     return result
 
 
@@ -208,10 +207,12 @@ def main() -> None:
     CASES[:] = cases[: options.first]
     names = options.only.split(",") if options.only else list(MISTAKES)
     n, taken = len(CASES), options.sample or len(CASES)
+    # a larger sample contains a smaller one, so that a count can be extended
+    order = np.random.default_rng(0).permutation(n)
     places = {
         (name, i): (name, i)
         for turn, name in enumerate(names)
-        for i in sorted({(turn * taken + k) % n for k in range(taken)})
+        for i in sorted({int(order[(turn + k) % n]) for k in range(taken)})
     }
     store = Store(options.store, options.jobs)
     fix = options.fix or bool(options.diagnose)

@@ -430,6 +430,9 @@ class TorqueDelay(Check):
             return
         # a joint whose lag is not known to itself agrees with nothing
         use = np.isfinite(found.joints) & (found.errors < max(abs(found.common), SMALLEST))
+        # nor one whose lag is another in its faster rows, as that of a missing effect
+        slow, fast = found.halves.T
+        use &= np.abs(slow - fast) < np.maximum(ALIKE, SAME * np.abs(found.joints))
         near = max(ALIKE, 0.3 * abs(found.common))
         alike = np.abs(found.joints[use] - found.common) < np.maximum(near, 2 * found.errors[use])
         weight = found.gains[use] / max(float(found.gains[use].sum()), 1e-12)
@@ -440,7 +443,7 @@ class TorqueDelay(Check):
         if (
             abs(found.common) > max(SMALLEST, ERRORS * found.error)
             and found.gain > LEAST
-            and alike.sum() > measurement.n_joints / 2
+            and alike.sum() >= measurement.n_joints / 2
             and (alike.mean() >= AGREEING or weight[alike].sum() >= AGREEING)
             and abs(found.common) > _least_lag(measurement)
         ):
