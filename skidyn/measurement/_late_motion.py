@@ -33,8 +33,8 @@ class LateMotion:
     lag : float, s
         Positive if its motion is late.
     gain, torque_gain : float
-        Log-likelihood that its removal gains, and that the removal of a delay of the torque of the
-        same joint gains at most.
+        Log-likelihood that its removal gains, and that the removal of a delay of the torque, of the
+        same joint or of all, gains at most.
     """
 
     joint: int
@@ -43,13 +43,15 @@ class LateMotion:
     torque_gain: float
 
 
-def find_late_motion(fits: Fits) -> LateMotion | None:
+def find_late_motion(fits: Fits, common: float) -> LateMotion | None:
     """The joint whose motion explains all torques best at another time; None without rows.
 
     Parameters
     ----------
     fits : Fits
         Rows.
+    common : float, s
+        Lag of all torques, about.
     """
     together = JointFit(fits, range(fits.n_joints))
     if not together.joints:
@@ -63,18 +65,21 @@ def find_late_motion(fits: Fits) -> LateMotion | None:
 
     slopes = {k: _with_slope(together, plain, k) for k in together.joints}
     k = max(slopes, key=lambda k: gain(slopes[k]))
-    only = JointFit(fits, [k])
 
     def of_motion(lag: float) -> float:
         moved = fits.with_motion(_shifted(together.signals, k, lag))
         return gain(JointFit(moved, range(fits.n_joints)).fit(fits.torque))
 
-    def of_torque(lag: float) -> float:
-        return gain(only.fit(fits.torque_at(lag)))
+    def of_torque(changed: JointFit, start: float) -> float:
+        def gained(lag: float) -> float:
+            return gain(changed.fit(fits.torque_at(lag)))
+
+        return gained(peak(gained, start, NEAR))
 
     first = float(slopes[k][0].coefficients[-1])
-    lag, opposite = peak(of_motion, first, NEAR), peak(of_torque, -first, NEAR)
-    return LateMotion(k, lag, of_motion(lag), of_torque(opposite))
+    lag = peak(of_motion, first, NEAR)
+    rivals = of_torque(JointFit(fits, [k]), -first), of_torque(together, common)
+    return LateMotion(k, lag, of_motion(lag), max(rivals))
 
 
 def _with_slope(together: JointFit, plain: list[RobustFit], joint: int) -> list[RobustFit]:

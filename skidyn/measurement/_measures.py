@@ -29,8 +29,6 @@ IDLE_ROWS, IDLE_TIME = 8, 0.05
 #: Fewest places with zeros instead of missing torques; least ratio of the torque beside them to
 #: the median torque: near a true zero it is small.
 FEWEST_MISSING, JUMPS = 5, 0.4
-#: Least share of rows in a dead band, and least edge of it, as a share of the large torques.
-BAND = 0.05
 #: Fewest values of a torque that is not coarse.
 FINE = 50
 #: Most steps that a position may be held before it catches up, and the share of the distance that
@@ -229,7 +227,7 @@ def missing_values(torque: np.ndarray, idle: np.ndarray) -> np.ndarray:
     idle : ndarray of shape (n_samples,) of bool
         Rows that do not count.
     """
-    missing = np.zeros(torque.shape, dtype=bool)
+    missing, signs = np.zeros(torque.shape, dtype=bool), np.sign(torque)
     for k, values in enumerate(np.abs(torque.T)):
         zero = (values == 0) & ~idle
         begins, ends = runs_of(zero)
@@ -238,9 +236,9 @@ def missing_values(torque: np.ndarray, idle: np.ndarray) -> np.ndarray:
         if not len(begins) or zero.mean() > MOSTLY_ZERO:
             continue
         least = float(values[values > 0].min())
-        if zero.mean() > BAND and least > BAND * float(np.quantile(values, 0.95)):
-            continue  # no torque between zero and the edge of a dead band
         beside = np.minimum(values[begins - 1], values[ends])
+        # dry friction passes a dead band from one sign to the other
+        beside[signs[begins - 1, k] != signs[ends, k]] = 0.0
         usual = JUMPS * float(np.median(values[~zero]))
         # a coarse torque is one step away from zero
         jump = beside > (max(usual, 1.5 * least) if len(np.unique(values)) < FINE else usual)

@@ -440,6 +440,12 @@ class TorqueDelay(Check):
         early = measurement.late_position
         if early and abs(found.common + early) < max(ALIKE, 0.3 * early):
             return
+        late = late_joints(found)
+        moved = find_late_motion(fits, found.common) if found.gains.sum() > LEAST else None
+        if moved and abs(moved.lag) > APART and moved.gain > SURE:
+            if moved.gain > max(moved.torque_gain, float(found.gains[late].sum())) + LEAST:
+                yield self._late_motion(measurement, moved)
+                return
         if (
             abs(found.common) > max(SMALLEST, ERRORS * found.error)
             and found.gain > LEAST
@@ -472,12 +478,6 @@ class TorqueDelay(Check):
                 remedy=(f"--late tau={late:g}", f"late={{'tau': {late:g}}}"),
             )
             return
-        late = late_joints(found)
-        moved = find_late_motion(fits) if found.gains.max() > LEAST else None
-        if moved and abs(moved.lag) > APART and moved.gain > SURE:
-            if moved.gain > max(moved.torque_gain, float(found.gains[late].sum())) + LEAST:
-                yield self._late_motion(measurement, moved)
-                return
         for k in late:
             lag = refined_lag(fits, found.joints[k], found.errors[k], [k])
             constant = _lowpass(fits, lag, [k])
