@@ -31,6 +31,8 @@ CLEARLY = (0.62, 1.6)
 FAR = 20.0
 #: Largest standard error of a scale that is reported without confirmation by the stated bodies.
 TELLING = 0.15
+#: Largest ratio of the torques per ampere of drives of one robot.
+DRIVES = 20.0
 #: Rates of clock and velocities that are tried.
 RATES = (0.1, 0.2, 0.33, 0.5, 2.0, 3.0, 5.0, 10.0)
 AS_IT_IS = Reading()
@@ -156,6 +158,12 @@ class TorqueScale(Check):
             return
         typical = float(np.median(sure if len(sure) > 1 else values))
         gains = gains if _one_sided(values) else known
+        # the multiple of a torque that bodies hardly explain may be anything
+        gains = {
+            k: gain
+            for k, gain in gains.items()
+            if k in known or abs(np.log(gain / typical)) < np.log(DRIVES)
+        }
         told = ", ".join(f"{measurement.joint_names[k]} {gain:.3g}" for k, gain in gains.items())
         unit = next((u for f, u in UNITS.items() if abs(np.log(typical / f)) < 0.3), None)
         if unit is not None:

@@ -442,7 +442,7 @@ class TorqueDelay(Check):
             return
         late = late_joints(found)
         moved = find_late_motion(fits, found.common) if found.gains.sum() > LEAST else None
-        if moved and abs(moved.lag) > APART and moved.gain > SURE:
+        if moved and abs(moved.lag) > 2 * _least_lag(measurement) and moved.gain > SURE:
             if moved.gain > max(moved.torque_gain, float(found.gains[late].sum())) + LEAST:
                 yield self._late_motion(measurement, moved)
                 return
