@@ -440,12 +440,10 @@ class TorqueDelay(Check):
         early = measurement.late_position
         if early and abs(found.common + early) < max(ALIKE, 0.3 * early):
             return
-        late = late_joints(found)
-        moved = find_late_motion(fits, found.common) if found.gains.sum() > LEAST else None
-        if moved and abs(moved.lag) > 2 * _least_lag(measurement) and moved.gain > SURE:
-            if moved.gain > max(moved.torque_gain, float(found.gains[late].sum())) + LEAST:
-                yield self._late_motion(measurement, moved)
-                return
+        moved = _late_motion(measurement, fits, found)
+        if moved is not None:
+            yield self._late_motion(measurement, moved)
+            return
         if (
             abs(found.common) > max(SMALLEST, ERRORS * found.error)
             and found.gain > LEAST
@@ -478,7 +476,7 @@ class TorqueDelay(Check):
                 remedy=(f"--late tau={late:g}", f"late={{'tau': {late:g}}}"),
             )
             return
-        for k in late:
+        for k in late_joints(found):
             lag = refined_lag(fits, found.joints[k], found.errors[k], [k])
             constant = _lowpass(fits, lag, [k])
             if constant is not None:
@@ -543,6 +541,17 @@ def _lowpass(fits: Fits, lag: float, late: Sequence[int]) -> float | None:
         return None
     constant, gain = lowpass_of_torque(fits, lag, late)
     return constant if gain > LIKELIER else None
+
+
+def _late_motion(measurement: Measurement, fits: Fits, found: Delay) -> LateMotion | None:
+    """A single joint whose motion is late; None if a lag of torques explains as much."""
+    if measurement.of_servos or found.gains.sum() < LEAST:
+        return None  # the torque of servos follows from this motion
+    moved = find_late_motion(fits, found.common)
+    if moved is None or abs(moved.lag) < 2 * _least_lag(measurement) or moved.gain < SURE:
+        return None
+    rival = max(moved.torque_gain, float(found.gains[late_joints(found)].sum()))
+    return moved if moved.gain > rival + LEAST else None
 
 
 def _least_lag(measurement: Measurement) -> float:
