@@ -170,6 +170,9 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
             if kept > -TIED:
                 return replace(absent, restorable=restored > LEAST)
             judged = [c for c in judged if c.kind != "gravity"]
+    restored_change = _restored(fits, reading, here) if judged and reading.gravity is None else None
+    if restored_change is not None:
+        return restored_change
     accepted = []
     for change in judged:
         if change.kind == "no_gravity":
@@ -485,6 +488,25 @@ def _without_gravity(fits: Fits, reading: Reading, here: Outcome) -> bool:
     """Whether the gravity that fits best is only a small part of the robot's own."""
     best, own = fitted_gravity(fits, reading, here), np.asarray(fits.robot.gravity, dtype=float)
     return best is not None and abs(float(best @ own / (own @ own))) < LEFT_OVER
+
+
+def _restored(fits: Fits, reading: Reading, here: Outcome) -> Change | None:
+    """Gravity that was subtracted with the stated bodies, which are not those of the robot.
+
+    A rest of gravity is left, in any direction, and looks like other changes. But only with the
+    subtracted torque are there bodies that explain all of it.
+    """
+    own = np.asarray(fits.robot.gravity, dtype=float)
+    best = fitted_gravity(fits, reading, here)
+    if best is None or not own.any() or abs(float(best @ own / (own @ own))) > LEFT_OVER:
+        return None
+    without = replace(reading, gravity=(0.0, 0.0, 0.0))
+    restored, kept = _restored_gain(fits, without, reading)
+    if min(restored, kept) < DECISIVE:
+        return None
+    whole = fits.with_gravity(without).identified(replace(without, gravity=None))
+    drop = _drop(fits.identified(reading), whole)
+    return Change("no_gravity", (), without, kept, kept, drop=drop, restorable=True)
 
 
 def _restored_gain(fits: Fits, without: Reading, reading: Reading) -> tuple[float, float]:

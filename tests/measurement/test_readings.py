@@ -96,3 +96,16 @@ def test_a_zero_is_within_half_a_turn(signals, torque, found):
     told = found(signals.with_(q=signals.q + [0.0, 3.0]), torque)
     value = float(told[0].remedy.option.split("=")[1])
     assert value == pytest.approx(3.0, abs=0.02)
+
+
+def test_gravity_that_was_removed_with_bodies_that_are_not_those_of_the_robot():
+    """The rest of it that is left looks like another scale of single torques."""
+    robot = load_panda()
+    log = make_hidden_effect_log(
+        robot, "stribeck", n_trajectories=5, duration=6.0, random_state=9700202
+    )
+    names = [f"tau{k + 1}" for k in range(7)]
+    pull = robot.gravity_torque(log.frame[[f"q{k + 1}" for k in range(7)]].to_numpy())
+    changes = dict(zip(names, (log.frame[names].to_numpy() - pull).T, strict=True))
+    told = {s.check: s for s in check_log(log.frame.assign(**changes), robot).checks}["reading"]
+    assert told.remedy.option == "--restore-gravity"
