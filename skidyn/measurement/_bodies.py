@@ -45,7 +45,7 @@ WRONG, TIMES, HEAVY = 0.2, 3.0, 0.3
 #: torque is nearly unrelated to the motion.
 UNRELATED, BEYOND = 0.67, 4.0
 #: Least share of it that any function of the position must leave, and the nodes of such a function.
-LEFT, PLACES = 0.8, 16
+LEFT, PLACES = 0.8, 8
 #: Largest share of friction, and that of the joint in the middle, where there is none.
 FRICTIONLESS, HARDLY = 0.12, 0.05
 #: A computed torque: largest difference from that of the stated bodies, largest share of friction,
@@ -440,10 +440,11 @@ def _left_by_position(seen: Explained, k: int) -> float:
     """
     residual = seen.identified.residual[k]
     q = seen.fits.average(seen.fits.signals.q[:, k])[seen.fits.moving[:, k]]
-    place = np.minimum(PLACES * np.argsort(np.argsort(q)) // len(q), PLACES - 1)
-    counts = np.maximum(np.bincount(place, minlength=PLACES), 1)
-    means = np.bincount(place, residual, minlength=PLACES) / counts
-    return float(np.std(residual - means[place]) / (np.std(residual) + 1e-300))
+    nodes = np.unique(np.quantile(q, np.linspace(0, 1, PLACES)))
+    # broken lines between few nodes; as many as for a constant each could follow slow noise
+    hats = np.stack([np.interp(q, nodes, unit) for unit in np.eye(len(nodes))], axis=1)
+    rest = residual - hats @ np.linalg.lstsq(hats, residual, rcond=None)[0]
+    return float(np.std(rest) / (np.std(residual) + 1e-300))
 
 
 class NoFriction(Check):
