@@ -27,7 +27,7 @@ EXPLAINED = 0.5
 USUAL = (0.4, 2.5)
 #: Multiples that are attributed to wrong masses unless the other joints contradict.
 CLEARLY = (0.62, 1.6)
-#: Multiples of an effort limit that only another unit reaches.
+#: Multiples of an effort limit, and of the torque of the bodies, that only another unit reaches.
 FAR = 20.0
 #: Largest standard error of a scale that is reported without confirmation by the stated bodies.
 TELLING = 0.15
@@ -153,11 +153,13 @@ class TorqueScale(Check):
             )
             return
         every = bool(odd) and (_one_sided(values) or (len(sure) > 1 and _one_sided(sure)))
+        # another unit of all torques, also where an effect is as large as the torque of the bodies
+        every |= len(values) > 1 and float(np.median(values)) > FAR
         if not every:
             yield from self._of_joints(measurement, fits, gains, known)
             return
         typical = float(np.median(sure if len(sure) > 1 else values))
-        gains = gains if _one_sided(values) else known
+        gains = gains if _one_sided(values) or not known else known
         # the multiple of a torque that bodies hardly explain may be anything
         gains = {
             k: gain
