@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """False-alarm rate: simulated logs without a hidden effect must be called complete.
 
-    python benchmarks/diagnosis/nothing_hidden.py [--logs 200] [--first 0] [--jobs 2]
+    python benchmarks/diagnosis/nothing_hidden.py [--logs 200] [--first 0] [--bits 13] [--jobs 2]
 
-Robots, noise, rate, motion and true parameters change from log to log.
+Robots, noise, rate, motion and true parameters change from log to log. ``--bits`` rounds the
+positions to as many steps per turn, and those of sliders to a tenth of such a step per m.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from __future__ import annotations
 import argparse
 import warnings
 
+import numpy as np
 from joblib import Parallel, delayed
 
 from skidyn.datasets import (
@@ -27,14 +29,18 @@ from skidyn.identification import RBDRegressor
 ROBOTS = (load_planar_arm, load_ur5, load_scara, load_srs_arm, load_panda)
 
 
-def alarm(seed: int) -> list[str]:
+def alarm(seed: int, bits: int | None = None) -> list[str]:
     """Sentences of what was found where nothing is."""
     warnings.simplefilter("ignore")
     robot = ROBOTS[seed % len(ROBOTS)]()
     noise = ("low", "high")[seed // len(ROBOTS) % 2]
     rate = (100.0, 250.0, 500.0)[seed // 10 % 3]  # the last two are looked at in short windows, too
     log = make_hidden_effect_log(robot, None, noise=noise, rate=rate, random_state=1000 + seed)
-    found = diagnose(RBDRegressor(robot), log.X, log.y).findings
+    X = log.X.copy()
+    for j, kind in enumerate(robot.joint_types if bits else ()):
+        step = 2 * np.pi / 2**bits * (0.1 if kind == "prismatic" else 1.0)
+        X[f"q{j + 1}"] = np.round(X[f"q{j + 1}"] / step) * step
+    found = diagnose(RBDRegressor(robot), X, log.y).findings
     return [f"{robot.name}, {noise} noise, {rate:g} Hz, seed {seed}: {f.sentence}" for f in found]
 
 
@@ -42,10 +48,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--logs", type=int, default=200)
     parser.add_argument("--first", type=int, default=0, help="seed of the first log")
+    parser.add_argument("--bits", type=int, help="resolution of the encoders")
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args()
     results = Parallel(n_jobs=options.jobs)(
-        delayed(alarm)(options.first + k) for k in range(options.logs)
+        delayed(alarm)(options.first + k, options.bits) for k in range(options.logs)
     )
     for sentence in (s for found in results for s in found):
         print(sentence)

@@ -33,7 +33,13 @@ from skidyn.diagnosis._held_out import folds_alone, held_out_residual
 from skidyn.diagnosis._hypothesis import UNKNOWN, Hypothesis, SearchResult
 from skidyn.diagnosis._intervals import parameter_intervals
 from skidyn.diagnosis._limits import Limit
-from skidyn.diagnosis._remainder import Remainder, find_remainder, torque_range
+from skidyn.diagnosis._noise import sensor_noise
+from skidyn.diagnosis._remainder import (
+    Remainder,
+    find_remainder,
+    position_noise,
+    torque_range,
+)
 from skidyn.diagnosis._result import Diagnosis, Verdict
 from skidyn.diagnosis._rule import (
     EPISODE_LEAST_HELD,
@@ -87,10 +93,16 @@ def conclude(
     robot = problem.robot
     assert robot is not None
     while True:
-        comparisons, history, residual, own_torque = _steps(problem, result, torque, sliding)
+        comparisons, history, averages, residual, own_torque = _steps(
+            problem, result, torque, sliding
+        )
         terms = [*problem.terms, *_found_terms(problem, result.findings)]
         fixed = parameter_intervals(problem, terms, result.fit.noise, shapes=False)
-        useless = _useless(problem, result.findings, comparisons, history, least_drop)
+        errors = [
+            [_mean_error(c), entry["rmse"], average]
+            for c, entry, average in zip(comparisons, history, averages, strict=True)
+        ]
+        useless = _useless(problem, result, errors, residual, least_drop)
         useless = useless or _vague(problem, result.findings, fixed)
         useless = useless or _impossible(result.findings, fixed)
         if useless is None:
@@ -132,9 +144,13 @@ def conclude(
     episodes, inside = find_episodes(problem, smooth, least, share_held)
     if episodes:
         findings.append(_episodic(episodes, inside, result.fit.residual))
-    errors = np.array(history[0]["rmse"]), rmse
+    ends = np.array(history[0]["rmse"]), rmse
     whole = problem.whole_trajectories
-    findings = [_sure(f, findings, parts, errors, whole) for f in findings]
+    scores = {h.kind: h.score for h in result.findings}
+    findings = [
+        _sure(f, findings, parts, ends, whole, f.margin * scores.get(f.kind, np.inf))
+        for f in findings
+    ]
     diagnosis = Diagnosis(
         _verdict(findings, parts),
         robot.joint_names,
@@ -189,12 +205,13 @@ def _refitted(
 
 def _steps(
     problem: Problem, result: SearchResult, torque: Array, sliding: NDArray[np.bool_]
-) -> tuple[list[Comparison], list[dict[str, Any]], Array, dict[Term, Array]]:
+) -> tuple[list[Comparison], list[dict[str, Any]], list[list[float]], Array, dict[Term, Array]]:
     """Comparison and errors of the given model and after each finding.
 
-    Also returns the held-out residual of the last model, and the torque of its findings.
+    Also returns the errors of averaged rows, the held-out residual of the last model, and the
+    torque of its findings.
     """
-    comparisons, history = [], []
+    comparisons, history, averages = [], [], []
     dry = [t for t in problem.terms if t.is_dry]
     for k in track(range(len(result.findings) + 1), "Judging what was found"):
         found = _found_terms(problem, result.findings[:k])
@@ -205,8 +222,14 @@ def _steps(
         kind, joints = (last.kind, last.joints) if last else (None, ())
         comparisons.append(comparison)
         history.append(_entry(comparison, kind, joints))
+        averages.append([_root(problem.rows.average(r, j)) for j, r in enumerate(residual.T)])
     # All terms at every sample would need most of the memory for a long log.
-    return comparisons, history, residual, {t: own[t] for t in found}
+    return comparisons, history, averages, residual, {t: own[t] for t in found}
+
+
+def _root(values: Array) -> float:
+    """Root mean square of some values, 0 of none."""
+    return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0
 
 
 def _found_terms(problem: Problem, findings: Sequence[Hypothesis]) -> list[Term]:
@@ -217,9 +240,9 @@ def _found_terms(problem: Problem, findings: Sequence[Hypothesis]) -> list[Term]
 
 def _useless(
     problem: Problem,
-    findings: Sequence[Hypothesis],
-    comparisons: Sequence[Comparison],
-    history: Sequence[dict[str, Any]],
+    result: SearchResult,
+    errors: Sequence[Sequence[Sequence[float]]],
+    residual: Array,
     least: float,
 ) -> tuple[Hypothesis, list[Candidate]] | None:
     """The last finding with terms that do not reduce the error of samples, and these terms.
@@ -227,18 +250,26 @@ def _useless(
     They reduced the error of averaged rows. The squared error, which few samples may dominate, and
     the mean absolute one are both used; terms that do not lower the squared error at all are
     included. Terms of some recordings need to remove less, by the share of samples of these.
+
+    Where the noise of positions exceeds that of the torque, it dominates the error of samples, and
+    changes with the inertia of the model: there the held-out error of averaged rows counts.
     """
-    for k in reversed(range(len(findings))):
-        errors = [(_mean_error(comparisons[i]), history[i]["rmse"]) for i in (k, k + 1)]
+    if not result.findings:
+        return None
+    sensor = np.nan_to_num(sensor_noise(problem.signals, residual))
+    coarse = position_noise(problem, result.fit) > sensor
+    for k in reversed(range(len(result.findings))):
         terms = []
-        for candidate in findings[k].candidates:
+        for candidate in result.findings[k].candidates:
             # A compliant link moves everything that it carries: other joints may be affected more.
-            drops = [_drop(a, b, tuple(candidate.rows)) for a, b in zip(*errors, strict=True)]
+            joints = tuple(candidate.rows)
+            drops = [_drop(a, b, joints) for a, b in zip(errors[k], errors[k + 1], strict=True)]
+            drops = drops[2:] * 2 if all(coarse[j] for j in joints) else drops[:2]
             share = _share_of_samples(problem, candidate.term.trajectories)
             if float(np.mean(drops)) < least * share or drops[1] <= 0:
                 terms.append(candidate)
         if terms:
-            return findings[k], terms
+            return result.findings[k], terms
     return None
 
 
@@ -453,6 +484,7 @@ def _sure(
     parts: Remainder,
     errors: tuple[Array, Array],
     whole: bool,
+    lead: float,
 ) -> Finding:
     """The finding with the probability that it is identified correctly."""
     if not finding.terms:
@@ -470,6 +502,7 @@ def _sure(
         finding.margin,
         float(parts.inflation[joints].max()),
         max(f.error_drop for f in findings if f.kind == finding.kind),
+        lead=lead,
         nameless=finding.kind != UNKNOWN and (beside or bool(parts.material[joints].any())),
         whole_recordings=whole,
         alike=finding.alike,

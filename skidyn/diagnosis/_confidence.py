@@ -35,6 +35,8 @@ DOUBTED = -1.5
 EQUAL, ABOVE = 0.005, 0.1
 #: The same where an effect acts in some recordings only: these alone separate the explanations.
 EQUAL_IN_SOME = 0.05
+#: Twice the log-likelihood that separates two explanations: about 20 to 1.
+SEPARATES = 6.0
 #: Inflation of the variance by coloured noise; range of the shares of the error.
 COLOURED, LEAST, ENOUGH = 1.7, 0.003, 0.3
 #: Highest confidence that the number of logs used for the weights permits.
@@ -49,6 +51,7 @@ def confidence(
     inflation: float,
     removed: float,
     *,
+    lead: float = np.inf,
     nameless: bool = False,
     whole_recordings: bool = True,
     alike: bool = False,
@@ -68,6 +71,8 @@ def confidence(
         Inflation of the variance by the autocorrelation of the remainder on its joints; 1 if white.
     removed : float
         Largest share of the squared error of a joint that the effect removes.
+    lead : float, default=inf
+        Margin over the best other explanation as twice a log-likelihood.
     nameless : bool, default=False
         Whether an unknown effect remains, or was found, on its joints.
     whole_recordings : bool, default=True
@@ -97,7 +102,7 @@ def confidence(
     logit += NAMELESS * nameless + BLOCKS * (not whole_recordings)
     logit += STAYS * stays + FEW * few + ALIKE * alike
     equal = EQUAL_IN_SOME if in_some else EQUAL
-    logit += EQUALLED * (rivalled and -ABOVE < margin < equal)
+    logit += EQUALLED * (rivalled and -ABOVE < margin and (margin < equal or lead < SEPARATES))
     most = MOST if has_name and not stays else MOST_NAMELESS
     return min(most, float(1 / (1 + np.exp(-logit))))
 

@@ -55,7 +55,8 @@ from skidyn.measurement import (
 from skidyn.robots import Robot
 from skidyn.simulation import Controller
 
-#: Suspicions about the clock with which a wave in time may be due to the logger.
+#: Suspicions with which a wave in time may be due to the logger. Uneven steps that are only noted
+#: are those of the samples, or too small to matter.
 UNSTEADY = {"repeated_rows", "interpolated_rows", "clock_jitter"}
 
 
@@ -307,7 +308,8 @@ def _diagnose(
         )
     for note in notes:
         warnings.warn(note, LogWarning, stacklevel=4)
-    steady = not {check.check for check in checks} & UNSTEADY
+    noted = {c.check for c in checks if c.certainty == "noted"} & {"clock_jitter"}
+    steady = not {c.check for c in checks} & UNSTEADY - noted
     if found is None or not steady:
         if not alone():
             problem = posed()  # without data of the previous search

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import lru_cache, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,59 +13,96 @@ from skidyn._signals import Signals
 from skidyn.effects._base import Array, Coefficient, Effect, Shape
 from skidyn.effects._derivatives import smooth_derivatives
 from skidyn.effects._nameless import NamelessEffect
-from skidyn.effects._second_order import second_order_filter
 
 
 def _swing(
-    load: Array, signals: Signals, resonance: float, damping: float
+    load: Array, inertia: Array, signals: Signals, resonance: float, damping: float
 ) -> tuple[Array, Array, Array]:
     """Wind-up of a spring-mass under a load, times the stiffness, and its time derivatives.
 
     The link oscillates on its spring: far below the resonance the wind-up is proportional to the
     load, near it the wind-up is larger and delayed, and above it the link does not follow. The
-    derivatives come from the same filter, because a later differentiation would need smoothing,
-    which removes most of an oscillation at 10 Hz.
+    inertia of the link, and with it the resonance, changes with the pose. The derivatives come from
+    the same equation, because a later differentiation would need smoothing, which removes most of
+    an oscillation at 10 Hz.
 
     Parameters
     ----------
     load : ndarray of shape (n_samples,), N m or N
         Torque of the rigid body without compliance.
+    inertia : ndarray of shape (n_samples,), kg m^2 or kg
+        Inertia of the free link at the joint.
     signals : Signals
         For its segments and clock.
     resonance : float, Hz
-        Resonance with a fixed motor.
+        Resonance with a fixed motor and the median inertia.
     damping : float
-        Damping ratio.
+        Damping ratio there.
 
     Returns
     -------
     tuple of 3 ndarray of shape (n_samples,), N m or N
         The wind-up, and its derivatives per s and per s^2.
     """
-    from scipy.signal import lfilter
-
     omega = 2 * np.pi * resonance
+    mobility = np.median(inertia) / inertia
     moves = tuple(np.zeros_like(load) for _ in range(3))
     for rows, step in zip(signals.segments, signals.steps, strict=True):
         if rows.stop - rows.start < 7:
             continue
-        rate = 1.0 / step
         # An oscillation faster than the sampling cannot be seen; the link follows at once.
-        filters = _swing_filters(min(omega, rate), damping, rate)
-        for move, (b, a, settled) in zip(moves, filters, strict=True):
-            move[rows] = lfilter(b, a, load[rows], zi=settled * load[rows.start])[0]
+        fastest = min(omega, 1.0 / step)
+        spring = fastest**2 * mobility[rows]
+        damper = 2 * damping * fastest * mobility[rows]
+        found = _oscillation(load[rows], spring, damper, step)
+        for move, values in zip(moves, found, strict=True):
+            move[rows] = values
     return moves  # type: ignore[return-value]
 
 
-@lru_cache(maxsize=256)
-def _swing_filters(omega: float, damping: float, rate: float) -> list[tuple[Array, Array, Array]]:
-    """Digital filters of a spring-mass for displacement, speed and acceleration, from rest."""
-    from scipy.signal import lfilter_zi
+def _oscillation(
+    load: Array, spring: Array, damper: Array, step: float
+) -> tuple[Array, Array, Array]:
+    r"""Solution of :math:`\ddot x = k(t) (f(t) - x) - d(t) \dot x` from rest, and its derivatives.
 
-    square = omega**2
-    tops = ((0.0, 0.0, square), (0.0, square, 0.0), (square, 0.0, 0.0))
-    filters = [second_order_filter(top, omega, damping, rate) for top in tops]
-    return [(b, a, lfilter_zi(b, a)) for b, a in filters]
+    By the trapezoidal rule, as one triangular system of equations for all samples: for constant
+    ``k`` and ``d`` it is the filter of :func:`second_order_filter`.
+
+    Parameters
+    ----------
+    load : ndarray of shape (n_samples,)
+        ``f``.
+    spring : ndarray of shape (n_samples,), 1/s^2
+        ``k``.
+    damper : ndarray of shape (n_samples,), 1/s
+        ``d``.
+    step : float, s
+        Time step.
+
+    Returns
+    -------
+    tuple of 3 ndarray of shape (n_samples,)
+        ``x`` and its derivatives per s and per s^2.
+    """
+    from scipy.linalg.blas import dtbsv
+
+    half = step / 2
+    # The unknowns are the speed and the position of every sample in turn; row i holds the i-th
+    # diagonal of the matrix from the main one downwards.
+    bands = np.zeros((4, 2 * len(load)), order="F")
+    right = np.zeros(2 * len(load))
+    bands[0] = 1.0
+    bands[0, 2::2] += half * (damper[1:] + half * spring[1:])
+    bands[2, 0:-2:2] = half * (damper[:-1] + half * spring[1:]) - 1.0
+    bands[1, 1:-1:2] = half * (spring[:-1] + spring[1:])
+    right[1] = load[0]
+    right[2::2] = half * (spring[:-1] * load[:-1] + spring[1:] * load[1:])
+    bands[1, 2::2] = -half
+    bands[2, 1:-2:2] = -1.0
+    bands[3, 0:-3:2] = -half
+    moved = dtbsv(3, bands, right, lower=1)
+    speed, position = moved[0::2], moved[1::2]
+    return position, speed, spring * (load - position) - damper * speed
 
 
 #: Frequency, Hz, above which accelerations are taken as noise, and fewest samples of a recording
@@ -241,8 +278,8 @@ class JointElasticity(_LinkSideEffect):
 
     def moves(self, signals: Signals, joint: int, **shape: Any) -> tuple[Array, Array, Array]:
         assert signals.load is not None
-        load = signals.load[:, joint]
-        return _swing(load, signals, shape["resonance"], shape["damping"])
+        load, inertia = signals.load[:, joint], _link_inertia(signals, joint)
+        return _swing(load, inertia, signals, shape["resonance"], shape["damping"])
 
     def bounded(
         self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any], share: float
@@ -292,6 +329,16 @@ class Backlash(_LinkSideEffect):
         for rows, step in zip(signals.segments, signals.steps, strict=True):
             position[rows] = _flight(free[rows], step, shape["gap"] / 2)
         return smooth_derivatives(position, signals)
+
+    def bounded(
+        self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any], share: float
+    ) -> dict[str, Any]:
+        return {**shape, "share": share}
+
+    def least(self, shape: Mapping[str, Any]) -> float:
+        # The times of the crossings determine the gap: rounded positions resemble a play of another
+        # size.
+        return float(shape.get("share", 0.0))
 
     def parameters(
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None

@@ -207,12 +207,13 @@ def _two_groups(multiples: Array) -> tuple[NDArray[np.bool_], float] | None:
 def _divided_zeros(fits: Fits) -> Iterator[Division]:
     """A joint whose position has one of two zeros."""
     number, runs = _runs_of(fits)
-    if len(runs) < RECORDINGS:
+    turning = np.flatnonzero(~fits.signals.prismatic).tolist()
+    if len(runs) < RECORDINGS or not turning:
         return
     here = fits.identified(Reading())
     plain = _by_run(fits, fits.signals.q, number, runs)
     tried = []
-    for k in np.flatnonzero(~fits.signals.prismatic).tolist():
+    for k in turning:
         for angle in ZEROS.tolist():
             q = fits.signals.q.copy()
             q[:, k] -= angle

@@ -34,5 +34,21 @@ def test_a_wave_in_time_is_told_with_its_frequency(log, frequency, square):
     assert diagnosis.rmse_after[1] < (1.6 if square else 1.25) * log.noise_std[1]
 
 
+def test_a_wave_is_told_in_samples_that_really_were_uneven():
+    fine = make_hidden_effect_log(
+        load_planar_arm(), None, rate=500.0, n_trajectories=6, duration=6.0, random_state=5
+    )
+    steps = np.random.default_rng(3).integers(1, 10, len(fine.X) // 5)
+    rows = np.cumsum(steps)
+    rows = rows[rows < len(fine.X)]
+    X, torque = fine.X.iloc[rows].reset_index(drop=True), np.array(fine.y)[rows]
+    torque[:, 1] += 3 * fine.noise_std[1] * np.sin(2 * np.pi * 21.7 * X["time"].to_numpy())
+
+    diagnosis = diagnose(RBDRegressor(fine.robot), X, torque)
+
+    assert diagnosis.findings[0].variables == ("time",)
+    np.testing.assert_allclose(diagnosis.findings[0].terms[0].shape["frequency"], 21.7, atol=0.02)
+
+
 def test_a_log_without_a_wave_has_none(log):
     assert diagnose(RBDRegressor(log.robot), log.X, log.y).verdict == "complete"

@@ -36,6 +36,9 @@ def test_margin_white_remainder_and_size_raise_it():
 def test_an_equal_explanation_lowers_it_below_what_is_sure():
     assert confidence(0.0, 1.0, 0.3) > 0.9 > confidence(0.0, 1.0, 0.3, rivalled=True)
     assert confidence(0.1, 1.0, 0.3, rivalled=True) == confidence(0.1, 1.0, 0.3)
+    # a tenth of a small effect is no evidence either
+    weak = confidence(0.1, 1.0, 0.3, rivalled=True, lead=4.0)
+    assert weak < 0.9 and confidence(0.1, 1.0, 0.3, rivalled=True, lead=40.0) > 0.9
 
 
 def test_that_something_has_no_name_is_less_sure():

@@ -3,6 +3,7 @@
 
 import warnings
 
+import numpy as np
 import pytest
 
 from skidyn.datasets import load_planar_arm, load_scara, make_hidden_effect_log
@@ -29,6 +30,22 @@ def test_a_play_is_not_told_as_elasticity_beside_it():
 @pytest.mark.parametrize("rate", [250.0, 500.0])
 def test_noise_of_accelerations_in_short_windows_is_no_play(rate):
     diagnosis = diagnosis_of(load_scara(), None, noise="low", rate=rate, random_state=5002)
+
+    assert diagnosis.verdict == "complete"
+
+
+def test_rounded_positions_are_no_play():
+    robot = load_scara()
+    log = make_hidden_effect_log(
+        robot, None, rate=250.0, n_trajectories=6, duration=4.0, random_state=2
+    )
+    X = log.X.copy()
+    for j, kind in enumerate(robot.joint_types):
+        step = 2 * np.pi / 2**13 if kind != "prismatic" else 8e-5
+        X[f"q{j + 1}"] = np.round(X[f"q{j + 1}"] / step) * step
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        diagnosis = diagnose(RBDRegressor(robot), X, log.y)
 
     assert diagnosis.verdict == "complete"
 

@@ -37,6 +37,30 @@ def test_a_spring_is_not_stiffer_than_its_swing_says():
     assert term.lowest == pytest.approx([0.5 / stiffness])
 
 
+def test_a_play_is_as_large_as_the_times_of_its_crossings_say():
+    term = Term("backlash", (1,), get_effect("backlash").bounded(None, [0], {"gap": 0.004}, 0.5))
+    assert list(term.lowest) == [0.5]
+    assert list(Term("backlash", (1,), {"gap": 0.004}).lowest) == [0.0]
+
+
+def test_a_swing_is_as_fast_as_the_inertia_of_the_link_in_its_pose(signals, robot):
+    effect = get_effect("joint_elasticity")
+    rows = max(signals.segments, key=lambda part: part.stop - part.start)
+    middle = (rows.start + rows.stop) // 2
+    halves = slice(rows.start + 1, middle), slice(middle, rows.stop)
+    still, load = np.zeros_like(signals.q), np.zeros_like(signals.q)
+    load[rows.start + 1 : rows.stop, 0] = 1.0  # it leaps, and the link rings
+    bent = still.copy()
+    bent[halves[1], 1] = 2.5
+    posed = signals.with_(q=bent, dq=still, ddq=still, load=load)
+
+    way, _, acceleration = effect.moves(posed, 0, resonance=6.0, damping=0.001)
+
+    squares = [np.polyfit(way[half] - 1.0, -acceleration[half], 1)[0] for half in halves]
+    inertia = robot.mass_matrix(np.array([[0.0, 0.0], [0.0, 2.5]]))[:, 0, 0]
+    assert squares[1] / squares[0] == pytest.approx(inertia[0] / inertia[1], rel=0.02)
+
+
 def test_the_inertia_that_bounds_a_compliance_is_that_of_the_link(signals, robot):
     effect = get_effect("joint_elasticity")
 

@@ -5,9 +5,26 @@ import pytest
 
 from skidyn.datasets import load_ur5, make_hidden_effect_log
 from skidyn.logs import check_log
+from skidyn.robots import Robot
 
 ROBOT = load_ur5()
 OPTIONS = {"n_trajectories": 6, "duration": 5.0, "random_state": 1}
+GANTRY = Robot.from_urdf(
+    '<robot name="gantry"><link name="rails"/>'
+    + "".join(
+        f'<link name="{link}"><inertial><origin xyz="0 0 0.1"/><mass value="{mass}"/>'
+        '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+        f'<joint name="{link}_axis" type="prismatic"><parent link="{parent}"/>'
+        f'<child link="{link}"/><axis xyz="{axis}"/>'
+        '<limit lower="-0.4" upper="0.4" velocity="0.5" effort="900"/></joint>'
+        for link, parent, axis, mass in (
+            ("bridge", "rails", "1 0 0", 60),
+            ("carriage", "bridge", "0 1 0", 25),
+            ("quill", "carriage", "0 0 1", 8),
+        )
+    )
+    + "</robot>"
+)
 FRAME = make_hidden_effect_log(ROBOT, "stribeck", joints=[2], **OPTIONS).frame
 
 
@@ -45,3 +62,8 @@ def test_effects_of_some_recordings_are_no_mistake(effect):
 def test_a_payload_that_multiplies_the_load_of_a_wrist_is_no_mistake():
     frame = make_hidden_effect_log(ROBOT, "payload", random_state=7411957).frame
     assert "divided_recordings" not in {s.check for s in told(frame)}
+
+
+def test_a_robot_of_sliders_alone_has_no_zeros_to_divide():
+    frame = make_hidden_effect_log(GANTRY, "friction_drift", **OPTIONS).frame
+    assert not [s for s in check_log(frame, GANTRY).checks if s.certainty != "noted"]
