@@ -448,6 +448,7 @@ class TorqueDelay(Check):
             abs(found.common) > max(SMALLEST, ERRORS * found.error)
             and found.gain > LEAST
             and alike.sum() >= measurement.n_joints / 2
+            and alike.mean() > 0.5
             and (alike.mean() >= AGREEING or weight[alike].sum() >= AGREEING)
             and abs(found.common) > _least_lag(measurement)
         ):
