@@ -2,30 +2,34 @@
 """Rates of detected mistakes in logs and of false suspicions, and results of the remedies.
 
 Usage: python benchmarks/measurement/mistakes.py [--cases FOLDER] [--seed 1] [--logs 5]
-       [--sample 5] [--only jitter,order] [--fix] [--verbose]
+       [--sample 5] [--only jitter,order] [--fix] [--diagnose 100] [--store FILE] [--jobs 2]
 
 One mistake is made in each log, half of which have a hidden effect (see ``spoils.py`` and
 ``spoils_of_*.py``). For every mistake it prints the number of logs in which it was reported on the
 right joints with the right remedy, the number of these in which it was certain, and the number of
 logs with another suspicion that the log without the mistake does not have, and that remains with
-the remedy of the right one. ``--fix`` reads the log again with the remedy and prints in how many
-cases this restored the recorded columns; ``--diagnose`` compares the diagnosis of the fixed log
-with that of the clean one where it did not. ``--cases`` takes a folder of logs of another simulator
-(``*/log.parquet`` and ``robot.urdf``).
+the remedy of the right one. ``--fix`` reads the log again with the remedies and prints in how many
+cases this restored the recorded columns. ``--diagnose N`` compares the diagnosis of the corrected
+log with that of the clean one in N cases in which it did not, evenly over all of them; where it
+did, the diagnoses agree by construction. ``--cases`` takes a folder of logs of another simulator
+(``*/log.parquet`` and ``robot.urdf``). ``--store`` appends every result to a file of JSON lines,
+from which a count that was interrupted continues.
 """
 
 from __future__ import annotations
 
 import argparse
-import ast
-import tempfile
+import json
+import multiprocessing
 import warnings
-from dataclasses import dataclass
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
-import pandas as pd
+from corrected import Case, answer, correct, gives_back, read_again, remedies
 from spoils import SPOILS, NoJointMovesError, Spoiled
 from spoils_of_channels import CHANNELS
 from spoils_of_clocks import CLOCKS
@@ -47,19 +51,12 @@ from skidyn.robots import Robot
 
 ROBOTS = (load_panda, load_ur5, load_scara, load_planar_arm)
 MISTAKES = SPOILS | PARTS | CLOCKS | JOINTS | OWNERS | CHANNELS | OTHERS
-Answer: TypeAlias = tuple[str, frozenset[tuple[str, tuple[int, ...]]]]
-#: How often a log is read again, and the least share of its rows that a remedy may leave.
-ROUNDS, LEFT = 3, 0.15
 EFFECTS = (None, "stribeck", None, "payload", "torque_ripple", None, "spring", None)
-
-
-@dataclass
-class Case:
-    """A log without a mistake."""
-
-    name: str
-    frame: pd.DataFrame
-    robot: Robot
+#: Where a mistake is made: its name, and the number of the log.
+Place: TypeAlias = tuple[str, int]
+Result: TypeAlias = dict[str, Any]
+CASES: list[Case] = []
+OWN: dict[int, set[tuple[str, tuple[int, ...]]]] = {}
 
 
 def made(seed: int, each: int) -> list[Case]:
@@ -89,82 +86,106 @@ def stored(folder: Path) -> list[Case]:
     return cases
 
 
-def fixed(spoiled: Spoiled, told: list[Suspicion]) -> tuple[pd.DataFrame, Robot]:
-    """The spoiled log, read again as it is told, and once more where the check asks for more."""
+def make_mistake(seed: int, place: Place) -> Spoiled | None:
+    """The mistake in the log; None where it cannot be made."""
+    name, i = place
+    try:
+        spoiled = MISTAKES[name](CASES[i].frame, CASES[i].robot, np.random.default_rng([seed, i]))
+    except NoJointMovesError:
+        return None
+    return spoiled
+
+
+def counted(seed: int, fix: bool, place: Place) -> Result | None:
+    """What the check reports on a log with a mistake, and the remedies that correct it."""
+    (name, i), spoiled = place, make_mistake(seed, place)
+    if spoiled is None:
+        return None
+    checks = check_log(spoiled.frame, spoiled.robot).checks
+    right = [c for c in checks if spoiled.is_right(c)]
+    told = [c for c in checks if c.certainty != "noted"]
+    other = [c for c in told if not spoiled.is_right(c) and not spoiled.follows(c)]
+    if other and name != "nothing":
+        other = [c for c in other if (c.check, c.joints) not in own_suspicions(i)]
+    mended = remedies(right)
+    if other and mended:  # what is gone with the remedy followed from the mistake
+        again = check_log(*read_again(spoiled.frame, spoiled.robot, mended)).checks
+        left = {(c.check, c.joints) for c in again if c.certainty != "noted"}
+        other = [c for c in other if (c.check, c.joints) in left]
+    result = {
+        "named": bool(right),
+        "certain": any(c.certainty == "certain" for c in right),
+        "other": [c.check for c in other],
+        "log": CASES[i].name,
+        "expected": spoiled.says,
+        "reported": [short(c) for c in checks],
+    }
+    asked = remedies(told)  # what is only noted is no mistake
+    if fix and asked and set(mended) & set(asked):
+        done = partial(gives_back, CASES[i])
+        result["remedies"], result["exact"] = correct(spoiled.frame, spoiled.robot, asked, done)
+    return result
+
+
+def own_suspicions(i: int) -> set[tuple[str, tuple[int, ...]]]:
+    """What the check reports on a log without a mistake."""
+    if i not in OWN:
+        OWN[i] = {(c.check, c.joints) for c in check_log(CASES[i].frame, CASES[i].robot).checks}
+    return OWN[i]
+
+
+def short(told: Suspicion) -> str:
+    """A suspicion in one line."""
+    option = told.remedy.option if told.remedy else "-"
+    return f"{told.check}/{told.certainty}: {told.suspicion[:70]} | {told.evidence[:90]} | {option}"
+
+
+def replayed(spoiled: Spoiled, rounds: list[list[str]]) -> tuple[Any, Robot]:
+    """A log with a mistake after the remedies."""
     frame, robot = spoiled.frame, spoiled.robot
-    for _ in range(ROUNDS):
-        frame, robot = read_again(frame, robot, told)
-        checks = check_log(frame, robot).checks
-        told = [c for c in checks if c.remedy and c.certainty != "noted"]
-        if not told:
-            break
+    for codes in rounds:
+        frame, robot = read_again(frame, robot, codes)
     return frame, robot
 
 
-def read_again(
-    frame: pd.DataFrame, robot: Robot, told: list[Suspicion]
-) -> tuple[pd.DataFrame, Robot]:
-    """A log and its robot, with the remedies that are told."""
-    options: dict[str, Any] = {}
-    for suspicion in told:
-        if suspicion.remedy is None:
-            continue
-        name, _, value = suspicion.remedy.code.partition("=")
-        if name == "Robot.from_urdf(..., gravity":
-            gravity = ast.literal_eval(value.rstrip(")") + ")")
-            robot = robot_with(robot, gravity)
-        else:
-            now = ast.literal_eval(value)
-            before = options.get(name)
-            if isinstance(now, dict) and before:
-                now = {**before, **now}
-            elif isinstance(now, list) and before and name == "flip":
-                now = before + now
-            options[name] = now
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, "log.parquet")
-        frame.to_parquet(path)
-        return read_log(path, robot=robot, check=False, **options), robot
+def diagnosed(seed: int, task: tuple[Place, list[list[str]]]) -> Result:
+    """The answer of the diagnosis on a corrected log; on the clean one for ``"nothing"``."""
+    place, rounds = task
+    if place[0] == "nothing":
+        return {"answer": answer(CASES[place[1]].frame, CASES[place[1]].robot)}
+    spoiled = make_mistake(seed, place)
+    assert spoiled is not None
+    return {"answer": answer(*replayed(spoiled, rounds))}
 
 
-def robot_with(robot: Robot, gravity: tuple[float, float, float]) -> Robot:
-    from dataclasses import replace
+class Store:
+    """Results by kind and place, appended to a file as they are found."""
 
-    return replace(robot, gravity=np.asarray(gravity, dtype=float))
+    def __init__(self, path: Path | None, jobs: int) -> None:
+        self.path, self.jobs = path, jobs
+        self.known: dict[tuple[str, str, int], Result | None] = {}
+        if path is not None and path.exists():
+            for line in path.read_text().splitlines():
+                kind, name, i, result = json.loads(line)
+                self.known[kind, name, i] = result
 
-
-def gives_back(case: Case, frame: pd.DataFrame, robot: Robot) -> bool:
-    """Whether every column is the recorded one in the rows that are left, and gravity the robot's.
-
-    Rows that only repeat others are left out: what they were to hold was never recorded.
-    """
-    if not np.allclose(robot.gravity, case.robot.gravity):
-        return False
-    recorded = case.frame
-    if len(frame) < len(recorded):
-        keys = ["trajectory", "time"]
-        places = pd.Series(np.arange(len(recorded)), index=pd.MultiIndex.from_frame(recorded[keys]))
-        found = places.reindex(pd.MultiIndex.from_frame(frame[keys]))
-        if found.isna().any() or len(frame) < LEFT * len(recorded):
-            return False
-        recorded = recorded.iloc[found.astype(int)].reset_index(drop=True)
-    names = [c for c in recorded.columns if c.rstrip("0123456789") in ("time", "q", "tau")]
-    return len(frame) == len(recorded) and all(
-        float(np.abs(frame[n] - recorded[n]).max()) <= 1e-5 * float(np.abs(recorded[n]).max())
-        for n in names
-    )
-
-
-def answer(frame: pd.DataFrame, robot: Robot) -> Answer:
-    """The verdict of a diagnosis, and what it names on which joints."""
-    from skidyn.diagnosis import diagnose
-    from skidyn.identification import RBDRegressor
-
-    n = robot.n_joints
-    tau = frame[[f"tau{k + 1}" for k in range(n)]].to_numpy()
-    model = RBDRegressor(robot, ("viscous", "coulomb"))
-    result = diagnose(model, frame, tau, force=True)
-    return result.verdict, frozenset((f.kind, tuple(f.joints)) for f in result.findings)
+    def find(
+        self, kind: str, work: Callable[[Any], Result | None], tasks: dict[Place, Any]
+    ) -> Iterator[tuple[Place, Result | None]]:
+        """Results in the order of the tasks; those that are known are not computed again."""
+        new = {p: task for p, task in tasks.items() if (kind, *p) not in self.known}
+        found: Iterable[Result | None] = map(work, new.values())
+        if self.jobs > 1 and new:
+            pool = multiprocessing.get_context("fork").Pool(self.jobs)
+            found = pool.imap(work, new.values())
+        results = iter(found)
+        for place in tasks:
+            if place in new:
+                self.known[kind, *place] = next(results)
+                if self.path is not None:
+                    with self.path.open("a") as file:
+                        print(json.dumps([kind, *place, self.known[kind, *place]]), file=file)
+            yield place, self.known[kind, *place]
 
 
 def main() -> None:
@@ -176,80 +197,81 @@ def main() -> None:
     parser.add_argument("--sample", type=int, help="so many logs of each mistake, in turn")
     parser.add_argument("--only", help="mistakes, separated by commas")
     parser.add_argument("--fix", action="store_true", help="read again with the remedies")
-    parser.add_argument("--diagnose", action="store_true", help="compare diagnoses, slow")
+    parser.add_argument("--diagnose", type=int, metavar="N", help="compare N diagnoses, slow")
+    parser.add_argument("--store", type=Path, help="file of results, to continue from")
+    parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument("--verbose", action="store_true", help="print every log that goes wrong")
     options = parser.parse_args()
     warnings.simplefilter("ignore")
     cases = stored(options.cases) if options.cases else made(options.seed, options.logs)
-    cases = cases[: options.first]
-    known: dict[str, Any] = {}
-    own: dict[int, set[tuple[str, tuple[int, ...]]]] = {}
+    CASES[:] = cases[: options.first]
+    names = options.only.split(",") if options.only else list(MISTAKES)
+    n, taken = len(CASES), options.sample or len(CASES)
+    # a larger sample contains a smaller one, so that a count can be extended
+    order = np.random.default_rng(0).permutation(n)
+    places = {
+        (name, i): (name, i)
+        for turn, name in enumerate(names)
+        for i in sorted({int(order[(turn + k) % n]) for k in range(taken)})
+    }
+    store = Store(options.store, options.jobs)
+    fix = options.fix or bool(options.diagnose)
+    results: dict[Place, Result] = {}
     totals = np.zeros(6, dtype=int)
-    print(f"{'mistake':24s} {'named':>9s} {'certain':>9s} {'another':>9s} {'fixed':>9s}")
-    for turn, name in enumerate(options.only.split(",") if options.only else MISTAKES):
-        counts, n, fixable = np.zeros(4, dtype=int), 0, 0
-        taken = options.sample or len(cases)
-        for i in sorted({(turn * taken + k) % len(cases) for k in range(taken)}):
-            case = cases[i]
-            rng = np.random.default_rng([options.seed, i])
-            try:
-                spoiled = MISTAKES[name](case.frame, case.robot, rng)
-            except NoJointMovesError:
-                continue
-            if spoiled is None:  # a robot that cannot make this mistake
-                continue
-            n += 1
-            checks = check_log(spoiled.frame, spoiled.robot).checks
-            right = [c for c in checks if spoiled.is_right(c)]
-            told = [c for c in checks if c.certainty != "noted"]
-            other = [c for c in told if not spoiled.is_right(c) and not spoiled.follows(c)]
-            if other and name != "nothing":
-                if i not in own:
-                    own[i] = {(c.check, c.joints) for c in check_log(case.frame, case.robot).checks}
-                other = [c for c in other if (c.check, c.joints) not in own[i]]
-            mended = [c for c in right if c.remedy]
-            if other and mended:  # what is gone with the remedy followed from the mistake
-                again = check_log(*read_again(spoiled.frame, spoiled.robot, mended)).checks
-                left = {(c.check, c.joints) for c in again if c.certainty != "noted"}
-                other = [c for c in other if (c.check, c.joints) in left]
-            certain = any(c.certainty == "certain" for c in right)
-            counts[:3] += [bool(right), certain, bool(other)]
-            good = None
-            if (options.fix or options.diagnose) and any(c.remedy for c in right):
-                fixable += 1
-                asked = [c for c in checks if c.remedy and (c in right or c in told)]
-                good = fix(case, spoiled, asked, known, options.diagnose)
-                counts[3] += good
-            if options.verbose and (other or (spoiled.checks and not right) or good is False):
-                print("   ", case.name, spoiled.says, good, *map(short, checks), sep=" ; ")
-        print(row(name, counts, n, fixable), flush=True)
-        if name != "nothing":
-            totals += [*counts, n, fixable]
-    print(row("all", totals[:4], totals[4], totals[5]))
+    print(f"{'mistake':24s} {'named':>9s} {'certain':>9s} {'another':>9s} {'exact':>9s}")
+    rows: dict[str, list[Result]] = defaultdict(list)
+    last = {name: max(p for p in places if p[0] == name) for name in names}
+    for place, result in store.find("check", partial(counted, options.seed, fix), places):
+        name = place[0]
+        if result is not None:
+            results[place] = result
+            rows[name].append(result)
+            wrong = result["other"] or not result["named"]
+            if options.verbose and (result["other"] if name == "nothing" else wrong):
+                print("   ", result["log"], result["expected"], *result["reported"], sep=" ; ")
+        if place == last[name]:
+            counts = summed(rows[name])
+            print(row(name, counts), flush=True)
+            totals += 0 if name == "nothing" else counts
+    print(row("all", totals), flush=True)
+    if options.diagnose:
+        compare(store, options.seed, results, options.diagnose)
 
 
-def row(name: str, counts: np.ndarray, n: int, fixable: int) -> str:
-    """A row of the table; what was fixed is counted among what was told with a remedy."""
+def summed(results: list[Result]) -> np.ndarray:
+    """Counts: named, certain, another, exact; of so many, of which so many have a remedy."""
+    keys = ("named", "certain", "other", "exact")
+    fixable = sum("exact" in r for r in results)
+    return np.array([*(sum(bool(r.get(k)) for r in results) for k in keys), len(results), fixable])
+
+
+def row(name: str, counts: np.ndarray) -> str:
+    """A row of the table; what was restored is counted among what was told with a remedy."""
+    n, fixable = counts[4:]
     of = (n, n, n, fixable)
-    return f"{name:24s}" + "".join(f" {c:4d}/{m:<4d}" for c, m in zip(counts, of, strict=True))
+    return f"{name:24s}" + "".join(f" {c:4d}/{m:<4d}" for c, m in zip(counts, of, strict=False))
 
 
-def short(told: Suspicion) -> str:
-    """A suspicion in one line."""
-    option = told.remedy.option if told.remedy else "-"
-    return f"{told.check}/{told.certainty}: {told.suspicion[:70]} | {told.evidence[:90]} | {option}"
-
-
-def fix(
-    case: Case, spoiled: Spoiled, told: list[Suspicion], known: dict[str, Any], diagnosed: bool
-) -> bool:
-    """Whether the remedies give back the recorded columns, or at least the diagnosis of them."""
-    frame, robot = fixed(spoiled, told)
-    if gives_back(case, frame, robot) or not diagnosed:
-        return gives_back(case, frame, robot)
-    if case.name not in known:
-        known[case.name] = answer(case.frame, case.robot)
-    return answer(frame, robot) == known[case.name]
+def compare(store: Store, seed: int, results: dict[Place, Result], count: int) -> None:
+    """Print in how many corrected logs the diagnosis gives the answer of the clean log."""
+    inexact = [p for p, r in results.items() if r.get("exact") is False]
+    some = np.unique(np.linspace(0, len(inexact) - 1, min(count, len(inexact))).astype(int))
+    picked = [inexact[k] for k in some]
+    work = partial(diagnosed, seed)
+    clean: dict[Place, Any] = {("nothing", i): (("nothing", i), []) for _, i in picked}
+    known = {i: r["answer"] for (_, i), r in store.find("clean", work, clean) if r}
+    tasks = {p: (p, results[p]["remedies"]) for p in picked}
+    agree: dict[str, list[bool]] = defaultdict(list)
+    for (name, i), result in store.find("corrected", work, tasks):
+        assert result is not None
+        agree[name].append(result["answer"] == known[i])
+        if not agree[name][-1]:
+            print("   ", name, CASES[i].name, results[name, i]["remedies"], sep=" ; ")
+            print("      clean:", known[i], "| corrected:", result["answer"], flush=True)
+    for name, same in agree.items():
+        print(f"{name:24s} same diagnosis {sum(same):4d}/{len(same):<4d}")
+    same = [x for group in agree.values() for x in group]
+    print(f"{'all':24s} same diagnosis {sum(same):4d}/{len(same):<4d} of {len(inexact)} inexact")
 
 
 if __name__ == "__main__":

@@ -29,6 +29,7 @@ class Spoiled:
     option: str = ""
     joints: tuple[int, ...] | None = None
     allowed: tuple[str, ...] = ()
+    equivalent: tuple[str, ...] = ()
 
     @property
     def says(self) -> str:
@@ -38,6 +39,8 @@ class Spoiled:
     def is_right(self, told: Suspicion) -> bool:
         """Whether the right check has the right remedy, on the right joints."""
         remedy = told.remedy.option if told.remedy else ""
+        if told.check in self.checks and remedy in self.equivalent:
+            return True
         joints = self.joints is None or set(told.joints) == set(self.joints)
         return told.check in self.checks and remedy.startswith(self.option) and joints
 
@@ -96,6 +99,16 @@ def felt(log: pd.DataFrame, robot: Robot, pull: np.ndarray) -> bool:
     return bool(np.any(np.std(change, axis=0) > 0.2 * joints_of(log, "tau", robot).std(axis=0)))
 
 
+def mirrors(log: pd.DataFrame, robot: Robot) -> bool:
+    """Whether the opposite motion has the opposite torque, as of an arm in a vertical plane.
+
+    Turning round one joint is then the mirror image of turning round all others.
+    """
+    q = joints_of(log.iloc[::10], "q", robot)
+    there, back = (robot.inverse_dynamics(x, x, x) for x in (q, -q))
+    return bool(np.allclose(there, -back, atol=1e-9 + 1e-6 * np.abs(there).max()))
+
+
 def signs(*quantities: str) -> Spoil:
     def spoil(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled | None:
         k = moved(log, robot, rng, turning="q" in quantities) + 1
@@ -109,7 +122,11 @@ def signs(*quantities: str) -> Spoil:
             log, robot, robot.gravity_torque(joints_of(changed, "q", robot))
         ):
             return None  # it looks the same from either side
-        return Spoiled(changed, robot, (check,), f"--flip {','.join(told)}", (k,))
+        option, equivalent = f"--flip {','.join(told)}", []
+        if set(quantities) == {"q", "dq", "tau"} and mirrors(log, robot):
+            others = [j + 1 for j in range(robot.n_joints) if j + 1 != k]
+            equivalent = [f"--flip {','.join(f'q{j},tau{j}' for j in others)}"]
+        return Spoiled(changed, robot, (check,), option, (k,), equivalent=tuple(equivalent))
 
     return spoil
 

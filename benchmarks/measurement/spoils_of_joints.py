@@ -105,6 +105,7 @@ def wrist_units(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Sp
         ("torque_scale",),
         "--gain",
         (robot.n_joints - 1, robot.n_joints),
+        ("torque_scale",),
     )
 
 

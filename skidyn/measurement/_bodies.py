@@ -27,10 +27,12 @@ EXPLAINED = 0.5
 USUAL = (0.4, 2.5)
 #: Multiples that are attributed to wrong masses unless the other joints contradict.
 CLEARLY = (0.62, 1.6)
-#: Multiples of an effort limit that only another unit reaches.
+#: Multiples of an effort limit, and of the torque of the bodies, that only another unit reaches.
 FAR = 20.0
 #: Largest standard error of a scale that is reported without confirmation by the stated bodies.
 TELLING = 0.15
+#: Largest ratio of the torques per ampere of drives of one robot.
+DRIVES = 20.0
 #: Rates of clock and velocities that are tried.
 RATES = (0.1, 0.2, 0.33, 0.5, 2.0, 3.0, 5.0, 10.0)
 AS_IT_IS = Reading()
@@ -43,7 +45,7 @@ WRONG, TIMES, HEAVY = 0.2, 3.0, 0.3
 #: torque is nearly unrelated to the motion.
 UNRELATED, BEYOND = 0.67, 4.0
 #: Least share of it that any function of the position must leave, and the nodes of such a function.
-LEFT, PLACES = 0.8, 16
+LEFT, PLACES = 0.8, 8
 #: Largest share of friction, and that of the joint in the middle, where there is none.
 FRICTIONLESS, HARDLY = 0.12, 0.05
 #: A computed torque: largest difference from that of the stated bodies, largest share of friction,
@@ -151,11 +153,19 @@ class TorqueScale(Check):
             )
             return
         every = bool(odd) and (_one_sided(values) or (len(sure) > 1 and _one_sided(sure)))
+        # another unit of all torques, also where an effect is as large as the torque of the bodies
+        every |= len(values) > 1 and float(np.median(values)) > FAR
         if not every:
             yield from self._of_joints(measurement, fits, gains, known)
             return
         typical = float(np.median(sure if len(sure) > 1 else values))
-        gains = gains if _one_sided(values) else known
+        gains = gains if _one_sided(values) or not known else known
+        # the multiple of a torque that bodies hardly explain may be anything
+        gains = {
+            k: gain
+            for k, gain in gains.items()
+            if k in known or abs(np.log(gain / typical)) < np.log(DRIVES)
+        }
         told = ", ".join(f"{measurement.joint_names[k]} {gain:.3g}" for k, gain in gains.items())
         unit = next((u for f, u in UNITS.items() if abs(np.log(typical / f)) < 0.3), None)
         if unit is not None:
@@ -376,7 +386,7 @@ class Bodies(Check):
         wrong = (stated > WRONG) & (stated > TIMES * identified)
         gain = seen.stated.gain[seen.joints]
         heavy = (seen.shares[0] > HEAVY) & (stated < WRONG)
-        odd = heavy & ((gain < USUAL[0]) | (gain > USUAL[1]))
+        odd = heavy & ((gain < CLEARLY[0]) | (gain > CLEARLY[1]))
         if not wrong.any() and odd.sum() < 2:
             return
         joints = [k for k, bad in zip(seen.joints, wrong | odd, strict=True) if bad]
@@ -432,10 +442,11 @@ def _left_by_position(seen: Explained, k: int) -> float:
     """
     residual = seen.identified.residual[k]
     q = seen.fits.average(seen.fits.signals.q[:, k])[seen.fits.moving[:, k]]
-    place = np.minimum(PLACES * np.argsort(np.argsort(q)) // len(q), PLACES - 1)
-    counts = np.maximum(np.bincount(place, minlength=PLACES), 1)
-    means = np.bincount(place, residual, minlength=PLACES) / counts
-    return float(np.std(residual - means[place]) / (np.std(residual) + 1e-300))
+    nodes = np.unique(np.quantile(q, np.linspace(0, 1, PLACES)))
+    # broken lines between few nodes; as many as for a constant each could follow slow noise
+    hats = np.stack([np.interp(q, nodes, unit) for unit in np.eye(len(nodes))], axis=1)
+    rest = residual - hats @ np.linalg.lstsq(hats, residual, rcond=None)[0]
+    return float(np.std(rest) / (np.std(residual) + 1e-300))
 
 
 class NoFriction(Check):
@@ -450,7 +461,8 @@ class NoFriction(Check):
         seen = explained(measurement)
         if seen is None:
             return
-        rubs = seen.shares[1]
+        bodies, rubs = seen.shares
+        rubs = rubs[bodies > HEAVY]  # the rest of a light joint is small beside nothing
         if len(rubs) > 1 and rubs.max() < FRICTIONLESS and np.median(rubs) < HARDLY:
             measurement.frictionless = True
             yield self.suspicion(

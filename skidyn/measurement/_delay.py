@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from skidyn._signals import SIGN_BLUR, Array, Signals
 from skidyn.measurement._fits import SAMPLES, Fits, Reading, friction
+from skidyn.measurement._peak import peak
 from skidyn.measurement._robust import FEWEST, RobustFit, fit_together
 from skidyn.robots import base_parameter_index
 
@@ -20,8 +22,8 @@ LAGS, FAR_LAGS = np.linspace(-0.06, 0.06, 13), np.linspace(-0.24, 0.24, 25)
 GROUPS = 8
 #: Share of the joints whose best lag is beyond those tried from which later ones are tried.
 MOST_BEYOND = 0.5
-#: Distance of the lags of a parabola, s, and most repetitions.
-NEAR, STEPS = 2e-3, 6
+#: Distance of the lags of a parabola, s.
+NEAR = 2e-3
 #: Fewest rows of a recording for its own lag.
 FEWEST_OF_RUN = 15
 #: Largest difference of agreeing lags of joints in one recording, s.
@@ -154,7 +156,7 @@ def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int]:
         use = _sliding(fits, s, j)
         if not fits.usable(j) or use.sum() < FEWEST:
             continue
-        own = np.column_stack([friction(s, j), _bent_friction(s, j), np.ones(len(s.q))])
+        own = _own_columns(s, j)
         columns = np.column_stack([regressor[use, j], fits.average(own)[use]])
         columns = columns[:, np.abs(columns).max(axis=0) > 0]
         columns = columns / np.linalg.norm(columns, axis=0)
@@ -301,7 +303,7 @@ class JointFit:
             use = _sliding(fits, s, j)
             if not fits.usable(j) or use.sum() < FEWEST:
                 continue
-            own = np.column_stack([friction(s, j), _bent_friction(s, j), np.ones(len(s.q))])
+            own = _own_columns(s, j)
             felt = np.flatnonzero(regressor[:, j].any(axis=0))
             self.joints.append(j)
             self.rows.append(use)
@@ -310,6 +312,13 @@ class JointFit:
             self.places.append(np.append(felt, first + np.arange(own.shape[1])))
             first += own.shape[1]
         self.torque = fits.average(fits.torque)
+
+    def moved(self, signals: Signals) -> JointFit:
+        """The same coefficients for another motion, whose residual :meth:`left` gives."""
+        other = copy(self)
+        other.signals = signals
+        other.own = [_own_columns(signals, j) for j in self.joints]
+        return other
 
     def fit(self, samples: Array) -> list[RobustFit]:
         """Fits to the torque of all samples of the rows, shape (n_samples, n_joints)."""
@@ -364,14 +373,7 @@ def refined_lag(fits: Fits, start: float, error: float, late: Sequence[int]) -> 
     def likelihood(lag: float) -> float:
         return together.likelihood(fits.torque_at(lag))
 
-    lag = start
-    for _ in range(STEPS):
-        left, middle, right = (likelihood(lag + step) for step in (-NEAR, 0.0, NEAR))
-        bend = 2 * middle - left - right
-        step = NEAR * (0.5 * (right - left) / bend if bend > 0 else np.sign(right - left))
-        lag += float(np.clip(step, -2 * NEAR, 2 * NEAR))
-        if abs(step) < NEAR / 20:
-            break
+    lag = peak(likelihood, start, NEAR)
     return lag if abs(lag - start) < max(2 * error, FAR) else start
 
 
@@ -395,6 +397,12 @@ def _sliding(fits: Fits, signals: Signals, joint: int) -> NDArray[np.bool_]:
     speed = (signals.dq[:, joint] / signals.unit[joint]).reshape(fits.n_rows, -1)
     fast = np.abs(speed).min(axis=1) > SLIDING
     return np.asarray(fast & (np.abs(np.sign(speed).sum(axis=1)) == speed.shape[1]))
+
+
+def _own_columns(signals: Signals, joint: int) -> Array:
+    """Columns of a joint in addition to those of the bodies."""
+    ones = np.ones(signals.n_samples)
+    return np.column_stack([friction(signals, joint), _bent_friction(signals, joint), ones])
 
 
 def _bent_friction(signals: Signals, joint: int) -> Array:

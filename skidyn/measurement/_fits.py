@@ -207,6 +207,10 @@ class Fits:
         """The same rows with another torque, (n_samples, n_joints); what motion implies is kept."""
         return replace(self, torque=torque, _fewer={}, _known={}, _fitted={})
 
+    def with_motion(self, signals: Signals) -> Fits:
+        """The same rows and torque with another motion."""
+        return Fits(self.robot, signals, self.torque, self.moving, self.recorded, self.left_out)
+
     def scaled(self, gains: Mapping[int, float]) -> Fits:
         """The same rows with columns of the torque divided by gains."""
         torque = self.torque.copy()

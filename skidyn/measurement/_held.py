@@ -49,7 +49,8 @@ class HeldTorque(Check):
         shares, lost = np.zeros(measurement.n_joints), measurement.clipped
         for k in range(measurement.n_joints):
             torque = measurement.torque[:, k]
-            share = np.mean(torque[1:][moved] == torque[:-1][moved])
+            valued = moved & (torque[1:] != 0)  # zeros follow each other in a dead band
+            share = np.mean(torque[1:][valued] == torque[:-1][valued]) if valued.any() else 0.0
             # equal steps are due to a coarse sensor, not a slow one
             if k not in lost and share > HELD and len(np.unique(torque)) > 0.1 * len(torque):
                 shares[k] = share if np.isnan(position_step(torque)) else 0.0

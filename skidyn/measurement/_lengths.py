@@ -35,8 +35,9 @@ LITTLE = 4.0
 #: Least length, m, and the change of a factor for a slope.
 LEAST_LENGTH, SLOPE = 1e-3, 1e-3
 #: Log-likelihood that other lengths must gain with bodies near the stated ones, also where the
-#: effect is there that takes most of their place, and with any bodies.
-LEAST, CONFIRMED = 10.0, 3.0
+#: effect is there that takes most of their place, and with any bodies; and the first of these if
+#: positions are coarse, because errors of the accelerations are then not white.
+LEAST, CONFIRMED, LEAST_COARSE = 10.0, 3.0, 100.0
 #: Least error of a length to be reported, in standard errors, and as a share.
 ERRORS, SHARE = 3.0, 0.03
 
@@ -82,7 +83,7 @@ class Lengths(Check):
             return  # without noise, errors of the derivatives are significant
         fits = fits.without(list(measurement.coarse_torques))  # rounding is not white noise
         found = find_lengths(fits)
-        if found is None or found.gain < LEAST:
+        if found is None or found.gain < (LEAST_COARSE if measurement.coarse else LEAST):
             return
         if not SHARE < np.abs(found.factors).max() < FARTHEST:
             return

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array, Signals
 from skidyn.measurement._measures import (
+    COARSE,
     excited,
     find_leaps,
     held_share,
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
 ALIKE, SHARED = 0.9, 0.05
 #: Share of the steps in which the position of a single joint is held.
 HELD_BY_ONE = 0.4
+#: Share of its range that a joint covers in a recording in which it moves.
+MOVES = 0.1
 
 
 @dataclass
@@ -269,13 +272,14 @@ class Measurement:
 
         if self.robot is None:
             return None
-        odd = [*self.odd_motion, *(run for runs in self.stuck.values() for run in runs)]
+        stuck = [*self.stuck.values(), *self.constant.values()]
+        odd = [*self.odd_motion, *(run for runs in stuck for run in runs)]
         out = self.idle | np.isin(self.signals.trajectory, odd)
         if out.all():
             return None
         if not out.any():
-            return make_fits(self.whole, self.torque, self.robot)
-        return make_fits(self.whole.take(~out), self.torque[~out], self.robot)
+            return make_fits(self.whole, self.filled, self.robot)
+        return make_fits(self.whole.take(~out), self.filled[~out], self.robot)
 
     @cached_property
     def stuck(self) -> dict[int, list[int]]:
@@ -283,6 +287,21 @@ class Measurement:
         from skidyn.measurement._odd_motion import stuck_positions
 
         return {} if len(self.leaps) or self.lost else stuck_positions(self.signals)
+
+    @cached_property
+    def constant(self) -> dict[int, list[int]]:
+        """Few recordings in which a torque never changes although its joint moves, by joint."""
+        if len(self.leaps) or self.lost:
+            return {}
+        parts = [(int(self.signals.trajectory[s.start]), s) for s in self.signals.segments]
+        found = {}
+        for k in range(self.n_joints):
+            torque, q = self.torque[:, k], self.signals.q[:, k]
+            span = MOVES * np.ptp(q)
+            runs = [run for run, s in parts if np.ptp(torque[s]) == 0 and np.ptp(q[s]) > span > 0]
+            if 0 < len(runs) < len(parts) / 2:
+                found[k] = runs
+        return found
 
     @cached_property
     def held(self) -> dict[int, float]:
@@ -299,6 +318,12 @@ class Measurement:
     def position_steps(self) -> list[float]:
         """Step of every position sensor, rad or m; NaN where it is not visible."""
         return [position_step(column) for column in self.signals.q.T]
+
+    @property
+    def coarse(self) -> bool:
+        """Whether a turning joint has an encoder of 13 bits or fewer."""
+        turning = np.flatnonzero(~self.signals.prismatic)
+        return any(self.position_steps[k] > COARSE for k in turning)
 
     @cached_property
     def coarse_torques(self) -> dict[int, tuple[float, float]]:
@@ -326,7 +351,7 @@ class Measurement:
         """Joints whose torque overflows, from 0, and how often it jumps."""
         from skidyn.measurement._overflow import overflowed_columns
 
-        return overflowed_columns(self.signals, self.torque)
+        return overflowed_columns(self.signals, self.filled)
 
     @cached_property
     def idle(self) -> NDArray[np.bool_]:
@@ -338,3 +363,14 @@ class Measurement:
     def missing(self) -> NDArray[np.bool_]:
         """Zeros in the place of missing torques, as a mask of rows and joints."""
         return missing_values(self.torque, self.idle)
+
+    @cached_property
+    def filled(self) -> Array:
+        """Torque in which missing values are interpolated."""
+        if not self.missing.any():
+            return self.torque
+        filled, rows = self.torque.astype(float), np.arange(self.n_samples)
+        for k in np.flatnonzero(self.missing.any(axis=0)).tolist():
+            lost = self.missing[:, k]
+            filled[lost, k] = np.interp(rows[lost], rows[~lost], filled[~lost, k])
+        return filled

@@ -29,6 +29,8 @@ IDLE_ROWS, IDLE_TIME = 8, 0.05
 #: Fewest places with zeros instead of missing torques; least ratio of the torque beside them to
 #: the median torque: near a true zero it is small.
 FEWEST_MISSING, JUMPS = 5, 0.4
+#: Fewest values of a torque that is not coarse.
+FINE = 50
 #: Most steps that a position may be held before it catches up, and the share of the distance that
 #: its velocity implies by which it then moves on.
 CATCH_UP, CAUGHT = 5, 0.3
@@ -225,7 +227,7 @@ def missing_values(torque: np.ndarray, idle: np.ndarray) -> np.ndarray:
     idle : ndarray of shape (n_samples,) of bool
         Rows that do not count.
     """
-    missing = np.zeros(torque.shape, dtype=bool)
+    missing, signs = np.zeros(torque.shape, dtype=bool), np.sign(torque)
     for k, values in enumerate(np.abs(torque.T)):
         zero = (values == 0) & ~idle
         begins, ends = runs_of(zero)
@@ -233,10 +235,13 @@ def missing_values(torque: np.ndarray, idle: np.ndarray) -> np.ndarray:
         begins, ends = begins[inside], ends[inside]
         if not len(begins) or zero.mean() > MOSTLY_ZERO:
             continue
+        least = float(values[values > 0].min())
         beside = np.minimum(values[begins - 1], values[ends])
+        # dry friction passes a dead band from one sign to the other
+        beside[signs[begins - 1, k] != signs[ends, k]] = 0.0
+        usual = JUMPS * float(np.median(values[~zero]))
         # a coarse torque is one step away from zero
-        least = max(JUMPS * float(np.median(values[~zero])), 1.5 * float(values[~zero].min()))
-        jump = beside > least
+        jump = beside > (max(usual, 1.5 * least) if len(np.unique(values)) < FINE else usual)
         for a, b in zip(begins[jump], ends[jump], strict=True):
             missing[a:b, k] = True
         if jump.sum() < FEWEST_MISSING or missing[:, k].sum() < 0.5 * zero.sum():

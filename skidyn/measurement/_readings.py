@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
@@ -13,6 +13,7 @@ import numpy as np
 from skidyn._signals import Array
 from skidyn.measurement._duel import fight
 from skidyn.measurement._fits import Fits, Outcome, Reading, friction
+from skidyn.measurement._peak import peak
 from skidyn.robots import Robot
 
 #: Least log-likelihood gain of a change, corrected for the correlation of neighbouring rows.
@@ -29,8 +30,8 @@ RIVALS = 0.2
 #: What a change must gain with identified bodies. Negative masses could replace torque with the
 #: opposite sign or gravity that points up or is absent, so that these gain little.
 NEEDED = {
-    **dict.fromkeys(("motion_sign", "joint_sign", "order", "torque_order", "summed", "zero"), 10.0),
-    "convention": 10.0,
+    **dict.fromkeys(("motion_sign", "joint_sign", "summed", "zero", "convention"), 10.0),
+    **dict.fromkeys(("order", "motion_order", "torque_order"), 10.0),
     **dict.fromkeys(("torque_sign", "gravity"), -3.0),
 }
 #: Least gain of a change relative to the largest one, as a share.
@@ -49,6 +50,9 @@ PARALLEL = 0.999
 OFFSETS = np.deg2rad([-135, -90, -45, -15, 15, 45, 90, 135, 180])
 #: Those tried for a joint that also counts in the opposite direction, rad.
 QUARTERS = np.deg2rad([-90, 90, 180])
+#: Distance of the angles of a parabola through the likelihood of a zero, rad, and how often several
+#: zeros are refined in turn.
+NEAR, SWEEPS = np.deg2rad(1.0), 3
 #: Alternative of a reading that gains little over bodies near those of the description.
 OTHER_BODIES = "bodies that differ from the description"
 #: Rounds of the fits for ranking, and number of changes that are examined in detail.
@@ -65,8 +69,8 @@ class Change:
     ----------
     kind : str
         ``"torque_sign"``, ``"motion_sign"``, ``"joint_sign"`` (both), ``"order"``,
-        ``"torque_order"``, ``"summed"``, ``"gravity"``, ``"no_gravity"`` or ``"zero"``; during the
-        comparison also ``"convention"``, a joint sign with a zero.
+        ``"motion_order"``, ``"torque_order"``, ``"summed"``, ``"gravity"``, ``"no_gravity"`` or
+        ``"zero"``; during the comparison also ``"convention"``, a joint sign with a zero.
     joints : tuple of int
         Joints concerned, from 0.
     reading : Reading
@@ -110,6 +114,7 @@ def find_changes(fits: Fits) -> list[Change]:
         Rows.
     """
     found: list[Change] = []
+    fitted: list[int] = []
     reading = Reading()
     while len(found) < 2 * fits.n_joints:
         best = _best(fits, reading)
@@ -118,6 +123,9 @@ def find_changes(fits: Fits) -> list[Change]:
         # a more extensive exchange replaces the previous one
         found = [c for c in found if not (best.kind == c.kind and "order" in c.kind)]
         both = ("joint_sign", "zero") if best.kind == "convention" else (best.kind,)
+        if best.kind == "zero":
+            fitted += best.joints
+            best = replace(best, reading=_sharpened(fits, best.reading, fitted))
         found += [replace(best, kind=kind) for kind in both]
         reading = best.reading
     return found
@@ -162,6 +170,9 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
             if kept > -TIED:
                 return replace(absent, restorable=restored > LEAST)
             judged = [c for c in judged if c.kind != "gravity"]
+    restored_change = _restored(fits, reading, here) if judged and reading.gravity is None else None
+    if restored_change is not None:
+        return restored_change
     accepted = []
     for change in judged:
         if change.kind == "no_gravity":
@@ -187,7 +198,7 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
         best = _first(accepted)
         held = _against_effects(fits, reading, here, best)
         if held is not None:
-            return _sharpened(fits, held) if held.kind == "zero" else held
+            return held
         accepted.remove(best)
     return None
 
@@ -230,8 +241,16 @@ def _first(accepted: list[Change]) -> Change:
         # other joints as well, which do not decide
         sign = (c for c in tied if c.kind == "torque_sign" and c.joints == first.joints)
         return next(sign, first)
-    # an angle that is free fits at least as well as one that is not
-    return next((c for c in tied if c.kind != "zero"), first) if first.kind == "zero" else first
+    # an angle that is free fits at least as well as one that is not, and a direction is two angles
+    angles = min(map(_free_angles, tied))
+    return next(c for c in (first, *tied) if _free_angles(c) == angles)
+
+
+def _free_angles(change: Change) -> int:
+    """Number of angles of a change that were fitted."""
+    if change.kind == "gravity":
+        return 0 if _upright(change.reading.gravity) else 2
+    return int(change.kind == "zero")
 
 
 def _but_for_angle(change: Change, zero: Change) -> bool:
@@ -239,10 +258,14 @@ def _but_for_angle(change: Change, zero: Change) -> bool:
 
     A robot upside down is equivalent to half a turn of a first joint with a horizontal axis.
     """
-    if zero.kind != "zero" or change.kind != "gravity" or change.reading.gravity is None:
+    if zero.kind != "zero" or change.kind != "gravity":
         return False
-    along = float(np.max(np.abs(change.reading.gravity))) > UPRIGHT * GRAVITY
-    return along and change.untuned > zero.untuned - TIED
+    return _upright(change.reading.gravity) and change.untuned > zero.untuned - TIED
+
+
+def _upright(gravity: Sequence[float] | None) -> bool:
+    """Whether gravity is along an axis of the base."""
+    return gravity is not None and float(np.max(np.abs(gravity))) > UPRIGHT * GRAVITY
 
 
 def _against_effects(fits: Fits, reading: Reading, here: Outcome, change: Change) -> Change | None:
@@ -270,15 +293,33 @@ def _refined(fits: Fits, change: Change) -> Change:
     return _climbed(change, likelihood, 22.5)
 
 
-def _sharpened(fits: Fits, change: Change) -> Change:
-    """The zero at which identified bodies fit best: those of the description are not exact."""
-    if change.confirmed < NEEDED["zero"]:
-        return change  # they can represent any zero
+def _sharpened(fits: Fits, reading: Reading, joints: Sequence[int]) -> Reading:
+    """Zeros of some joints at which identified bodies fit best: stated ones are not exact.
 
-    def likelihood(reading: Reading) -> float:
-        return float(fits.identified(reading).likelihood.sum())
+    Each was found while others were still wrong, so several are refined in turn. One that bodies
+    could replace is left as it is.
+    """
+    here = fits.identified(reading)
+    felt = []
+    for joint in joints:
+        without = replace(reading, zero=tuple(z for z in reading.zero if z[0] != joint))
+        if float(here.margin(fits.identified(without)).sum()) >= NEEDED["zero"]:
+            felt.append(joint)
+    for joint in (SWEEPS if len(felt) > 1 else 1) * felt:
+        now = reading
 
-    return _climbed(change, likelihood, 4.0)
+        def likelihood(angle: float, joint: int = joint, now: Reading = now) -> float:
+            return float(fits.identified(_with_zero(now, joint, angle)).likelihood.sum())
+
+        reading = _with_zero(now, joint, peak(likelihood, dict(now.zero)[joint], NEAR))
+    return reading
+
+
+def _with_zero(reading: Reading, joint: int, angle: float) -> Reading:
+    """A reading with another zero of a joint, within half a turn."""
+    turned = float(np.angle(np.exp(1j * angle)))
+    zero = tuple((j, turned if j == joint else x) for j, x in reading.zero)
+    return replace(reading, zero=zero)
 
 
 def _climbed(change: Change, likelihood: Callable[[Reading], float], degrees: float) -> Change:
@@ -328,11 +369,17 @@ def _all_gain(fits: Fits, change: Change, reading: Reading, here: Outcome) -> bo
     moved = [
         column
         for j in range(fits.n_joints)
-        if (column := fits.torque_column(change.reading, j)[0]) != fits.torque_column(reading, j)[0]
-        and fits.usable(column)
+        if _columns(fits, change.reading, j) != _columns(fits, reading, j)
+        and fits.usable(column := fits.torque_column(change.reading, j)[0])
     ]
     gains = there.margin(here)[moved]
     return bool(gains.sum() >= LEAST and np.all(gains > -LEAST))
+
+
+def _columns(fits: Fits, reading: Reading, joint: int) -> tuple[int, int]:
+    """Columns of the motion and of the torque of a joint."""
+    motion = joint if reading.order is None else reading.order[joint]
+    return motion, fits.torque_column(reading, joint)[0]
 
 
 def _drop(before: Outcome, after: Outcome) -> float:
@@ -410,6 +457,11 @@ def _orders(fits: Fits, reading: Reading) -> Iterator[Change]:
             if wanted is not None:
                 changed: Any = {name: wanted}
                 yield Change(name, moved, replace(reading, **changed))
+            if name == "order" and wanted is not None:  # the same motion, with the torques as now
+                own = tuple(order.index(fits.torque_column(reading, j)[0]) for j in range(n))
+                yield Change(
+                    "motion_order", moved, replace(reading, order=wanted, torque_order=own)
+                )
 
 
 def _gravities(fits: Fits, reading: Reading, here: Outcome) -> Iterator[Change]:
@@ -436,6 +488,25 @@ def _without_gravity(fits: Fits, reading: Reading, here: Outcome) -> bool:
     """Whether the gravity that fits best is only a small part of the robot's own."""
     best, own = fitted_gravity(fits, reading, here), np.asarray(fits.robot.gravity, dtype=float)
     return best is not None and abs(float(best @ own / (own @ own))) < LEFT_OVER
+
+
+def _restored(fits: Fits, reading: Reading, here: Outcome) -> Change | None:
+    """Gravity that was subtracted with the stated bodies, which are not those of the robot.
+
+    A rest of gravity is left, in any direction, and looks like other changes. But only with the
+    subtracted torque are there bodies that explain all of it.
+    """
+    own = np.asarray(fits.robot.gravity, dtype=float)
+    best = fitted_gravity(fits, reading, here)
+    if best is None or not own.any() or abs(float(best @ own / (own @ own))) > LEFT_OVER:
+        return None
+    without = replace(reading, gravity=(0.0, 0.0, 0.0))
+    restored, kept = _restored_gain(fits, without, reading)
+    if min(restored, kept) < DECISIVE:
+        return None
+    whole = fits.with_gravity(without).identified(replace(without, gravity=None))
+    drop = _drop(fits.identified(reading), whole)
+    return Change("no_gravity", (), without, kept, kept, drop=drop, restorable=True)
 
 
 def _restored_gain(fits: Fits, without: Reading, reading: Reading) -> tuple[float, float]:

@@ -13,9 +13,10 @@ from skidyn.measurement._check import Check
 from skidyn.measurement._copies import copied_columns
 from skidyn.measurement._delay import Delay, RunDelay, find_delay, refined_lag
 from skidyn.measurement._fits import Fits, Reading, friction
+from skidyn.measurement._late_motion import LateMotion, find_late_motion
 from skidyn.measurement._lowpass import lowpass_of_torque, suspect_lowpass
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._measures import COARSE, reversals
+from skidyn.measurement._measures import reversals
 from skidyn.measurement._readings import DECISIVE, HALF, Change, find_changes
 from skidyn.measurement._robust import fit_admissible
 from skidyn.measurement._suspicion import Certainty, Suspicion
@@ -289,7 +290,7 @@ class Columns(Check):
 
 
 #: Kinds of changes that exchange columns.
-ORDERS = ("order", "torque_order")
+ORDERS = ("order", "motion_order", "torque_order")
 
 
 def _ordered(measurement: Measurement, final: Reading) -> tuple[str, tuple[str, str]]:
@@ -327,6 +328,7 @@ _RIVALS = {
     "joint_sign": "position and torque with the opposite sign",
     "convention": "a position that counts in the opposite direction from another zero",
     "order": "a different order of all columns",
+    "motion_order": "a different order of the positions and velocities",
     "torque_order": "a different order of the torques",
     "summed": "a position relative to another link",
     "zero": "a different zero of a position",
@@ -428,6 +430,9 @@ class TorqueDelay(Check):
             return
         # a joint whose lag is not known to itself agrees with nothing
         use = np.isfinite(found.joints) & (found.errors < max(abs(found.common), SMALLEST))
+        # nor one whose lag is another in its faster rows, as that of a missing effect
+        slow, fast = found.halves.T
+        use &= np.abs(slow - fast) < np.maximum(ALIKE, SAME * np.abs(found.joints))
         near = max(ALIKE, 0.3 * abs(found.common))
         alike = np.abs(found.joints[use] - found.common) < np.maximum(near, 2 * found.errors[use])
         weight = found.gains[use] / max(float(found.gains[use].sum()), 1e-12)
@@ -435,10 +440,15 @@ class TorqueDelay(Check):
         early = measurement.late_position
         if early and abs(found.common + early) < max(ALIKE, 0.3 * early):
             return
+        moved = _late_motion(measurement, fits, found)
+        if moved is not None:
+            yield self._late_motion(measurement, moved)
+            return
         if (
             abs(found.common) > max(SMALLEST, ERRORS * found.error)
             and found.gain > LEAST
-            and alike.sum() > measurement.n_joints / 2
+            and alike.sum() >= measurement.n_joints / 2
+            and alike.mean() > 0.5
             and (alike.mean() >= AGREEING or weight[alike].sum() >= AGREEING)
             and abs(found.common) > _least_lag(measurement)
         ):
@@ -487,6 +497,23 @@ class TorqueDelay(Check):
                 (f"--late tau{k + 1}={lag:g}", f"late={{'tau{k + 1}': {lag:g}}}"),
             )
 
+    def _late_motion(self, measurement: Measurement, moved: LateMotion) -> Suspicion:
+        """Position and velocity of one joint that are late."""
+        lag, k = float(f"{_whole(measurement, moved.lag):.5f}"), moved.joint
+        late = {f"q{k + 1}": lag, f"dq{k + 1}": lag}
+        words = ",".join(f"{name}={value:g}" for name, value in late.items())
+        return self.suspicion(
+            f"position and velocity of {measurement.joint(k)} are "
+            f"{'late' if lag > 0 else 'early'} by about {abs(1e3 * lag):.1f} ms relative to those "
+            "of the other joints and to the torque",
+            "without this delay, bodies, friction and rotor inertia explain all torques better by "
+            f"{moved.gain:.0f} (log-likelihood), and with one of its torque instead by "
+            f"{moved.torque_gain:.0f}",
+            "suspected",
+            [k],
+            (f"--late {words}", f"late={late}"),
+        )
+
     def _late_command(self, lag: float, error: float, n_alike: int) -> Suspicion:
         """A torque of servos that is early, since commands are used before their arrival."""
         return self.suspicion(
@@ -517,11 +544,20 @@ def _lowpass(fits: Fits, lag: float, late: Sequence[int]) -> float | None:
     return constant if gain > LIKELIER else None
 
 
+def _late_motion(measurement: Measurement, fits: Fits, found: Delay) -> LateMotion | None:
+    """A single joint whose motion is late; None if a lag of torques explains as much."""
+    if measurement.of_servos or found.gains.sum() < LEAST:
+        return None  # the torque of servos follows from this motion
+    moved = find_late_motion(fits, found.common)
+    if moved is None or abs(moved.lag) < 2 * _least_lag(measurement) or moved.gain < SURE:
+        return None
+    rival = max(moved.torque_gain, float(found.gains[late_joints(found)].sum()))
+    return moved if moved.gain > rival + LEAST else None
+
+
 def _least_lag(measurement: Measurement) -> float:
     """Smallest lag of the torque that is reported, s; coarse positions cause lags of their own."""
-    s = measurement.signals
-    steps = [measurement.position_steps[k] for k in np.flatnonzero(~s.prismatic)]
-    return SMALLEST_COARSE if any(step > COARSE for step in steps) else SMALLEST
+    return SMALLEST_COARSE if measurement.coarse else SMALLEST
 
 
 def _whole(measurement: Measurement, lag: float) -> float:

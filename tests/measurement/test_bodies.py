@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from skidyn.datasets import load_ur5, make_hidden_effect_log
+from skidyn.datasets import load_scara, load_ur5, make_hidden_effect_log
+from skidyn.logs import check_log
 from skidyn.measurement import Measurement, check_measurement
 
 
@@ -75,3 +76,14 @@ def test_a_rate_that_is_wrong_in_clock_and_velocities(factor, told_of):
     words = dict(pair.split("=") for pair in told.remedy.option.split(" ")[1].split(","))
     assert float(words["time"]) == pytest.approx(1 / factor, rel=0.1)
     assert float(words["dq"]) == pytest.approx(factor, rel=0.1)
+
+
+def test_a_unit_beside_an_effect_as_large_as_the_torque_of_the_bodies():
+    robot = load_scara()
+    log = make_hidden_effect_log(
+        robot, "torque_ripple", n_trajectories=5, duration=6.0, magnitude=4.0, random_state=2
+    )
+    torque = {f"tau{k + 1}": 1e3 * log.frame[f"tau{k + 1}"] for k in range(4)}
+    told = {s.check: s for s in check_log(log.frame.assign(**torque), robot).checks}
+    assert told["torque_scale"].remedy.option == "--units tau=Nmm"
+    assert "torque_scale" not in {s.check for s in check_log(log.frame, robot).checks}

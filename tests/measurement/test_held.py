@@ -41,3 +41,19 @@ def test_zeros_of_one_joint(signals, torque, found):
     holes[np.random.default_rng(1).choice(len(torque), 40, replace=False), 0] = 0.0
     told = {s.check: s for s in found(signals, holes)}
     assert told["missing_torque"].joints == (1,)
+
+
+def test_a_wide_dead_band_is_neither_held_nor_missing(recorded, told_of):
+    torque = recorded.frame[["tau1", "tau2"]]
+    band = torque.where(torque.abs() > 0.2 * torque.abs().quantile(0.95), 0.0)
+    told = set(told_of(recorded.frame.assign(tau1=band["tau1"], tau2=band["tau2"])))
+    assert "dead_band" in told and not told & {"held_torque", "missing_torque"}
+
+
+def test_lost_samples_of_a_nearly_constant_torque_are_missing(signals, torque, found):
+    """They are no jumps from one end of its range to the other."""
+    holes = torque.copy()
+    holes[:, 0] = 15 + 0.01 * torque[:, 0]
+    holes[np.random.default_rng(1).choice(len(torque), 40, replace=False), 0] = 0.0
+    told = {s.check: s for s in found(signals, holes)}
+    assert told["missing_torque"].joints == (1,) and "overflowed_torque" not in told

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from skidyn.datasets import load_ur5, make_hidden_effect_log
+from skidyn.datasets import load_panda, load_ur5, make_hidden_effect_log
 from skidyn.logs import check_log
 
 
@@ -72,3 +72,40 @@ def test_upside_down_goes_before_a_first_joint_half_a_turn_off(arm, recorded, to
     told = told_of(recorded.frame, replace(arm, gravity=-arm.gravity))["reading"]
     assert told.remedy.option == "--gravity=0,0,-9.81" and told.certainty == "suspected"
     assert "zero" in told.evidence
+
+
+def test_motions_that_are_exchanged_with_their_torques_in_place(recorded, told_of):
+    frame = recorded.frame
+    changes = {f"{x}{i}": frame[f"{x}{3 - i}"] for x in ("q", "dq") for i in (1, 2)}
+    told = told_of(frame.assign(**changes))["reading"]
+    assert told.certainty == "certain" and told.remedy.option == "--order motion=2,1"
+
+
+def test_zeros_of_two_joints_are_refined_together():
+    log = make_hidden_effect_log(
+        load_panda(), None, n_trajectories=5, duration=6.0, random_state=9700101
+    )
+    frame = log.frame.assign(q5=log.frame["q5"] - 0.74, q6=log.frame["q6"] + 1.89)
+    told = {s.check: s for s in check_log(frame, log.robot).checks}["reading"]
+    values = dict(x.split("=") for x in told.remedy.option.removeprefix("--zero ").split(","))
+    assert float(values["q5"]) == pytest.approx(-0.74, abs=0.01)
+    assert float(values["q6"]) == pytest.approx(1.89, abs=0.01)
+
+
+def test_a_zero_is_within_half_a_turn(signals, torque, found):
+    told = found(signals.with_(q=signals.q + [0.0, 3.0]), torque)
+    value = float(told[0].remedy.option.split("=")[1])
+    assert value == pytest.approx(3.0, abs=0.02)
+
+
+def test_gravity_that_was_removed_with_bodies_that_are_not_those_of_the_robot():
+    """The rest of it that is left looks like another scale of single torques."""
+    robot = load_panda()
+    log = make_hidden_effect_log(
+        robot, "stribeck", n_trajectories=5, duration=6.0, random_state=9700202
+    )
+    names = [f"tau{k + 1}" for k in range(7)]
+    pull = robot.gravity_torque(log.frame[[f"q{k + 1}" for k in range(7)]].to_numpy())
+    changes = dict(zip(names, (log.frame[names].to_numpy() - pull).T, strict=True))
+    told = {s.check: s for s in check_log(log.frame.assign(**changes), robot).checks}["reading"]
+    assert told.remedy.option == "--restore-gravity"
