@@ -38,6 +38,7 @@ from skidyn.diagnosis._remainder import (
     Remainder,
     find_remainder,
     position_noise,
+    root_mean_square,
     torque_range,
 )
 from skidyn.diagnosis._result import Diagnosis, Verdict
@@ -228,14 +229,11 @@ def _steps(
         kind, joints = (last.kind, last.joints) if last else (None, ())
         comparisons.append(comparison)
         history.append(_entry(comparison, kind, joints))
-        averages.append([_root(problem.rows.average(r, j)) for j, r in enumerate(residual.T)])
+        averages.append(
+            [root_mean_square(problem.rows.average(r, j)) for j, r in enumerate(residual.T)]
+        )
     # All terms at every sample would need most of the memory for a long log.
     return comparisons, history, averages, residual, {t: own[t] for t in found}
-
-
-def _root(values: Array) -> float:
-    """Root mean square of some values, 0 of none."""
-    return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0
 
 
 def _found_terms(problem: Problem, findings: Sequence[Hypothesis]) -> list[Term]:
@@ -269,10 +267,13 @@ def _useless(
         for candidate in result.findings[k].candidates:
             # A compliant link moves everything that it carries: other joints may be affected more.
             joints = tuple(candidate.rows)
-            drops = [_drop(a, b, joints) for a, b in zip(errors[k], errors[k + 1], strict=True)]
-            drops = drops[2:] * 2 if all(coarse[j] for j in joints) else drops[:2]
+            absolute, squared, averaged = (
+                _drop(a, b, joints) for a, b in zip(errors[k], errors[k + 1], strict=True)
+            )
+            if all(coarse[j] for j in joints):
+                absolute = squared = averaged
             share = _share_of_samples(problem, candidate.term.trajectories)
-            if float(np.mean(drops)) < least * share or drops[1] <= 0:
+            if (absolute + squared) / 2 < least * share or squared <= 0:
                 terms.append(candidate)
         if terms:
             return result.findings[k], terms

@@ -98,6 +98,11 @@ def torque_range(torque: Array) -> Array:
     return np.asarray(high - low)
 
 
+def root_mean_square(values: Array) -> float:
+    """Root mean square of some values in their unit, 0 of none."""
+    return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0
+
+
 def find_remainder(
     problem: Problem,
     fit: Fit,
@@ -131,7 +136,7 @@ def find_remainder(
     left = np.sqrt(np.maximum(excess - predictable**2, 0.0))
     span = torque_range(torque)
     material = (rmse > REMAINDER_TIMES_NOISE * noise) & (left > REMAINDER_SHARE_OF_RANGE * span)
-    rows = np.array([np.sqrt(np.mean(e**2)) if len(e) else 0.0 for e in averaged])
+    rows = np.array([root_mean_square(e) for e in averaged])
     inflation = variance_inflation(problem, averaged, range(len(averaged)))
     slow = (inflation > REMAINDER_CORRELATED) & (rows > REMAINDER_SLOW_TIMES_NOISE * noise)
     material |= slow & (left > REMAINDER_SLOW_SHARE_OF_RANGE * span)
