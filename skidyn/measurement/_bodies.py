@@ -29,6 +29,9 @@ USUAL = (0.4, 2.5)
 CLEARLY = (0.62, 1.6)
 #: Multiples of an effort limit, and of the torque of the bodies, that only another unit reaches.
 FAR = 20.0
+#: Multiple of its effort limit that a joint cannot reach, beside one whose torque is in another unit:
+#: drives of a wrist report the same unit, and friction alone has no scale.
+WITH_ANOTHER = 1.5
 #: Largest standard error of a scale that is reported without confirmation by the stated bodies.
 TELLING = 0.15
 #: Largest ratio of the torques per ampere of drives of one robot.
@@ -38,6 +41,8 @@ RATES = (0.1, 0.2, 0.33, 0.5, 2.0, 3.0, 5.0, 10.0)
 AS_IT_IS = Reading()
 #: Factors of units of torque.
 UNITS = {1e3: "Nmm", 1e2: "Ncm", 1e-3: "kNm"}
+#: That of torques beyond what their joints can have.
+KILO = 1e3
 #: Error with stated bodies, as a share of the spread, and as a multiple of that with identified
 #: ones, from which the stated ones are wrong; least share of the bodies in a torque.
 WRONG, TIMES, HEAVY = 0.2, 3.0, 0.3
@@ -196,6 +201,10 @@ class TorqueScale(Check):
     ) -> Iterator[Suspicion]:
         """Single joints at another scale than the others."""
         found = {}
+        # If bodies need a torque of this scale, the joint can provide it, and the limit is wrong.
+        usual = {k for k, gain in gains.items() if USUAL[0] <= gain <= USUAL[1]}
+        reached = {k: x for k, x in _beyond_limits(measurement).items() if k not in usual}
+        far = {k for k, times in reached.items() if times > FAR}
         for k, gain in gains.items():
             low, high = CLEARLY if k in known else USUAL
             if low <= gain <= high or (k not in known and gain < low):
@@ -204,7 +213,7 @@ class TorqueScale(Check):
             wrong = not USUAL[0] <= gain <= USUAL[1] and k in known
             if gained > (LEAST if wrong else SURE) and apart > LEAST and not low <= own <= high:
                 found[k] = own
-            elif wrong and gained > 0:
+            elif wrong and gained > 0 and k not in far:
                 yield self.suspicion(
                     f"either the torque of {measurement.joint(k)} has a different scale than that "
                     "of the other joints, or the bodies it moves differ from the description",
@@ -221,17 +230,16 @@ class TorqueScale(Check):
                 f"it is {told} times that of the stated bodies, and {fitted} times that of bodies "
                 "that explain the other joints"
             )
-        # If bodies need a torque of this scale, the joint can provide it, and the limit is wrong.
-        usual = {k for k, gain in gains.items() if USUAL[0] <= gain <= USUAL[1]}
-        far = _beyond_limits(measurement).items()
-        beyond = {k: times for k, times in far if k not in found and k not in usual}
+        if far or any(_unit_like(gain) == KILO for gain in found.values()):
+            far |= set(reached)
+        beyond = {k: times for k, times in reached.items() if k in far and k not in found}
         if beyond:
             names = ", ".join(measurement.joint(k) for k in beyond)
             times = ", ".join(f"{size:.3g}" for size in beyond.values())
             evidence.append(f"it reaches {times} times the effort limit of {names}")
         if found or beyond:
             units = {k: unit for k, gain in found.items() if (unit := _unit_like(gain))}
-            units |= dict.fromkeys(beyond, 1e3)
+            units |= dict.fromkeys(beyond, KILO)
             refined = {k: gain for k, gain in found.items() if k not in units}
             factors = {k: 1 / unit for k, unit in units.items()}
             factors |= refined_scales(fits, units, refined).factors if refined else {}
@@ -280,13 +288,13 @@ def _other_rate(fits: Fits) -> float | None:
 
 
 def _beyond_limits(measurement: Measurement) -> dict[int, float]:
-    """Torques far beyond the effort limit of the description, while others are within."""
+    """Torques beyond the effort limit of the description, while most others are within."""
     robot = measurement.robot
     if robot is None:
         return {}
     limits = np.where(robot.effort_limits > 0, robot.effort_limits, np.inf)
     reached = np.quantile(np.abs(measurement.torque), 0.95, axis=0) / limits
-    far = np.flatnonzero(reached > FAR)
+    far = np.flatnonzero(reached > WITH_ANOTHER)
     if np.mean(reached < 1) < 0.5:
         return {}  # the limits, or all torques, are in another unit
     return {int(k): float(reached[k]) for k in far}

@@ -252,11 +252,15 @@ def _multiples(seen: Explained) -> list[Multiple]:
             predicted = (y - outcome.residual[k])[own]
             if k in others:
                 predicted, scale = others[k]
+            spoils = scale < outcome.scale[k] / 2
+            if seen.stated.scale[k] < scale / 2:
+                # the torque of a joint in another unit spoils bodies common to all of them
+                predicted, scale = (y - seen.stated.residual[k])[own], float(seen.stated.scale[k])
+                spoils = False
             found = _multiple(y[own], predicted, scale) if own.sum() >= FEWEST else None
             if found is not None:
                 size, likeness, gain, larger = found
                 gain /= max(1.0, outcome.inflation_of(k))
-                spoils = scale < outcome.scale[k] / 2
                 told.append(Multiple(k, int(run), size, likeness, gain, larger, bool(spoils)))
     return told
 
