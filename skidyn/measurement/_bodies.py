@@ -29,8 +29,8 @@ USUAL = (0.4, 2.5)
 CLEARLY = (0.62, 1.6)
 #: Multiples of an effort limit, and of the torque of the bodies, that only another unit reaches.
 FAR = 20.0
-#: Multiple of its effort limit that a joint cannot reach, beside one whose torque is in another unit:
-#: drives of a wrist report the same unit, and friction alone has no scale.
+#: Multiple of its effort limit that a joint cannot reach, beside one whose torque is in another
+#: unit: drives of a wrist report the same unit, and friction alone has no scale.
 WITH_ANOTHER = 1.5
 #: Largest standard error of a scale that is reported without confirmation by the stated bodies.
 TELLING = 0.15

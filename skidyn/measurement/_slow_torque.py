@@ -21,8 +21,8 @@ from skidyn.measurement._suspicion import Suspicion
 #: Rows between two values of the slower bus that are tried, and orders of the differences: of held
 #: values, lines and cubic splines.
 PERIODS, ORDERS = range(2, 17), (1, 2, 4)
-#: Least log-likelihood gain of a period on all joints; share of the joints that must gain by it; how
-#: many times as large the largest differences are as the smallest ones, on one of them.
+#: Least log-likelihood gain of a period on all joints; share of the joints that must gain by it;
+#: how many times as large the largest differences are as the smallest ones, on one of them.
 SURE, AGREEING, TIMES = 40.0, 0.6, 1.7
 #: Fewest differences of each phase, and least size of them as a share of the spread of the torque.
 FEWEST, ROUNDING = 30, 1e-9
