@@ -117,10 +117,12 @@ def find_delay(fits: Fits) -> Delay:
     fits : Fits
         Rows.
     """
-    near, beyond = _delay_within(fits, LAGS)
-    if not beyond:
+    near, beyond, late_runs = _delay_within(fits, LAGS)
+    if not beyond and not late_runs:
         return near
-    far, _ = _delay_within(fits, FAR_LAGS)
+    far, *_ = _delay_within(fits, FAR_LAGS)
+    if not beyond:  # only single recordings are
+        return replace(near, runs=far.runs)
     if beyond > MOST_BEYOND * fits.n_joints:
         return replace(far, runs={})  # these lags are too far apart for single recordings
     only_far = ~np.isfinite(near.joints) & np.isfinite(far.joints)
@@ -134,8 +136,8 @@ def find_delay(fits: Fits) -> Delay:
     )
 
 
-def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int]:
-    """The best of some lags, and the number of joints whose best lag is the first or the last."""
+def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int, int]:
+    """The best of some lags, and how many joints and recordings have the first or the last."""
     n = fits.n_joints
     beyond, middle = 0, len(lags_tried) // 2
     own_errors, own_gains, halves = np.full(n, np.nan), np.zeros(n), np.full((n, 2), np.nan)
@@ -189,7 +191,7 @@ def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int]:
         halves[j] = [_lowest((rest[rows] ** 2).sum(axis=0), lags_tried) for rows in (~fast, fast)]
         own_gains[j] = len(rest) / 2 * np.log(total[middle] / _least(total))
     if not tables:
-        return unknown, beyond
+        return unknown, beyond, 0
 
     # squared errors, and not their logarithms, are a parabola of the lag
     noise = [float(e.sum(axis=0).min()) / n for n, e in tables]
@@ -207,11 +209,11 @@ def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int]:
     whole = sum(n / 2 * np.log(e.sum(axis=0)) for n, e in tables)
     gain = float(whole[middle] - _least(whole))
     early, late = lag(firsts), lag(seconds)
-    runs = _of_runs(squares, counts, lags_tried)
+    runs, runs_beyond = _of_runs(squares, counts, lags_tried)
     found = Delay(
         common, error, lags, own_errors, gain, own_gains, halves, early, late, drift, runs, drifts
     )
-    return found, beyond
+    return found, beyond, runs_beyond
 
 
 def _run_costs(
@@ -249,12 +251,15 @@ def _run_costs(
 
 def _of_runs(
     squares: Mapping[int, list[Array]], counts: Mapping[int, int], tried: Array
-) -> dict[int, RunDelay]:
-    """Lags of single recordings, from half the squared residuals of their joints over noise."""
+) -> tuple[dict[int, RunDelay], int]:
+    """Lags of single recordings, from half the squared residuals of their joints over noise.
+
+    Also returns the number of recordings whose best lag is the first or the last.
+    """
     if len(squares) < 3:
-        return {}
+        return {}, 0
     whole = {run: np.sum(parts, axis=0) for run, parts in squares.items()}
-    found = {}
+    found, beyond = {}, 0
     for run, parts in squares.items():
         usual = _lowest(
             np.sum([cost for other, cost in whole.items() if other != run], axis=0), tried
@@ -262,6 +267,7 @@ def _of_runs(
         lag = _lowest(whole[run], tried)
         here, there = (int(np.argmin(np.abs(tried - x))) for x in (usual, lag))
         if there in (0, len(tried) - 1):
+            beyond += 1
             continue
         gains = np.array([part[here] - part[there] for part in parts])
         own = np.array([_lowest(part, tried) for part in parts])
@@ -274,7 +280,7 @@ def _of_runs(
         found[run] = RunDelay(
             lag - usual, error, float(gains.sum()), agreeing, float(left), float(before), usual
         )
-    return found
+    return found, beyond
 
 
 class JointFit:

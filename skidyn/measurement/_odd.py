@@ -16,6 +16,7 @@ from skidyn.measurement._check import Check
 from skidyn.measurement._duel import left_by_effects
 from skidyn.measurement._fits import SAMPLES, Fits, Reading
 from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._odd_order import find_exchanges
 from skidyn.measurement._robust import robust_likelihood, student
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import asked_changes
@@ -89,6 +90,19 @@ class OddRecording(Check):
             )
         if sizes:
             measurement.odd = True
+            return
+        exchanged = list(find_exchanges(seen))
+        for one in exchanged:
+            measurement.odd = True
+            names = " and ".join(measurement.joint(k) for k in one.joints)
+            yield self.suspicion(
+                f"in trajectory {one.run} the torques of {names} are exchanged",
+                "each is what the other trajectories predict for the other joint, which improves "
+                f"the fit by {one.gain:.0f} (log-likelihood); fix that file, or leave it out",
+                "suspected",
+                one.joints,
+            )
+        if exchanged:
             return
         told = _multiples(seen)
         scaled, unlike = [], []
