@@ -32,6 +32,8 @@ NEARLY = 0.008
 FAR = 1e-3
 #: Least velocity of rows that count, in rad/s (a tenth of it in m/s).
 SLIDING = 0.05
+#: Nodes of a function of the position.
+PLACES = 8
 #: Largest share of the torque's spread that the fit of a joint may leave for its lag to count.
 LEFT = 0.5
 
@@ -158,7 +160,7 @@ def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int, int]:
         use = _sliding(fits, s, j)
         if not fits.usable(j) or use.sum() < FEWEST:
             continue
-        own = _own_columns(s, j)
+        own = np.column_stack([_own_columns(s, j), _of_position(s, j)])
         columns = np.column_stack([regressor[use, j], fits.average(own)[use]])
         columns = columns[:, np.abs(columns).max(axis=0) > 0]
         columns = columns / np.linalg.norm(columns, axis=0)
@@ -409,6 +411,13 @@ def _own_columns(signals: Signals, joint: int) -> Array:
     """Columns of a joint in addition to those of the bodies."""
     ones = np.ones(signals.n_samples)
     return np.column_stack([friction(signals, joint), _bent_friction(signals, joint), ones])
+
+
+def _of_position(signals: Signals, joint: int) -> Array:
+    """Any slow function of the position, as of a spring that is missing."""
+    q = signals.q[:, joint]
+    nodes = np.unique(np.quantile(q, np.linspace(0, 1, PLACES)))
+    return np.stack([np.interp(q, nodes, unit) for unit in np.eye(len(nodes))], axis=1)
 
 
 def _bent_friction(signals: Signals, joint: int) -> Array:

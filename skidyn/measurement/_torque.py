@@ -48,8 +48,9 @@ AGREEING = 0.75
 #: How far the lag of one joint must be from those of others, s, and how nearly it must be the same
 #: in its slower and its faster rows, as a share of it.
 APART, SAME = 0.008, 0.3
-#: Fewest other joints of known lag to compare with it, in robots that have as many.
-FEWEST_SURE = 2
+#: Fewest other joints of known lag to compare with it, in robots that have as many, and the largest
+#: lag of these, as a share of it, if it is more than the smallest that is reported.
+FEWEST_SURE, LITTLE = 2, 0.2
 
 
 #: Share of the recordings that may be late by themselves, and log-likelihood that they must gain:
@@ -628,7 +629,8 @@ def late_joints(found: Delay) -> list[int]:
         if not np.isfinite(lag) or len(sure) < min(FEWEST_SURE, len(others)):
             continue
         common = float(np.median(sure))
-        apart = abs(lag - common) > max(APART, ERRORS * found.errors[k]) and abs(common) < SMALLEST
+        apart = abs(lag - common) > max(APART, ERRORS * found.errors[k])
+        apart &= abs(common) < max(SMALLEST, LITTLE * abs(lag))
         slow, fast = found.halves[k]
         if apart and found.gains[k] > SURE and abs(slow - fast) < SAME * abs(lag):
             late.append(k)
