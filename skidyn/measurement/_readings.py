@@ -23,6 +23,8 @@ LEAST = 15.0
 WEAKEST, DECISIVE, HALF = 3.0, 60.0, 0.5
 #: What it gains with stated bodies where identified ones, that could be negative, need not agree.
 OVERWHELMING = 100.0
+#: Share of a joint's residual that a zero must take off to be noted beside other bodies.
+MOSTLY = 0.8
 #: Changes of one joint whose gains differ by less than this, or this share, cannot be separated.
 TIED, ALIKE = 3.0, 0.05
 #: Share of the gain within which another kind of change of the same joints is equally possible.
@@ -85,6 +87,8 @@ class Change:
         Other kinds of change of the same joints that explain equally much.
     other : str
         An equally good explanation other than a reading, such as a physical effect; empty if none.
+    rival_gains : bool
+        Whether that other explanation is the likelier one.
     restorable : bool
         For torque without gravity: whether it was subtracted with the bodies of the description.
     """
@@ -98,6 +102,7 @@ class Change:
     drop: float = 0.0
     rivals: tuple[str, ...] = ()
     other: str = ""
+    rival_gains: bool = False
     restorable: bool = False
 
 
@@ -127,6 +132,8 @@ def find_changes(fits: Fits) -> list[Change]:
             fitted += best.joints
             best = replace(best, reading=_sharpened(fits, best.reading, fitted))
         found += [replace(best, kind=kind) for kind in both]
+        if best.rival_gains:
+            break  # nothing is read on top of what may be a load
         reading = best.reading
     return found
 
@@ -200,7 +207,8 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
         if held is not None:
             return held
         accepted.remove(best)
-    return None
+    turned = [c for c in judged if c.kind == "zero" and c.gain >= max(OVERWHELMING, most)]
+    return next((_or_bodies(fits, reading, c) for c in turned if c.drop >= MOSTLY), None)
 
 
 def _distinct(screened: list[tuple[float, Change]]) -> list[tuple[float, Change]]:
@@ -279,6 +287,16 @@ def _against_effects(fits: Fits, reading: Reading, here: Outcome, change: Change
     if duel.gain < LEAST or max(duel.beside, duel.gain - duel.rival) <= 0:
         return None
     return replace(change, other=duel.effect)
+
+
+def _or_bodies(fits: Fits, reading: Reading, zero: Change) -> Change | None:
+    """A zero that explains nearly all, beside other bodies or a load, which do so as well.
+
+    They turn the direction of the weight on a last joint as another zero does.
+    """
+    duel = fight(fits, reading, zero.reading, zero.joints)
+    other = duel.effect or OTHER_BODIES
+    return replace(zero, other=other, rival_gains=True) if duel.gain > 0 else None
 
 
 def _refined(fits: Fits, change: Change) -> Change:
