@@ -15,7 +15,9 @@ from skidyn.measurement._check import Check
 from skidyn.measurement._fits import Fits, Outcome, Reading, friction
 from skidyn.measurement._gains import Scales, refined_scales
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._robust import fit_admissible
+from skidyn.measurement._peak import peak
+from skidyn.measurement._readings import DECISIVE, FEWEST_ROWS, MOST_ROWS
+from skidyn.measurement._robust import ROUNDS, fit_admissible
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import asked_changes, readable_fits
 
@@ -38,6 +40,9 @@ TELLING = 0.15
 DRIVES = 20.0
 #: Rates of clock and velocities that are tried.
 RATES = (0.1, 0.2, 0.33, 0.5, 2.0, 3.0, 5.0, 10.0)
+#: Distance of the points of a parabola through the likelihood of the logarithm of a rate, how far
+#: identified bodies may move it, and how near it is to a whole multiple that is one.
+RATE_STEP, RATE_MOVES, RATE_WHOLE = 0.02, 0.2, 0.02
 AS_IT_IS = Reading()
 #: Factors of units of torque.
 UNITS = {1e3: "Nmm", 1e2: "Ncm", 1e-3: "kNm"}
@@ -144,15 +149,14 @@ class TorqueScale(Check):
         gains = {k: float(g) for k, g in enumerate(here) if np.isfinite(g) and g > 0}
         values = np.array(list(gains.values()))
         sure = np.array(list(known.values()))
-        rate = _other_rate(fits) if odd else None
+        rate = _other_rate(fits, bool(odd))
         if rate is not None:
-            value = float(f"{rate:.3g}")
+            value = float(f"{rate:.4g}")
             words = f"time={1 / value:.6g},dq={value:g}"
             yield self.suspicion(
                 "the clock runs at a different rate, and the velocities were derived with it",
                 f"with a sampling rate {value:g} times as high, the rigid-body torque explains "
-                f"the measured torque better by {_rate_gain(fits, rate):.0f} (log-likelihood), "
-                "with a plausible scale on every joint",
+                f"the measured torque better by {_rate_gain(fits, rate):.0f} (log-likelihood)",
                 "suspected",
                 remedy=(f"--gain {words}", f"gain={{'time': {1 / value:.6g}, 'dq': {value:g}}}"),
             )
@@ -262,19 +266,24 @@ def _all_factors(fits: Fits, gains: dict[int, float], typical: float) -> dict[in
     return Scales({k: found.gains[k] for k in known}, {k: found.errors[k] for k in known}).factors
 
 
-def _rate_gain(fits: Fits, rate: float) -> float:
+def _rate_gain(fits: Fits, rate: float, rounds: int = ROUNDS) -> float:
     """Log-likelihood gain of another rate of clock and velocities."""
-    here, there = fits.nominal(Reading()), fits.nominal(Reading(stretch=rate))
+    here, there = (fits.nominal(Reading(stretch=x), rounds) for x in (1.0, rate))
     return float(there.margin(here).sum())
 
 
-def _other_rate(fits: Fits) -> float | None:
-    """Rate of clock and velocities at which all torques have the scale of the bodies.
+def _other_rate(fits: Fits, odd: bool) -> float | None:
+    """Rate of clock and velocities that explains the torque better; None if there is none.
 
-    Inertia grows with its square and gravity does not, so no scale of a torque is equivalent.
+    Inertia grows with its square and gravity does not, so no scale of a torque is equivalent. If
+    the scales of some torques are odd, it must make all of them usual, or identified bodies, which
+    know nothing of scales, must confirm it.
     """
-    best, log = max((_rate_gain(fits, float(np.exp(x))), x) for x in np.log(RATES))
-    step = 0.2
+    few = fits.thinned(max(FEWEST_ROWS, MOST_ROWS // fits.n_joints))
+    best, log = max((_rate_gain(few, rate, 1), float(np.log(rate))) for rate in RATES)
+    if best < LEAST and not odd:
+        return None
+    step, best = 0.2, _rate_gain(fits, float(np.exp(log)))
     while step > 0.01:
         near, other = max((_rate_gain(fits, float(np.exp(x))), x) for x in (log - step, log + step))
         if near > best:
@@ -282,9 +291,29 @@ def _other_rate(fits: Fits) -> float | None:
         else:
             step /= 2
     rate = float(np.exp(log))
+    if best < SURE or CLEARLY[0] < rate < CLEARLY[1]:
+        return None
     gains = list(_known_gains(fits, Reading(stretch=rate)).values())
-    usual = len(gains) > 1 and all(USUAL[0] <= gain <= USUAL[1] for gain in gains)
-    return rate if best > SURE and usual and not CLEARLY[0] < rate < CLEARLY[1] else None
+    usual = odd and len(gains) > 1 and all(USUAL[0] <= gain <= USUAL[1] for gain in gains)
+    here, there = (fits.identified(Reading(stretch=x)) for x in (1.0, rate))
+    confirmed = float(there.margin(here).sum()) > DECISIVE
+    return _sharpened(fits, rate) if usual or confirmed else None
+
+
+def _sharpened(fits: Fits, rate: float) -> float:
+    """Rate at which identified bodies fit best, since stated ones are not exact.
+
+    Rates that are set wrongly are mostly whole multiples or parts of the right one.
+    """
+
+    def likelihood(log: float) -> float:
+        return float(fits.identified(Reading(stretch=float(np.exp(log)))).likelihood.sum())
+
+    log = peak(likelihood, float(np.log(rate)), RATE_STEP)
+    found = float(np.exp(log)) if abs(log - np.log(rate)) < RATE_MOVES else rate
+    times = max(found, 1 / found)
+    whole = float(round(times)) if abs(times / round(times) - 1) < RATE_WHOLE else times
+    return whole if found > 1 else 1 / whole
 
 
 def _beyond_limits(measurement: Measurement) -> dict[int, float]:
