@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.measurement._check import Check
-from skidyn.measurement._fits import Fits, Outcome, Reading, friction
+from skidyn.measurement._crosstalk import find_shares
+from skidyn.measurement._fits import SAMPLES, Fits, Outcome, Reading, friction
 from skidyn.measurement._gains import Scales, refined_scales
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._peak import peak
@@ -54,8 +55,10 @@ WRONG, TIMES, HEAVY = 0.2, 3.0, 0.3
 #: Error of any bodies, as a share of the spread, and in errors of the mean of a row, from which a
 #: torque is nearly unrelated to the motion.
 UNRELATED, BEYOND = 0.67, 4.0
-#: Least share of it that any function of the position must leave, and the nodes of such a function.
-LEFT, PLACES = 0.8, 8
+#: Least share of it that any function of the position must leave, the nodes of such a function, and
+#: the fewest parts of a log that are predicted by the others, the least share of it that can
+#: be.
+LEFT, PLACES, FEWEST_PARTS, MOSTLY = 0.8, 8, 3, 0.5
 #: Largest share of friction, and that of the joint in the middle, where there is none.
 FRICTIONLESS, HARDLY = 0.12, 0.05
 #: A computed torque: largest difference from that of the stated bodies, largest share of friction,
@@ -459,6 +462,9 @@ class UnexplainedTorque(Check):
         bad: NDArray[np.bool_] = (least > UNRELATED) & (least > BEYOND * steady)
         unlike = [k for k, found in zip(seen.joints, bad, strict=True) if found]
         joints = [k for k in unlike if _left_by_position(seen, k) > LEFT]
+        if joints:  # that of another joint may be larger than its own
+            shared = {share.joint for share in find_shares(measurement, seen.fits)}
+            joints = [k for k in joints if k not in shared]
         bad = np.isin(seen.joints, joints)
         if joints:
             names = ", ".join(measurement.joint(k) for k in joints)
@@ -475,15 +481,27 @@ class UnexplainedTorque(Check):
 def _left_by_position(seen: Explained, k: int) -> float:
     """Share of the residual of identified bodies that no function of the position explains.
 
-    A spring of any form, or a stop, is related to the motion.
+    A spring of any form, or a stop, is related to the motion, and is the same in all recordings, by
+    the others of which each is predicted: slow noise would be followed otherwise.
     """
-    residual = seen.identified.residual[k]
-    q = seen.fits.average(seen.fits.signals.q[:, k])[seen.fits.moving[:, k]]
+    residual, use = seen.identified.residual[k], seen.fits.moving[:, k]
+    q = seen.fits.average(seen.fits.signals.q[:, k])[use]
+    part = seen.fits.signals.trajectory[::SAMPLES][use]
+    if len(np.unique(part)) < FEWEST_PARTS:
+        part = np.arange(len(q)) * FEWEST_PARTS // len(q)
     nodes = np.unique(np.quantile(q, np.linspace(0, 1, PLACES)))
-    # broken lines between few nodes; as many as for a constant each could follow slow noise
     hats = np.stack([np.interp(q, nodes, unit) for unit in np.eye(len(nodes))], axis=1)
-    rest = residual - hats @ np.linalg.lstsq(hats, residual, rcond=None)[0]
-    return float(np.std(rest) / (np.std(residual) + 1e-300))
+    rest, known = residual.copy(), np.zeros(len(q), dtype=bool)
+    for one in np.unique(part):
+        out = part == one
+        seen_nodes = hats[~out].sum(axis=0) > FEWEST_PARTS
+        known[out] = hats[out][:, seen_nodes].sum(axis=1) > 0.99
+        fitted = np.linalg.lstsq(hats[~out][:, seen_nodes], residual[~out], rcond=1e-6)[0]
+        rest[out] -= hats[out][:, seen_nodes] @ fitted
+    if known.mean() < MOSTLY:  # recordings in different places predict nothing
+        rest = residual - hats @ np.linalg.lstsq(hats, residual, rcond=None)[0]
+        known[:] = True
+    return float(np.std(rest[known]) / (np.std(residual[known]) + 1e-300))
 
 
 class NoFriction(Check):
