@@ -55,9 +55,8 @@ WRONG, TIMES, HEAVY = 0.2, 3.0, 0.3
 #: Error of any bodies, as a share of the spread, and in errors of the mean of a row, from which a
 #: torque is nearly unrelated to the motion.
 UNRELATED, BEYOND = 0.67, 4.0
-#: Least share of it that any function of the position must leave, the nodes of such a function, and
-#: the fewest parts of a log that are predicted by the others, the least share of it that can
-#: be.
+#: Least share of it that any function of the position must leave, the nodes of such a function, the
+#: fewest parts of a log that are predicted by the others, and the least share of it that can be.
 LEFT, PLACES, FEWEST_PARTS, MOSTLY = 0.8, 8, 3, 0.5
 #: Largest share of friction, and that of the joint in the middle, where there is none.
 FRICTIONLESS, HARDLY = 0.12, 0.05

@@ -34,9 +34,9 @@ MILLIMETRES = 20.0
 LEAST_DEGREES = 6.0
 #: How nearly a factor is a round number that it is taken for.
 WHOLE = 2e-3
-#: Distance of the logarithms of sizes between which a parabola is laid, and how far that at which
-#: identified bodies fit best may be from that of the stated ones.
-APART, NOT_FAR = 0.02, 0.06
+#: First and last step of the search for the logarithm of a size at which identified bodies fit
+#: best, distance of the points of a parabola there, and how far it may be from that of stated ones.
+APART, FINEST, BEND, NOT_FAR = 0.02, 5e-4, 5e-3, 0.06
 #: Share of recordings in which positions may be in another unit, how many times as far they then
 #: spread, and recordings at least.
 FEW, SPREAD, RECORDINGS = 0.4, 10.0, 3
@@ -359,16 +359,18 @@ def _sharpened(fits: Fits, size: float, joints: frozenset[int] | None) -> float:
         return float(np.sum(outcome.likelihood / inflation))
 
     first = log = float(np.log(size))
-    step, error = APART, NOT_FAR
-    for _ in range(4):
-        left, middle, right = (likelihood(log + x) for x in (-step, 0.0, step))
-        bend = 2 * middle - left - right
-        if bend <= 0:
-            return size  # bodies compensate any size
-        error = step / np.sqrt(bend)
-        log += float(np.clip(0.5 * step * (right - left) / bend, -2 * step, 2 * step))
-        step /= 2
-    if abs(log - first) > NOT_FAR or error > NOT_FAR:
+    step, best = APART, likelihood(log)
+    while step > FINEST and abs(log - first) <= NOT_FAR:  # the maximum is narrow without noise
+        near, other = max((likelihood(x), x) for x in (log - step, log + step))
+        if near > best:
+            best, log = near, other
+        else:
+            step /= 2
+    bend = 2 * best - likelihood(log - BEND) - likelihood(log + BEND)
+    if bend <= 0 or abs(log - first) > NOT_FAR:
+        return size  # bodies compensate any size
+    error = BEND / np.sqrt(bend)
+    if error > NOT_FAR:
         return size
     found = float(np.exp(log))
     for whole in (10, 5, 1):
