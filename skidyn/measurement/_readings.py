@@ -202,11 +202,13 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
             rivals = tuple(dict.fromkeys(c.kind for c in alike))
             accepted.append(replace(change, confirmed=confirmed, rivals=rivals))
     while accepted:
-        best = _first(accepted)
+        best = _turned(fits, _first(accepted), accepted)
         held = _against_effects(fits, reading, here, best)
         if held is not None:
             return held
         accepted.remove(best)
+    if reading != Reading():
+        return None  # what is read anew already, and bodies, need no other zero
     turned = [c for c in judged if c.kind == "zero" and c.gain >= max(OVERWHELMING, most)]
     return next((_or_bodies(fits, reading, c) for c in turned if c.drop >= MOSTLY), None)
 
@@ -252,6 +254,20 @@ def _first(accepted: list[Change]) -> Change:
     # an angle that is free fits at least as well as one that is not, and a direction is two angles
     angles = min(map(_free_angles, tied))
     return next(c for c in (first, *tied) if _free_angles(c) == angles)
+
+
+def _turned(fits: Fits, first: Change, accepted: list[Change]) -> Change:
+    """The change that comes first, or a zero in place of gravity along an axis.
+
+    Both are alike to the stated bodies, but identified ones determine the angle of the joint.
+    """
+    for zero in accepted:
+        if _but_for_angle(first, zero):
+            sharp = _sharpened(fits, zero.reading, zero.joints)
+            there, here = (fits.identified(reading) for reading in (sharp, first.reading))
+            if float(there.margin(here).sum()) >= DECISIVE:
+                return replace(zero, reading=sharp)
+    return first
 
 
 def _free_angles(change: Change) -> int:
