@@ -239,6 +239,17 @@ class TorqueScale(Check):
         if far or any(_unit_like(gain) == KILO for gain in found.values()):
             far |= set(reached)
         beyond = {k: times for k, times in reached.items() if k in far and k not in found}
+        for k, times in reached.items():
+            if k not in far and k not in known and k not in found:
+                yield self.suspicion(
+                    f"either the torque of {measurement.joint(k)} is in another unit, or its "
+                    "effort limit in the description is wrong",
+                    f"it reaches {times:.3g} times that limit; the bodies that it moves do not "
+                    "determine its scale",
+                    "noted",
+                    [k],
+                    _gain_remedy({k: 1 / KILO}),
+                )
         if beyond:
             names = ", ".join(measurement.joint(k) for k in beyond)
             times = ", ".join(f"{size:.3g}" for size in beyond.values())
