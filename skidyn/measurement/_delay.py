@@ -135,6 +135,7 @@ def find_delay(fits: Fits) -> Delay:
         gains=np.where(only_far, far.gains, near.gains),
         halves=np.where(only_far[:, None], far.halves, near.halves),
         drifts=np.where(only_far, far.drifts, near.drifts),
+        runs=far.runs if late_runs else near.runs,
     )
 
 
@@ -179,7 +180,7 @@ def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int, int]:
             beyond += 1
             continue
         tables.append((len(rest), errors))
-        for run, cost in _run_costs(basis, y, int(np.argmin(total)), run_of[use]):
+        for run, cost in _run_costs(basis, y, run_of[use]):
             squares.setdefault(run, []).append(cost)
             counts[run] = counts.get(run, 0) + int(np.sum(run_of[use] == run))
         sooner = rest * first[use][:, None]
@@ -218,10 +219,10 @@ def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int, int]:
     return found, beyond, runs_beyond
 
 
-def _run_costs(
-    basis: Array, torque: Array, usual: int, run_of: Array
-) -> Iterator[tuple[int, Array]]:
+def _run_costs(basis: Array, torque: Array, run_of: Array) -> Iterator[tuple[int, Array]]:
     """Half the squared residual of every recording over noise, by lag, with the bodies of others.
+
+    These are fitted at the lag at which they explain the other recordings best.
 
     Parameters
     ----------
@@ -229,21 +230,22 @@ def _run_costs(
         Orthonormal columns.
     torque : ndarray of shape (n_rows, n_lags)
         Torque at every lag.
-    usual : int
-        Lag at which the other recordings are fitted.
     run_of : ndarray of shape (n_rows,)
         Recording of every row.
     """
-    y = torque[:, usual]
-    whole = basis.T @ y
+    whole = basis.T @ torque
     for run in np.unique(run_of).tolist():
         rows = run_of == run
         own = basis[rows]
+        if rows.sum() < FEWEST_OF_RUN or rows.all():
+            continue
         gram = np.eye(basis.shape[1]) - own.T @ own
         gram[np.diag_indices(len(gram))] += 1e-3  # excited only by this recording
-        bodies = np.linalg.solve(gram, whole - own.T @ y[rows])
-        noise = float(np.mean((y[~rows] - basis[~rows] @ bodies) ** 2)) if (~rows).any() else 0.0
-        if rows.sum() < FEWEST_OF_RUN or noise <= 0:
+        found = np.linalg.solve(gram, whole - own.T @ torque[rows])
+        others = np.mean((torque[~rows] - basis[~rows] @ found) ** 2, axis=0)
+        usual = int(np.argmin(others))
+        bodies, noise = found[:, usual], float(others[usual])
+        if noise <= 0:
             continue
         left = torque[rows] - (own @ bodies)[:, None]
         # unknown parameters of the others' bodies have no penalty

@@ -23,7 +23,8 @@ from skidyn.measurement._torque import asked_changes
 
 #: Fewest rows of a recording to be judged.
 FEWEST = 12
-#: Log-likelihood that another multiple must gain in a recording, and another zero, which is free.
+#: Log-likelihood that another multiple must gain in a recording, beside the logarithm of their
+#: number, and another zero, which is free.
 LEAST, SURE = 15.0, 40.0
 #: Least spread of what the other recordings predict, in residuals, for its multiple to be reported.
 CLEAR = 2.0
@@ -105,6 +106,7 @@ class OddRecording(Check):
         if exchanged:
             return
         told = _multiples(seen)
+        least = LEAST + np.log(max(1, len(told)))  # of so many torques one may gain by chance
         scaled, unlike = [], []
         for k in sorted({one.joint for one in told}):
             own = [one for one in told if one.joint == k]
@@ -116,9 +118,9 @@ class OddRecording(Check):
                 if _clipped(measurement, one):
                     continue  # its torque has another multiple because it is saturated
                 within = USUAL[0] <= one.multiple <= USUAL[1]
-                if not within and one.gain > LEAST and abs(one.likeness) > SCALED:
+                if not within and one.gain > least and abs(one.likeness) > SCALED:
                     scaled.append(one)
-                elif one.gain > LEAST and one.larger > LARGER and one.likeness < UNLIKE:
+                elif one.gain > least and one.larger > LARGER and one.likeness < UNLIKE:
                     # a contact, or a payload of one recording, would look like it
                     without, left, _ = left_by_effects(seen.fits, k, _rows_of(seen.fits, one.run))
                     if left > max(LARGER, LEFT * without):

@@ -23,8 +23,9 @@ LEAST = 15.0
 WEAKEST, DECISIVE, HALF = 3.0, 60.0, 0.5
 #: What it gains with stated bodies where identified ones, that could be negative, need not agree.
 OVERWHELMING = 100.0
-#: Share of a joint's residual that a zero must take off to be noted beside other bodies.
-MOSTLY = 0.8
+#: Share of a joint's residual that a zero must take off to be noted beside other bodies, and its
+#: least angle, rad: the direction of a weight in a description is not known better.
+MOSTLY, NOTED = 0.8, np.deg2rad(10)
 #: Changes of one joint whose gains differ by less than this, or this share, cannot be separated.
 TIED, ALIKE = 3.0, 0.05
 #: Share of the gain within which another kind of change of the same joints is equally possible.
@@ -210,7 +211,11 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
     if reading != Reading():
         return None  # what is read anew already, and bodies, need no other zero
     turned = [c for c in judged if c.kind == "zero" and c.gain >= max(OVERWHELMING, most)]
-    return next((_or_bodies(fits, reading, c) for c in turned if c.drop >= MOSTLY), None)
+    for change in turned:
+        angle = abs(change.reading.zero[-1][1])
+        if change.drop >= MOSTLY and angle >= NOTED:
+            return _or_bodies(fits, reading, change)
+    return None
 
 
 def _distinct(screened: list[tuple[float, Change]]) -> list[tuple[float, Change]]:
