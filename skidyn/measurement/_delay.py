@@ -32,8 +32,8 @@ NEARLY = 0.008
 FAR = 1e-3
 #: Least velocity of rows that count, in rad/s (a tenth of it in m/s).
 SLIDING = 0.05
-#: Nodes of a function of the position.
-PLACES = 8
+#: Nodes of a function of the position; numbers of recordings that may carry loads of their own.
+PLACES, FEW_RUNS, MOST_RUNS = 8, 1, 8
 #: Largest share of the torque's spread that the fit of a joint may leave for its lag to count.
 LEFT = 0.5
 
@@ -162,7 +162,8 @@ def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int, int]:
         if not fits.usable(j) or use.sum() < FEWEST:
             continue
         own = np.column_stack([_own_columns(s, j), _of_position(s, j)])
-        columns = np.column_stack([regressor[use, j], fits.average(own)[use]])
+        felt = regressor[use, j]
+        columns = np.column_stack([felt, _by_recording(felt, run_of[use]), fits.average(own)[use]])
         columns = columns[:, np.abs(columns).max(axis=0) > 0]
         columns = columns / np.linalg.norm(columns, axis=0)
         basis, values, _ = np.linalg.svd(columns, full_matrices=False)
@@ -413,6 +414,15 @@ def _own_columns(signals: Signals, joint: int) -> Array:
     """Columns of a joint in addition to those of the bodies."""
     ones = np.ones(signals.n_samples)
     return np.column_stack([friction(signals, joint), _bent_friction(signals, joint), ones])
+
+
+def _by_recording(regressor: Array, run_of: Array) -> Array:
+    """Columns of a load on the last body that differs from recording to recording."""
+    load = regressor[:, -10:-6]  # its mass and first moments
+    runs = np.unique(run_of)
+    if not FEW_RUNS < len(runs) <= MOST_RUNS:
+        return np.zeros((len(load), 0))
+    return np.hstack([load * (run_of == run)[:, None] for run in runs[1:]])
 
 
 def _of_position(signals: Signals, joint: int) -> Array:
